@@ -28,7 +28,7 @@ demo: setup
 	$(BIN)/robomark demo
 
 test: setup lint
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not long"
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not long" --durations 25
 
 # The quick third, which needs no worker: under a minute.
 FAST := tests/models/test_model_plots.py tests/responders/test_bridge.py tests/responders/test_conversation.py \
@@ -47,7 +47,7 @@ browser:
 	which chromium chromium-browser google-chrome > /dev/null 2>&1 || timeout 300 apt-get install -y -q chromium > /dev/null 2>&1 || true
 
 test-long: setup browser
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m long
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m long --durations 40
 
 test-all: test test-long
 

@@ -54,8 +54,8 @@ def fill(store: Store, image_of: GradedBatch) -> None:
         enrolment = session.get_one(Enrolment, job.enrolment_id)
         who = _FIRST + student.c.number
         named = _text("student", student.c.number)
-        _copy(session, Person, enrolment.person_id, student, {"id": who, "name": named})
-        enrolled = {"id": who, "person_id": who, "student": named, "written": named}
+        _copy(session, Person, enrolment.person_id, student, {"id": who})
+        enrolled = {"id": who, "person_id": who, "student": named, "written": named, "name": named}
         _copy(session, Enrolment, enrolment.id, student, enrolled)
         batches = _numbers(BATCHES)
         _copy(session, Batch, image_of.batch, batches, {"id": _text("b", _WIDE + batches.c.number)})

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
-import os
 import subprocess
 import sys
 from importlib.metadata import version
@@ -16,14 +15,7 @@ from pathlib import Path
 from models.cards import Card
 from models.tasks import tasks
 from sim.errors import HostError, UsageError
-
-_SETTINGS = {
-    "OPENBLAS_NUM_THREADS": "1",
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_CORETYPE": "Haswell",
-    "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR",
-    "PYTHONHASHSEED": "0",
-}
+from sim.processes import python_command, same_arithmetic, start
 
 
 def train(name: str, folder: Path) -> Card:
@@ -44,15 +36,11 @@ def train(name: str, folder: Path) -> Card:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"{folder} cannot be made: {error.strerror}") from error
-    process = subprocess.run(
-        [sys.executable, "-m", "models.training", name, str(folder)],
-        env=os.environ | _SETTINGS,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = python_command("-m", "models.training", name, str(folder.absolute()))
+    process = start(command, same_arithmetic(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    _, said = process.communicate()
     if process.returncode != 0:
-        reason = (process.stderr.strip().splitlines() or ["no reason given"])[-1]
+        reason = (said.strip().splitlines() or ["no reason given"])[-1]
         raise HostError(f"training {name} failed: {reason}")
     return Card.from_json((folder / f"{name}.json").read_text())
 

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal
 
 from responders import wire
@@ -18,8 +19,9 @@ from responders.logger_file import read_log
 from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
-from responders.trial_spec import AgentSpec, TrialSpec
+from responders.trial_spec import AgentSpec
 from sim.chance import Stream
+from sim.readers.json_text import read_json
 from sim.recording import SECOND, AgentMessage, AgentOutput, Fault, Recording, Verdict
 from sim.world import Chain
 
@@ -39,10 +41,26 @@ class Told:
     slept: int = 0
 
 
-class Agents:
-    """All agents of one trial. ``ask`` never raises for what an agent does."""
+@dataclass(frozen=True, slots=True)
+class Position:
+    """How much the agents had said, done wrong and called at some moment."""
 
-    def __init__(self, spec: TrialSpec, sandboxes: Sandboxes, meter: JobMeter, stack: contextlib.ExitStack) -> None:
+    messages: int = 0
+    faults: int = 0
+    calls: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))  # by agent
+
+
+class Agents:
+    """All agents of one trial or notebook. ``ask`` never raises for what an agent does."""
+
+    def __init__(
+        self,
+        specs: Mapping[str, AgentSpec],
+        seed: int,
+        sandboxes: Sandboxes,
+        meter: JobMeter,
+        stack: contextlib.ExitStack,
+    ) -> None:
         """Their processes and folders end with ``stack``."""
         self.messages: list[AgentMessage] = []
         self.faults: list[Fault] = []
@@ -52,10 +70,11 @@ class Agents:
         self._outputs: list[AgentOutput] = []
         self._waiting: list[str] = []  # whose answer is waited for, the first that was asked first
         self._loaded = False
+        self._unloadable = 0  # how many faults come of loading
         self._processes: dict[str, AgentProcess] = {}
-        for name, each in spec.agents.items():
+        for name, each in specs.items():
             folder = stack.enter_context(sandboxes.private_folder())
-            self._processes[name] = AgentProcess(name, each, sandboxes, folder, spec.child_seed, meter, self)
+            self._processes[name] = AgentProcess(name, each, sandboxes, folder, seed, meter, self)
             stack.callback(self._processes[name].close)
 
     def others(self, asker: str) -> Sequence[str]:
@@ -72,6 +91,11 @@ class Agents:
             if fault is not None:
                 self.faults.append(fault)
         self._loaded = True
+        self._unloadable = len(self.faults)
+
+    def faults_since(self, since: Position) -> Sequence[Fault]:
+        """Faults of agents that could not be loaded, and those of all since then."""
+        return (*self.faults[: self._unloadable], *self.faults[max(since.faults, self._unloadable) :])
 
     def ask(self, asker: str, question: wire.Frame, t: int, message: int) -> Told:
         """What the agent says that ``question`` names, asked at ``t`` while the robot's ``message`` is answered.
@@ -101,8 +125,17 @@ class Agents:
             self._note(name, asker, _content(told.text, object), t + told.slept, message, index)
         return told
 
-    def finish(self, chain: Chain, now: int) -> None:
-        """End their processes, read back what they have written, and add what was said to the trial's chain."""
+    def position(self) -> Position:
+        """How much they have said, done wrong and called so far."""
+        calls = {name: len(process.calls) for name, process in self._processes.items()}
+        return Position(len(self.messages), len(self.faults), MappingProxyType(calls))
+
+    def seal(self, chain: Chain, now: int) -> None:
+        """Add what was said so far to the chain of a run that ends."""
+        chain.add("agents", now, self._chain.hexdigest().encode())
+
+    def finish(self) -> None:
+        """End their processes and read back what they have written."""
         for name, process in self._processes.items():
             process.close()
             log, unread = read_log(process.folder, self._meter, name)
@@ -110,17 +143,24 @@ class Agents:
                 self.faults.append(unread)
             self._outputs.append(AgentOutput(name, "\n".join(process.output), log))
             self.notes += process.notes
-        chain.add("agents", now, self._chain.hexdigest().encode())
 
-    def told(self, recording: Recording) -> Recording:
-        """The recording with what the agents said, called and wrote."""
-        calls = [call for process in self._processes.values() for call in process.calls]
+    def add_talk(self, recording: Recording, since: Position) -> Recording:
+        """The recording with what the agents have said and called since then."""
+        talk = [
+            replace(each, reply_to=None if each.reply_to is None else each.reply_to - since.messages)
+            for each in self.messages[since.messages :]
+        ]
+        own = [call for name, process in self._processes.items() for call in process.calls[since.calls.get(name, 0) :]]
+        calls = [replace(call, before=call.before - since.messages) for call in own]
         return replace(
             recording,
             calls=tuple(sorted((*recording.calls, *calls), key=lambda call: (call.message, call.before))),
-            agent_messages=tuple(self.messages),
-            agent_outputs=tuple(self._outputs),
+            agent_messages=tuple(talk),
         )
+
+    def add_outputs(self, recording: Recording) -> Recording:
+        """The recording with what the agents have printed and written until they were ended."""
+        return replace(recording, agent_outputs=tuple(self._outputs))
 
     def failed(self, name: str, fault: Fault, slept: int) -> Told:
         """What an asker is told of an agent's fault, which is kept unless an asker may have brought it about."""
@@ -153,13 +193,15 @@ class Agents:
 
 
 @contextlib.contextmanager
-def agents_beside(spec: TrialSpec, sandboxes: Sandboxes, meter: JobMeter) -> Iterator[Agents | None]:
-    """The agents of a trial in fresh processes, loaded; None, and no cost, where the assignment has none."""
+def agents_beside(
+    specs: Mapping[str, AgentSpec], seed: int, sandboxes: Sandboxes, meter: JobMeter
+) -> Iterator[Agents | None]:
+    """These agents in fresh processes, loaded; None, and no cost, where there are none."""
     with contextlib.ExitStack() as stack:
-        if not spec.agents:
+        if not specs:
             yield None
             return
-        agents = Agents(spec, sandboxes, meter, stack)
+        agents = Agents(specs, seed, sandboxes, meter, stack)
         agents.load()
         yield agents
 
@@ -231,8 +273,8 @@ class AgentProcess(ResponderProcess):
 def _content(text: str, kind: type) -> Any:
     """What a message holds. Raises ChildStopped where that is not JSON, or not of this kind."""
     try:
-        value = json.loads(text, parse_constant=_no_constant)
-    except (ValueError, RecursionError):
+        value = read_json(text, parse_constant=_no_constant)
+    except ValueError:
         value = _NOT_JSON
     if value is _NOT_JSON or not isinstance(value, kind):
         raise ChildStopped(Verdict.PROTOCOL_ERROR, "it sent a message that is no JSON or is nested too deeply")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NoReturn
 
 from responders import message_format, packed, wire
@@ -83,7 +84,7 @@ class Bridge:
         except ChildStopped as stop:
             return self._stopped(stop)
         except _Cut as cut:
-            return cut.fault
+            return self._placed(cut.fault)
         except Exception as error:
             return self._stopped(surprise(error))
 
@@ -99,6 +100,7 @@ class Bridge:
                 "sensors": {name: len(value) if isinstance(value, list) else 0 for name, value in values.items()},
                 "seed": Stream(spec.child_seed, "program").integer(0),
                 "number": spec.number,
+                **({"watch": True} if spec.program.ran is not None else {}),
             }
         )
         while True:
@@ -109,6 +111,13 @@ class Bridge:
 
     def _stopped(self, stop: ChildStopped) -> Fault:
         return stopped(stop, "program", self.now)
+
+    def _placed(self, fault: Fault) -> Fault:
+        """Add the line that the program waits in when the simulated time is up."""
+        if fault.verdict is not Verdict.TIME_LIMIT:
+            return fault
+        place = self._child.last_place()
+        return replace(fault, line=place["line"], file=place["file"] or "")
 
     def collected(self) -> Collected:
         """What the program has logged since this was last asked, data and images."""
@@ -145,6 +154,8 @@ class Bridge:
                 self._reply(None)
             case "stuck":
                 self._never_waits(frame["line"], frame["file"])
+            case "ran" if self._spec.program.ran is not None:
+                self._spec.program.ran.add(frame)
             case "refused":
                 if len(self.notes) < _MOST_NOTES:
                     self.notes.append(refusal("program", frame))
@@ -200,7 +211,8 @@ class Bridge:
     def _read(self, what: str, lasts: int) -> None:
         """The value of every sensor; no answer when the child has been told them in this tick already."""
         end = self.now + lasts
-        known = end < self._told_until
+        # A read that lasts beyond the limit is cut as any wait is, also where the child knows its value.
+        known = end < self._told_until and end <= self._limit
         if known:
             self._free_acts = 0
             self.now = end

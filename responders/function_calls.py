@@ -6,7 +6,6 @@ is judged elsewhere.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,7 +18,8 @@ from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import ResponderSpec
+from responders.trial_spec import RanStatements, ResponderSpec
+from sim.readers.json_text import read_json
 from sim.recording import Fault, Verdict
 
 #: Tells the child that no function of the module has to be a responder.
@@ -71,15 +71,16 @@ def call_functions(
     sandboxes: Sandboxes,
     seed: int,
     meter: JobMeter,
+    ran: RanStatements | None = None,
 ) -> Called:
     """Load ``code`` with ``files`` in its folder, and make the calls. ``limits`` are for all of them together.
 
-    ``meter`` counts what their job costs.
+    ``meter`` counts what their job costs; ``ran`` notes which statements are run, if it is there.
 
     Raises HostError when the machine, not the module, fails.
     """
     with sandboxes.private_folder() as folder:
-        spec = ResponderSpec(code, files, limits, output_bytes, _NO_RESPONDER)
+        spec = ResponderSpec(code, files, limits, output_bytes, _NO_RESPONDER, ran)
         caller = _Caller(spec, sandboxes, folder, seed, meter)
         try:
             sandbox = caller.sandbox
@@ -134,11 +135,11 @@ def _read(frame: wire.Frame, function: str) -> Returned:
     match frame["kind"]:
         case "value":
             try:
-                return Returned(json.loads(frame["text"], parse_constant=_no_constant))
-            except (ValueError, RecursionError):
+                return Returned(read_json(frame["text"], parse_constant=_no_constant))
+            except ValueError:
                 sentence = f"{function} returned a value that cannot be read"
         case "missing":
-            sentence = f"there is no function called {function}"
+            sentence = no_function(function)
         case "long":
             sentence = f"{function} returned a value that is too long to be passed on"
         case "other":
@@ -146,6 +147,11 @@ def _read(frame: wire.Frame, function: str) -> Returned:
         case _:
             return Returned(fault=error_fault(frame["error"], 0, "responder"))
     return Returned(fault=Fault(0.0, Verdict.RESPONDER_ERROR, "responder", sentence))
+
+
+def no_function(name: str) -> str:
+    """The message of the fault where a module has no function of this name."""
+    return f"there is no function called {name}"
 
 
 def _no_constant(name: str) -> None:

@@ -13,6 +13,8 @@ from collections.abc import Iterator, Mapping
 from itertools import chain
 
 from responders.sandbox.inside.libraries import BESIDE
+from sim.readers.python_source import parse_module
+from sim.readers.unreadable import Unreadable
 
 _LOADED = ("nbev3devsim.load_nbev3devwidget", "inside.source_reader")
 #: Characters of one text; reading a longer one takes long.
@@ -55,8 +57,8 @@ def _leads_away(text: str, own: frozenset[str]) -> bool:
     if len(text) > _MOST_READ:
         return True
     try:
-        nodes = list(ast.walk(ast.parse(text)))
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        nodes = list(ast.walk(parse_module(text)))
+    except (SyntaxError, Unreadable):
         # The error may be all there is to it, but then it costs little.
         return True
     known = own.union(BESIDE, _LOADED)

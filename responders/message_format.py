@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from typing import Any, Literal
 
+from sim.readers.json_text import JSONDecodeError, read_json
 from sim.recording import Datum
 
 PY = "PY::"
@@ -93,19 +94,14 @@ def _plain(value: Any) -> Any:
 def parsed_answer(text: str) -> Any:
     """The object in an answer that starts with ``JSON::``. Raises ValueError with the reason if it is malformed."""
     try:
-        return _plain(json.loads(text[len(JSON) :], parse_constant=_no_constant))
-    except json.JSONDecodeError as error:
+        return _plain(read_json(text[len(JSON) :], parse_constant=_no_constant))
+    except JSONDecodeError as error:
         raise ValueError(f"{error.msg} at character {error.pos + 1}") from None
-    except RecursionError:
-        raise ValueError("it is nested too deeply") from None
 
 
 def queue_entry(text: str) -> str:
     """The same object as JSON for the robot's queue, as short as the answer. Raises ValueError as ``parsed_answer``."""
-    try:
-        return json.dumps(parsed_answer(text), separators=(",", ":"), ensure_ascii=False)
-    except RecursionError:
-        raise ValueError("it is nested too deeply") from None
+    return json.dumps(parsed_answer(text), separators=(",", ":"), ensure_ascii=False)
 
 
 def passed_on(text: str) -> str:

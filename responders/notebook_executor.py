@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from responders import wire
+from responders.agents import Agents, Position, agents_beside
 from responders.bridge import Bridge, robot_state, world_of
 from responders.logger_file import read_log
 from responders.notebook_process import NotebookProcess, NotebookSpec
@@ -25,6 +26,7 @@ from sim.world import Chain
 
 _MOST_RUNS = 300
 _LONGEST_LINE = 2000
+_MOST_CELL_ERRORS = 5
 #: What all unmarked runs of an execution may compute together, as a multiple of what one may.
 _UNMARKED_CPU = 4
 #: And how long they may take together, in simulated seconds, or in the longest that one may take.
@@ -75,11 +77,15 @@ Ground = Callable[[TrialSpec, tuple[Rectangle, ...]], tuple[Arena, LightCamera]]
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run of a robot; ``cell`` is the cell that started it, None after the last."""
+    """One run of a robot. ``cell`` is the cell that started it, None after the last.
+
+    ``printed`` is the number of characters of the notebook's output that came before it.
+    """
 
     cell: int | None
     marked: bool
     recording: Recording
+    printed: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +112,7 @@ class ExecutedNotebook:
             responder_output=self.output,
             responder_log=self.log,
             notes=(*recording.notes, *self.notes)[:MOST_NOTES],
+            cell_errors=self.raised[:_MOST_CELL_ERRORS],
         )
 
 
@@ -116,20 +123,24 @@ def execute_notebook(
 
     Raises HostError when the machine, not the student, fails.
     """
-    with sandboxes.private_folder() as folder:
-        process = NotebookProcess(spec, sandboxes, folder, meter)
+    with sandboxes.private_folder() as folder, agents_beside(spec.agents, spec.seed, sandboxes, meter) as agents:
+        process = NotebookProcess(spec, sandboxes, folder, meter, agents)
         try:
-            execution = _Execution(process, planner, ground, sandboxes, meter)
+            execution = _Execution(process, planner, ground, sandboxes, meter, agents)
             process.execute(execution.perform)
             execution.finish()
         finally:
             process.close()
         log, unread = read_log(folder, meter)
+        runs = execution.runs
+        if agents is not None:
+            agents.finish()
+            runs = [replace(run, recording=agents.add_outputs(run.recording)) for run in runs]
     return ExecutedNotebook(
-        tuple(execution.runs),
+        tuple(runs),
         "\n".join(process.output),
         log,
-        tuple(process.notes),
+        (*process.notes, *(agents.notes if agents is not None else ())),
         process.sandbox,
         tuple(process.raised),
         process.stopped or unread,
@@ -167,8 +178,10 @@ class _Execution:
         ground: Ground,
         sandboxes: Sandboxes,
         meter: JobMeter,
+        agents: Agents | None,
     ) -> None:
         self._process = process
+        self._agents = agents
         self._planner = planner
         self._ground = ground
         self._sandboxes = sandboxes
@@ -223,10 +236,12 @@ class _Execution:
 
     def _run(self, cell: int | None, planned: PlannedRun, spec: TrialSpec) -> Bridge:
         process = self._process
+        printed = len("\n".join(process.output))
         if planned.needs_responder:
             self._missing = process.missing
         answers = spec.collaborative and (process.missing is None or planned.needs_responder)
         first_call = len(process.calls)
+        since = self._agents.position() if self._agents is not None else Position()
         arena, camera = self._ground(spec, planned.obstacles)
         program = self._sandboxes.spawn(spec.program.role, spec.program.limits, meter=self._meter)
         try:
@@ -238,14 +253,21 @@ class _Execution:
         finally:
             program.close()
         bridge.conversation.finish()
+        if self._agents is not None:
+            self._agents.seal(bridge.chain, bridge.now)
         faults = [*bridge.conversation.faults, *([fault] if fault else [])]
         if planned.needs_responder and process.missing is not None and not bridge.conversation.faults:
             faults.append(Fault(0.0, Verdict.RESPONDER_ERROR, "responder", process.missing, hint=self._why_missing()))
         faults = [self._placed(each, planned.program_cell) for each in faults]
+        # An agent that cannot be loaded counts in every run, other faults in the run that they belong to.
+        faults += [] if self._agents is None else self._agents.faults_since(since)
         faults.sort(key=lambda each: each.t)
         recording = recording_of(spec, bridge, tuple(faults), program.sandbox)
-        recording = replace(recording, calls=tuple(process.calls[first_call:]))
-        self.runs.append(Run(cell, planned.marked, recording))
+        calls = [replace(call, before=call.before - since.messages) for call in process.calls[first_call:]]
+        recording = replace(recording, calls=tuple(calls))
+        if self._agents is not None:
+            recording = self._agents.add_talk(recording, since)
+        self.runs.append(Run(cell, planned.marked, recording, printed))
         self._planner.ran(recording)
         return bridge
 

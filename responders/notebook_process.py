@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import bisect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 from responders import wire
 from responders.code import Code
@@ -19,9 +20,12 @@ from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import ResponderSpec
+from responders.trial_spec import AgentSpec, ResponderSpec
 from sim.chance import Stream
 from sim.recording import Fault, Verdict
+
+if TYPE_CHECKING:
+    from responders.agents import Agents
 
 #: How often a notebook may call a magic that sets up or starts the robot.
 _MOST_MAGICS = 2000
@@ -37,6 +41,7 @@ class NotebookSpec:
     limits: ChildLimits
     output_bytes: int
     seed: int
+    agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))
 
     @property
     def as_responder(self) -> ResponderSpec:
@@ -49,8 +54,12 @@ class NotebookProcess(ResponderProcess):
 
     _schema = wire.NOTEBOOK
 
-    def __init__(self, spec: NotebookSpec, sandboxes: Sandboxes, folder: Path, meter: JobMeter) -> None:
-        super().__init__(spec.as_responder, sandboxes, folder, spec.seed, meter)
+    def __init__(
+        self, spec: NotebookSpec, sandboxes: Sandboxes, folder: Path, meter: JobMeter, agents: Agents | None = None
+    ) -> None:
+        super().__init__(spec.as_responder, sandboxes, folder, spec.seed, meter, agents)
+        if agents is not None:
+            self._schema = wire.NOTEBOOK_WITH_AGENTS
         self._notebook = spec
         self._first_lines = [1]
         for source in spec.cells:
@@ -76,6 +85,7 @@ class NotebookProcess(ResponderProcess):
                     "cells": self._notebook.cells,
                     "seed": Stream(self._seed, "responder").integer(0),
                     "function": None,
+                    **self._agent_names(),
                 }
             )
             while True:

@@ -3,6 +3,9 @@
 A child is told a seed, and then nothing but what the worker sends it. So one that uses no chance says the same again
 for as long as it is sent the same, and here it is not run but its part is read out; the world, the other children and
 the recording are what they always are. What is sent is compared each time, and where it differs the trial is run.
+
+A limit is met again for certain only by a child that is far from passing it: one that has said nothing since half of
+its processor time, and does the same at twice its limit. Near the limit every trial is run.
 """
 
 from __future__ import annotations
@@ -34,8 +37,10 @@ _WITHOUT_CHANCE = frozenset(
     ["collections", "ev3dev2", "ev3dev2_glue", "functools", "itertools", "json", "math", "re", "string", "time"]
 )
 _IMPORT = re.compile(r"\bfrom\s+([\w.]+)\s+import\b|\bimport\b([^\n;#]*)")
-#: Names that chance, or another child's memory, is come to by from there.
+#: Names that chance, or another child's memory, is come to by from there, and ways to write a name that is not seen in
+#: the text: escapes, fields of a format, attributes that are copied by their names.
 _LEADING_AWAY = re.compile(
+    r"\\[xuN0-7\n]|\b(?:v?format(?:_map|_field)?|get_field|Formatter|update_wrapper|wraps|metaclass)\b|\btype\s*\([^)]*,|"
     r"\b(?:_?random|urandom|_?sys|modules|eval|exec|compile|open|getattr|globals|locals|vars|id|hash|inspect"
     r"|(?:gi|cr|ag|tb)_frame|_getframe|f_\w+|__(?!(?:name|main|init|str|repr)__)\w+)\b"
 )
@@ -62,6 +67,7 @@ class _Part:
     steps: list[_Told | _Said] = field(default_factory=list)
     left: int = _MOST_BYTES
     whole: bool = True
+    repeats: bool = True  # whether it would come to the same limit again, however fast the machine is
 
     def add(self, step: _Told | _Said, size: int) -> None:
         self.left -= size
@@ -112,6 +118,9 @@ class RepeatedFaults:
             return replace(recording, notes=(*recording.notes, SPARED[_role(self._last)]))
         if not self._known and fault is not None and self._last is not None and _alike(fault, self._last):
             self._known = [part for part in self._heard if part.whole]
+            if not all(part.repeats for part in self._known):
+                # So near to the limit that another trial may end otherwise: all are run, and none is measured again.
+                self._known, self._misses = [], _MOST_MISSES
         if not self._known:
             self._last = fault
         self._heard = []
@@ -133,6 +142,7 @@ class _Written:
         self._child, self._folder, self._meter, self._parts = child, folder, meter, parts
         self._part: _Part | None = None
         self._begun = False
+        self._spoke = 0.0  # what it had computed when it last said something, seconds
         self.sandbox = child.sandbox
 
     def send(self, frame: wire.Frame, arrived: Sequence[str] = ()) -> None:
@@ -141,6 +151,7 @@ class _Written:
             self._part.add(_Told(frame, tuple(arrived)), sum(map(len, arrived)) + len(str(frame)))
         elif not self._begun and _is_alone(frame) and not _may_use_chance(frame, self._folder):
             self._part = _Part(_without_seed(frame), self.sandbox)
+            self._child.measured = True
         self._begun = True
 
     def send_readings(self, units: int, values: Sequence[float]) -> None:
@@ -153,8 +164,12 @@ class _Written:
         said: wire.Frame | ChildStopped
         try:
             said = self._child.receive(schema)
+            if self._part is not None:
+                self._spoke = self._child.cpu_seconds()
         except ChildStopped as stop:
             said = stop
+            if self._part is not None and stop.verdict in _LIMITS:
+                self._part.repeats = self._child.outlasted and self._spoke < self._child.cpu_limit / 2
         paid = self._meter.spent.kept_bytes - before
         if self._part is not None:
             self._part.add(_Said(said, paid), paid)
@@ -164,6 +179,9 @@ class _Written:
 
     def cpu_seconds(self) -> float:
         return self._child.cpu_seconds()
+
+    def last_place(self) -> wire.Frame:
+        return self._child.last_place()
 
     def close(self) -> None:
         self._child.close()
@@ -218,6 +236,11 @@ class _ByHeart:
 
     def cpu_seconds(self) -> float:
         return self._child.cpu_seconds() if self._child is not None else 0.0
+
+    def last_place(self) -> wire.Frame:
+        if self._child is None:
+            raise Diverged("a child that is not run is nowhere")
+        return self._child.last_place()
 
     def close(self) -> None:
         if self._child is not None:

@@ -92,14 +92,18 @@ class ResponderProcess:
 
     def _beginning(self) -> dict[str, Any]:
         """The first frame for the child."""
-        names = {"agents": self._agents.others("responder")} if self._agents is not None else {}
         return {
             "name": self._spec.code.name,
             "text": self._spec.code.text,
             "seed": Stream(self._seed, "responder").integer(0),
             "function": self._spec.function,
-            **names,
+            **self._agent_names(),
+            **({"watch": True} if self._spec.ran is not None else {}),
         }
+
+    def _agent_names(self) -> dict[str, Any]:
+        """The part of the first frame that names the agents, if there are any."""
+        return {"agents": self._agents.others("responder")} if self._agents is not None else {}
 
     @property
     def alive(self) -> bool:
@@ -173,6 +177,9 @@ class ResponderProcess:
                 self._print(frame["text"])
             case "refused":
                 self._note(refusal(self._who, frame))
+            case "ran":
+                if self._spec.ran is not None:
+                    self._spec.ran.add(frame)
             case "sleep":
                 self._slept += frame["units"]
             case "call":

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from responders import message_format
-from responders.agents import agents_beside
+from responders.agents import Position, agents_beside
 from responders.bridge import Bridge
 from responders.logger_file import read_log
 from responders.responder_process import ResponderProcess
@@ -33,7 +33,7 @@ def run_trial(
 
     Raises HostError when the machine, not the student, fails.
     """
-    with sandboxes.private_folder() as folder, agents_beside(spec, sandboxes, meter) as agents:
+    with sandboxes.private_folder() as folder, agents_beside(spec.agents, spec.child_seed, sandboxes, meter) as agents:
         responder = None
         if spec.responder is not None:
             responder = ResponderProcess(spec.responder, sandboxes, folder, spec.child_seed, meter, agents)
@@ -50,7 +50,8 @@ def run_trial(
                 responder.close()
         log, unread = read_log(folder, meter) if responder is not None else ("", None)
         if agents is not None:
-            agents.finish(bridge.chain, bridge.now)
+            agents.seal(bridge.chain, bridge.now)
+            agents.finish()
     bridge.conversation.finish()
     of_agents = agents.faults if agents is not None else ()
     faults = [each for each in (*of_agents, unloadable, *bridge.conversation.faults, fault, unread) if each is not None]
@@ -65,7 +66,7 @@ def run_trial(
         responder_log=log,
         notes=(*recording.notes, *responder.notes, *(agents.notes if agents is not None else ()))[:MOST_NOTES],
     )
-    return recording if agents is None else agents.told(recording)
+    return recording if agents is None else agents.add_outputs(agents.add_talk(recording, Position()))
 
 
 def recording_of(spec: TrialSpec, bridge: Bridge, faults: tuple[Fault, ...], sandbox: str) -> Recording:

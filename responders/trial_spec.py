@@ -10,7 +10,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 from responders.channel import Channel
 from responders.code import Code
@@ -26,18 +26,35 @@ from sim.robot import Robot
 from sim.world import Noise
 
 _A_LIBRARY = re.compile(rf"\b(?:{'|'.join(LIBRARIES)})\b")
+_MOST_STATEMENTS = 100_000
 Preamble = Literal["none", "imports", "preloaded"]
+
+
+class RanStatements:
+    """Which statements of a part its processes say that they have run: file (empty: the part itself), line, column."""
+
+    def __init__(self) -> None:
+        self.places: set[tuple[str, int, int]] = set()
+
+    def add(self, frame: Mapping[str, Any]) -> None:
+        """Take note of a ``ran`` frame."""
+        if len(self.places) < _MOST_STATEMENTS:
+            self.places.add((frame["file"] or "", frame["line"], frame["column"]))
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramSpec:
-    """A robot program and what it may use; ``modules`` are texts that it can import, by their names."""
+    """A robot program and what it may use; ``modules`` are texts that it can import, by their names.
+
+    Which of its statements are run is noted in ``ran``, if there is one.
+    """
 
     code: Code
     preamble: Preamble
     limits: ChildLimits
     output_bytes: int
     modules: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    ran: RanStatements | None = None
 
     @property
     def role(self) -> Role:
@@ -49,13 +66,14 @@ class ProgramSpec:
 
 @dataclass(frozen=True, slots=True)
 class ResponderSpec:
-    """What answers the robot: code and the files in its folder."""
+    """What answers the robot: code and the files in its folder; ``ran`` as in a ``ProgramSpec``."""
 
     code: Code
     files: Mapping[str, bytes]
     limits: ChildLimits
     output_bytes: int
     function: str | None = None  # the name of the responder; by the module's own choice if not given
+    ran: RanStatements | None = None
 
     @property
     def role(self) -> Role:

@@ -94,6 +94,7 @@ SANDBOX: Schema = MappingProxyType(
                 "landlock": _whole(0, 99),
                 "seccomp": _flag,
                 "own_user": _flag,
+                "fixed_addresses": _flag,
                 "without_doorkeeper": _or_none(_text),
                 "policy": _text,
                 "missing": _or_none(_text),
@@ -114,6 +115,11 @@ BATTERY: Schema = MappingProxyType(
 )
 
 _REFUSED: tuple[Mapping[str, Check], Mapping[str, Check]] = ({"what": _text, **_PLACE}, {})
+#: A statement of the student's that was run for the first time.
+_RAN: tuple[Mapping[str, Check], Mapping[str, Check]] = (
+    {"line": _whole(0, 10**7), "file": _file, "column": _whole(0, 10**7)},
+    {},
+)
 #: The last word of a child without libraries that has imported one.
 _LIBRARIES: tuple[Mapping[str, Check], Mapping[str, Check]] = ({}, {})
 
@@ -122,6 +128,7 @@ ROBOT: Schema = MappingProxyType(
     {
         "acts": ({"acts": _packed_alone}, {}),
         "refused": _REFUSED,
+        "ran": _RAN,
         "libraries": _LIBRARIES,
         "print": ({"text": _text}, {}),
         "say": ({"text": _text}, {}),
@@ -143,6 +150,7 @@ ROBOT: Schema = MappingProxyType(
 RESPONDER: Schema = MappingProxyType(
     {
         "refused": _REFUSED,
+        "ran": _RAN,
         "libraries": _LIBRARIES,
         "ready": ({"error": _or_none(_error)}, {}),
         "print": ({"text": _text}, {}),
@@ -202,6 +210,7 @@ _ASK: tuple[Mapping[str, Check], Mapping[str, Check]] = ({"agent": _text, "argum
 
 #: What a responder's process may say whose submission has agents, and what such an agent's process may.
 RESPONDER_WITH_AGENTS: Schema = MappingProxyType({**RESPONDER, "ask": _ASK})
+NOTEBOOK_WITH_AGENTS: Schema = MappingProxyType({**NOTEBOOK, "ask": _ASK})
 AGENT: Schema = MappingProxyType({**CALLS, "ask": _ASK})
 
 #: Kinds that hold numbers and words of the schema alone, or are a child's last. Nothing else that a child has worded is

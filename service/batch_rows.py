@@ -6,6 +6,7 @@ What a table makes of a row is ``service.reports``'; the database is only read.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from service.grading.grade import Grade
 from service.reports.rows import TableRow, missing_words
@@ -26,7 +27,7 @@ def rows_of(
         grade = None
         if not reason:
             with store.reading() as session:
-                grade = results.load(session, line.id)
+                grade = replace(results.load(session, line.id), student=line.student)
         rows.append(row_of(line, grade, reason))
     return sorted(rows, key=lambda row: (row.who, row.assignment))
 
@@ -34,7 +35,9 @@ def rows_of(
 def row_of(line: JobLine, grade: Grade | None, reason: str = "") -> TableRow[Grade]:
     """The row of one job."""
     student = Student(line.student, line.name, line.email)
-    return TableRow(student, line.source, line.assignment, grade, reason or missing_words(line.missing))
+    reason = reason or missing_words(line.missing)
+    told, for_staff = _told(line), line.staff_only is not None
+    return TableRow(student, line.source, line.assignment, grade, reason, told=told, for_staff=for_staff)
 
 
 def refused_row(refusal: Refusal) -> TableRow[Grade]:
@@ -56,3 +59,13 @@ def why_not_shown(line: JobLine, *, published: bool = False) -> str:
     if line.staff_only is not None:
         return f"for staff only: {line.staff_only}"
     return "not published" if published and line.published_at is None else ""
+
+
+def _told(line: JobLine) -> str:
+    """Why a job has no grade, where its student is told otherwise than staff: faults of ours are for staff."""
+    match line.state:
+        case JobState.DEAD:
+            return "could not be graded yet; the staff of your course can see why"
+        case JobState.CANCELLED:
+            return "was cancelled and is not graded"
+    return "is graded again" if line.suspect is not None else ""

@@ -5,11 +5,18 @@ The commands are put together in ``command_line.py``.
 
 from __future__ import annotations
 
-import gc
-import os
-import signal
 import sys
-from typing import NoReturn
+
+# With ``python -m`` or ``-c``, and by an empty entry in PYTHONPATH, the current folder is on the path. It may be one of
+# submissions: no module that is imported from here on must be one of its files. Python itself has loaded ``os``.
+_own = __file__.rpartition("/service/")[0]
+_here = sys.modules["os"].getcwd()
+sys.path[:] = [folder for folder in sys.path if folder == _own or (folder.startswith("/") and folder != _here)]
+
+import gc  # noqa: E402
+import os  # noqa: E402
+import signal  # noqa: E402
+from typing import NoReturn  # noqa: E402
 
 _STOPPED = 130
 

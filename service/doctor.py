@@ -6,17 +6,24 @@ raises, and nothing is changed but that the home folder is made.
 
 from __future__ import annotations
 
+import base64
+import errno
+import hashlib
 import os
 import platform
 import shutil
+import sqlite3
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from importlib import metadata
+from pathlib import Path
 
 import redis
+import structlog
 from sqlalchemy import select
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -30,17 +37,24 @@ from service.store.installation import secret_of
 from service.store.models import Job
 from service.store.queue import workers
 from service.store.queue.metrics import collect
-from service.store.revision import current_revision, newest_revision
+from service.store.revision import newest_revision, schema_state
 from service.store.states import JobState
+from service.version import GRADER_VERSION, release_problem
 from sim.errors import RobomarkError
 from submissions.seeds import name_of
 
+#: The packages of the distribution, beside the record of it.
+_PACKAGES = frozenset({"robomark", "sim", "models", "responders", "submissions", "service"})
 _FREE_BYTES = 1_000_000_000
 _OLDEST_BROKER = (6, 2)
 _APART_SECONDS = 5.0
 _LONG_SECONDS = 60.0
 _STUCK_SECONDS = 180.0
 _READY_SECONDS = 2.0
+#: SQLSTATE of PostgreSQL.
+_DISK_FULL = "53100"
+
+_log = structlog.get_logger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,14 +99,60 @@ def _found_of_service(check: Check, settings: Settings, store: Store) -> Finding
     assert check.of_service is not None
     try:
         return Finding(check.what, *check.of_service(settings, store))
-    except (RobomarkError, SQLAlchemyError, OSError):
-        return Finding(check.what, False, "the database does not answer")
+    except (RobomarkError, SQLAlchemyError, OSError) as error:
+        return Finding(
+            check.what, False, "the disk is full" if _is_disk_full(error) else "the database does not answer"
+        )
+
+
+def _is_disk_full(error: Exception) -> bool:
+    cause = getattr(error, "orig", None) or error
+    is_full = (
+        getattr(cause, "errno", None) == errno.ENOSPC
+        or getattr(cause, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
+        or getattr(cause, "sqlstate", None) == _DISK_FULL
+    )
+    if is_full:
+        _log.error("disk.full", error=str(cause))
+    return is_full
+
+
+def _release(_settings: Settings) -> tuple[bool, str]:
+    return True, f"Robomark {GRADER_VERSION}, tables at revision {newest_revision()}"
+
+
+def _release_of_service(settings: Settings, _store: Store) -> tuple[bool, str]:
+    problem = release_problem()
+    return not problem, problem or _release(settings)[1]
 
 
 def _python(_settings: Settings) -> tuple[bool, str]:
     fits = sys.version_info[:2] == (3, 11) and platform.machine() == "x86_64" and sys.platform == "linux"
     found = f"{platform.python_implementation()} {platform.python_version()} on {sys.platform} {platform.machine()}"
     return fits, found if fits else f"{found}; PyBullet needs CPython 3.11 on x86-64 Linux"
+
+
+def _files(_settings: Settings) -> tuple[bool, str]:
+    """Whether our files are those that were installed: another distribution can have a ``models/`` of its own."""
+    recorded = [file for file in metadata.files("robomark") or () if file.hash is not None]
+    ours = [file for file in recorded if file.parts[0] in _PACKAGES]
+    if not ours:
+        return True, "an editable installation, which has no record of its files to compare with"
+    changed = sorted(str(file) for file in ours if not _is_as_recorded(file))
+    if not changed:
+        return True, f"{len(ours)} files are as they were installed"
+    more = f" and {len(changed) - 1} more" if len(changed) > 1 else ""
+    return False, f"{changed[0]}{more} changed since it was installed, as if by another package: install robomark anew"
+
+
+def _is_as_recorded(file: metadata.PackagePath) -> bool:
+    assert file.hash is not None
+    try:
+        data = Path(str(file.locate())).read_bytes()
+    except OSError:
+        return False
+    digest = base64.urlsafe_b64encode(hashlib.new(file.hash.mode, data).digest())
+    return digest.rstrip(b"=").decode() == file.hash.value
 
 
 def _simulator(_settings: Settings) -> tuple[bool, str]:
@@ -152,22 +212,22 @@ def _home(settings: Settings) -> tuple[bool, str]:
 def _database(settings: Settings) -> tuple[bool, str]:
     engine = open_engine(settings.database)
     try:
-        revision = current_revision(engine)
+        state = schema_state(engine)
     finally:
         engine.dispose()
     where = engine.url.render_as_string(hide_password=True)
-    if revision is None:
+    if state.revision is None:
         return True, f"{where}, no tables yet; they are made when first needed"
-    if revision != newest_revision():
-        return False, f"{where} is at revision {revision}, this Robomark at {newest_revision()}: robomark db upgrade"
-    return True, f"{where}, tables at revision {revision}"
+    if state.problem:
+        return False, f"{where} is {state.problem}"
+    return True, f"{where}, tables at revision {state.revision}"
 
 
 def _tables(_settings: Settings, store: Store) -> tuple[bool, str]:
-    revision = current_revision(store.engine)
-    if revision != newest_revision():
-        return False, f"its tables are at revision {revision}, this Robomark at {newest_revision()}"
-    return True, f"answers, tables at revision {revision}"
+    state = schema_state(store.engine)
+    if not state.is_usable:
+        return False, f"its tables are {state.problem or 'gone'}"
+    return True, f"answers, tables at revision {state.revision}"
 
 
 def _secret(settings: Settings) -> tuple[bool, str]:
@@ -241,6 +301,8 @@ def _clock(settings: Settings) -> tuple[bool, str]:
     with _opened(settings) as store:
         if store is None:
             return True, "nothing to compare it with yet"
+        if store.engine.dialect.name == "sqlite":
+            return True, "the only one, as the database is a file of this machine"
         with store.reading() as session:
             apart = abs((now(session) - datetime.now(UTC)).total_seconds())
     if apart > _APART_SECONDS:
@@ -258,14 +320,19 @@ def _workers(settings: Settings) -> tuple[bool, str]:
         return True, here
     slots = sum(worker.concurrency for worker in lately)
     hosts = len({worker.host for worker in lately})
-    return True, f"{here}; heard of lately: {len(lately)} on {hosts} machines, {slots} gradings at a time"
+    told = f"{here}; heard of lately: {len(lately)} on {hosts} machines, {slots} gradings at a time"
+    problems = [f"{worker.name}: {worker.problem}" for worker in lately if worker.problem]
+    return not problems, "; ".join([told, *problems])
 
 
 def _workers_of_service(_settings: Settings, store: Store) -> tuple[bool, str]:
     lately = _lately(store)
     if not lately:
         return False, "none was heard of lately"
-    return True, f"{len(lately)} heard of lately, {sum(worker.concurrency for worker in lately)} gradings at a time"
+    fit = [worker for worker in lately if not worker.problem]
+    told = f"{len(fit)} heard of lately, {sum(worker.concurrency for worker in fit)} gradings at a time"
+    problems = Counter(worker.problem for worker in lately if worker.problem)
+    return bool(fit), "; ".join([told, *(f"{count} not ready: {problem}" for problem, count in problems.items())])
 
 
 def _queue(settings: Settings) -> tuple[bool, str]:
@@ -284,7 +351,9 @@ def _queue_of_service(_settings: Settings, store: Store) -> tuple[bool, str]:
     told += f"; {dead} dead: robomark batch list, and retry" if dead else ""
     if waiting and oldest > _LONG_SECONDS and not any(seen.lately for seen in metrics.workers):
         return False, f"{told}; no worker was heard of lately"
-    if waiting and oldest > _STUCK_SECONDS and not by_state[JobState.RUNNING]:
+    # Between two jobs of a long backlog none runs for a moment.
+    idle = metrics.idle_seconds > _STUCK_SECONDS and not by_state[JobState.RUNNING]
+    if waiting and oldest > _STUCK_SECONDS and idle:
         return False, f"{told}; workers live and none begins it: their logs may say why, and restarting them may help"
     return True, told
 
@@ -299,13 +368,15 @@ def _opened(settings: Settings) -> Iterator[Store | None]:
     """The database as it is; None where it has no tables of this release."""
     engine = open_engine(settings.database)
     try:
-        yield Store(engine, settings.own_secret) if current_revision(engine) == newest_revision() else None
+        yield Store(engine, settings.own_secret) if schema_state(engine).is_usable else None
     finally:
         engine.dispose()
 
 
 CHECKS = (
+    Check("release", _release, _release_of_service),
     Check("Python", _python),
+    Check("files", _files),
     Check("simulator", _simulator),
     Check("sandbox", _sandbox, _sandbox_of_workers),
     Check("control groups", _control_groups),

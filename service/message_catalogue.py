@@ -20,20 +20,41 @@ _METHODS = [
     ("reports/templates/**.html", "jinja2"),
     ("web/**.py", "python"),
     ("reports/**.py", "python"),
+    ("operations/**.py", "python"),
     ("grading/endings.py", "python"),
 ]
 #: What is refused of what students send: who raises it does not know who reads it.
 _RAISED = [
     (f"{name}.py", "python")
-    for name in ("store/grades/appeals", "store/queue/tryouts", "web/submitting", "web/pages/mine")
+    for name in (
+        "operations/**",
+        "store/batches/intake",
+        "store/grades/appeals",
+        "store/grades/comments",
+        "store/grades/overrides",
+        "store/people/lti",
+        "store/queue/tryouts",
+        "web/pages/mine",
+    )
 ]
 _RAISED_OF_FILES = [
     (f"{name}.py", "python")
-    for name in ("agent_files", "bundle", "marked_cell", "meta", "notebook", "raw_files", "run_choice", "source_text")
+    for name in (
+        "agent_files",
+        "bundle",
+        "file_kinds",
+        "marked_cell",
+        "meta",
+        "notebook",
+        "raw_files",
+        "run_choice",
+        "source_text",
+    )
 ]
 _KEYWORDS = {"_": None, "translatable": None, "say": None, "gettext": None, "ngettext": (1, 2), "counted": (1, 2)}
 _KEYWORDS |= {"Sentence": None}
-_RAISING = {"Sentence": None, "UsageError": None, "LacksPart": None}
+_RAISING = {"Sentence": None, "UsageError": None, "LacksPart": None, "MarksChanged": None, "StudentsKnowAnother": None}
+_RAISING |= {"NotFound": None, "Forbidden": None, "Conflict": None, "Invalid": None}
 _OPTIONS = {pattern: {"silent": "false", "trimmed": "true"} for pattern, kind in _METHODS if kind == "jinja2"}
 
 

@@ -24,15 +24,30 @@ _MOST_RESOLVED = 20
 Networks = Sequence[IPv4Network | IPv6Network]
 #: What may be reached besides public addresses.
 NO_OTHERS: Networks = ()
+#: What Python 3.11 calls global and is not, or leads to an address that is not looked at.
+_NOT_PUBLIC: Networks = tuple(
+    map(
+        ip_network,
+        (
+            "192.0.0.0/24",  # protocols' own
+            "192.88.99.0/24",  # relays of 6to4, given up
+            "::/96",  # addresses of the older kind, given up
+            "64:ff9b::/96",  # translated to addresses of the older kind
+            "64:ff9b:1::/48",  # the same, within one network
+            "100::/64",  # discarded
+            "2001::/23",  # protocols' own
+            "2001:db8::/32",  # in documents
+            "3fff::/20",  # in documents
+            "5f00::/16",  # segments of routes
+            "fec0::/10",  # sites' own, given up for fc00::/7
+        ),
+    )
+)
 ALL_OTHERS: Networks = (ip_network("0.0.0.0/0"), ip_network("::/0"))
 
 
 class NotReached(RobomarkError):
     """An address that may not be asked, or did not answer."""
-
-
-class NotPublic(NotReached):
-    """An address in a network that may not be reached."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,14 +133,18 @@ def _target(url: str) -> _Target:
 
 
 def _addresses(target: _Target, others: Networks) -> list[str]:
-    """Where to connect to. Raises NotPublic where any of the addresses is neither public nor in ``others``."""
+    """Where to connect to.
+
+    Raises NotReached where there is nothing of this name or any of its addresses is neither public nor in ``others``,
+    in the same words: which of both it is would tell the names of a network inside.
+    """
     try:
         found = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_STREAM)[:_MOST_RESOLVED]
     except (OSError, UnicodeError):
-        raise NotReached(f"{target.host} cannot be found") from None
+        found = []
     addresses = [str(each[4][0]) for each in found]
     if not addresses or not all(is_public(each) or _is_in(each, others) for each in addresses):
-        raise NotPublic(f"{target.host} is no public address")
+        raise NotReached(f"{target.host} is not the name of a public address")
     return addresses
 
 
@@ -158,8 +177,8 @@ def is_public(address: str) -> bool:
         carried = found.ipv4_mapped or found.sixtofour or (found.teredo and found.teredo[1])
         if carried:
             return is_public(str(carried))
-        if found.packed[:4] == bytes.fromhex("0064ff9b") or found.packed[:12] == bytes(12):
-            return False
+    if any(found in network for network in _NOT_PUBLIC):
+        return False
     return found.is_global and not (found.is_multicast or found.is_reserved)
 
 

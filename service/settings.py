@@ -7,8 +7,10 @@ here opens a connection.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
+from ipaddress import ip_network
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
@@ -76,6 +78,26 @@ def _address(url: str) -> str:
     if url and (scheme not in {"https", "http"} or not name or "/" in name):
         raise ValueError("expected https://name, as browsers are to write it")
     return url.rstrip("/")
+
+
+def names_in(written: str) -> tuple[str, ...]:
+    """The parts of a list with commas."""
+    return tuple(part for each in written.split(",") if (part := each.strip().lower()))
+
+
+def _networks(written: str) -> str:
+    for each in names_in(written):
+        try:
+            ip_network(each)
+        except ValueError:
+            raise ValueError("expected addresses or networks with commas between, like 127.0.0.1, 10.0.0.0/8") from None
+    return ",".join(names_in(written))
+
+
+def _host_names(written: str) -> str:
+    if not all(re.fullmatch(r"[a-z0-9]([a-z0-9._-]*[a-z0-9])?", each) for each in names_in(written)):
+        raise ValueError("expected names without ports, with commas between, like web, robomark.internal")
+    return ",".join(names_in(written))
 
 
 def _log_level(level: str) -> str:
@@ -159,6 +181,12 @@ class Settings:
     public_url: str = _setting(_address, default="")
     #: How often a token may call the API; as often again at once, after a rest.
     api_calls_per_minute: float = _setting(_seconds(1, 1_000_000), default=600.0)
+    #: What all submissions of one student to one assignment may have together.
+    student_quota_mb: int = _setting(_count(1, 1_000_000), default=200)
+    #: Proxies whose X-Forwarded-For is believed: addresses or networks, with commas between.
+    trusted_proxies: str = _setting(_networks, default="")
+    #: Names by which /health and /metrics answer besides addresses and the public name, with commas between.
+    probe_hosts: str = _setting(_host_names, default="")
     #: Whether webhooks may lead to addresses of the own network, which else are refused.
     webhooks_inside: bool = _setting(_whether, default=False)
     #: Wins over the database's own; empty where there is none.

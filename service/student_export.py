@@ -9,10 +9,10 @@ import io
 import json
 import re
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from typing import Any
 
-from sqlalchemy import select
+from sqlalchemy import or_, select
 from sqlalchemy.orm import Session
 
 from service.report_files import report_alone
@@ -23,18 +23,23 @@ from service.store.courses import policies
 from service.store.engine import Store
 from service.store.grades import results
 from service.store.models import Course, Enrolment, Extension, Job, Person, SubmissionRow
+from service.store.people import people
 from service.store.states import JobState, Standing
 from service.store.web_tables import Appeal, Credential
 
 
-def export_student(store: Store, enrolment_id: int) -> bytes:
-    """The zip."""
+def export_student(store: Store, enrolment_id: int, without: Set[str] = frozenset()) -> bytes:
+    """Return the zip, without the submissions for some assignments.
+
+    Times and sizes would tell which rows with hidden names are the student's. So would the times of sign-ins and of the
+    enrolment, which are left out with them.
+    """
     sink = io.BytesIO()
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
         with store.reading() as session:
-            student = _student(session, enrolment_id)
-            mine = SubmissionRow.enrolment_id == enrolment_id
-            ids = session.scalars(select(SubmissionRow.id).where(mine).order_by(SubmissionRow.id)).all()
+            student = _student(session, enrolment_id) | ({} if without else _moments(session, enrolment_id))
+            mine = (SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment.not_in(without))
+            ids = session.scalars(select(SubmissionRow.id).where(*mine).order_by(SubmissionRow.id)).all()
         told = []
         for submission_id in ids:
             document, files = _submission(store, submission_id)
@@ -48,22 +53,31 @@ def export_student(store: Store, enrolment_id: int) -> bytes:
 
 def _student(session: Session, enrolment_id: int) -> dict[str, Any]:
     enrolment = session.get_one(Enrolment, enrolment_id)
-    person = session.get_one(Person, enrolment.person_id)
-    signs_in = select(Credential).where(Credential.person_id == person.id).order_by(Credential.created_at)
     allowed = select(Extension).where(Extension.enrolment_id == enrolment_id).order_by(Extension.id)
     return {
         "course": session.get_one(Course, enrolment.course_id).name,
         "id": enrolment.student,
         "written": enrolment.written,
-        "name": person.name,
-        "email": person.email or "",
+        "name": enrolment.name,
+        "email": enrolment.email,
         "role": enrolment.role.value,
-        "since": person.created_at,
         "extensions": [_columns(row, ("assignment", "due_at", "more_attempts")) for row in session.scalars(allowed)],
-        "signed_in_with": [
-            _columns(row, ("kind", "name", "created_at", "expires_at", "used_at", "revoked_at"))
-            for row in session.scalars(signs_in)
-        ],
+    }
+
+
+def _moments(session: Session, enrolment_id: int) -> dict[str, Any]:
+    """When a student came and signed in, as far as it belongs to this course."""
+    enrolment = session.get_one(Enrolment, enrolment_id)
+    person = session.get_one(Person, enrolment.person_id)
+    here = Credential.course_id == enrolment.course_id
+    if not people.is_more_than(session, enrolment):
+        # One course is all they have, so what reaches everywhere reaches this course alone.
+        here = or_(here, Credential.course_id.is_(None))
+    signs_in = select(Credential).where(Credential.person_id == person.id, here).order_by(Credential.created_at)
+    names = ("kind", "name", "created_at", "expires_at", "used_at", "revoked_at")
+    return {
+        "since": person.created_at.date(),
+        "signed_in_with": [_columns(row, names) for row in session.scalars(signs_in)],
     }
 
 

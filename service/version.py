@@ -6,7 +6,7 @@ import hashlib
 import platform
 from collections.abc import Iterator
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 GRADER_VERSION = version("robomark")
@@ -15,7 +15,19 @@ _PACKAGES = Path(__file__).parent.parent
 #: What the marks follow from; an assignment has a hash of its own.
 _DECIDING = ("sim", "models", "responders", "submissions", "service/grading")
 _NOT_DECIDING = {"__pycache__", "catalogue", "examples"}
-_DISTRIBUTIONS = ("pybullet", "numpy", "scikit-learn", "joblib", "pandas", "pillow", "google-re2")
+#: Every library that the deciding code imports, and those that these compute with.
+_DISTRIBUTIONS = (
+    *("pybullet", "numpy", "scipy", "scikit-learn", "joblib", "threadpoolctl", "pandas", "pillow", "google-re2"),
+    *("onnxruntime", "ai-edge-litert", "pydantic", "pydantic-core", "pyyaml"),
+)
+
+
+def release_problem() -> str:
+    """Why this process must be restarted: the installed release is not the one that runs. Empty where it is."""
+    installed = _version("robomark")
+    if installed == GRADER_VERSION:
+        return ""
+    return f"another release ({installed}) is installed than the one that runs ({GRADER_VERSION}); restart"
 
 
 @cache
@@ -23,11 +35,19 @@ def grader_sha256() -> str:
     """Hash of the grading code, its data and the libraries it stands on: where it is the same, marks are too."""
     digest = hashlib.sha256(platform.python_version().encode())
     for name in _DISTRIBUTIONS:
-        digest.update(f"{name} {version(name)}\n".encode())
+        digest.update(f"{name} {_version(name)}\n".encode())
     for path in _files():
         data = path.read_bytes()
         digest.update(f"{path.relative_to(_PACKAGES)}:{len(data)}:".encode() + data)
     return digest.hexdigest()
+
+
+def _version(distribution: str) -> str:
+    """The version that is installed now; "none" for a library that is not."""
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return "none"
 
 
 def _files() -> Iterator[Path]:

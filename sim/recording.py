@@ -335,3 +335,4 @@ class Recording:
     agent_messages: tuple[AgentMessage, ...] = ()
     agent_outputs: tuple[AgentOutput, ...] = ()  # of every agent, in the assignment's order
     partner: Recording | None = None
+    cell_errors: tuple[Fault, ...] = ()  # of a notebook: the first cells that failed, whatever came of it

@@ -6,6 +6,7 @@ They lie among the files beside robot.py and responder.py; who asks them is no b
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -15,16 +16,18 @@ from sim.errors import UsageError
 from sim.sentences import listed
 from submissions.raw_files import shown
 from submissions.source_text import decode_source
-from submissions.submission import Submission
+from submissions.submission import Notebook, Submission
 
 if TYPE_CHECKING:
     from submissions.assignment.definition import Parts
+
+_WRITEFILE = re.compile(r"\s*%%(?:writefile|file)[ \t]+(?P<name>[A-Za-z0-9_.]+)[ \t]*\n")
 
 
 def with_agents(submission: Submission, asked: Parts, where: str) -> Submission:
     """The submission with each agent among its files, whatever it was taken for.
 
-    Raises UsageError if one is missing.
+    A notebook can bring an agent in a cell that begins with ``%%writefile``. Raises UsageError if one is missing.
     """
     if not asked.agents:
         return submission
@@ -41,8 +44,18 @@ def with_agents(submission: Submission, asked: Parts, where: str) -> Submission:
     ]:
         del files[name]
         notes.append(f"{shown(name)} was left out: the assignment brings that agent itself.")
+    if submission.notebook is not None:
+        files = _written_by_cells(submission.notebook, asked.agents) | files
     there = {_agent_of(name, asked.agents) for name in files}
     missing = [f"{name}.py" for name, who in asked.agents.items() if who == "student" and name not in there]
+    if missing and submission.notebook is not None:
+        raise UsageError(
+            "%(where)s: has no %(missing)s; put each agent in a file beside the notebook, or in a cell that begins "
+            "with %%%%writefile %(first)s.",
+            where=where,
+            missing=listed(missing),
+            first=missing[0],
+        )
     if missing:
         raise UsageError(
             "%(where)s: has no %(missing)s, expected a file for each agent.", where=where, missing=listed(missing)
@@ -54,6 +67,16 @@ def with_agents(submission: Submission, asked: Parts, where: str) -> Submission:
         files=MappingProxyType(dict(sorted(files.items()))),
         notes=tuple(notes),
     )
+
+
+def _written_by_cells(notebook: Notebook, agents: Mapping[str, str]) -> dict[str, bytes]:
+    """The agents of the student that cells of the notebook write to files of their own."""
+    written = {}
+    for cell in notebook.cells:
+        match = _WRITEFILE.match(cell.source)
+        if match is not None and agents.get(_agent_of(match["name"], agents) or "") == "student":
+            written[match["name"]] = cell.source[match.end() :].encode("utf-8", "surrogatepass")
+    return written
 
 
 def code_of(agent: str, files: Mapping[str, bytes]) -> Code | None:

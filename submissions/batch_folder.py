@@ -5,6 +5,7 @@ Every bad row is named and stops no other. Nothing is stored here.
 
 from __future__ import annotations
 
+import logging
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -26,9 +27,12 @@ from submissions.roster import RosterRow, file_inside, read_roster
 from submissions.submission import Submission
 from submissions.unzipping import unzip
 
+_log = logging.getLogger(__name__)
 _PARTS = {"robot.py", "program.py", "responder.py"}
 _MOST_ENTRIES = 50_000
 _MOST_BYTES = 4_000_000_000
+#: How much a zip may unpack to, for its size: text is a tenth or a fifth when it is compressed, zeros a thousandth.
+_ALWAYS_BYTES, _MOST_TIMES = 50_000_000, 30
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +126,10 @@ def _read(rows: Iterable[_Row]) -> BatchContents:
             found.append(row.read())
         except UsageError as error:
             found.append(" ".join(str(error).split()).removeprefix(f"{row.name}: "))
+        except Exception:
+            # One submission that we fail on is no reason to refuse those of a whole class.
+            _log.exception("%s could not be read", row.name)
+            found.append("cannot be read because of a fault in Robomark; its log has the details. Report this fault.")
     found = _one_each(rows, found)
     return BatchContents(
         tuple(each for each in found if isinstance(each, GradingRequest)),
@@ -230,7 +238,7 @@ def _opened(path: Path) -> Iterator[Path]:
             # The name of the zip stands for the folder, so that sentences and assignments speak of it.
             folder = Path(name) / (path.stem or "batch")
             folder.mkdir()
-            unzip(path, folder, _MOST_ENTRIES, _MOST_BYTES)
+            unzip(path, folder, _MOST_ENTRIES, min(_MOST_BYTES, _ALWAYS_BYTES + _MOST_TIMES * path.stat().st_size))
             yield _stepped_into(folder)
     elif not path.exists():
         raise UsageError(f"{path}: does not exist, expected a folder or a .zip of submissions, or a .csv roster.")

@@ -21,6 +21,7 @@ from sim.sentences import Sentence, listed
 from submissions.agent_files import with_agents
 from submissions.assignment.second_robot import SECOND_PROGRAM
 from submissions.compiled import is_compiled
+from submissions.file_kinds import advice_on_kind
 from submissions.marked_cell import LAST, marked_site, sites
 from submissions.meta import META, read_meta, run_of, text_of
 from submissions.names import LONGEST_NAME, shown_name
@@ -72,6 +73,9 @@ def read_submission(path: Path, *, student: str | None = None, asked: Parts | No
     elif suffix in (".py", _NOTEBOOK):
         raw = RawFiles({os.fsencode(path.name).decode("utf-8", "replace"): read_single_file(path)})
     else:
+        advice = advice_on_kind([path.name])
+        if advice is not None:
+            raise UsageError(Sentence("%(advice)s.", {"advice": advice}))
         raise UsageError(
             "%(where)s: is of a kind that cannot be read, expected a .py file, a notebook, a folder or a .zip.",
             where=where,
@@ -182,22 +186,30 @@ def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, wher
             notes.append(f"{shown(source.name)} lies beside the notebook; the notebook is what is run.")
     if asked.program != "student" and sites(notebook):
         notes.append(f"{shown(notebook.name)}: the assignment brings the robot program that is marked.")
-    return dataclasses.replace(
+    alone = dataclasses.replace(
         submission,
         program=None,
         responder=None,
         files=MappingProxyType(dict(sorted(files.items()))),
         notes=tuple(notes),
     )
+    return with_agents(alone, asked, where)
 
 
 def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submission:
     files = dict(raw.files)
     notes = list(raw.notes)
     meta = read_meta(files.pop(META, b""), where)
-    for compiled in [each for each, data in files.items() if is_compiled(each, data)]:
+    left_out = [each for each, data in files.items() if is_compiled(each, data)]
+    for compiled in left_out:
         del files[compiled]
         notes.append(f"{shown(compiled)} was left out: it is compiled code; submit the Python that it was made of.")
+    if left_out and not files:
+        raise UsageError(
+            "%(where)s: has only %(names)s in it, which is not Python source, expected robot.py and responder.py.",
+            where=where,
+            names=listed([shown(each) for each in left_out[:3]]),
+        )
     if not files:
         raise UsageError("%(where)s: has no files in it, expected robot.py and responder.py.", where=where)
     notebook = _find_notebook(files, where, notes)
@@ -300,7 +312,9 @@ def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alo
             notes.append(f"{shown(name)} was taken for {_WORDS[part]}.")
         return found
     found_names = ", ".join(shown(name) for name in sorted(files)[:5])
-    renamed = _renamed(PART_FILES, files)
+    advice = advice_on_kind(sorted(files))
+    instead = Sentence("; %(advice)s", {"advice": advice}) if advice is not None else ""
+    renamed = _renamed(PART_FILES, files) or instead
     raise UsageError(
         "%(where)s: has no robot.py or responder.py (found %(found)s), expected one or both%(renamed)s.",
         where=where,

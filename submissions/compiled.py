@@ -5,13 +5,14 @@ Python would import them from the folder like any module. Model files, archives 
 
 from __future__ import annotations
 
-import zipfile
 from io import BytesIO
+
+from sim.readers.unreadable import Unreadable
+from sim.readers.zip_archive import is_zip, open_zip
 
 _SUFFIXES = (".pyc", ".pyo", ".pyd", ".so", ".egg", ".whl")
 _MODULES = (".py", *_SUFFIXES)
 _ELF = b"\x7fELF"
-_ENTRY = b"PK\x01\x02"
 #: What is looked at in an archive; zipfile makes an object of each entry.
 _MOST_ENTRIES = 2000
 
@@ -23,13 +24,10 @@ def is_compiled(name: str, data: bytes) -> bool:
 
 def _has_modules(data: bytes) -> bool:
     """Whether it is an archive, however it begins, from which Python could import; one that is too large may be."""
-    entries = data.count(_ENTRY)
-    if entries == 0 or not zipfile.is_zipfile(BytesIO(data)):
+    if not is_zip(BytesIO(data)):
         return False
-    if entries > _MOST_ENTRIES:
-        return True
     try:
-        with zipfile.ZipFile(BytesIO(data)) as archive:
+        with open_zip(BytesIO(data), _MOST_ENTRIES) as archive:
             return any(entry.lower().endswith(_MODULES) for entry in archive.namelist())
-    except Exception:  # zipfile raises all kinds of things for archives that were made to break it
+    except Unreadable:
         return True

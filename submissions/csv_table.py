@@ -5,16 +5,19 @@ What the columns mean is for whoever asks; every row that cannot be read is name
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from sim.errors import UsageError
+from sim.readers.csv_text import CsvRecord, records
+from sim.readers.unreadable import Unreadable
 
 _MOST_BYTES = 10_000_000
 _SEPARATORS = (",", ";", "\t")
+#: Lines that the first row may span.
+_LONGEST_HEADING = 20
+_QUOTES = 'has quotation marks that do not match (one inside a cell is written "").'
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,20 +47,19 @@ def read_csv(path: Path, columns: Mapping[str, Sequence[str]], usual: str) -> Cs
     if not lines:
         raise UsageError(f"{path.name}: is empty, expected the columns {usual}.")
     by_heading = {heading: column for column, headings in columns.items() for heading in headings}
-    records = _records(lines, _separator(lines, by_heading))
-    header = next(records)
+    try:
+        header, *others = records(lines, _separator(lines, by_heading))
+    except Unreadable as error:
+        raise UsageError(f"{path.name}: cannot be read: {error}, expected a list of students.") from None
     places = _places(header, by_heading, path.name)
-    rows = [_row(record, places, len(header.cells)) for record in records if record.problem or any(record.cells)]
+    rows = [
+        _row(record, places, len(header.cells))
+        for record in others
+        if record.broken or any(map(str.strip, record.cells))
+    ]
     if not rows:
         raise UsageError(f"{path.name}: has no rows, expected one for each student below the line of columns.")
     return CsvTable(frozenset(places), tuple(rows))
-
-
-@dataclass(frozen=True, slots=True)
-class _Record:
-    line: int
-    cells: Sequence[str]
-    problem: str = ""
 
 
 def _text(path: Path) -> str:
@@ -82,50 +84,35 @@ def _separator(lines: Sequence[str], by_heading: Mapping[str, str]) -> str:
     """The separator by which the first line has most of the columns."""
 
     def found(separator: str) -> int:
-        cells = next(_records(lines, separator)).cells
-        return sum(cell.casefold() in by_heading for cell in cells)
+        cells = next(records(lines[:_LONGEST_HEADING], separator)).cells
+        return sum(cell.strip().casefold() in by_heading for cell in cells)
 
     return max(_SEPARATORS, key=found)
 
 
-def _records(lines: Sequence[str], separator: str) -> Iterator[_Record]:
-    """The records of a CSV. After one with broken quotes it goes on at the next line, so that it costs one row."""
-    start = 0
-    while start < len(lines):
-        reader = csv.reader(io.StringIO("".join(lines[start:]), newline=""), delimiter=separator, strict=True)
-        begun = start
-        try:
-            for cells in reader:
-                yield _Record(begun + 1, [cell.strip() for cell in cells])
-                begun = start + reader.line_num
-            return
-        except csv.Error:
-            yield _Record(begun + 1, (), 'has quotation marks that do not match (one inside a cell is written "").')
-            start = begun + 1
-
-
-def _places(header: _Record, by_heading: Mapping[str, str], name: str) -> Mapping[str, int]:
+def _places(header: CsvRecord, by_heading: Mapping[str, str], name: str) -> Mapping[str, int]:
     """Where the columns stand."""
-    if header.problem:
-        raise UsageError(f"{name}: line 1 {header.problem}")
+    if header.broken:
+        raise UsageError(f"{name}: line 1 {_QUOTES}")
     places: dict[str, int] = {}
-    for place, cell in enumerate(header.cells):
+    headings = [cell.strip() for cell in header.cells]
+    for place, cell in enumerate(headings):
         column = by_heading.get(cell.casefold())
         if column is None:
             continue
         if column in places:
-            both = dict.fromkeys([header.cells[places[column]], cell])
+            both = dict.fromkeys([headings[places[column]], cell])
             raise UsageError(f"{name}: has two columns {' and '.join(both)}, expected one.")
         places[column] = place
     return places
 
 
-def _row(record: _Record, places: Mapping[str, int], columns: int) -> CsvRow:
-    if record.problem:
-        return CsvRow(record.line, problem=record.problem)
-    if any(record.cells[columns:]):
+def _row(record: CsvRecord, places: Mapping[str, int], columns: int) -> CsvRow:
+    if record.broken:
+        return CsvRow(record.line, problem=_QUOTES)
+    found = [cell.strip() for cell in record.cells]
+    if any(found[columns:]):
         return CsvRow(
-            record.line, problem=f"has {len(record.cells)} cells for {columns} columns; quote a cell with a separator."
+            record.line, problem=f"has {len(found)} cells for {columns} columns; quote a cell with a separator."
         )
-    cells = {column: record.cells[at] if at < len(record.cells) else "" for column, at in places.items()}
-    return CsvRow(record.line, cells)
+    return CsvRow(record.line, {column: found[at] if at < len(found) else "" for column, at in places.items()})

@@ -11,6 +11,7 @@ from typing import Literal
 DiagramKind = Literal["blockdiag", "seqdiag"]
 Line = Literal["solid", "dashed", "dotted"]
 Heads = Literal["target", "both", "none"]
+_CHARACTERS_OF_PART = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +68,14 @@ class Diagram:
     steps: tuple[DiagramArrow | Divider, ...]
     groups: tuple[ActorGroup, ...] = ()
     portrait: bool = False
+
+    @property
+    def parts(self) -> int:
+        """What drawing it takes: an actor, step, group or piece of text of 200 characters is one part."""
+        texts = sum(len(actor.label) for actor in self.actors)
+        for step in self.steps:
+            texts += len(step.text) if isinstance(step, Divider) else len(step.label) + len(step.note)
+        return len(self.actors) + len(self.steps) + len(self.groups) + texts // _CHARACTERS_OF_PART
 
     @property
     def arrows(self) -> tuple[DiagramArrow, ...]:

@@ -12,10 +12,12 @@ from typing import cast
 from sim.errors import UsageError
 from submissions.diagram import Diagram, DiagramKind
 from submissions.diagram_text import read_diagram
-from submissions.magics import magic_place
+from submissions.magic_lines import magic_place
 from submissions.submission import Notebook
 
 MOST_DIAGRAMS = 20
+#: Of all diagrams of a notebook together: six times what the course's largest notebook has; a part takes about 15 ms.
+MOST_PARTS = 240
 _MAGIC = re.compile(r"%%(?P<kind>blockdiag|seqdiag)\b")
 
 
@@ -36,7 +38,11 @@ class NotebookDiagrams:
 
 
 def diagrams_in(notebook: Notebook | None) -> NotebookDiagrams:
-    """What the cells of a notebook draw; of more than ``MOST_DIAGRAMS`` the first ones. None without a notebook."""
+    """What the cells of a notebook draw; of more than ``MOST_DIAGRAMS`` the first ones. None without a notebook.
+
+    One that does not fit into ``MOST_PARTS`` with those before it is left out.
+    """
+    left = MOST_PARTS
     found: list[DiagramCell] = []
     problems: list[str] = []
     for cell in notebook.cells if notebook is not None else ():
@@ -50,7 +56,16 @@ def diagrams_in(notebook: Notebook | None) -> NotebookDiagrams:
             break
         kind = cast(DiagramKind, magic["kind"])
         try:
-            found.append(DiagramCell(cell.number, read_diagram(kind, "\n".join(lines[place + 1 :]), place + 2)))
+            diagram = read_diagram(kind, "\n".join(lines[place + 1 :]), place + 2)
         except UsageError as error:
             problems.append(f"cell {cell.number}, {error}; the diagram is not drawn")
+            continue
+        if diagram.parts > left:
+            problems.append(
+                f"cell {cell.number}: all diagrams together have more than {MOST_PARTS} actors, steps and texts; "
+                "this one is not drawn"
+            )
+            continue
+        left -= diagram.parts
+        found.append(DiagramCell(cell.number, diagram))
     return NotebookDiagrams(tuple(found), tuple(problems))

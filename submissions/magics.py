@@ -9,21 +9,13 @@ from __future__ import annotations
 import math
 import shlex
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
-from responders.sandbox.inside.cell_source import WRAPPERS
 from sim.errors import UsageError
 from sim.floors import OBSTACLE_PRESETS, names, start_of
 from sim.recording import Pose
 from sim.robot import WIDENED, usual_robot
+from submissions.magic_lines import PREAMBLES, Preamble, magic_place
 from submissions.nearest import did_you_mean
-
-Preamble = Literal["none", "imports", "preloaded"]
-_PREAMBLES: dict[str, Preamble] = {
-    "sim_magic": "none",
-    "sim_magic_imports": "imports",
-    "sim_magic_preloaded": "preloaded",
-}
 
 _X_MOST, _Y_MOST, _ANGLE_MOST = 2362, 1143, 360
 _LIGHT_NOISE_MOST, _MOTOR_NOISE_MOST = 128, 500
@@ -127,31 +119,6 @@ def without_magic(text: str) -> str:
     return "\n".join(lines)
 
 
-def magic_place(text: str) -> int | None:
-    """The index of the first line that is neither blank nor a comment, if it is a magic; of wrappers the last."""
-    found = None
-    for place, line in enumerate(text.split("\n")):
-        stripped = line.lstrip("\ufeff").strip()
-        if not stripped or stripped.startswith("#"):
-            continue
-        if not stripped.startswith("%"):
-            return found
-        found = place
-        if not stripped.startswith("%%") or _name(stripped) not in WRAPPERS:
-            return place
-    return found
-
-
-def is_program_magic(line: str) -> bool:
-    """Whether a line makes its cell a robot program, as ``%%sim_magic`` does and ``%sim_magic`` does not."""
-    stripped = line.lstrip("\ufeff").strip()
-    return stripped.startswith("%%") and _name(stripped) in _PREAMBLES
-
-
-def _name(magic: str) -> str:
-    return (magic.split(maxsplit=1) or [""])[0].lstrip("%")
-
-
 def parse_magic(line: str, number: int = 1) -> Flags:
     """The flags of a ``%%sim_magic...`` line. Raises UsageError, naming line ``number``, for what does not exist."""
     name, *rest = line.lstrip("%").split(maxsplit=1) or [""]
@@ -165,11 +132,11 @@ def parse_magic(line: str, number: int = 1) -> Flags:
 
 def parse_flags(name: str, arguments: str) -> Flags:
     """The flags of the magic ``name``. Raises UsageError for a magic or a flag that does not exist."""
-    if name not in _PREAMBLES:
-        expected = ", ".join(f"%%{known}" for known in _PREAMBLES)
-        near = did_you_mean(f"%%{name[:40]}", (f"%%{known}" for known in _PREAMBLES))
+    if name not in PREAMBLES:
+        expected = ", ".join(f"%%{known}" for known in PREAMBLES)
+        near = did_you_mean(f"%%{name[:40]}", (f"%%{known}" for known in PREAMBLES))
         raise UsageError(f"%{name[:40]} is not a magic that starts a program; expected one of {expected}{near}")
-    flags = _flags(_words(name, arguments), _PREAMBLES[name])
+    flags = _flags(_words(name, arguments), PREAMBLES[name])
     foreign = sorted(flags.switches & _PLAIN_ONLY)
     if name != "sim_magic" and foreign:
         raise UsageError(f"%%{name} has no flag -{foreign[0]}; only %sim_magic has it")

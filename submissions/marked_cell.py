@@ -12,7 +12,9 @@ from dataclasses import dataclass
 from responders.sandbox.inside.cell_source import WRAPPERS, cell_magic
 from sim.errors import UsageError
 from sim.sentences import Sentence
-from submissions.magics import is_program_magic, magic_place, parse_flags, parse_magic
+from submissions.magic_lines import is_program_magic, magic_place
+from submissions.magics import parse_flags, parse_magic
+from submissions.notebook import as_code_cell
 from submissions.raw_files import shown
 from submissions.submission import Cell, Notebook
 
@@ -26,6 +28,8 @@ _AUTORUN = re.compile(r"(?:^|\s)(?:-[A-Za-z]*R|--auto)")
 _EXPANDED = re.compile(r"[{$]")
 #: A line that was to begin a robot program.
 NEARLY_MAGIC = re.compile(r"[ \t\ufeff]*%*[ \t]?sim_?ma\w*(?:[ \t]+-|[ \t]*\r?$)")
+#: Its percent signs and its name, also where blanks are between them.
+_BEGIN = re.compile(r"%*[ \t]?sim_?ma\w*")
 _CALL = re.compile(r"""\.run_cell_magic\([ \t]*['"]sim_magic""")
 
 
@@ -133,14 +137,27 @@ def _tagged(notebook: Notebook, tag: str) -> Site:
 
 
 def _near_miss(notebook: Notebook) -> str | Sentence:
-    """A line that is nearly a program's magic, or is one in the wrong place."""
+    """A line that is nearly a program's magic, or is one in the wrong place, such as a Markdown cell."""
+    for place in notebook.markdown_programs:
+        return Sentence("; %(near)s", {"near": as_code_cell(place)})
     for cell in notebook.cells:
         for number, line in enumerate(cell.source.split("\n"), 1):
-            if NEARLY_MAGIC.match(line[:200]):
-                why = Sentence("below other code") if is_program_magic(line) else Sentence("another word")
-                values = {"line": number, "cell": cell.number, "word": shown(line.split()[0]), "why": why}
+            begin = _BEGIN.search(line[:200]) if NEARLY_MAGIC.match(line[:200]) else None
+            if begin is not None:
+                values = {"line": number, "cell": cell.number, "word": shown(begin[0]), "why": _why_not(line)}
                 return Sentence("; line %(line)s of cell %(cell)s has %(word)s, %(why)s", values)
     return ""
+
+
+def _why_not(line: str) -> Sentence:
+    """Why a line that is nearly a program's magic begins no program."""
+    if is_program_magic(line):
+        return Sentence("below other code: make it the first line")
+    if is_program_magic(f"%{line.lstrip()}"):
+        return Sentence("with one %(sign)s: write two", {"sign": "%"})
+    if is_program_magic(re.sub(r"^%%\s+", "%%", line.strip())):
+        return Sentence("with a blank after %(signs)s: delete the blank", {"signs": "%%"})
+    return Sentence("another word")
 
 
 def _count(number: int) -> Sentence:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 
 from sim.errors import UsageError
-from sim.sentences import Sentence
+from sim.readers.toml_text import read_toml
+from sim.readers.unreadable import Unreadable
 
 META = "submission.toml"
 _MAX_BYTES = 64 * 1024
@@ -18,10 +18,15 @@ def read_meta(data: bytes, where: str) -> dict[str, object]:
         return {}
     if len(data) > _MAX_BYTES:
         raise UsageError("%(where)s: %(file)s is too large, expected a few lines.", where=where, file=META)
+    return parse_meta(data, where)
+
+
+def parse_meta(data: bytes, where: str) -> dict[str, object]:
+    """The same without a limit of size, for files written here: notes on many files are more than a few lines."""
     try:
-        return tomllib.loads(data.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        problem = Sentence("it is nested too deeply") if isinstance(error, RecursionError) else str(error)[:200]
+        return read_toml(data.decode("utf-8-sig"))
+    except ValueError as error:
+        problem = error.said if isinstance(error, Unreadable) else str(error)[:200]
         raise UsageError(
             '%(where)s: %(file)s cannot be read (%(problem)s), expected lines like assignment = "echo-responder".',
             where=where,

@@ -14,7 +14,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from sim.errors import UsageError
+from sim.readers.json_text import JSONDecodeError, read_json
+from sim.readers.python_source import parse_module
+from sim.readers.unreadable import TooMany, Unreadable
 from sim.sentences import Sentence
+from submissions.magic_lines import is_program_magic
 from submissions.source_text import MAX_SOURCE_BYTES
 from submissions.submission import Cell, Notebook
 
@@ -22,8 +26,11 @@ MAX_CELLS = 5000
 #: What a notebook may hold in lists and tables; each becomes an object in memory.
 _MAX_VALUES = 3_000_000
 _MAX_NOTES = 10
+_MAX_LOOKED_AT = 20  # lines of a Markdown cell
 
 _SCRIPT = re.compile(r"^[ \t]*get_ipython\(\)\.run_(?:cell|line)_magic\([ \t]*['\"]sim_magic", re.MULTILINE)
+_RESPONDER = re.compile(r"^def (?:\w+_)?responder\([^\n]{0,100}", re.MULTILINE)
+_MOST_RAW = 3
 _MARKER = re.compile(r"^#[ \t]*In[ \t]*\[[ \t\d*]*\]:?[ \t]*$")
 _CELL_MAGIC_CALL = re.compile(r"^get_ipython\(\)\.run_cell_magic\(")
 
@@ -46,6 +53,8 @@ def read_notebook(data: bytes, name: str) -> ReadNotebook:
     document = _parsed(text, name)
     _check_language(document, name)
     cells: list[Cell] = []
+    markdown: list[int] = []
+    responders: list[str] = []
     for place, raw in enumerate(_raw_cells(document, name), 1):
         problem = _cell_problem(raw)
         if problem:
@@ -55,7 +64,20 @@ def read_notebook(data: bytes, name: str) -> ReadNotebook:
         source = _source(raw)
         if raw["cell_type"] == "code" and source.strip():
             cells.append(Cell(len(cells) + 1, source, _tags(raw)))
-    return ReadNotebook(_checked(Notebook(name, tuple(cells))), tuple(notes))
+        elif raw["cell_type"] != "code" and any(map(is_program_magic, source.split("\n", _MAX_LOOKED_AT))):
+            markdown.append(place)
+        elif raw["cell_type"] == "raw":
+            responders += _RESPONDER.findall(source)
+    found = Notebook(name, tuple(cells), tuple(markdown), tuple(responders[:_MOST_RAW]))
+    return ReadNotebook(_checked(found), tuple(notes))
+
+
+def as_code_cell(place: int) -> Sentence:
+    """That the robot program in a Markdown cell is no code, and what to do about it."""
+    return Sentence(
+        "cell %(place)s from the top has a robot program, but is a Markdown cell. Change it to a code cell",
+        {"place": place},
+    )
 
 
 def is_script(text: str) -> bool:
@@ -80,7 +102,10 @@ def read_script(text: str, name: str) -> Notebook:
 
 
 def pack_notebook(notebook: Notebook) -> bytes:
-    """The notebook as an .ipynb file without outputs; ``read_notebook`` gives the same cells again."""
+    """The notebook as an .ipynb file without outputs; ``read_notebook`` gives the same cells again.
+
+    Of Raw cells with a responder it has the line that defines it.
+    """
     cells: list[dict[str, Any]] = [
         {
             "cell_type": "code",
@@ -91,6 +116,7 @@ def pack_notebook(notebook: Notebook) -> bytes:
         }
         for cell in notebook.cells
     ]
+    cells += [{"cell_type": "raw", "metadata": {}, "source": line} for line in notebook.raw_responders]
     document = {"cells": cells, "metadata": {}, "nbformat": 4, "nbformat_minor": 4}
     return json.dumps(document, indent=1).encode("ascii")
 
@@ -113,19 +139,19 @@ def _decoded(data: bytes, name: str) -> tuple[str, str]:
 def _parsed(text: str, name: str) -> Mapping[str, Any]:
     if not text.strip():
         raise UsageError("%(name)s: is an empty file, expected a notebook.", name=name)
-    if text.count(",") + text.count("[") + text.count("{") > _MAX_VALUES:
+    try:
+        document = read_json(text, most_values=_MAX_VALUES, strict=False)
+    except TooMany:
         raise UsageError(
             "%(name)s: has too much output in it, expected a notebook whose outputs were cleared before it was saved.",
             name=name,
-        )
-    try:
-        document = json.loads(text, strict=False)
-    except RecursionError:
+        ) from None
+    except Unreadable:
         raise UsageError(
             "%(name)s: is nested too deeply, expected a notebook as Jupyter saves it.", name=name
         ) from None
     except ValueError as error:
-        line = error.lineno if isinstance(error, json.JSONDecodeError) else None
+        line = error.lineno if isinstance(error, JSONDecodeError) else None
         where = "" if line is None else Sentence(" (line %(line)s)", {"line": line})
         raise UsageError(
             "%(name)s: is not a notebook: its JSON is broken%(where)s, expected one saved by Jupyter.",
@@ -197,6 +223,10 @@ def _tags(raw: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _checked(notebook: Notebook) -> Notebook:
     name, cells = notebook.name, notebook.cells
+    if not cells and notebook.markdown_programs:
+        raise UsageError(
+            "%(name)s: has no code cells; %(near)s.", name=name, near=as_code_cell(notebook.markdown_programs[0])
+        )
     if not cells:
         raise UsageError("%(name)s: has no code cells, expected a notebook with Python code.", name=name)
     if len(cells) > MAX_CELLS:
@@ -236,9 +266,10 @@ def _cell_magic(line: str) -> str | None:
 def _constants(line: str) -> Iterator[str]:
     """The arguments of a call of texts; none if it is something else."""
     try:
-        tree = ast.parse(line, mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        body = parse_module(line).body
+    except (SyntaxError, Unreadable):
         return
+    tree = body[0].value if len(body) == 1 and isinstance(body[0], ast.Expr) else None
     if isinstance(tree, ast.Call) and not tree.keywords:
         for argument in tree.args:
             if not isinstance(argument, ast.Constant) or not isinstance(argument.value, str):

@@ -9,11 +9,15 @@ from io import BytesIO
 from types import MappingProxyType
 
 from responders.code import Code
-from submissions.meta import META, read_meta, run_of
+from sim.errors import UsageError
+from sim.readers.unreadable import Unreadable
+from sim.readers.zip_archive import entry_chunks, open_zip
+from submissions.meta import META, parse_meta, run_of
 from submissions.notebook import pack_notebook, read_notebook
-from submissions.raw_files import unzip
+from submissions.raw_files import MAX_FILES
 from submissions.submission import PART_FILES, Part, Submission
 
+_KEPT = "the kept submission"
 _PACKED_NOTEBOOK = "notebook.ipynb"
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip archive can hold
 
@@ -51,9 +55,12 @@ def pack_submission(submission: Submission) -> bytes:
 
 
 def unpack_submission(data: bytes) -> Submission:
-    """The submission that ``pack_submission`` packed. Raises UsageError for other bytes."""
-    files = unzip(data, "the kept submission").files
-    meta = read_meta(files.pop(META, b""), "the kept submission")
+    """The submission that ``pack_submission`` packed. Raises UsageError for other bytes.
+
+    Nothing that intake accepted is refused: neither its limits nor its rules for names apply here.
+    """
+    files = _entries(data)
+    meta = parse_meta(files.pop(META, b""), _KEPT)
     sources: dict[Part, Code | None] = {}
     for part, canonical in PART_FILES.items():
         name = meta.get(part)
@@ -73,8 +80,17 @@ def unpack_submission(data: bytes) -> Submission:
         assignment=assignment if isinstance(assignment, str) else None,
         notes=tuple(map(str, notes)) if isinstance(notes, list) else (),
         notebook=notebook,
-        run=run_of(meta, "the kept submission"),
+        run=run_of(meta, _KEPT),
     )
+
+
+def _entries(data: bytes) -> dict[str, bytes]:
+    try:
+        # Ours holds at most what intake accepted, and a few entries that packing adds.
+        with open_zip(BytesIO(data), 2 * MAX_FILES) as archive:
+            return {info.orig_filename: b"".join(entry_chunks(archive, info)) for info in archive.infolist()}
+    except Unreadable:
+        raise UsageError("%(where)s: is not a zip archive that can be read.", where=_KEPT) from None
 
 
 def _toml_text(text: str) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-from responders.sandbox.inside.cell_source import LINE_WRAPPERS, WRAPPERS, cell_magic, wrapped
+from responders.sandbox.inside.cell_source import LINE_WRAPPERS, WRAPPERS, cell_magics, wrapped
 from submissions.submission import Notebook
 
 _RUN_LINE = re.compile(rf"%(?:{'|'.join(sorted(LINE_WRAPPERS))})[ \t]+(?P<rest>.*)")
@@ -21,11 +21,13 @@ def python_of(notebook: Notebook) -> str:
 
 def _python(source: str) -> str | None:
     """The cell with its lines in their places; None if it is for a magic that runs no Python."""
-    while (magic := cell_magic(source)) is not None:
-        if magic.name not in WRAPPERS:
+    lines = source.split("\n")
+    above = 0
+    for place, name in cell_magics(lines):
+        if name not in WRAPPERS:
             return None
-        source = "#\n" * magic.number + magic.body
-    return source
+        above = place + 1
+    return "\n".join(["#"] * above + lines[above:])
 
 
 def _without_magics(source: str) -> str:

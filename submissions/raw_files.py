@@ -6,20 +6,18 @@ What the files mean is decided in ``bundle.py``; nothing here is unpacked to dis
 from __future__ import annotations
 
 import contextlib
-import lzma
 import os
 import stat
-import struct
 import unicodedata
-import zipfile
-import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
 from sim.errors import UsageError
+from sim.readers.unreadable import TooMany, Unreadable
+from sim.readers.zip_archive import CHUNK, PLAIN_COMPRESSION, ZipFile, ZipInfo, entry_chunks, open_zip
 from sim.sentences import Sentence
 
 MEGABYTE = 1024 * 1024
@@ -27,28 +25,10 @@ MAX_TOTAL_BYTES = 32 * MEGABYTE
 MAX_FILE_BYTES = 16 * MEGABYTE
 MAX_FILES = 256
 _MAX_NAME_BYTES = 200
-_CHUNK = 64 * 1024
 
 #: Leftovers of tools and systems; they are no part of a submission, in whatever folder they lie.
 _IGNORED_NAMES = {"__MACOSX", "__pycache__", "Thumbs.db", "desktop.ini", "Icon\r"}
 _EXPECTED_FLAT = Sentence("expected robot.py, responder.py and the files they use side by side")
-
-#: What ``zipfile`` and its decompressors raise on archives that were made to break them.
-_BROKEN_ARCHIVE = (
-    zipfile.BadZipFile,
-    zipfile.LargeZipFile,
-    zlib.error,
-    lzma.LZMAError,
-    struct.error,
-    EOFError,
-    OSError,
-    OverflowError,
-    RuntimeError,
-    UnicodeError,
-    ValueError,
-    IndexError,
-    KeyError,
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +69,13 @@ class _Budget:
 
     def read(self, name: str, stream: BinaryIO) -> bytes:
         """All of ``stream``, counted while it comes, whatever size it claims to have."""
+        return self.join(name, iter(lambda: stream.read(CHUNK), b""))
+
+    def join(self, name: str, coming: Iterator[bytes]) -> bytes:
+        """All chunks of a file, counted while they come."""
         chunks = []
         size = 0
-        while chunk := stream.read(_CHUNK):
+        for chunk in coming:
             size += len(chunk)
             self.total += len(chunk)
             if size > MAX_FILE_BYTES:
@@ -223,12 +207,12 @@ def _with_archive_opened(raw: RawFiles) -> RawFiles:
 
 
 def read_zip(path: Path) -> RawFiles:
-    """The files in a zip archive, or in the one top folder that all of them lie in.
+    """The files in a zip archive, in the one top folder that all of them lie in, or in the one archive in it.
 
     Raises UsageError for anything that is no plain archive of flat files: paths that lead elsewhere, links,
     encrypted or nested entries, two of one name, too many, too large once they are decompressed.
     """
-    return unzip(read_single_file(path), shown(path.name))
+    return _with_archive_opened(unzip(read_single_file(path), shown(path.name)))
 
 
 def unzip(data: bytes, where: str) -> RawFiles:
@@ -237,16 +221,7 @@ def unzip(data: bytes, where: str) -> RawFiles:
         raise UsageError(
             "%(where)s: is an empty file, expected a zip archive with robot.py and responder.py.", where=where
         )
-    # zipfile builds an object for each entry before anything can be counted.
-    if data.count(b"PK\x01\x02") > 8 * MAX_FILES:
-        raise UsageError("%(where)s: has too many files, expected at most %(most)s.", where=where, most=MAX_FILES)
-    try:
-        archive = zipfile.ZipFile(BytesIO(data))
-    except (*_BROKEN_ARCHIVE, NotImplementedError):
-        raise UsageError(
-            "%(where)s: is not a zip archive that can be read, expected an ordinary .zip.", where=where
-        ) from None
-    with archive:
+    with _opened(data, where) as archive:
         entries = _plain_entries(archive.infolist(), where)
         notes: list[str] = []
         tops = {parts[0] for parts, _ in entries}
@@ -266,25 +241,35 @@ def unzip(data: bytes, where: str) -> RawFiles:
             if parts[0] in files:
                 raise _twice(where, shown(parts[0]))
             budget.one_more()
-            files[parts[0]] = _decompress(archive, info, parts[0], where, budget)
+            try:
+                files[parts[0]] = budget.join(parts[0], entry_chunks(archive, info))
+            except Unreadable:
+                raise UsageError(
+                    "%(where)s: %(name)s is damaged in the archive, expected one that unpacks without errors.",
+                    where=where,
+                    name=shown(parts[0]),
+                ) from None
     return RawFiles(files, tuple(notes))
 
 
-def _decompress(archive: zipfile.ZipFile, info: zipfile.ZipInfo, name: str, where: str, budget: _Budget) -> bytes:
-    try:
-        with archive.open(info) as stream:
-            return budget.read(name, stream)  # type: ignore[arg-type]
-    except UsageError:
-        raise
-    except (*_BROKEN_ARCHIVE, NotImplementedError):
-        raise UsageError(
-            "%(where)s: %(name)s is damaged in the archive, expected one that unpacks without errors.",
-            where=where,
-            name=shown(name),
-        ) from None
+@contextlib.contextmanager
+def _opened(data: bytes, where: str) -> Iterator[ZipFile]:
+    with contextlib.ExitStack() as held:
+        try:
+            # Entries that do not count, and those of archives in it, are entries too.
+            archive = held.enter_context(open_zip(BytesIO(data), 8 * MAX_FILES))
+        except TooMany:
+            raise UsageError(
+                "%(where)s: has too many files, expected at most %(most)s.", where=where, most=MAX_FILES
+            ) from None
+        except Unreadable:
+            raise UsageError(
+                "%(where)s: is not a zip archive that can be read, expected an ordinary .zip.", where=where
+            ) from None
+        yield archive
 
 
-def _plain_entries(infos: Iterable[zipfile.ZipInfo], where: str) -> list[tuple[tuple[str, ...], zipfile.ZipInfo]]:
+def _plain_entries(infos: Iterable[ZipInfo], where: str) -> list[tuple[tuple[str, ...], ZipInfo]]:
     """The path, in parts, of every file that counts; the hostile ones are refused before any is read."""
     entries = []
     for info in infos:
@@ -317,7 +302,7 @@ def _plain_entries(infos: Iterable[zipfile.ZipInfo], where: str) -> list[tuple[t
             continue
         for part in parts:
             _check_name(where, part)
-        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        if info.compress_type not in PLAIN_COMPRESSION:
             raise UsageError(
                 "%(where)s: %(name)s is compressed in an unusual way, expected an ordinary .zip.",
                 where=where,
@@ -343,6 +328,13 @@ def _check_name(where: str, name: str) -> None:
             where=where,
             name=shown(name),
             most=_MAX_NAME_BYTES,
+        )
+    if "\\" in name or ":" in name:
+        raise UsageError(
+            "%(where)s: has a file name with a backslash or a colon in it (%(name)s), expected a name that every "
+            "system can have: rename the file.",
+            where=where,
+            name=shown(name),
         )
 
 

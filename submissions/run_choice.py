@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from sim.errors import UsageError
+from sim.readers.python_source import parse_module
+from sim.readers.unreadable import Unreadable
 from submissions.assignment.definition import Assignment
 from submissions.magics import without_magic
 from submissions.marked_cell import LAST, TAG, Site, marked_site, named_floors, program_of, sites
@@ -123,8 +125,8 @@ def _is_test(text: str) -> bool:
     if len(code) > _TEST_LENGTH:
         return False
     try:
-        nodes = list(ast.walk(ast.parse(code)))
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        nodes = list(ast.walk(parse_module(code)))
+    except (SyntaxError, Unreadable):
         return False
     statements = [node for node in nodes if isinstance(node, ast.stmt)]
     called = [ast.unparse(node.func) for node in nodes if isinstance(node, ast.Call)]

@@ -22,6 +22,10 @@ _TEXT_ENCODINGS = re.compile(
 )
 
 
+_RICH_TEXT = rb"{\rtf"
+_NOTEBOOK_KEYS = (b'"cells"', b'"nbformat"')
+
+
 @dataclass(frozen=True, slots=True)
 class DecodedText:
     """The text, and a sentence on how it was read where that was not plain UTF-8."""
@@ -33,10 +37,19 @@ class DecodedText:
 def decode_source(data: bytes, name: str) -> DecodedText:
     """UTF-8, a byte order mark, a PEP 263 cookie, else Latin-1, in this order.
 
-    Raises UsageError for more than 1 MB and for NUL characters, which no Python file has.
+    Raises UsageError for more than 1 MB, for NUL characters, which no Python file has, for rich text and for notebooks.
     """
     if len(data) > MAX_SOURCE_BYTES:
         raise UsageError("%(name)s: is too large for a Python file, expected at most 1 MB.", name=name)
+    if data.lstrip().startswith(_RICH_TEXT):
+        raise UsageError(
+            "%(name)s: is a rich text document, expected Python source. In the editor, save it as plain text.",
+            name=name,
+        )
+    if data.lstrip().startswith(b"{") and all(key in data for key in _NOTEBOOK_KEYS):
+        raise UsageError(
+            "%(name)s: is a notebook, expected Python source. Rename it so that it ends in .ipynb.", name=name
+        )
     decoded = _decode(data, name)
     nul = decoded.text.find("\0")
     if nul >= 0:

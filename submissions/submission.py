@@ -29,10 +29,16 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Notebook:
-    """A notebook of the student's: the name it was submitted under, and its code cells from the top."""
+    """A notebook of the student's: the name it was submitted under, and its code cells from the top.
+
+    ``markdown_programs`` are the Markdown cells, counted among all cells, that begin a robot program; none is run.
+    ``raw_responders`` are the first lines of functions called responder that are in Raw cells.
+    """
 
     name: str
     cells: tuple[Cell, ...]
+    markdown_programs: tuple[int, ...] = field(default=(), compare=False)
+    raw_responders: tuple[str, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True, slots=True)

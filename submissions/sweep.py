@@ -56,6 +56,11 @@ class Sweep:
         """The conditions that are varied."""
         return tuple(field.name for field in fields(self) if getattr(self, field.name))
 
+    @property
+    def count(self) -> int:
+        """How many coordinates there are."""
+        return sum(len(getattr(self, condition)) for condition in self.conditions) or 1
+
     def coordinates(self) -> Iterator[Coordinates]:
         """One condition after the other, each over its levels; a single empty one if nothing is varied."""
         if not self.conditions:

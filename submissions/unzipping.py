@@ -7,41 +7,44 @@ from __future__ import annotations
 
 import os
 import shutil
-import zipfile
-import zlib
 from pathlib import Path, PurePosixPath
 
 from sim.errors import UsageError
+from sim.readers.unreadable import Unreadable
+from sim.readers.zip_archive import ZipFile, entry_chunks, open_zip
 from submissions.raw_files import shown
-
-_CHUNK = 1 << 20
 
 
 def unzip(path: Path, folder: Path, most_entries: int, most_bytes: int) -> None:
     """Lay what is in a zip into a folder, as files and folders alone. Raises UsageError where that cannot be."""
-    left = most_bytes
     try:
-        with zipfile.ZipFile(path) as archive:
-            infos = [info for info in archive.infolist() if not info.is_dir()]
-            if len(infos) > most_entries:
-                raise UsageError(f"{path.name}: holds {len(infos)} files, expected at most {most_entries}.")
-            for info in infos:
-                target = _target(folder, info.filename, path.name)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                with archive.open(info) as source, target.open("xb") as sink:
-                    while chunk := source.read(_CHUNK):
-                        left -= len(chunk)
-                        if left < 0:
-                            raise UsageError(f"{path.name}: unpacks to more than {_amount(most_bytes)}.")
-                        sink.write(chunk)
+        # The entries of folders, and of archives in it, count here, too.
+        with path.open("rb") as source, open_zip(source, 2 * most_entries) as archive:
+            _lay(archive, folder, path.name, most_entries, most_bytes)
     except FileExistsError as error:
         double = shown(str(Path(error.filename).relative_to(folder)))
         raise UsageError(f"{path.name}: holds two files of the same name, {double}.") from None
-    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError, ValueError) as error:
+    except Unreadable as error:
         raise UsageError(f"{path.name}: cannot be unpacked: {error}.") from None
     except OSError as error:
         free = shutil.disk_usage(folder).free
         raise UsageError(f"{path.name}: cannot be unpacked: {error.strerror} ({free >> 20} MB free).") from None
+
+
+def _lay(archive: ZipFile, folder: Path, name: str, most_entries: int, most_bytes: int) -> None:
+    left = most_bytes
+    infos = [info for info in archive.infolist() if not info.is_dir()]
+    if len(infos) > most_entries:
+        raise UsageError(f"{name}: holds {len(infos)} files, expected at most {most_entries}.")
+    for info in infos:
+        target = _target(folder, info.filename, name)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with target.open("xb") as sink:
+            for chunk in entry_chunks(archive, info):
+                left -= len(chunk)
+                if left < 0:
+                    raise UsageError(f"{name}: unpacks to more than {_amount(most_bytes)}.")
+                sink.write(chunk)
 
 
 def _target(folder: Path, name: str, archive: str) -> Path:

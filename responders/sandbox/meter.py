@@ -66,6 +66,10 @@ class JobMeter:
         """What the job may cost."""
         return self._limits
 
+    def extend(self, limits: JobLimits) -> None:
+        """Let the job cost this much from now on; what it has cost is kept."""
+        self._limits = limits
+
     def heartbeat(self) -> None:
         """Whatever it raises that is not ours to tell a user is the machine's fault, never a child's."""
         try:
@@ -89,7 +93,7 @@ class JobMeter:
         if self._cpu + running > self._limits.cpu_seconds:
             raise ChildStopped(
                 Verdict.CPU_LIMIT,
-                f"all trials together computed for more than {self._limits.cpu_seconds:g} seconds of CPU time",
+                "all trials together computed for longer than a submission may",
             )
 
     def check_sleep(self, running: float) -> None:

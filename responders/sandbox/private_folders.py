@@ -18,8 +18,8 @@ from pathlib import Path
 _PREFIX = "robomark-trials-"
 #: Others may pass through it, as a child that runs as a user of its own must, but not look round.
 _MODE = 0o711
-#: How many numbers are left out at most before a trial, several times what a child may use up.
-_SKIPPED = 1500
+#: How many numbers each trial takes up, with those that are left out after it: several times what a child may use up.
+_NUMBERS = 1024
 #: How many numbers are taken at most during a trial, several times what others make in the meantime.
 _TAKEN = 64
 
@@ -43,7 +43,7 @@ class PrivateFolders:
     @contextlib.contextmanager
     def one(self) -> Iterator[Path]:
         """A folder for one trial."""
-        with self._anybodys_guess():
+        with self._telling_nothing():
             folder = Path(tempfile.mkdtemp(dir=self.path))
             try:
                 yield folder
@@ -51,18 +51,24 @@ class PrivateFolders:
                 _remove(folder)
 
     @contextlib.contextmanager
-    def _anybodys_guess(self) -> Iterator[None]:
-        """Meanwhile the number of the next file says nothing about how many an earlier trial has made.
+    def _telling_nothing(self) -> Iterator[None]:
+        """Keep the number of a trial's next file from saying how many files an earlier trial has made.
 
-        Where files are numbered on and on (tmpfs, Btrfs) it would say so itself. Where the lowest free number is taken
-        (ext4) it says whether others, who made files beside that trial, found the low ones taken.
+        Where files are numbered on and on (tmpfs, Btrfs), every trial takes up as many numbers, whatever it makes.
+        Where the lowest free number is taken (ext4) it would say whether others, who made files beside that trial,
+        found the low ones taken; so a number of low ones that nobody knows is taken meanwhile.
         """
+        folder = self.path
         if self._counting:
-            for _ in range(secrets.randbelow(_SKIPPED)):
-                _number(self.path)
-            yield
+            end = _number(folder) + _NUMBERS
+            try:
+                yield
+            finally:
+                for _ in range(_NUMBERS):
+                    if _number(folder) >= end:
+                        break
             return
-        taking = Path(tempfile.mkdtemp(dir=self.path))
+        taking = Path(tempfile.mkdtemp(dir=folder))
         try:
             for place in range(secrets.randbelow(_TAKEN)):
                 (taking / str(place)).touch(0o600)
@@ -80,13 +86,7 @@ class PrivateFolders:
             self._lock = -1
 
     def _make(self, path: Path | None) -> None:
-        # Whoever looks for left-overs does not see it without its lock.
-        hidden = Path(tempfile.mkdtemp(prefix=f".{_PREFIX}"))
-        hidden.chmod(_MODE)
-        path = path or hidden.with_name(hidden.name.removeprefix("."))
-        locked = os.open(hidden, os.O_RDONLY | os.O_DIRECTORY)
-        fcntl.flock(locked, fcntl.LOCK_EX)
-        hidden.rename(path)
+        path, locked = locked_folder(_PREFIX, _MODE, path)
         if self._lock >= 0:
             os.close(self._lock)
         self._path, self._lock = path, locked
@@ -103,12 +103,24 @@ def _number(folder: Path) -> int:
         path.unlink()
 
 
-def remove_left_overs() -> None:
-    """Remove the folders of trials whose worker was killed before it could do so itself.
+def locked_folder(prefix: str, mode: int, path: Path | None = None) -> tuple[Path, int]:
+    """Make a temporary folder, at ``path`` if given. Returns it and its lock, a descriptor to be closed at the end."""
+    # Whoever looks for left-overs does not see it without its lock.
+    hidden = Path(tempfile.mkdtemp(prefix=f".{prefix}"))
+    hidden.chmod(mode)
+    path = path or hidden.with_name(hidden.name.removeprefix("."))
+    locked = os.open(hidden, os.O_RDONLY | os.O_DIRECTORY)
+    fcntl.flock(locked, fcntl.LOCK_EX)
+    hidden.rename(path)
+    return path, locked
 
-    A worker may live in another name space, where process ids say nothing: only the lock says that it is gone.
+
+def remove_left_overs(prefix: str = _PREFIX) -> None:
+    """Remove the locked folders whose process was killed before it could do so itself.
+
+    It may live in another name space, where process ids say nothing: only the lock says that it is gone.
     """
-    for folder in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
+    for folder in Path(tempfile.gettempdir()).glob(f"{prefix}*"):
         # Another worker may be doing the same at this moment.
         with contextlib.suppress(OSError), _opened(folder) as descriptor:
             if os.fstat(descriptor).st_uid == os.getuid():

@@ -24,9 +24,9 @@ from sim.recording import Verdict
 _POLL_SECONDS = 0.02
 #: What is read of the wire at once, bytes; most of what comes is far shorter.
 _AT_ONCE = 8192
-#: What a child is charged for a frame at least; made by our own code there, one costs it several times this. It keeps
-#: a child that writes thousands of frames at a stroke from holding up the worker, to which each costs more.
-_FRAME_CPU_SECONDS = 5e-6
+#: Seconds that a child is charged at least for a frame, for each of its bytes and for an act in a packet: a little more
+#: than reading it costs the worker. So a child that writes thousands or long ones pays for the worker's time.
+_FRAME_CPU_SECONDS, _BYTE_CPU_SECONDS, _ACT_CPU_SECONDS = 1e-5, 1e-8, 5e-6
 _STALLED_SECONDS = 5.0
 #: Of the child's own time, and of real time once it does not even wait for a processor.
 _LAST_WORD_CPU_SECONDS = 0.04
@@ -74,6 +74,9 @@ class ServedChild(Protocol):
     def cpu_seconds(self) -> float:
         """What the child has used so far."""
 
+    def last_place(self) -> wire.Frame:
+        """Return the ``line`` and ``file`` that the child is at, and end its work: it serves nothing afterwards."""
+
     def close(self) -> None:
         """End the child."""
 
@@ -106,9 +109,11 @@ class Child:
         self._meter = JobMeter()
         self._blamed = self._has_libraries = False
         self._overran: Callable[[], bool] | None = None
+        #: Whether it is watched on past its limits, which end it all the same, and whether it came to twice as much.
+        self.measured = self.outlasted = False
         self._pending = b""
         self._sent = self._received = 0  # frames
-        self._charged = 0  # frames, and acts in packets
+        self._charged = 0.0  # seconds, for frames and acts in packets
         self._known: dict[bytes, wire.Frame] = {}
         self._closed = False
         self._clock = (~pid << 3) | 2  # the scheduler's CPU clock of another process, see clock_getcpuclockid(3)
@@ -170,6 +175,7 @@ class Child:
             line, self._pending = self._line(data)
             number, line = wire.unnumbered(line)
             self._count(number)
+            self._charged += len(line) * _BYTE_CPU_SECONDS
             frame = self._known.get(line)
             if frame is not None:
                 return frame
@@ -202,7 +208,7 @@ class Child:
         self._pending = data[size:]
         acts = packed.acts_of(data[:size])
         self._count(number)
-        self._charged += len(acts)
+        self._charged += len(acts) * _ACT_CPU_SECONDS
         return acts
 
     def _at_least(self, data: bytes, size: int) -> bytes:
@@ -218,7 +224,12 @@ class Child:
         if number != self._received:
             raise wire.WireError(f"frame {number} where frame {self._received} was due")
         self._received += 1
-        self._charged += 1
+        self._charged += _FRAME_CPU_SECONDS
+
+    @property
+    def cpu_limit(self) -> float:
+        """The seconds that it may compute."""
+        return self._limits.cpu_seconds
 
     @property
     def closed(self) -> bool:
@@ -231,6 +242,13 @@ class Child:
             return time.clock_gettime(self._clock)
         except OSError:
             return 0.0
+
+    def last_place(self) -> wire.Frame:
+        """Return the ``line`` and ``file`` that the child is at, and end its work: it serves nothing afterwards.
+
+        A child that waits for a reply is at the same line in every run.
+        """
+        return self._last_word()
 
     def close(self) -> None:
         """Kill the child and wait until it is gone."""
@@ -265,6 +283,8 @@ class Child:
             if used != last_cpu or process_state.runnable(self._pid):
                 last_cpu, still_since = used, now
             elif now - still_since > _STALLED_SECONDS:
+                if self.measured:
+                    self._watch_on(computing=False)
                 raise self._stalled()
         now = time.monotonic()
         self._waited += now - began
@@ -282,11 +302,32 @@ class Child:
         """CPU seconds used. Raises ChildStopped when it is too much, or when the folder has grown too large."""
         self._check_folder()
         used = self.cpu_seconds()
-        charged = max(used, self._charged * _FRAME_CPU_SECONDS)
+        charged = max(used, self._charged)
         if charged > self._limits.cpu_seconds:
+            if self.measured:
+                self._watch_on(computing=True)
             raise child_ends.too_busy(self._limits.cpu_seconds, self._last_word())
         self._meter.check_cpu(charged)
         return used
+
+    def _watch_on(self, computing: bool) -> None:
+        """See whether a child at its limit goes on computing up to twice as much, or sleeping, and says nothing."""
+        used, still_since = self.cpu_seconds(), time.monotonic()
+        with contextlib.suppress(ChildStopped):
+            while not self._answered.poll(_POLL_SECONDS * 1000):
+                self._meter.heartbeat()
+                self._check_folder()
+                before, used = used, self.cpu_seconds()
+                slept_on = time.monotonic() - still_since > _STALLED_SECONDS
+                if used > 2 * self._limits.cpu_seconds or (slept_on and not computing):
+                    self.outlasted = True
+                    return
+                if used == before and slept_on:
+                    return
+                if used != before:
+                    if not computing:
+                        return
+                    still_since = time.monotonic()
 
     def _check_sleep(self) -> None:
         """Time in which neither it nor the worker ran or stood in the queue for a processor adds up.
@@ -363,7 +404,11 @@ class Child:
     def _leave(self) -> None:
         """End the child, and tell the meter what it has cost."""
         self._closed = True
-        self._meter.child_ended(self.cpu_seconds(), self._slept_seconds())
+        cpu_seconds, slept = max(self.cpu_seconds(), self._charged), self._slept_seconds()
+        if self.measured:
+            # Being watched on is not its doing.
+            cpu_seconds, slept = min(cpu_seconds, self._limits.cpu_seconds), min(slept, _STALLED_SECONDS)
+        self._meter.child_ended(cpu_seconds, slept)
         self._kill()
         for fd in (self._reading, self._writing, self._pidfd):
             os.close(fd)

@@ -1,4 +1,4 @@
-"""A process with imports loaded, from which the children of one role are forked, and the sandbox that stand round them.
+"""A process with imports loaded, from which the children of one role are forked, and the sandbox round them.
 
 Nothing of the worker's reaches it: it is a fresh process with a clean environment. Which zygotes a worker has is
 ``manager.py``'s; listening to a child and stopping it is ``running_child.py``'s.
@@ -19,19 +19,18 @@ import socket
 import struct
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
 from responders import wire
-from responders.sandbox import bubblewrap
+from responders.sandbox import bubblewrap, zygote_command
 from responders.sandbox.child_ends import KilledFromOutside
 from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.private_folders import PrivateFolders
-from responders.sandbox.processor import ALLOWED
 from responders.sandbox.running_child import Child, ChildLimits
 from sim.errors import HostError
 
@@ -43,6 +42,7 @@ _START_SECONDS = 60.0
 _END_SECONDS = 0.5
 _FILE_BYTES = 4 << 20
 _RECYCLE_AFTER = 1000
+_MOST_PROCESSORS = 1024
 #: How a zygote tells that a child has ended: the wait status, seconds and microseconds of the user's and the system's.
 _ENDED = struct.Struct("=i4x4q")
 _BATTERY_LIMITS = ChildLimits(2.0, 64 << 20)
@@ -96,6 +96,7 @@ def stamp(standing: wire.Frame, bubblewrap: bool, control_group: bool) -> str:
     layers = [f"Landlock {standing['landlock']}"] * bool(standing["landlock"]) + ["seccomp"] * standing["seccomp"]
     layers += ["doorkeeper"] * (standing["without_doorkeeper"] is None) + ["own user"] * standing["own_user"]
     layers += ["bubblewrap"] * bubblewrap + ["control group"] * control_group
+    layers += ["fixed addresses"] * (bool(layers) and standing["fixed_addresses"])
     policy = standing["policy"]
     return ", ".join([*layers, "process limits", f"policy {policy}"]) if layers else "process limits only"
 
@@ -123,7 +124,7 @@ class Zygote:
         #: Why its children can name any path; None when a doorkeeper decides about those.
         self.without_doorkeeper: str | None = "no child has been forked"
         self.children_cpu_seconds = 0.0  # of all children that are gone
-        self._control: socket.socket | None = None
+        self._sockets: tuple[socket.socket, ...] = ()  # to the zygote, for orders, and to children, for their specs
         self._process: subprocess.Popen[bytes] | None = None
 
     def spawn(
@@ -170,7 +171,7 @@ class Zygote:
     def reap(self, pid: int) -> int:
         """The wait status of a child that has been killed or has ended. Raises HostError when the zygote is gone."""
         try:
-            ended, _ = self._ask({"do": "reap", "pid": pid})
+            ended, _ = self._order(pid)
             self._living -= 1
             status, *used = _ENDED.unpack_from(ended)
             self.children_cpu_seconds += sum(used[0::2]) + sum(used[1::2]) / 1e6
@@ -182,9 +183,9 @@ class Zygote:
 
     def close(self) -> None:
         """End the zygote, by force if it does not end by itself, and close what leads to it."""
-        if self._control is not None:
-            self._control.close()
-            self._control = None
+        for opened in self._sockets:
+            opened.close()
+        self._sockets = ()
         if self._process is not None:
             # It ends by itself then, and its doorkeeper after it, unless it is stuck.
             with contextlib.suppress(subprocess.TimeoutExpired):
@@ -206,11 +207,10 @@ class Zygote:
         reading, their_writing = os.pipe()
         their_reading, writing = os.pipe()
         try:
-            data, received = self._ask(
+            data, received = self._fork(
                 {
-                    "do": "spawn",
                     "work": work,
-                    "processors": sorted(os.sched_getaffinity(0)),
+                    "processors": _mask(os.sched_getaffinity(0)),
                     "cpu": limits.cpu_seconds,
                     "memory": limits.memory_bytes,
                     "without": limits.without,
@@ -294,59 +294,60 @@ class Zygote:
     def _exec(self, wrapping: list[str]) -> None:
         """Exec a clean process, with nothing of ours in its environment."""
         self.close()
-        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        code = (
-            f"import os, sys; os.sched_setaffinity(0, {sorted(ALLOWED)}); "
-            "os.dup2(int(sys.argv[1]), 3); os.closerange(4, 1 << 16); sys.path.insert(0, sys.argv[2]); "
-            "from inside.zygote import main; main(sys.argv[3], sys.argv[4], sys.argv[5].split(), sys.argv[6:])"
-        )
+        pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(2)]
+        ours, theirs = zip(*pairs, strict=True)
+        numbers = [each.fileno() for each in theirs]
         joining = self._group.joining if self._group is not None else []
-        without = " ".join(self._without)
-        own = [str(_HERE), self._role, str(self._folders.path), without, own_modules(self._role)]
+        arguments = [str(_HERE), self._role, str(self._folders.path), " ".join(self._without), own_modules(self._role)]
         try:
             self._process = subprocess.Popen(
-                [*joining, *wrapping, sys.executable, "-I", "-B", "-c", code, str(theirs.fileno()), *own],
-                pass_fds=(theirs.fileno(),),
+                [*joining, *wrapping, *zygote_command.command(numbers, arguments)],
+                pass_fds=numbers,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 cwd="/",
-                env={
-                    "PATH": "/usr/bin:/bin",
-                    "LANG": "C.UTF-8",
-                    "OPENBLAS_NUM_THREADS": "1",
-                    "OMP_NUM_THREADS": "1",
-                    "MKL_NUM_THREADS": "1",
-                    "MALLOC_ARENA_MAX": "2",
-                    "LOKY_MAX_CPU_COUNT": "1",
-                    "JOBLIB_MULTIPROCESSING": "0",
-                    "PYTHONHASHSEED": "0",
-                    "ORT_DISABLE_TELEMETRY": "1",
-                },
+                env=zygote_command.environment(),
             )
         finally:
-            theirs.close()
-        self._control = ours
+            for each in theirs:
+                each.close()
+        self._sockets = ours
 
-    def _ask(self, order: dict[str, Any], descriptors: list[int] | None = None) -> tuple[bytes, list[int]]:
-        if self._control is None:
-            raise EOFError("it is not running")
-        payload = array.array("i", descriptors or [])
-        ancillary = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, payload)] if descriptors else []
-        self._control.sendmsg([json.dumps(order).encode()], ancillary)
-        return self._answer()
+    def _fork(self, spec: dict[str, Any], descriptors: list[int]) -> tuple[bytes, list[int]]:
+        """Have a child forked, which reads its spec; its answer."""
+        _, specs = self._running()
+        payload = array.array("i", descriptors)
+        specs.sendmsg([json.dumps(spec).encode()], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, payload)])
+        return self._order(0, answers=1)
 
-    def _answer(self) -> tuple[bytes, list[int]]:
-        if self._control is None:
-            raise EOFError("it is not running")
-        if not select.select([self._control], [], [], _START_SECONDS)[0]:
+    def _order(self, number: int, answers: int = 0) -> tuple[bytes, list[int]]:
+        """Send an order to the zygote: zero, or the child that is to be reaped. The answer, from one of the sockets."""
+        self._running()[0].send(number.to_bytes(4, "little"))
+        return self._answer(answers)
+
+    def _answer(self, which: int = 0) -> tuple[bytes, list[int]]:
+        sockets = self._running()
+        answered, control = sockets[which], sockets[0]
+        ready = select.select({answered, control}, [], [], _START_SECONDS)[0]
+        if not ready:
             raise EOFError("no answer")
-        data, received, _, _ = self._control.recvmsg(65536, socket.CMSG_SPACE(8 * 4))
+        data, received, _, _ = (answered if answered in ready else control).recvmsg(65536, socket.CMSG_SPACE(8 * 4))
         if not data:
             raise EOFError("it ended")
         found = array.array("i")
         for _, _, part in received:
             found.frombytes(part[: len(part) - len(part) % 4])
         return data, list(found)
+
+    def _running(self) -> tuple[socket.socket, ...]:
+        if not self._sockets:
+            raise EOFError("it is not running")
+        return self._sockets
+
+
+def _mask(processors: Set[int]) -> str:
+    """A bit each, as many digits whichever they are: how long a spec is shows in a child's addresses."""
+    return sum(1 << number for number in processors).to_bytes(_MOST_PROCESSORS // 8, "little").hex()
 
 
 def _close(*descriptors: int) -> None:

@@ -1,7 +1,4 @@
-"""``robomark appeals``: what students ask again, and the answers.
-
-What it does stands in ``store/appeals.py``.
-"""
+"""``robomark appeals``: what students ask again, and the answers."""
 
 from __future__ import annotations
 
@@ -9,15 +6,10 @@ from typing import Annotated
 
 import typer
 
+from service.commands.operating import operating
 from service.commands.shown import document, show, table, tell
-from service.settings import load_settings
-from service.store import audit
-from service.store.courses.hidden_names import hidden_names
-from service.store.engine import open_store
-from service.store.grades import appeals
-from service.store.installation import secret_of
-from service.store.people import people
-from service.store.people.students import DEFAULT_COURSE
+from service.operations import appeals, courses
+from service.operations.courses import DEFAULT_COURSE
 
 Course = Annotated[str, typer.Option(help="The course.")]
 
@@ -27,13 +19,10 @@ def list_appeals(
     answered: Annotated[bool, typer.Option("--answered", help="Those that are answered, too.")] = False,
 ) -> None:
     """List the open appeals of a course, the longest waiting first."""
-    with open_store(load_settings()) as store:
-        secret = secret_of(store)
-        with store.reading() as session:
-            course_id = people.find_course(session, course)
-            hidden = hidden_names(session, course_id, secret)
-            found = appeals.in_course(session, course_id, hidden, answered=False)
-            found += appeals.in_course(session, course_id, hidden, answered=True) if answered else []
+    with operating() as (service, actor):
+        course_id = courses.find(service, actor, course)
+        found = appeals.list_open(service, actor, course_id)
+        found += appeals.list_answered(service, actor, course_id) if answered else []
     document(appeals=found)
     if not found:
         tell("no appeal is open")
@@ -51,7 +40,7 @@ def answer(
     course: Course = DEFAULT_COURSE,
 ) -> None:
     """Answer an appeal, which closes it."""
-    with open_store(load_settings()) as store, store.transaction() as session:
-        appeals.answer(session, people.find_course(session, course), number, text, audit.this_user())
+    with operating() as (service, actor):
+        appeals.answer(service, actor, courses.find(service, actor, course), number, text)
     document(appeal=number)
     tell(f"appeal {number} is answered")

@@ -1,31 +1,25 @@
 """``robomark course``: when and how often students may submit, and what single students are allowed beyond it.
 
-What follows for a submission stands in ``store/policies.py``.
+The rules for a submission are in ``service/store/courses/policies.py``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from sqlalchemy.orm import Session
 
+from service.commands.operating import operating
 from service.commands.shown import document, show, table, tell
-from service.settings import load_settings
-from service.store import audit
-from service.store.courses import open_assignments, policies
-from service.store.courses.open_assignments import CourseAssignment
-from service.store.courses.policies import PolicyLimits
-from service.store.courses.versions import check_assignment
-from service.store.engine import Store, now, open_store
-from service.store.people import people
-from service.store.people.students import DEFAULT_COURSE, Students, course_of
+from service.operations import assignments, courses, policies
+from service.operations import people as people_operations
+from service.operations.assignments import CourseAssignment
+from service.operations.courses import DEFAULT_COURSE
+from service.operations.policies import ExtensionRequest, PolicyLimits
 from sim.errors import UsageError
-from submissions.names import shown_name
 from submissions.people import read_people, students_of
 from submissions.roster import moment
 
@@ -53,20 +47,13 @@ def policy(
     allowed = PolicyLimits(_due(due), late_days, attempts, cool_down * 60)
     if drop and allowed != PolicyLimits():
         raise UsageError("--drop takes away what was set, expected no other limits beside it")
-    with open_store(load_settings()) as store:
+    with operating() as (service, actor):
+        course_id = courses.find(service, actor, course)
         if drop:
-            with store.transaction() as session:
-                course_id = people.find_course(session, course)
-                policies.drop_policy(session, course_id, assignment)
-                told = {"assignment": assignment, "dropped": True}
-                audit.note(session, audit.this_user(), "policy", "course", str(course_id), **told)
+            policies.drop_policy(service, actor, course_id, assignment)
         elif allowed != PolicyLimits():
-            with store.transaction() as session:
-                course_id = course_of(session, course, now(session))
-                check_assignment(session, assignment)
-                policies.set_policy(session, course_id, assignment, allowed)
-                audit.note(session, audit.this_user(), "policy", "course", str(course_id), **_told(assignment, allowed))
-        _show(store, course)
+            policies.set_policy(service, actor, course_id, assignment, allowed)
+        _show(policies.list_policies(service, actor, course_id))
 
 
 def extend(
@@ -80,18 +67,13 @@ def extend(
 
     Who has not submitted anything yet is enrolled first.
     """
-    if due is None and not more_attempts:
-        raise UsageError("say what to allow: --due, --more-attempts, or both")
     due_at = _due(due)
-    student = shown_name(student)
-    with open_store(load_settings()) as store, store.transaction() as session:
-        at = now(session)
-        course_id = course_of(session, course, at)
-        check_assignment(session, assignment)
-        enrolment_id = Students(session, course_id).find(student)
-        policies.extend(session, enrolment_id, assignment, due_at, more_attempts)
-        detail = {"student": student, **_told(assignment, PolicyLimits(due_at, attempts=more_attempts))}
-        audit.note(session, audit.this_user(), "extend", "course", str(course_id), **detail)
+    with operating() as (service, actor):
+        course_id = courses.find(service, actor, course)
+        member = people_operations.find(service, actor, course, student)
+        request = ExtensionRequest(assignment, due_at, more_attempts)
+        policies.extend(service, actor, course_id, member.enrolment_id, request)
+    student = member.id
     until = "" if due_at is None else f" until {due_at:%Y-%m-%d %H:%M}"
     more = f", {more_attempts} times more" if more_attempts else ""
     document(student=student, assignment=assignment, due=due_at, more_attempts=more_attempts)
@@ -104,13 +86,8 @@ def enrol(
 ) -> None:
     """Enrol students before they submit, or give those who have an id alone their names and addresses."""
     listed = students_of(read_people(people))
-    with open_store(load_settings()) as store, store.transaction() as session:
-        at = now(session)
-        course_id = course_of(session, course, at)
-        students = Students(session, course_id)
-        for student in listed:
-            students.enrol(student, at)
-        audit.note(session, audit.this_user(), "enrol", "course", str(course_id), students=len(listed))
+    with operating() as (service, actor):
+        people_operations.enrol(service, actor, courses.find(service, actor, course), listed)
     document(students=len(listed))
     tell(f"{len(listed)} {'student is' if len(listed) == 1 else 'students are'} in the course")
 
@@ -120,47 +97,35 @@ def prepare(
     course: InCourse = DEFAULT_COURSE,
 ) -> None:
     """Put an assignment into a course, not yet open; again, to mark by what it says now."""
-    # With all kinds of criteria, which whoever opens or closes need not wait for.
-    from service.store.courses.versions import freeze
+    # With all kinds of criteria, which other commands need not wait for.
     from submissions.assignment.reader import find_assignment
 
-    frozen = freeze(find_assignment(assignment))
-    with open_store(load_settings()) as store, store.transaction() as session:
-        course_id = course_of(session, course, now(session))
-        made = open_assignments.prepare(session, course_id, frozen)
-        detail = {"assignment": made.assignment, "version": made.version}
-        audit.note(session, audit.this_user(), "prepare", "course", str(course_id), **detail)
+    found = find_assignment(assignment)
+    with operating() as (service, actor):
+        made = assignments.prepare(service, actor, courses.find(service, actor, course), found)
     _tell_state(made)
 
 
 def open_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
     """Let students see a prepared assignment and submit to it on the web."""
-    _tell_state(_changed(course, assignment, "open", open_assignments.open_for_students))
+    with operating() as (service, actor):
+        made = assignments.open_for_students(service, actor, courses.find(service, actor, course), assignment)
+    _tell_state(made)
 
 
 def close_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
     """Let nobody submit to an assignment on the web any more; what was submitted stays."""
-    _tell_state(_changed(course, assignment, "close", open_assignments.close))
+    with operating() as (service, actor):
+        made = assignments.close(service, actor, courses.find(service, actor, course), assignment)
+    _tell_state(made)
 
 
 def remove_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
     """Let a course have an assignment no more that no student has been shown; graded batches stay."""
-    with open_store(load_settings()) as store, store.transaction() as session:
-        course_id = course_of(session, course, now(session))
-        open_assignments.remove(session, course_id, assignment)
-        audit.note(session, audit.this_user(), "remove", "course", str(course_id), assignment=assignment)
+    with operating() as (service, actor):
+        assignments.remove(service, actor, courses.find(service, actor, course), assignment)
     document(assignment=assignment)
     tell(f"{assignment} is in the course no more")
-
-
-def _changed(
-    course: str, assignment: str, action: str, change: Callable[[Session, int, str], None]
-) -> CourseAssignment:
-    with open_store(load_settings()) as store, store.transaction() as session:
-        course_id = course_of(session, course, now(session))
-        change(session, course_id, assignment)
-        audit.note(session, audit.this_user(), action, "course", str(course_id), assignment=assignment)
-        return open_assignments.find(session, course_id, assignment)
 
 
 def _tell_state(line: CourseAssignment) -> None:
@@ -185,14 +150,7 @@ def _due(text: str | None) -> datetime | None:
         raise UsageError(f"--due is {text!r}, expected a date or a date and time, like 2026-11-30T17:00") from None
 
 
-def _told(assignment: str, allowed: PolicyLimits) -> dict[str, object]:
-    due_at = None if allowed.due_at is None else allowed.due_at.isoformat()
-    return {"assignment": assignment, "due": due_at, "late_days": allowed.late_days, "attempts": allowed.attempts}
-
-
-def _show(store: Store, course: str) -> None:
-    with store.transaction() as session:
-        found = policies.policies(session, course_of(session, course, now(session)))
+def _show(found: dict[str, PolicyLimits]) -> None:
     document(policies=[{"assignment": name, **asdict(allowed)} for name, allowed in found.items()])
     if not found:
         tell("no policy: everything that is submitted is marked, whenever it comes")

@@ -7,13 +7,22 @@ from typing import Annotated
 
 import typer
 
-from service.commands import channel_flags
+from service.commands.channel_flags import ChannelFlags
 from service.commands.format_option import format_option
 from service.commands.language_option import LanguageOption
+from service.commands.option_groups import with_option_groups
 from service.commands.shown import wants_json
 from service.language import SOURCE
 
 
+def _documents() -> tuple[str, ...]:
+    """The formats that have a document for one grade."""
+    from service.reports.formats import FORMATS
+
+    return tuple(name for name, form in FORMATS.items() if form.document is not None)
+
+
+@with_option_groups
 def grade(
     submissions: Annotated[list[Path], typer.Argument(help="Submissions: a .py file, a folder or a .zip each.")],
     assignment: Annotated[
@@ -25,17 +34,8 @@ def grade(
     run: Annotated[
         str | None, typer.Option(metavar="N|TAG", help="Of a notebook: which of its runs is marked, or the tag of one.")
     ] = None,
-    link: channel_flags.LinkFlag = None,
-    beacon: channel_flags.BeaconFlag = None,
-    reach: channel_flags.RangeFlag = None,
-    facing: channel_flags.FacingFlag = None,
-    blocked_by: channel_flags.BlockedByFlag = None,
-    loss: channel_flags.LossFlag = None,
-    delay: channel_flags.DelayFlag = None,
-    jitter: channel_flags.JitterFlag = None,
-    duplication: channel_flags.DuplicationFlag = None,
-    reordering: channel_flags.ReorderingFlag = None,
-    corruption: channel_flags.CorruptionFlag = None,
+    *,
+    channel: ChannelFlags,
     unsafe: Annotated[
         bool, typer.Option("--unsafe-no-sandbox", help="Let submissions do anything on this machine; for development.")
     ] = False,
@@ -44,29 +44,7 @@ def grade(
 
     Several are one document in every format but text, also those that could not be graded, with the reason.
     """
-    from service.commands.channel_flags import given_flags
     from service.commands.grading import grade_all
 
-    given = given_flags(
-        link=link,
-        beacon=beacon,
-        range=reach,
-        facing=facing,
-        blocked_by=blocked_by,
-        loss=loss,
-        delay=delay,
-        jitter=jitter,
-        duplication=duplication,
-        reordering=reordering,
-        corruption=corruption,
-    )
-    grade_all(
-        submissions, assignment, report, "json" if wants_json() else form, given, language, run=run, unsafe=unsafe
-    )
-
-
-def _documents() -> tuple[str, ...]:
-    """The formats that have a document for one grade."""
-    from service.reports.formats import FORMATS
-
-    return tuple(name for name, form in FORMATS.items() if form.document is not None)
+    chosen = "json" if wants_json() else form
+    grade_all(submissions, assignment, report, chosen, channel.given(), language, run=run, unsafe=unsafe)

@@ -1,28 +1,31 @@
-"""``robomark mark``: what instructors set by hand in a grade that is stored, and what they write to its student.
-
-What it does stands in ``store/overrides.py`` and ``store/comments.py``.
-"""
+"""``robomark mark``: what instructors set by hand in a grade that is stored, and what they write to its student."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from sqlalchemy.orm import Session
 
 from service.commands.batch.words import out_of
+from service.commands.operating import operating
 from service.commands.shown import document, show, table, tell
-from service.settings import load_settings
-from service.store import audit
-from service.store.batches import batches
-from service.store.engine import open_store
-from service.store.grades import comments, marking_history, overrides
-from service.store.models import Job
+
+if TYPE_CHECKING:
+    from service.operations.grades import Marking
 
 GradeId = Annotated[str, typer.Argument(help="The grade's id, or the beginning of it.")]
 CriterionId = Annotated[str, typer.Argument(help="The criterion's id; robomark mark history names them.")]
 Reason = Annotated[str, typer.Option(help="Why; the student reads it.")]
+
+
+Seen = Annotated[
+    int | None,
+    typer.Option(
+        min=0,
+        help="Refuse the change if somebody else changed these marks: the id of what is set by hand, as robomark mark "
+        "history --json has it, 0 for nothing.",
+    ),
+]
 
 
 def set_marks(
@@ -30,20 +33,34 @@ def set_marks(
     criterion: CriterionId,
     marks: Annotated[str, typer.Argument(help="From 0 to the most that the criterion gives.")],
     reason: Reason,
+    seen: Seen = None,
 ) -> None:
     """Set the marks of a criterion in place of the grader's, for this submission and all its grades."""
-    wanted = overrides.read_marks(marks)
-    _change(grade, lambda session, job, actor: overrides.set_marks(session, job, criterion, wanted, reason, actor))
+    from service.operations import batches, grades
+
+    with operating() as (service, actor):
+        found = batches.find_grade(service, actor, grade)
+        asked = grades.MarksRequest(criterion, marks, reason, seen)
+        _tell(grades.set_marks(service, actor, found.course_id, found.id, asked))
 
 
-def excuse(grade: GradeId, criterion: CriterionId, reason: Reason) -> None:
+def excuse(grade: GradeId, criterion: CriterionId, reason: Reason, seen: Seen = None) -> None:
     """Let neither the marks of a criterion count nor the most there are."""
-    _change(grade, lambda session, job, actor: overrides.excuse(session, job, criterion, reason, actor))
+    from service.operations import batches, grades
+
+    with operating() as (service, actor):
+        found = batches.find_grade(service, actor, grade)
+        asked = grades.MarksRequest(criterion, None, reason, seen)
+        _tell(grades.set_marks(service, actor, found.course_id, found.id, asked))
 
 
-def withdraw(grade: GradeId, criterion: CriterionId) -> None:
+def withdraw(grade: GradeId, criterion: CriterionId, seen: Seen = None) -> None:
     """Let the grader's marks of a criterion count again."""
-    _change(grade, lambda session, job, actor: overrides.withdraw(session, job, criterion, actor))
+    from service.operations import batches, grades
+
+    with operating() as (service, actor):
+        found = batches.find_grade(service, actor, grade)
+        _tell(grades.withdraw(service, actor, found.course_id, found.id, criterion, seen))
 
 
 def comment(
@@ -52,24 +69,34 @@ def comment(
     criterion: Annotated[str, typer.Option(help="The criterion that it is about; else all of the submission.")] = "",
 ) -> None:
     """Write a comment for the student."""
-    _change(grade, lambda session, job, actor: comments.comment(session, job, criterion, text, actor))
+    from service.operations import batches, grades
+
+    with operating() as (service, actor):
+        found = batches.find_grade(service, actor, grade)
+        asked = grades.CommentRequest(text, criterion)
+        _tell(grades.comment(service, actor, found.course_id, found.id, asked))
 
 
 def uncomment(
     grade: GradeId, number: Annotated[int, typer.Argument(help="The comment's, as robomark mark history says.")]
 ) -> None:
     """Withdraw a comment."""
-    _change(grade, lambda session, job, actor: comments.withdraw(session, job, number, actor))
+    from service.operations import batches, grades
+
+    with operating() as (service, actor):
+        found = batches.find_grade(service, actor, grade)
+        _tell(grades.withdraw_comment(service, actor, found.course_id, found.id, number))
 
 
 def history(grade: GradeId) -> None:
     """Show the criteria of a grade as graded and as they count, the comments, and who did what."""
-    with open_store(load_settings()) as store, store.reading() as session:
-        job_id = batches.find_job(session, grade)
-        criteria = overrides.criterion_marks(session, job_id)
-        written = comments.of_job(session, job_id)
-        done = marking_history.history(session, session.get_one(Job, job_id).submission_id)
-    document(grade=job_id, criteria=criteria, comments=written, history=done)
+    from service.operations import batches, grades
+
+    with operating() as (service, actor):
+        found = batches.find_grade(service, actor, grade)
+        marking = grades.show_marking(service, actor, found.course_id, found.id)
+    criteria, written, done = marking.criteria, marking.comments, marking.history
+    document(grade=found.id, criteria=criteria, comments=written, history=done)
     listed = table("criterion", "title", "as graded", "counts", "reason", right=("as graded", "counts"))
     for line in criteria:
         graded = "not judged" if line.graded is None else out_of(line.graded, line.worth)
@@ -88,13 +115,8 @@ def history(grade: GradeId) -> None:
         show(told)
 
 
-def _change(grade: str, change: Callable[[Session, str, str], object]) -> None:
-    """Make a change and tell what the grade comes to."""
-    with open_store(load_settings()) as store:
-        with store.transaction() as session:
-            job_id = batches.find_job(session, grade)
-            change(session, job_id, audit.this_user())
-        with store.reading() as session:
-            line = batches.job_line(session, job_id)
+def _tell(changed: Marking) -> None:
+    """Say what the grade comes to after a change."""
+    line = changed.line
     document(job=line)
     tell(f"{line.student}, {line.assignment}: {out_of(line.marks, line.max_marks)}")

@@ -1,24 +1,21 @@
 """``robomark course export-student``, ``delete-student`` and ``purge``: a student's data on request, and what is old.
 
-What goes is decided in ``store/purge.py``.
+The rules are in ``service/store/purge.py``.
 """
 
 from __future__ import annotations
 
 from dataclasses import asdict
-from datetime import timedelta
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from service.commands.operating import operating
 from service.commands.shown import document, note, tell
-from service.settings import load_settings
-from service.store import audit
-from service.store.backup import back_up
-from service.store.engine import Store, now, open_store
-from service.store.people.students import DEFAULT_COURSE, Students, course_of
-from service.store.purge import erase_student, purge
+from service.operations import courses, people, privacy
+from service.operations.courses import DEFAULT_COURSE
+from service.operations.privacy import PurgeRequest
 from sim.errors import UsageError
 
 Who = Annotated[str, typer.Argument(help="The student's name, as submitted.")]
@@ -28,12 +25,11 @@ def export_student(
     student: Who, output: Annotated[Path, typer.Option("-o", "--output", help="The zip to write.")]
 ) -> None:
     """Write all there is of a student, as they may see it: who they are, what they submitted, and what came of it."""
-    # Reports take long to load.
     from service.home import for_the_user
-    from service.student_export import export_student as exported
 
-    with open_store(load_settings()) as store:
-        data = exported(store, _find(store, student))
+    with operating() as (service, actor):
+        member = people.find(service, actor, DEFAULT_COURSE, student)
+        data = privacy.export_student(service, actor, member.course_id, member.enrolment_id).zip
     try:
         with for_the_user():
             output.write_bytes(data)
@@ -53,8 +49,9 @@ def delete_student(
     """
     if not for_good:
         raise UsageError("this cannot be undone; say --for-good, after export-student if a copy is wanted")
-    with open_store(load_settings()) as store:
-        gone = erase_student(store, _find(store, student), audit.this_user())
+    with operating() as (service, actor):
+        member = people.find(service, actor, DEFAULT_COURSE, student)
+        gone = privacy.erase_student(service, actor, member.course_id, member.enrolment_id)
     document(submissions=gone.submissions, grades=gone.grades)
     tell(f"removed: {gone.submissions} submissions, {gone.grades} grades, and who the student was")
 
@@ -71,20 +68,11 @@ def purge_course(
     if archive is not None and for_good:
         raise UsageError("--archive keeps a copy and --for-good keeps none; name one of them")
     only_count = archive is None and not for_good
-    with open_store(load_settings()) as store:
-        with store.transaction() as session:
-            at = now(session)
-            course_id = course_of(session, DEFAULT_COURSE, at)
+    with operating() as (service, actor):
+        course_id = courses.find(service, actor, DEFAULT_COURSE)
         if archive is not None:
-            back_up(store.engine, archive)
-            note(f"{archive}: {archive.stat().st_size} bytes")
-        before = at - timedelta(days=older_than)
-        gone = purge(store, before, audit.this_user(), course_id=course_id, only_count=only_count)
+            note(f"{archive}: {privacy.archive(service, actor, archive)} bytes")
+        gone = privacy.purge(service, actor, course_id, PurgeRequest(older_than, only_count))
     counted = f"{gone.submissions} submissions, {gone.grades} grades, {gone.students} students"
     document(removed=not only_count, archive=archive, **asdict(gone))
     tell(f"{counted} would go; --archive FILE or --for-good removes them" if only_count else f"removed: {counted}")
-
-
-def _find(store: Store, student: str) -> int:
-    with store.transaction() as session:
-        return Students(session, course_of(session, DEFAULT_COURSE, now(session))).find(student)

@@ -1,33 +1,40 @@
-"""Runs one robot program, now, in a simulator set up by the magic's flags, and shows what happened. No marks.
-
-What can be said to it is ``run.py``'s; a notebook is run by ``run_notebook.py``.
-"""
+"""What ``robomark run`` shows and keeps of a run. Its options are ``run.py``'s; the run is the grader's."""
 
 from __future__ import annotations
 
 import json
-import stat
 import sys
-from collections.abc import Mapping, Set
-from dataclasses import replace
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from models import weights_bytes
 from responders.channel import Channel
-from responders.code import Code
+from responders.notebook_executor import ExecutedNotebook
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
 from responders.sandbox.zygote import FULL, NONE
-from responders.trial_spec import PartnerSpec, ProgramSpec, ResponderSpec, TrialSpec
-from service.commands.channel_flags import changed
-from service.commands.run_notebook import LastRun, RunLimits, run_notebook, show_diagrams, show_notebook
+from service.commands.channel_flags import ChannelFlags, changed
+from service.commands.run import Conditions, Kept, MagicFlags, Tick
 from service.commands.shown import document, note, tell
 from service.commands.unsafe import warn_of_no_sandbox
 from service.grading.grade import TrialResult
+from service.grading.standalone import (
+    ProgramFile,
+    RunLimits,
+    RunOptions,
+    find_notebook,
+    find_responder,
+    own_floor,
+    read_files_beside,
+    read_program,
+    run_notebook,
+    run_program,
+)
 from service.grading.trial_runner import TrialRunner
 from service.home import for_the_user
+from service.reports.plots.diagram_parts import Highlights
+from service.reports.plots.drawn_diagrams import draw_diagram
+from service.reports.plots.own_diagrams import title_of_cell
 from service.reports.plots.path import draw_path
 from service.reports.plots.style import png
 from service.reports.readable import readable
@@ -37,217 +44,122 @@ from service.reports.robots import robots_of
 from service.reports.trace import storable, trace
 from service.reports.transcript import transcript
 from service.reports.view import NO_OTHERS, OtherTrials
-from service.reports.written import prepare_folder, write_film, write_replay
+from service.reports.written import prepare_folder, write_file, write_film, write_replay
 from sim.errors import UsageError
-from sim.floors import Floor, floor, floor_from_image, names
+from sim.floors import Floor
 from sim.recorded import faults_of, floor_of
-from sim.recording import Recording
-from sim.robot import robot
-from sim.world import Noise
-from submissions.helper_modules import modules_of
-from submissions.magics import Flags, setup, split_program
-from submissions.notebook import is_script, read_notebook, read_script
-from submissions.source_text import decode_source
+from sim.recording import BROWSER_TICK, TICK, Recording
+from submissions.diagram_cells import diagrams_in
+from submissions.magics import Flags
 from submissions.submission import Notebook
 
-_PROGRAM = ChildLimits(5.0, 128 << 20)
-_RESPONDER_MEMORY = 512 << 20
-_ALL_CPU = 150.0  # of all processes together, beside what the responder may compute
-_OUTPUT_BYTES = 1_000_000
-_IMAGES = (".png", ".jpg", ".jpeg")
-_FILES_BYTES = 16 << 20
-_NETWORKS = {"mlp_shapes_14x14.joblib": "shapes"}
 
-
-def run_program(
-    program: Path,
-    values: Mapping[str, str | None],
-    switches: Set[str],
-    given: Mapping[str, object],
-    *,
-    responder: str | None,
-    second: Path | None,
-    responder_cpu: float,
-    seconds: float,
-    seed: int,
-    sheet: int | None,
-    replay: Path | None,
-    over: Path | None,
-    film: Path | None,
-    trace_file: Path | None,
-    image: Path | None,
-    diagrams: Path | None,
-    unsafe: bool,
+def run_file(
+    path: Path, magic: MagicFlags, conditions: Conditions, channel: ChannelFlags, kept: Kept, *, unsafe: bool
 ) -> None:
-    """Run it with these flags of the magic, by their letters, and of the channel; show what happened."""
-    if diagrams is not None:
-        prepare_folder(diagrams)
-    own = _own_floor(values["b"])
-    values = {**values, "b": values["b"] if own is None else None}
-    channel = changed(Channel(), given)
-    wanted = Flags(switches=frozenset(switches)).with_values(**values)
+    """Run what is in a file, a robot program or a notebook; show what happened, and keep what is to be kept."""
+    if kept.diagrams is not None:
+        prepare_folder(kept.diagrams)
+    options = _options(magic, conditions, channel)
     if unsafe:
         warn_of_no_sandbox()
-    allowed = ChildLimits(responder_cpu, _RESPONDER_MEMORY)
-    meter = JobMeter(JobLimits(cpu_seconds=_ALL_CPU + responder_cpu))
-    notebook = _notebook(program)
-    if notebook is not None:
-        if responder is not None:
-            raise UsageError(f"{program.name} is a notebook and answers the robot itself; leave --responder out")
-        if second is not None:
-            raise UsageError(f"{program.name} is a notebook and starts its robots itself; leave --second out")
-        if over is not None:
-            raise UsageError(f"{program.name} is a notebook, which no other program is run over; leave --over out")
-        last = LastRun(wanted, seed, seed if sheet is None else sheet, channel, own)
-        limits = RunLimits(allowed, _PROGRAM, _OUTPUT_BYTES, seconds)
-        with TrialRunner(Sandboxes(NONE if unsafe else FULL)) as runner:
-            text = "\n".join(cell.source for cell in notebook.cells)
-            executed = run_notebook(notebook, _files_beside(program, text), limits, last, runner, meter)
-        runs = [{"cell": run.cell, **_told(run.recording)} for run in executed.runs]
-        document(output=executed.output, runs=runs, notes=executed.notes, stopped=executed.stopped)
-        show_notebook(executed, _show)
-        show_diagrams(notebook, diagrams)
-        if executed.runs:
-            recording = executed.runs[-1].recording
-            _keep(recording, program.name, seed, trace_file, image, film, own)
-            _keep_replay(replay, recording, program.name, seed, sources_of_cells(notebook), own)
-        return
-    if diagrams is not None:
-        raise UsageError(f"{program.name} is not a notebook and draws no diagrams; leave --diagrams out")
-    flags, text = _program(program)
-    flags = Flags(flags.preamble, flags.values | wanted.values, flags.switches | wanted.switches)
-    flags = flags if own is None else flags.without("b")
-    chosen = setup(flags)
-    spec = TrialSpec(
-        program=_program_spec(program, flags, text),
-        responder=_responder(responder, allowed),
-        collaborative=chosen.collaborative or responder is not None or second is not None,
-        floor=own or floor(chosen.background, seed=seed if sheet is None else sheet),
-        robot=robot(chosen.robot),
-        pose=chosen.pose,
-        noise=Noise(chosen.light_noise, chosen.motor_noise),
-        channel=channel,
-        seconds=seconds,
-        seed=seed,
-        child_seed=seed,
-        pen_down=chosen.pen_down,
-        partner=_partner(second),
-    )
-    other = None if over is None else _other_program(over)
-    for each in chosen.notes:
+    notebook, notes = find_notebook(path)
+    for each in notes:
         note(f"note: {each}")
     with TrialRunner(Sandboxes(NONE if unsafe else FULL)) as runner:
-        recording = runner.run(spec, chosen.obstacles, meter)
-        others = NO_OTHERS
-        if other is not None:
-            beside = runner.run(replace(spec, program=other), chosen.obstacles, meter)
-            others = OtherTrials(other.code.name, {0: _as_trial(beside, seed)})
-    document(run=_told(recording), notes=chosen.notes)
-    _show(recording)
-    _keep(recording, program.name, seed, trace_file, image, film, own)
-    answering = None if spec.responder is None else spec.responder.code
-    _keep_replay(replay, recording, program.name, seed, sources_of_files(spec.program.code, answering), own, others)
+        if notebook is None:
+            _run_program(path, options, conditions, kept, runner)
+        else:
+            _run_notebook(path, notebook, options, conditions, kept, runner)
 
 
-def _other_program(path: Path) -> ProgramSpec:
+def _options(magic: MagicFlags, conditions: Conditions, channel: ChannelFlags) -> RunOptions:
+    floor = own_floor(magic.background)
+    values = {**magic.values, "b": magic.background if floor is None else None}
+    limits = RunLimits()
+    return RunOptions(
+        flags=Flags(switches=magic.switches).with_values(**values),
+        channel=changed(Channel(), channel.given()),
+        floor=floor,
+        seconds=conditions.seconds,
+        seed=conditions.seed,
+        sheet=conditions.sheet,
+        tick=BROWSER_TICK if conditions.tick is Tick.BROWSER else TICK,
+        limits=RunLimits(ChildLimits(conditions.responder_cpu, limits.responder.memory_bytes)),
+    )
+
+
+def _run_notebook(
+    path: Path, notebook: Notebook, options: RunOptions, conditions: Conditions, kept: Kept, runner: TrialRunner
+) -> None:
+    if conditions.responder is not None:
+        raise UsageError(f"{path.name} is a notebook and answers the robot itself; leave --responder out")
+    if conditions.second is not None:
+        raise UsageError(f"{path.name} is a notebook and starts its robots itself; leave --second out")
+    if kept.over is not None:
+        raise UsageError(f"{path.name} is a notebook, which no other program is run over; leave --over out")
+    text = "\n".join(cell.source for cell in notebook.cells)
+    executed = run_notebook(notebook, read_files_beside(path, text), options, runner)
+    runs = [{"cell": run.cell, **_told(run.recording)} for run in executed.runs]
+    document(output=executed.output, runs=runs, notes=executed.notes, stopped=executed.stopped)
+    _show_notebook(executed, _show)
+    _show_diagrams(notebook, kept.diagrams)
+    if executed.runs:
+        _keep(kept, executed.runs[-1].recording, path.name, options, sources_of_cells(notebook))
+
+
+def _run_program(path: Path, options: RunOptions, conditions: Conditions, kept: Kept, runner: TrialRunner) -> None:
+    if kept.diagrams is not None:
+        raise UsageError(f"{path.name} is not a notebook and draws no diagrams; leave --diagrams out")
+    ran = run_program(
+        read_program(path),
+        options,
+        runner,
+        responder=None if conditions.responder is None else find_responder(conditions.responder, options.limits),
+        second=None if conditions.second is None else read_program(conditions.second),
+        over=None if kept.over is None else _other_program(kept.over),
+    )
+    for each in ran.notes:
+        note(f"note: {each}")
+    document(run=_told(ran.recording), notes=ran.notes)
+    _show(ran.recording)
+    others = NO_OTHERS
+    if ran.over is not None and kept.over is not None:
+        others = OtherTrials(kept.over.name, {0: _as_trial(ran.over, options.seed)})
+    answering = None if ran.spec.responder is None else ran.spec.responder.code
+    _keep(kept, ran.recording, path.name, options, sources_of_files(ran.spec.program.code, answering), others)
+
+
+def _other_program(path: Path) -> ProgramFile:
     """A program that is run in the first one's world, whatever its own first line says of one."""
-    if _notebook(path) is not None:
+    notebook, _ = find_notebook(path)
+    if notebook is not None:
         raise UsageError(f"--over {path.name} is a notebook, expected a robot program")
-    return _program_spec(path, *_program(path))
-
-
-def _program_spec(path: Path, flags: Flags, text: str) -> ProgramSpec:
-    return ProgramSpec(Code(path.name, text), flags.preamble, _PROGRAM, _OUTPUT_BYTES, _modules_beside(path, text))
-
-
-def _partner(second: Path | None) -> PartnerSpec | None:
-    """The second robot, as the first line of its program says."""
-    if second is None:
-        return None
-    flags, text = _program(second)
-    if not {"x", "y"} <= flags.values.keys():
-        raise UsageError(f"{second.name}: does not say where the second robot starts; expected -x and -y in line 1")
-    chosen = setup(flags)
-    program = ProgramSpec(Code(second.name, text), flags.preamble, _PROGRAM, _OUTPUT_BYTES)
-    return PartnerSpec(program, chosen.pose, chosen.pen_down)
-
-
-def _own_floor(background: str | None) -> Floor | None:
-    """The floor that an image file is; None where a floor is named."""
-    path = Path(background or "")
-    if background in names() or path.suffix.lower() not in _IMAGES:
-        return None
-    return floor_from_image(path.name, _read(path))
+    return read_program(path)
 
 
 def _keep(
+    kept: Kept,
     recording: Recording,
     name: str,
-    seed: int,
-    trace_file: Path | None,
-    image: Path | None,
-    film: Path | None,
-    own: Floor | None,
-) -> None:
-    if trace_file is not None:
-        _write(trace_file, json.dumps(trace(recording)).encode())
-    if image is not None:
-        _write(image, _drawn(recording, name, seed, own))
-    if film is not None:
-        write_film(film, _as_trial(recording, seed), _own_pixels(own))
-
-
-def _keep_replay(
-    path: Path | None,
-    recording: Recording,
-    name: str,
-    seed: int,
+    options: RunOptions,
     sources: Sources,
-    own: Floor | None,
     others: OtherTrials = NO_OTHERS,
 ) -> None:
-    if path is not None:
-        write_replay(path, replay_of_run(recording, name, seed, sources, _own_pixels(own), others))
-
-
-def _own_pixels(own: Floor | None) -> dict[str, Pixels]:
-    return {} if own is None else {own.name: own.pixels}
+    seed, floor = options.seed, options.floor
+    pixels: dict[str, Pixels] = {} if floor is None else {floor.name: floor.pixels}
+    if kept.trace_file is not None:
+        _write(kept.trace_file, json.dumps(trace(recording)).encode())
+    if kept.picture is not None:
+        _write(kept.picture, _drawn(recording, name, seed, floor))
+    if kept.film is not None:
+        write_film(kept.film, _as_trial(recording, seed), pixels)
+    if kept.replay is not None:
+        write_replay(kept.replay, replay_of_run(recording, name, seed, sources, pixels, others))
 
 
 def _as_trial(recording: Recording, seed: int) -> TrialResult:
     return TrialResult("run", 0, seed, 0, 0, "visible", recording)
-
-
-def _notebook(path: Path) -> Notebook | None:
-    """The notebook in a file, or that nbconvert has made a file of; None if it is a robot program."""
-    if path.suffix.lower() == ".ipynb":
-        read = read_notebook(_read(path), path.name)
-        for each in read.notes:
-            note(f"note: {each}")
-        return read.notebook
-    text = _source(path)
-    return read_script(text, path.name) if is_script(text) else None
-
-
-def _program(path: Path) -> tuple[Flags, str]:
-    text = _source(path)
-    try:
-        return split_program(text)
-    except UsageError as error:
-        raise UsageError(f"{path.name}: {error}") from None
-
-
-def _source(path: Path) -> str:
-    return decode_source(_read(path), path.name).text
-
-
-def _read(path: Path) -> bytes:
-    try:
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise UsageError(f"{path} is not a file; expected one that can be read")
-        return path.read_bytes()
-    except OSError as error:
-        raise UsageError(f"{path} cannot be read: {error.strerror}") from error
 
 
 def _write(path: Path, data: bytes) -> None:
@@ -256,43 +168,6 @@ def _write(path: Path, data: bytes) -> None:
             path.write_bytes(data)
     except OSError as error:
         raise UsageError(f"{path} cannot be written: {error.strerror}") from error
-
-
-def _responder(given: str | None, limits: ChildLimits) -> ResponderSpec | None:
-    """FILE or FILE:NAME, with the files beside it, and the course's networks unless it brings its own."""
-    if given is None:
-        return None
-    path, name = Path(given), None
-    if not path.exists() and ":" in given:
-        file, _, name = given.rpartition(":")
-        path = Path(file)
-    text = _source(path)
-    return ResponderSpec(Code(path.name, text), _files_beside(path, text), limits, _OUTPUT_BYTES, name)
-
-
-def _modules_beside(path: Path, text: str) -> Mapping[str, str]:
-    """What a file with this text imports from its folder."""
-
-    def read(name: str) -> bytes | None:
-        beside = path.parent / name
-        if beside.is_symlink() or not beside.is_file() or name == path.name:
-            return None
-        return beside.read_bytes()
-
-    return modules_of(text, read)
-
-
-def _files_beside(path: Path, text: str) -> dict[str, bytes]:
-    files = {file: weights_bytes(model) for file, model in _NETWORKS.items()}
-    files |= {f"{name}.py": module.encode() for name, module in _modules_beside(path, text).items()}
-    left = _FILES_BYTES
-    for beside in sorted(path.parent.iterdir()):
-        if beside.suffix in (".py", ".ipynb", "") or beside.is_symlink() or not beside.is_file():
-            continue
-        left -= beside.stat().st_size
-        if left >= 0:
-            files[beside.name] = beside.read_bytes()
-    return files
 
 
 def _show(recording: Recording) -> None:
@@ -334,3 +209,40 @@ def _told(recording: Recording) -> dict[str, Any]:
 def _drawn(recording: Recording, name: str, seed: int, own: Floor | None) -> bytes:
     driven_on = own if own is not None and own.name == recording.background else floor_of(recording)
     return png(draw_path(_as_trial(recording, seed), name, driven_on.pixels if driven_on else None))
+
+
+def _show_notebook(executed: ExecutedNotebook, show: Callable[[Recording], None]) -> None:
+    """Print what the cells printed, each run by ``show`` where a cell started it, and what was left out."""
+    shown = 0
+    for run in executed.runs:
+        _show_output(executed.output[shown : run.printed])
+        shown = run.printed
+        tell(f"--- the robot, started by cell {run.cell} ---")
+        show(run.recording)
+    _show_output(executed.output[shown:])
+    for each in executed.notes:
+        note(f"note: {readable(each, 400)}")
+    if executed.stopped is not None:
+        stopped = executed.stopped
+        print(f"{stopped.place}: {stopped.verdict}: {stopped.message}", file=sys.stderr)
+    if not executed.runs:
+        note("note: no robot was started: no cell begins with %%sim_magic_preloaded")
+
+
+def _show_output(text: str) -> None:
+    for line in text.strip("\n").split("\n") if text.strip("\n") else ():
+        tell(readable(line, 400))
+
+
+def _show_diagrams(notebook: Notebook, folder: Path | None) -> None:
+    """The diagrams of the notebook's cells as files, if there is a folder for them, and which cannot be drawn."""
+    found = diagrams_in(notebook)
+    for problem in found.problems:
+        note(f"note: {readable(problem, 400)}")
+    if folder is None:
+        if found.cells:
+            note("note: the notebook has diagrams; --diagrams FOLDER draws them")
+        return
+    for cell in found.cells:
+        figure = draw_diagram(cell.diagram, title_of_cell(cell), notebook.name, Highlights())
+        note(f"diagram: {write_file(folder, f'cell-{cell.cell}.png', png(figure))}")

@@ -5,6 +5,8 @@ What is kept running is ``supervisor.py``'s and ``web``'s.
 
 from __future__ import annotations
 
+import os
+import sys
 import time
 from contextlib import ExitStack
 
@@ -25,16 +27,20 @@ from service.store.states import CredentialKind
 from service.web.listening import address, check_reach, listen
 from service.web.server import serve_on
 from sim.errors import HostError, RobomarkError, UsageError
+from sim.processes import leave_current_folder
 from submissions.people import Student
 
 _log = structlog.get_logger(__name__)
 _LOOK_SECONDS = 0.5
+#: In the home, readable by its owner alone.
+_LINK_FILE = "sign-in-link"
 
 
 def bring_up(workers: int, host: str, port: int, *, serve: bool) -> None:
     """Keep broker, workers and web server up until Ctrl-C."""
     settings = load_settings()
     configure_logging(settings.log_level)
+    leave_current_folder()
     # Before there are others in this group: it can only be divided when nobody is left in it.
     control_group.divide()
     if serve:
@@ -43,6 +49,7 @@ def bring_up(workers: int, host: str, port: int, *, serve: bool) -> None:
         leave_note = held.enter_context(alone_in(settings))
         listening = held.enter_context(listen(host, port)) if serve else None
         where = "" if listening is None else f", {address(listening)}"
+        link = ""
         leave_note(where)
         with Sandboxes() as sandboxes:
             # Here the reason can be said; a worker that refuses would only be seen to end.
@@ -50,8 +57,8 @@ def bring_up(workers: int, host: str, port: int, *, serve: bool) -> None:
         store = held.enter_context(open_store(settings))
         try:
             if listening is not None:
-                where += f"; sign in by {_first_link(settings, store, address(listening))}"
-            _keep_up(settings, store, Supervisor(settings, store, workers, listening), where)
+                link = f"; {_told_link(settings, _first_link(settings, store, address(listening)))}"
+            _keep_up(settings, store, Supervisor(settings, store, workers, listening), where + link)
         except KeyboardInterrupt:
             return
 
@@ -86,6 +93,17 @@ def _keep_up(settings: Settings, store: Store, service: Supervisor, where: str) 
             given_back = service.stop()
             announce("up.ended", f"ended; jobs in flight that went back: {given_back}")
             raise
+
+
+def _told_link(settings: Settings, link: str) -> str:
+    """How to sign in: the link on a terminal, else where it is; what is printed there ends up in a journal for many."""
+    if sys.stdout.isatty():
+        return f"sign in by {link}"
+    path = settings.home / _LINK_FILE
+    path.unlink(missing_ok=True)
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as stream:
+        stream.write(f"{link}\n")
+    return f"sign in by the link in {path}"
 
 
 def _first_link(settings: Settings, store: Store, listening_at: str) -> str:

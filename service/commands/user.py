@@ -1,24 +1,22 @@
-"""``robomark user``: who instructs, who runs the installation, and how anybody signs in on the web.
+"""``robomark user``: instructors and operators, and how anybody signs in on the web.
 
 Students come with their submissions or by ``robomark course enrol``.
 """
 
 from __future__ import annotations
 
-from datetime import timedelta
 from typing import Annotated
 
 import typer
 
-from service.commands.shown import document, show, table, tell
-from service.settings import Settings, load_settings
-from service.store import audit
-from service.store.engine import now, open_store
-from service.store.people import credentials, people, sign_in_links
-from service.store.people.students import DEFAULT_COURSE, course_of
-from service.store.states import CredentialKind
+from service.commands.operating import operating
+from service.commands.shown import document, note, show, table, tell
+from service.operations import courses, people, people_views, sign_in_links
+from service.operations.courses import DEFAULT_COURSE, MemberRequest
+from service.operations.people import JoinRequest, Member, TokenForRequest
+from service.operations.types import Role
+from service.settings import Settings
 from sim.errors import UsageError
-from submissions.people import Student
 
 Id = Annotated[str, typer.Argument(help="What the course knows them by.")]
 Course = Annotated[str, typer.Option(help="The course.")]
@@ -35,25 +33,23 @@ def add(
     """Add an instructor to a course, or a student, and print a link that signs them in once."""
     if student and operator:
         raise UsageError("a student does not run the installation: say --student or --operator")
-    settings = load_settings()
-    make = people.make_student if student else people.make_instructor
-    with open_store(settings) as store, store.transaction() as session:
-        member = make(session, course, Student(who, name, email))
-        if operator:
-            people.make_operator(session, member.person_id)
-        actor, told = audit.this_user(), {"role": member.role.value, "operator": operator}
-        audit.note(session, actor, "add", "person", str(member.person_id), **told)
-        secret = sign_in_links.make_link(session, member.person_id, actor)
-    _tell_link(settings, member.id, secret)
+    role = Role.STUDENT if student else Role.INSTRUCTOR
+    with operating() as (service, actor):
+        added = courses.add_member(service, actor, MemberRequest(course, who, name, email, role, operator))
+    member = added.member
+    _tell_link(service.settings, member.id, added.secret)
+    for other, instructor in added.elsewhere:
+        note(
+            f"{_called(instructor)} instructs {other}, too. If this is the same person: robomark user join {member.id} "
+            f"--course {course} --same-as {instructor.id} --of {other}"
+        )
 
 
 def link(who: Id, course: Course = DEFAULT_COURSE) -> None:
     """Print a new link that signs somebody in once."""
-    settings = load_settings()
-    with open_store(settings) as store, store.transaction() as session:
-        member = people.member(session, course, who)
-        secret = sign_in_links.make_link(session, member.person_id, audit.this_user())
-    _tell_link(settings, member.id, secret)
+    with operating() as (service, actor):
+        member, secret = sign_in_links.make_members_link(service, actor, course, who)
+    _tell_link(service.settings, member.id, secret)
 
 
 def token(
@@ -64,35 +60,65 @@ def token(
     days: Annotated[int, typer.Option(min=1, max=366, help="It ends after so many.")] = 90,
 ) -> None:
     """Print a token for programs that counts in one course."""
-    from service.web.api_scopes import SCOPES
+    from service.operations.scopes import SCOPES
 
     for scope in scopes:
         if scope not in SCOPES:
             raise UsageError(f"--scope is {scope!r}, expected one of {', '.join(SCOPES)}")
-    with open_store(load_settings()) as store, store.transaction() as session:
-        member = people.member(session, course, who)
-        course_id = course_of(session, course, now(session))
-        secret = credentials.issue(
-            session,
-            member.person_id,
-            CredentialKind.TOKEN,
-            timedelta(days=days),
-            name=name or "command line",
-            scopes=scopes,
-            course_id=course_id,
-        )
-        audit.note(session, audit.this_user(), "token", "person", str(member.person_id), scopes=sorted(scopes))
+    with operating() as (service, actor):
+        member = people.find(service, actor, course, who)
+        asked = TokenForRequest(name or "command line", frozenset(scopes), days)
+        secret = people.issue_token(service, actor, member.enrolment_id, asked)
     document(id=member.id, token=secret, scopes=sorted(scopes), days=days)
     tell(secret)
 
 
+def sign_out(
+    who: Id,
+    course: Course = DEFAULT_COURSE,
+    release: Annotated[
+        bool, typer.Option("--release", help="A student's next launch with this id may take this place in the course.")
+    ] = False,
+) -> None:
+    """End all links, sessions and tokens of a person."""
+    with operating() as (service, actor):
+        member = people.find(service, actor, course, who)
+        ended = people.sign_out(service, actor, member.enrolment_id, release=release)
+    document(id=member.id, ended=ended)
+    tell(f"{_called(member)} is signed out: {ended} links, sessions and tokens ended")
+
+
+def remove(who: Id, course: Course = DEFAULT_COURSE) -> None:
+    """Remove somebody from a course who has submitted nothing to it."""
+    with operating() as (service, actor):
+        member = people.find(service, actor, course, who)
+        people.remove(service, actor, member.course_id, member.enrolment_id)
+    document(id=member.id, course=course)
+    tell(f"{_called(member)} is removed from {course}")
+
+
+def join(
+    who: Id,
+    same_as: Annotated[str, typer.Option("--same-as", help="The id of the same person in the other course.")],
+    of: Annotated[str, typer.Option("--of", help="The other course.")],
+    course: Course = DEFAULT_COURSE,
+    from_platform: Annotated[
+        bool, typer.Option("--from-platform", help="Also if a learning platform signs one of them in.")
+    ] = False,
+) -> None:
+    """Make one person of two in different courses, and sign both out."""
+    with operating() as (service, actor):
+        member = people.find(service, actor, course, who)
+        other = people.find(service, actor, of, same_as)
+        people.join(service, actor, JoinRequest(member.enrolment_id, other.enrolment_id, from_platform))
+    document(id=member.id, course=course, same_as=other.id, of=of)
+    tell(f"{_called(member)} in {course} and {_called(other)} in {of} are one person now")
+
+
 def list_people(course: Course = DEFAULT_COURSE) -> None:
     """List who is in a course."""
-    with open_store(load_settings()) as store, store.reading() as session:
-        found = [line for line in people.courses(session) if line.name == course]
-        if not found:
-            raise UsageError(f"there is no course {course!r}")
-        members = people.members(session, found[0].id)
+    with operating() as (service, actor):
+        members = people_views.list_members(service, actor, courses.find(service, actor, course))
     document(
         people=[
             {"id": each.id, "name": each.name, "email": each.email, "role": each.role, "operator": each.operator}
@@ -110,3 +136,7 @@ def _tell_link(settings: Settings, who: str, secret: str) -> None:
     where = f"{settings.public_url}{path}" if settings.public_url else path
     document(id=who, path=path, url=f"{settings.public_url}{path}" if settings.public_url else None)
     tell(where if settings.public_url else f"{path}   (behind the address that robomark up or serve prints)")
+
+
+def _called(member: Member) -> str:
+    return f"{member.name} ({member.id})" if member.name else member.id

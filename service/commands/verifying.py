@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
+
 from service.commands.shown import document, note, show, table, tell
 from service.grading.grade import Grade, TrialResult
 from service.grading.grader import grade as grade_submission
@@ -14,9 +18,21 @@ from service.store.installation import secret_of
 from service.store.models import Job
 from service.version import GRADER_VERSION, grader_sha256
 from sim.errors import HostError
-from sim.recording import Verdict
+from sim.recording import Recording, Verdict
+from submissions.criteria import Criterion
+from submissions.grading_request import GradingRequest
 from submissions.seeds import PUBLIC, Secret, name_of
 
+#: A trial as stored, and as run again.
+Row = tuple[TrialResult, TrialResult]
+
+#: Where the difference comes from, in words.
+_REASONS = {
+    "program": "three gradings of it in fresh processes differ from each other, so the program uses chance of its own, "
+    "such as addresses of objects or the processor's clock",
+    "grader": "three gradings of it in fresh processes are the same, so the fault is Robomark's and not the program's; "
+    "please report it with both versions",
+}
 #: How far such a trial came is decided by the machine and its load, so no hash is promised for it.
 _CUT = frozenset({Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR})
 
@@ -30,10 +46,12 @@ def verify_grade(grade: str) -> None:
             stored = results.load_graded(session, job.id)
             grading_request = intake.load_grading_request(session, job.id)
     secret = _secret_of(job, own)
-    with TrialRunner(spares=False) as runner:
-        again = grade_submission(grading_request.submission, grading_request.assignment, secret=secret, runner=runner)
+    again = _grade_again(grading_request, secret)
     rows = list(zip(stored.trials, again.trials, strict=False))
-    document(**_told(job.id, stored, again, rows))
+    marks = _compare_marks(stored, again, rows, grading_request.assignment.criteria)
+    cause = _cause_of(rows, marks, again, grading_request, secret)
+    same = len(stored.trials) == len(again.trials) and "differs" not in (*marks, *itertools.starmap(_compared, rows))
+    document(**_told(job.id, stored, again, rows), same=same, cause=cause)
     compared = table("scenario", "trial", "stored", "again", "")
     for before, after in rows:
         hashes = (before.recording.sha256[:16], after.recording.sha256[:16])
@@ -42,16 +60,51 @@ def verify_grade(grade: str) -> None:
     tell(f"marks: {stored.marks} stored, {again.marks} again")
     if job.grader_sha256 != grader_sha256():
         note(f"graded by Robomark {stored.grader_version}, again by {GRADER_VERSION}; their code or libraries differ")
-    if not _same(stored, again, rows):
-        raise HostError(f"grade {job.id} is not what grading it again gives")
+    for result, compared_marks in zip(stored.criteria, marks, strict=False):
+        if compared_marks != "same":
+            note(f"the marks of {result.title} differ ({compared_marks})")
+    if not same:
+        reason = f": {_REASONS[cause]}" if cause else ""
+        raise HostError(f"grade {job.id} is not what grading it again gives{reason}")
     tell(f"grade {job.id} is what grading it again gives")
 
 
-def _told(job_id: str, stored: Grade, again: Grade, rows: list[tuple[TrialResult, TrialResult]]) -> dict[str, object]:
+def _grade_again(request: GradingRequest, secret: Secret, earlier: int = 0) -> Grade:
+    """Grade the submission, every trial of it, in processes of their own, and before it so many ``earlier`` times.
+
+    In a name space of its own process numbers begin anew, so only earlier processes make them differ.
+    """
+    with TrialRunner(spares=False) as runner:
+        for _ in range(earlier):
+            grade_submission(request.submission, request.assignment, secret=secret, runner=runner)
+        return grade_submission(request.submission, request.assignment, secret=secret, runner=runner)
+
+
+def _cause_of(
+    rows: Sequence[Row], marks: Sequence[str], again: Grade, request: GradingRequest, secret: Secret
+) -> str | None:
+    """Return why trials or marks differ from the stored ones: grade twice more, in fresh processes each time.
+
+    A program that draws chance of its own differs from itself; Robomark, which simulates every chance that it offers,
+    does not. None if nothing differs.
+    """
+    trials = [number for number, row in enumerate(rows) if _compared(*row) == "differs"]
+    criteria = [number for number, compared in enumerate(marks) if compared == "differs"]
+    if not trials and not criteria:
+        return None
+    repeated = (_grade_again(request, secret), _grade_again(request, secret, earlier=1))
+    differs = any(
+        any(_compared(again.trials[number], grade.trials[number]) == "differs" for number in trials)
+        or any(again.criteria[number].marks != grade.criteria[number].marks for number in criteria)
+        for grade in repeated
+    )
+    return "program" if differs else "grader"
+
+
+def _told(job_id: str, stored: Grade, again: Grade, rows: Sequence[Row]) -> dict[str, object]:
     """What a document says of the comparison."""
     return {
         "grade": job_id,
-        "same": _same(stored, again, rows),
         "marks": stored.marks,
         "marks_again": again.marks,
         "trials": [
@@ -81,14 +134,35 @@ def _secret_of(job: Job, own: Secret) -> Secret:
     return own
 
 
-def _same(stored: Grade, again: Grade, rows: list[tuple[TrialResult, TrialResult]]) -> bool:
-    cut = any(before.verdict in _CUT or after.verdict in _CUT for before, after in rows)
-    same_marks = cut or [r.marks for r in stored.criteria] == [r.marks for r in again.criteria]
-    whole = len(stored.trials) == len(again.trials)
-    return whole and same_marks and all(_compared(before, after) != "differs" for before, after in rows)
+def _compare_marks(stored: Grade, again: Grade, rows: Sequence[Row], criteria: Sequence[Criterion]) -> list[str]:
+    """Compare the marks of each criterion. Only one that looks at a trial which a limit cut short may differ."""
+    by_id = {criterion.id: criterion for criterion in criteria}
+    cut = {before.scenario for before, after in rows if _compared(before, after) == "cut by a limit"}
+    return [
+        "same"
+        if before.marks == after.marks
+        else "cut by a limit"
+        if before.id in by_id and _looks_at(by_id[before.id], cut)
+        else "differs"
+        for before, after in zip(stored.criteria, again.criteria, strict=True)
+    ]
+
+
+def _looks_at(criterion: Criterion, scenarios: AbstractSet[str]) -> bool:
+    return criterion.judges_runs and bool(scenarios & set(criterion.scenarios or scenarios))
 
 
 def _compared(before: TrialResult, after: TrialResult) -> str:
     if before.recording.sha256 == after.recording.sha256:
         return "same"
-    return "cut by a limit" if before.verdict in _CUT or after.verdict in _CUT else "differs"
+    cut = before.verdict in _CUT or after.verdict in _CUT
+    return "cut by a limit" if cut and _begin_alike(before.recording, after.recording) else "differs"
+
+
+def _begin_alike(before: Recording, after: Recording) -> bool:
+    """Return whether all that one of the two said is what the other said first."""
+    pairs = (*zip(before.spoken, after.spoken, strict=False), *zip(before.printed, after.printed, strict=False))
+    messages = zip(before.messages, after.messages, strict=False)
+    return all(one == other for one, other in pairs) and all(
+        (one.t, one.sender, one.text) == (other.t, other.sender, other.text) for one, other in messages
+    )

@@ -13,6 +13,7 @@ from decimal import Decimal
 
 from service.grading.grade import Grade
 from service.grading.grader import grade
+from service.grading.guessable import find_guessable_reports
 from service.grading.judging.words import fault_words
 from service.grading.statistics import MarkedSubmission, marked_of
 from service.grading.trial_runner import TrialRunner
@@ -70,6 +71,11 @@ class CheckedAssignment:
         of_examples = (problem for example in self.examples for problem in example.problems)
         of_measures = (problem for measure in self.measures for problem in _measure_problems(measure))
         return (*of_examples, *of_measures)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence for each thing that is allowed, but makes marks easy to guess."""
+        return tuple(find_guessable_reports(self.assignment))
 
     @property
     def unwritten(self) -> Mapping[str, Expectation]:

@@ -5,6 +5,7 @@ Nothing here judges or simulates; ``judge.py`` and ``grader.py`` make grades, re
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 
@@ -171,6 +172,11 @@ class CriterionResult:
         """The most marks there are for it, whoever excused it."""
         return self.max_marks if self.set_by_hand is None else self.set_by_hand.worth
 
+    @property
+    def excused(self) -> bool:
+        """Whether neither its marks nor the most there are count."""
+        return self.set_by_hand is not None and self.set_by_hand.excused
+
 
 @dataclass(frozen=True, slots=True)
 class TrialResult:
@@ -242,5 +248,17 @@ class Grade:
 
     @property
     def accuracy(self) -> Accuracy | None:
-        """The first classification criterion's accuracy."""
-        return next((result.accuracy for result in self.criteria if result.accuracy is not None), None)
+        """The accuracy of ``recognition``."""
+        return self.recognition.accuracy if self.recognition is not None else None
+
+    @property
+    def recognition(self) -> CriterionResult | None:
+        """The first marked criterion with an accuracy and not excused; without one the first that is for practice."""
+        measured = [each for each in self.criteria if each.accuracy is not None and not each.excused]
+        return next((result for result in measured if result.worth), measured[0] if measured else None)
+
+
+def unjudged_notes(criteria: Sequence[CriterionResult]) -> tuple[str, ...]:
+    """Return the note that some of these criteria could not be judged, if so."""
+    count = sum(bool(result.unjudged) for result in criteria)
+    return (f"{count} of {len(criteria)} criteria could not be judged; staff will look at it",) if count else ()

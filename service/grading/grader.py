@@ -14,7 +14,7 @@ from typing import Protocol
 from responders.repeated_faults import SPARED, Diverged, RepeatedFaults
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.trial_spec import PartnerSpec, TrialSpec
-from service.grading.grade import Cost, CriterionResult, Grade, TrialResult
+from service.grading.grade import Cost, Grade, TrialResult, unjudged_notes
 from service.grading.hints import hints_for
 from service.grading.judging.bounded import bounds_for, judge_within
 from service.grading.run_plan import RunPlan, plan_run
@@ -78,7 +78,7 @@ def grade(
     runner.begin(plan.processes)
     trials = tuple(assignment.trials(secret)) if plan.program or not plan.missing else ()
     watch = _Watch(observe or _nobody, len(trials))
-    meter = JobMeter(_limits_of_job(assignment, len(trials)), watch.heartbeat)
+    meter = JobMeter(_limits_of_job(assignment, sum(map(_is_visible, trials))), watch.heartbeat)
     results = _run_trials(plan, trials, runner, meter, watch)
     results = with_models_answers(results, plan, runner, meter)
     analysis = analyse(plan, results, runner, meter)
@@ -98,7 +98,7 @@ def grade(
             *plan.notes,
             *plan.trial.notes_on_all(results),
             *_spared_notes(results),
-            *_unjudged_notes(criteria),
+            *unjudged_notes(criteria),
         ),
         missing=PART_FILES[plan.missing] if plan.missing else "",
         hints=hints_for(submission, plan, results, criteria, meter.heartbeat),
@@ -111,12 +111,15 @@ def _run_trials(
     plan: RunPlan, trials: Sequence[Trial], runner: TrialRunner, meter: JobMeter, watch: _Watch
 ) -> list[TrialResult]:
     """The results in the order of ``trials``, whatever the order in which they are run."""
-    if any(trial.scenario.visibility != "visible" for trial in trials):
+    if not all(map(_is_visible, trials)):
         runner.check_forgetting()
     run: dict[int, TrialResult] = {}
     repeats = RepeatedFaults()
     for number in _run_order(trials, plan.child_seed):
         trial = trials[number]
+        if not _is_visible(trial):
+            # Visible trials ran within a limit of their own, which does not tell how many hidden ones there are.
+            meter.extend(_limits_of_job(plan.assignment, len(trials)))
         run[number] = TrialResult(
             trial.scenario.id,
             trial.index,
@@ -148,13 +151,17 @@ def _run_order(trials: Sequence[Trial], own_seed: int) -> Sequence[int]:
     """The numbers of the trials as they are run: visible ones first, and else in an order of each submission's own.
 
     So what counts processes or looks at a clock does not tell a trial again, and what is shown was there before the
-    first hidden trial was.
+    first hidden trial was; nor does the order of the visible ones depend on hidden ones.
     """
     chance = Stream(own_seed, "order of trials")
-    return sorted(
-        range(len(trials)),
-        key=lambda number: (trials[number].scenario.visibility != "visible", chance.integer(number)),
-    )
+    visible = [number for number, trial in enumerate(trials) if _is_visible(trial)]
+    hidden = [number for number, trial in enumerate(trials) if not _is_visible(trial)]
+    places = {number: place for place, number in enumerate((*visible, *hidden))}
+    return sorted(places, key=lambda number: (not _is_visible(trials[number]), chance.integer(places[number])))
+
+
+def _is_visible(trial: Trial) -> bool:
+    return trial.scenario.visibility == "visible"
 
 
 def _spared_notes(results: Sequence[TrialResult]) -> tuple[str, ...]:
@@ -167,11 +174,6 @@ def _spared_notes(results: Sequence[TrialResult]) -> tuple[str, ...]:
         for note, count in counts
         if count
     )
-
-
-def _unjudged_notes(criteria: Sequence[CriterionResult]) -> tuple[str, ...]:
-    count = sum(bool(result.unjudged) for result in criteria)
-    return (f"{count} of {len(criteria)} criteria could not be judged; staff will look at it",) if count else ()
 
 
 def _limits_of_job(assignment: Assignment, trials: int) -> JobLimits:
@@ -215,6 +217,8 @@ def _own_floor(name: str, image: bytes) -> Floor:
 
 def _spec(trial: Trial, plan: RunPlan) -> TrialSpec:
     world = plan.assignment.world
+    if trial.scenario.visibility != "visible":
+        plan = plan.unwatched()
     if plan.program is None:
         raise AssignmentError(f"Assignment {plan.assignment.id} has scenarios and no robot program to run in them.")
     return TrialSpec(

@@ -7,25 +7,31 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from responders.message_format import kind
 from service.grading.hint_clues import Clues
 from service.grading.judging.words import quoted
+from sim.recording import Verdict
 from submissions.criteria import Criterion
+from submissions.criteria.logged import Datalog
 from submissions.criteria.replies import Replies
+from submissions.criteria.reporting import Events, Reports
+from submissions.criteria.sequence import WordSequence
 from submissions.criteria.texts import Messages, Prints, Says, TextSequence
 from submissions.submission import PART_FILES, Part
 
 _NEAR = 0.72
 _MOST_TEXTS, _LONGEST = 20, 80
 _DIGITS = re.compile(r"[\d.,]+")
+#: The end of what the simulator itself prints when an image is logged.
+_LOGGED = "image data logged..."
 _QUOTE = re.compile("[\"']")
 
 
 @dataclass(frozen=True, slots=True)
-class _Wanted:
+class Wanted:
     """A text that is asked for, and whether it is all, the beginning or some of what counts."""
 
     text: str
@@ -54,9 +60,18 @@ class _Wanted:
                 return plain in given
 
 
+def of_sent_texts(clues: Clues) -> Iterator[str]:
+    """A message that is nearly right: whatever its answer led to came of it."""
+    yield from _of_criteria((each for each in clues.lost if isinstance(each, Messages)), clues)
+
+
 def of_texts(clues: Clues) -> Iterator[str]:
     """One for each criterion that has lost marks by a text that is nearly right."""
-    for criterion in clues.lost:
+    yield from _of_criteria(clues.lost, clues)
+
+
+def _of_criteria(criteria: Iterable[Criterion], clues: Clues) -> Iterator[str]:
+    for criterion in criteria:
         part, texts, verb = _looked_at(criterion, clues)
         wanted = list(_wanted(criterion))
         folds = getattr(criterion, "ignore_case", False)
@@ -64,29 +79,54 @@ def of_texts(clues: Clues) -> Iterator[str]:
         for each in wanted:
             if any(each.is_met_by(text, ignore_case=folds) for text in texts):
                 continue
-            near = next((text for text in strange[:_MOST_TEXTS] if _is_near(each, text)), None)
+            near = next((text for text in strange[:_MOST_TEXTS] if is_near(each, text)), None)
             if near is not None:
                 at = {"equals": "", "starts_with": " at its start"}.get(each.how, " in it")
-                yield f"{_where(clues, part, near)} {verb} {quoted(near)}; expected {quoted(each.text)}{at}"
+                yield f"{where_written(clues, part, near)} {verb} {quoted(near)}; expected {quoted(each.text)}{at}"
                 break
 
 
 def of_unspoken(clues: Clues) -> Iterator[str]:
     """A text that is printed where it should be said, and nothing is."""
-    wanted = [list(_wanted(each)) for each in clues.lost if isinstance(each, Says)]
-    if clues.spoken or not wanted:
+    wanted = [list(_wanted(each)) for each in clues.lost if isinstance(each, Says) or _is_spoken(each)]
+    # After an error, nothing may be said for that alone.
+    if clues.spoken or not wanted or any(fault.verdict is Verdict.PROGRAM_ERROR for fault in clues.faults):
         return
     asked = [one for each in wanted for one in each]
-    printed = [text for text in clues.printed if kind(text) == "text"]
-    meant = (text for text in printed if not asked or any(_is_near(each, text) for each in asked))
+    printed = [text for text in clues.printed if kind(text) == "text" and not text.endswith(_LOGGED)]
+    meant = (text for text in printed if not asked or any(is_near(each, text) for each in asked))
     for text in list(meant)[-1:]:
-        where = _where(clues, "program", text)
+        where = where_written(clues, "program", text)
         yield f"{where} prints {quoted(text)}, and nothing is said; expected say(...), which prints as well"
+
+
+def of_unlogged(clues: Clues) -> Iterator[str]:
+    """A series of the datalog of which nothing is printed."""
+    for criterion in clues.lost:
+        if not isinstance(criterion, Datalog) or clues.missing is not None:
+            continue
+        begin = Wanted(f"{criterion.series}:", "starts_with")
+        near = any(is_near(begin, text) or begin.is_met_by(text, ignore_case=True) for text in clues.printed)
+        if near or any(True for _ in clues.faults):
+            continue
+        name = next((each.name for each in clues.programs), "the notebook")
+        yield (
+            f'{name} never prints a line such as "{criterion.series}: 42". '
+            f'Add print("{criterion.series}: " + str(...)) where the value is read. '
+            "If it is the program of another assignment, submit the right one"
+        )
+        return
+
+
+def _is_spoken(criterion: Criterion) -> bool:
+    return isinstance(criterion, WordSequence | Reports | Events) and criterion.source == "speech"
 
 
 def _looked_at(criterion: Criterion, clues: Clues) -> tuple[Part, Sequence[str], str]:
     """Whose texts a criterion looks at, and how they came about; none where it looks at anything else."""
     match criterion:
+        case Datalog():
+            return "program", clues.printed, "prints"
         case Says():
             return "program", clues.spoken, "says"
         case Prints():
@@ -98,17 +138,20 @@ def _looked_at(criterion: Criterion, clues: Clues) -> tuple[Part, Sequence[str],
     return "program", (), ""
 
 
-def _wanted(criterion: Criterion) -> Iterator[_Wanted]:
+def _wanted(criterion: Criterion) -> Iterator[Wanted]:
+    if isinstance(criterion, Datalog):
+        yield Wanted(f"{criterion.series}:", "starts_with")
     if isinstance(criterion, TextSequence | Replies):
         for how in ("equals", "starts_with", "contains"):
-            yield from (_Wanted(text, how) for text in getattr(criterion, how))
+            yield from (Wanted(text, how) for text in getattr(criterion, how))
     if isinstance(criterion, TextSequence) and criterion.compare != "matches":
-        yield from (_Wanted(text, criterion.compare) for text in criterion.in_order)
+        yield from (Wanted(text, criterion.compare) for text in criterion.in_order)
     if isinstance(criterion, Replies):
-        yield from (_Wanted(text, "equals") for text in criterion.expect.values() if isinstance(text, str))
+        yield from (Wanted(text, "equals") for text in criterion.expect.values() if isinstance(text, str))
 
 
-def _is_near(wanted: _Wanted, text: str) -> bool:
+def is_near(wanted: Wanted, text: str) -> bool:
+    """Whether some part of a text differs from what is asked for by little."""
     if len(wanted.text) > _LONGEST or len(text) > _LONGEST:
         return False
     return any(_alike(part, wanted.text) for part in wanted.compared_parts(text))
@@ -122,7 +165,7 @@ def _alike(one: str, other: str) -> bool:
     return difflib.SequenceMatcher(None, plain.casefold(), expected.casefold()).ratio() >= _NEAR
 
 
-def _where(clues: Clues, part: Part, text: str) -> str:
+def where_written(clues: Clues, part: Part, text: str) -> str:
     """The line that has most of the text's beginning in quotes."""
     words = text.split()
     for count in range(min(len(words), 12), 0, -1):

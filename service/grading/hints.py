@@ -9,29 +9,188 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from service.grading.grade import CriterionResult, TrialResult
+from service.grading.hint_accepted import accepted_differences
+from service.grading.hint_answers import (
+    of_image_command,
+    of_missing_key,
+    of_none_answers,
+    of_other_keys,
+    of_swapped_values,
+    of_text_numbers,
+)
+from service.grading.hint_braces import of_braces
 from service.grading.hint_clues import Clues, clues_of
+from service.grading.hint_errors import of_cell_errors, of_errors, of_other_cell_errors
+from service.grading.hint_files import of_ignored_magic, of_redefined, of_several_programs, of_starter, of_swapped_parts
+from service.grading.hint_formulas import of_division, of_gain, of_gyro_direction, of_radius, of_reversed_distance
+from service.grading.hint_functions import of_functions, of_no_return
+from service.grading.hint_loops import of_limits
+from service.grading.hint_motion import (
+    of_curves,
+    of_distances,
+    of_loops_that_end_at_once,
+    of_speeds,
+    of_stillness,
+    of_turns,
+    of_units,
+)
+from service.grading.hint_places import of_places
+from service.grading.hint_recognition import of_recognition
+from service.grading.hint_repeats import (
+    of_exact_reading,
+    of_inner_loop,
+    of_last_number,
+    of_single_round,
+    of_words_in_loop,
+)
+from service.grading.hint_responder import (
+    of_double_json,
+    of_misnamed_function,
+    of_missing_responder,
+    of_printed_answers,
+    of_replaced_prefix,
+    of_single_colon,
+    of_uncallable_responder,
+    of_unqueued_answers,
+    of_unreadable_answers,
+)
 from service.grading.hint_rules import (
     of_answers,
-    of_errors,
+    of_empty_parts,
+    of_image_log,
     of_images,
     of_magics,
     of_messages,
     of_missing_files,
-    of_printed_answers,
-    of_responder_names,
-    of_stillness,
+    of_quoted_names,
 )
-from service.grading.hint_texts import of_texts, of_unspoken
+from service.grading.hint_signatures import of_signatures
+from service.grading.hint_slips import of_short_list, of_slips
+from service.grading.hint_steps import (
+    of_count_from_one,
+    of_first_message,
+    of_first_value,
+    of_mirrored_end,
+    of_no_way_back,
+    of_other_step,
+    of_spoken_name,
+    of_unused_parameter,
+)
+from service.grading.hint_structure import (
+    of_no_effect,
+    of_replaced,
+    of_single_look,
+    of_stop_in_loop,
+    of_unbracketed,
+    of_uncalled,
+    of_unindented,
+)
+from service.grading.hint_texts import of_sent_texts, of_texts, of_unlogged, of_unspoken
+from service.grading.hint_thresholds import of_joined_colours, of_thresholds
+from service.grading.hint_timing import of_overlapping_speech, of_seldom_looks, of_short_waits
+from service.grading.hint_unused import (
+    of_few_images,
+    of_few_samples,
+    of_partial_reading,
+    of_swallowed_flags,
+    of_swapped_atan2,
+    of_swapped_ports,
+    of_unread,
+)
 from service.grading.judging.bounded import sentences_within
 from service.grading.run_plan import RunPlan
 from submissions.submission import Submission
 
 _MOST = 5
 Rule = Callable[[Clues], Iterator[str]]
+#: What keeps everything else from happening.
+_OF_FILES: Sequence[Rule] = (of_missing_files, of_empty_parts, of_starter, of_swapped_parts)
 #: What explains an error better than its own words do; those are told where none of these does.
-_OF_ERRORS: Sequence[Rule] = (of_magics, of_responder_names, of_printed_answers)
+_OF_ERRORS: Sequence[Rule] = (
+    of_magics,
+    of_cell_errors,
+    of_misnamed_function,
+    of_missing_responder,
+    of_uncallable_responder,
+    of_printed_answers,
+    of_unreadable_answers,
+    of_no_return,
+    of_missing_key,
+    of_unqueued_answers,
+    of_signatures,
+    of_short_list,
+)
 #: What errors come of.
-_OF_MESSAGES: Sequence[Rule] = (of_messages, of_images, of_answers)
+_OF_MESSAGES: Sequence[Rule] = (
+    of_messages,
+    of_quoted_names,
+    of_braces,
+    of_images,
+    of_image_log,
+    of_double_json,
+    of_single_colon,
+    of_replaced_prefix,
+    of_answers,
+    of_sent_texts,
+    of_other_keys,
+    of_text_numbers,
+)
+#: Why a program that came to its end did too little; the surest first.
+_OF_STRUCTURE: Sequence[Rule] = (
+    of_ignored_magic,
+    of_unbracketed,
+    of_replaced,
+    of_redefined,
+    of_uncalled,
+    of_single_look,
+    of_loops_that_end_at_once,
+    of_no_effect,
+    of_unindented,
+)
+_OF_RESULTS: Sequence[Rule] = (
+    of_spoken_name,
+    of_first_message,
+    of_overlapping_speech,
+    of_short_waits,
+    of_functions,
+    of_division,
+    of_image_command,
+    of_none_answers,
+    of_swapped_values,
+    of_texts,
+    of_unspoken,
+    of_unlogged,
+    of_recognition,
+    of_units,
+    of_turns,
+    of_curves,
+    of_speeds,
+    of_distances,
+    of_count_from_one,
+    of_other_step,
+    of_unused_parameter,
+    of_no_way_back,
+    of_mirrored_end,
+    of_gain,
+    of_reversed_distance,
+    of_first_value,
+    of_radius,
+    of_joined_colours,
+    of_partial_reading,
+    of_thresholds,
+    of_seldom_looks,
+    of_swallowed_flags,
+    of_swapped_ports,
+    of_swapped_atan2,
+    of_words_in_loop,
+    of_inner_loop,
+    of_last_number,
+    of_exact_reading,
+    of_few_samples,
+    of_few_images,
+    of_single_round,
+    of_unread,
+)
 
 
 def hints_for(
@@ -41,23 +200,33 @@ def hints_for(
     results: Sequence[CriterionResult],
     heartbeat: Callable[[], None] = lambda: None,
 ) -> tuple[str, ...]:
-    """The most telling first; none where every criterion that is shown has full marks, or if it takes too long.
+    """The most telling first; where every criterion that is shown has full marks, what was accepted all the same.
+
+    None if it takes too long.
 
     Raises what ``sentences_within`` raises.
     """
     shown = [result for result in results if result.visibility == "visible"]
-    if all(result.marks >= result.max_marks for result in shown):
-        return ()
-    return sentences_within(trials, lambda: near_misses(clues_of(submission, plan, trials, results)), heartbeat)
+    rules = accepted_differences if all(result.marks >= result.max_marks for result in shown) else _near_and_accepted
+    return sentences_within(trials, lambda: rules(clues_of(submission, plan, trials, results)), heartbeat)
+
+
+def _near_and_accepted(clues: Clues) -> tuple[str, ...]:
+    return (*near_misses(clues), *accepted_differences(clues))[:_MOST]
 
 
 def near_misses(clues: Clues) -> tuple[str, ...]:
     """All that the rules find, whatever the marks; what keeps everything else from happening first."""
     explained = _found(_OF_ERRORS, clues)
-    errors = () if explained else tuple(of_errors(clues))
-    still = () if explained or errors else tuple(of_stillness(clues))
-    told = (*_found(_OF_MESSAGES, clues), *errors, *still, *of_texts(clues), *of_unspoken(clues))
-    found = (*of_missing_files(clues), *explained, *told)
+    errors = explained or tuple(of_errors(clues))
+    sent = _found(_OF_MESSAGES, clues)
+    slips = () if errors else tuple(of_slips(clues))
+    limits = () if errors or slips else (*of_stop_in_loop(clues), *of_gyro_direction(clues), *of_limits(clues))
+    structure = () if errors else _found(_OF_STRUCTURE, clues)
+    still = () if errors or slips or limits or structure else tuple(of_stillness(clues))
+    first = (*explained, *sent) if explained else (*sent, *errors)
+    found = (*_found(_OF_FILES, clues), *first, *slips, *limits, *structure, *still, *_found(_OF_RESULTS, clues))
+    found = found or tuple(of_other_cell_errors(clues)) or tuple(of_several_programs(clues)) or tuple(of_places(clues))
     return tuple(dict.fromkeys(found))[:_MOST]
 
 

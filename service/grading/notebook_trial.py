@@ -28,7 +28,7 @@ class NotebookTrial:
 
     ``choice`` is None when the program is the assignment's.
     With ``as_read`` the text of the trial's spec is what is run: its rules were held against that, and a notebook can
-    hand over another. The seed in ``notebook`` is set for each trial.
+    hand over another. The seed and the agents in ``notebook`` are set for each trial.
     """
 
     notebook: NotebookSpec
@@ -100,7 +100,7 @@ class NotebookTrial:
         limits, files = spec.program.limits, self.notebook.files
         output = spec.program.output_bytes
         unmarked = UnmarkedRuns(limits, output, spec.seconds, spec.child_seed, files, spec.tick, sheet)
-        notebook = replace(self.notebook, seed=spec.child_seed)
+        notebook = replace(self.notebook, seed=spec.child_seed, agents=spec.agents)
 
         def execute() -> tuple[ExecutedNotebook, list[Site]]:
             planner = NotebookRuns(site, marked_run, unmarked, planned if self.choice is None else PlannedRun())

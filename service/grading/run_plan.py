@@ -14,7 +14,7 @@ from responders.code import Code
 from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import AgentSpec, ProgramSpec, ResponderSpec, TrialSpec
+from responders.trial_spec import AgentSpec, ProgramSpec, RanStatements, ResponderSpec, TrialSpec
 from service.grading.grade import TrialResult
 from service.grading.notebook_trial import NotebookTrial
 from service.grading.trial_runner import TrialRunner
@@ -86,6 +86,12 @@ class RunPlan:
     agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # whom ``answers`` may ask
     second_program: ProgramSpec | None = None  # where there are two robots
     second_flags: Flags = field(default_factory=Flags)
+    ran: Mapping[Part, RanStatements] = field(default_factory=lambda: MappingProxyType({}))  # of parts that are watched
+
+    @property
+    def ignored_magic(self) -> str:
+        """Why the program's magic line is ignored; empty where it is not."""
+        return next((note.removeprefix(f"{_IGNORED}: ") for note in self.notes if note.startswith(_IGNORED)), "")
 
     @property
     def processes(self) -> tuple[ProgramSpec | ResponderSpec, ...]:
@@ -93,6 +99,16 @@ class RunPlan:
         answers = self.trial.notebook.as_responder if isinstance(self.trial, NotebookTrial) else self.answers
         found = (answers, *self.agents.values(), self.program, self.second_program)
         return tuple(each for each in found if each is not None)
+
+    def unwatched(self) -> RunPlan:
+        """The plan for a trial that is not shown: which statements are run there could tell what the robot sees."""
+        program, second, answers = self.program, self.second_program, self.answers
+        return replace(
+            self,
+            program=program and replace(program, ran=None),
+            second_program=second and replace(second, ran=None),
+            answers=answers and replace(answers, ran=None),
+        )
 
 
 def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PUBLIC) -> RunPlan:
@@ -104,18 +120,40 @@ def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PU
     if notebook is not None and assignment.training is not None:
         function = assignment.training.function
         raise UsageError(f"{notebook.name}: is a notebook, expected responder.py with a function {function}")
-    if notebook is not None and assignment.parts.agents:
-        files = " and ".join(f"{name}.py" for name in assignment.parts.agents)
-        raise UsageError(f"{notebook.name}: is a notebook, expected robot.py and responder.py beside {files}")
     if notebook is not None and "student" in (assignment.parts.program, assignment.parts.responder):
         plan = _of_notebook(submission, notebook, assignment)
     else:
         plan = _of_files(submission, assignment)
+    plan = replace(plan, agents=MappingProxyType(_agents(submission, assignment)))
     seed = child_seed(world_seed(secret, assignment.id), submission.sha256)
+    plan = _watched(plan)
     if assignment.world.robots == 2:
         plan = _with_second_program(plan, submission)
     plan = replace(plan, notes=(*plan.notes, *diagrams_in(notebook).problems))
     return replace(plan, own_files=submission.files, submission=submission.sha256, child_seed=seed)
+
+
+def _watched(plan: RunPlan) -> RunPlan:
+    """The plan with a look at which statements are run of the parts of which rules ask what they use.
+
+    A notebook is not watched, and nor is what is trained: of these, what can be run counts.
+    """
+    asked = {
+        criterion.part
+        for criterion in plan.assignment.criteria
+        if isinstance(criterion, SourceRules) and (criterion.uses or criterion.in_loop)
+    }
+    if isinstance(plan.trial, NotebookTrial) or plan.assignment.training is not None:
+        return plan
+    ran: dict[Part, RanStatements] = {part: RanStatements() for part in sorted(asked) if part in plan.read_as}
+    program, answers, functions = plan.program, plan.answers, plan.functions
+    return replace(
+        plan,
+        program=program and replace(program, ran=ran.get("program")),
+        answers=answers and replace(answers, ran=ran.get("responder")),
+        functions=functions and replace(functions, ran=ran.get("responder")),
+        ran=MappingProxyType(ran),
+    )
 
 
 def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
@@ -136,7 +174,6 @@ def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
     if missing == "program" and (asking := _stand_in(assignment)) is not None:
         asked_by = "your responder was asked by a program of Robomark's own, which only sends the texts"
         plan = replace(plan, program=asking, notes=(*plan.notes, asked_by))
-    plan = replace(plan, agents=MappingProxyType(_agents(submission, assignment)))
     # What is sent to a responder that is not there is a message all the same.
     return replace(plan, missing=missing, collaborative=plan.collaborative or missing == "responder")
 
@@ -277,7 +314,8 @@ def _flags(text: str, assignment: Assignment) -> tuple[Flags, str, tuple[str, ..
     world = assignment.world
     notes = []
     if "b" in flags.values and wanted.background != world.background:
-        notes.append(f"the program asks for the background {wanted.background}; the assignment's is {world.background}")
+        asked = flags.values["b"][:40]
+        notes.append(f"the program asks for the background {asked}; the assignment's is {world.background}")
     if "r" in flags.values and wanted.robot != world.robot:
         notes.append(f"the program asks for the robot {wanted.robot}; the assignment's is {world.robot}")
     if flags.values.keys() & {"N", "M"}:

@@ -54,7 +54,8 @@ def analyse(plan: RunPlan, trials: Sequence[TrialResult], caller: Caller, meter:
     checks: dict[tuple[str, int], Returned] = {}
     # What the instructor's checks cost is not the submission's, and what that has left is not theirs.
     own = JobMeter(meter.limits, meter.heartbeat)
-    for criterion in assignment.criteria:
+    # Texts are read last, as what counts in them is what has been run.
+    for criterion in sorted(assignment.criteria, key=lambda each: isinstance(each, SourceRules)):
         if isinstance(criterion, SourceRules) and criterion.part in plan.read_as:
             answers[criterion.id] = _answers(criterion, plan, caller, meter)
         elif isinstance(criterion, Functions) and plan.functions is not None:
@@ -112,7 +113,9 @@ def _answers(criterion: SourceRules, plan: RunPlan, caller: Caller, meter: JobMe
         "shown": SPEECH,
         "entries": (*criterion.defines, *entries),
     }
-    calls = [FunctionCall("read", [list(_read_files(criterion.part, plan)), asked])]
+    ran = plan.ran.get(criterion.part)
+    was_run = sorted(ran.places) if ran is not None and ran.places else None
+    calls = [FunctionCall("read", [list(_read_files(criterion.part, plan)), asked, was_run])]
     called = caller.call(_READER, calls, 0, meter)
     fault = called.fault or called.returned[0].fault
     if fault is not None:

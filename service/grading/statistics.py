@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
+from decimal import ROUND_HALF_UP, Decimal
 from math import sqrt
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from service.grading.grade import Grade
 
 _BINS, _MOST_BINS = 10, 15
+_HUNDREDTH = Decimal("0.01")
+#: Share of all marks that passes, where nobody names another.
+PASS_SHARE = Decimal("0.4")
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +35,7 @@ class MarkedCriterion:
 
 @dataclass(frozen=True, slots=True)
 class MarkedSubmission:
-    """One submission that has marks."""
+    """One submission that has marks, out of all that its assignment gives: others count for an excused criterion."""
 
     who: str
     assignment: str
@@ -101,12 +104,26 @@ def distribution(marks: Iterable[Decimal], max_marks: Decimal) -> tuple[MarksBin
     return tuple(MarksBin(*pair) for pair in zip(edges, [*edges[1:], max_marks], counts, strict=True))
 
 
+def marks_out_of_all(marks: Decimal, max_marks: Decimal, worth: Decimal) -> Decimal | None:
+    """Marks out of ``max_marks`` as marks out of ``worth``: where a criterion is excused, the others count for it.
+
+    None where all criteria are excused, so that there are no marks.
+    """
+    if worth == max_marks:
+        return marks
+    if not max_marks:
+        return None
+    return (marks * worth / max_marks).quantize(_HUNDREDTH, ROUND_HALF_UP)
+
+
 def marked_of(grade: Grade) -> MarkedSubmission:
     """A grade as statistics see it; what could not be judged is left out."""
     criteria = tuple(
         MarkedCriterion(each.id, each.title, each.marks, each.max_marks) for each in grade.criteria if not each.unjudged
     )
-    return MarkedSubmission(grade.student, grade.assignment, grade.marks, grade.max_marks, grade.verdict, criteria)
+    marks = marks_out_of_all(grade.marks, grade.max_marks, grade.worth)
+    marks = Decimal(0) if marks is None else marks
+    return MarkedSubmission(grade.student, grade.assignment, marks, grade.worth, grade.verdict, criteria)
 
 
 def statistics_of(submissions: Iterable[MarkedSubmission]) -> tuple[AssignmentStatistics, ...]:

@@ -25,6 +25,7 @@ from sim.recording import Fault, Image, Message, Recording, Verdict
 from submissions.assignment.definition import Training
 
 _HINT = "Your function is called once, with all images and labels; call it yourself with a few rows of numbers."
+_COLLECT = 'Log images while the robot stands over something, with print("image_data both").'
 _SIDE = {"focus": 14, "whole": 20}
 
 
@@ -49,8 +50,8 @@ def with_models_answers(
     # Not in the order of the track: neighbours on it mostly show the same.
     chance = Stream(plan.child_seed, "order of images")
     orders = [sorted(range(len(images)), key=chance.integer) for images in unseen]
-    named = runner.train(
-        TrainingSpec(
+    if known:
+        spec = TrainingSpec(
             trainer.code,
             trainer.files,
             training.function,
@@ -63,9 +64,11 @@ def with_models_answers(
             trainer.limits,
             trainer.output_bytes,
             plan.child_seed,
-        ),
-        meter,
-    )
+        )
+        named = runner.train(spec, meter)
+    else:
+        fault = _nothing_learnt(len(learnt), plan)
+        named = tuple(Named((None,) * len(images), fault, "") for images in unseen)
     answered = list(results)
     for group, order, gave in zip(groups, orders, named, strict=True):
         by_place = dict(zip(order, gave.names, strict=True))
@@ -74,6 +77,15 @@ def with_models_answers(
             recording = _answered(results[index].recording, _collected(results[index]), names, gave)
             answered[index] = replace(results[index], recording=recording)
     return answered
+
+
+def _nothing_learnt(images: int, plan: RunPlan) -> Fault:
+    """The fault of a robot program that leaves nothing to train on; the assignment's own program is no student's."""
+    collected = "collected no images" if not images else f"collected {images} images, but none over a known label"
+    sentence = f"the robot {collected}, so there is nothing to train on"
+    if plan.assignment.parts.program != "student":
+        return Fault(0.0, Verdict.ASSIGNMENT_ERROR, "assignment", sentence)
+    return Fault(0.0, Verdict.PROGRAM_ERROR, "program", sentence, hint=_COLLECT)
 
 
 def _collected(result: TrialResult) -> list[Pair]:

@@ -108,7 +108,15 @@ class TrialRunner:
         meter = meter or JobMeter()
         return self.undisturbed(
             lambda: call_functions(
-                module.code, module.files, calls, module.limits, module.output_bytes, self._sandboxes, seed, meter
+                module.code,
+                module.files,
+                calls,
+                module.limits,
+                module.output_bytes,
+                self._sandboxes,
+                seed,
+                meter,
+                module.ran,
             ),
             meter,
         )

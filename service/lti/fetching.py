@@ -1,11 +1,10 @@
-"""Requests to a platform for JSON, to the addresses that its administrator registered, in whatever network they are.
+"""Requests to a platform for JSON, to addresses whose origin an operator registered, in whatever network they are.
 
 How an address is asked, and how long, is ``service.outside``'s.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 from service.outside import ALL_OTHERS, NotReached, ask
 from service.version import GRADER_VERSION
 from sim.errors import HostError
+from sim.readers.json_text import read_json
 
 _MOST_BYTES = 4 * 2**20
 
@@ -45,6 +45,6 @@ def fetch(
     if len(answer.body) > _MOST_BYTES:
         raise PlatformError(f"The platform at {host} answered more than {_MOST_BYTES} bytes")
     try:
-        return Fetched(json.loads(answer.body) if answer.body.strip() else None, answer.headers.get("link", ""))
+        return Fetched(read_json(answer.body) if answer.body.strip() else None, answer.headers.get("link", ""))
     except ValueError:
         raise PlatformError(f"The platform at {host} answered something that is not JSON") from None

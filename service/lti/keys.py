@@ -10,6 +10,7 @@ from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption,
 from jwt.algorithms import RSAAlgorithm
 from sqlalchemy.orm import Session
 
+from service.store.locks import lock_installation
 from service.store.people import lti
 
 _BITS = 2048
@@ -17,6 +18,8 @@ _BITS = 2048
 
 def signing_key(session: Session) -> tuple[str, str]:
     """Id and PEM of the key to sign with, made when it is first asked for."""
+    if not lti.private_keys(session):
+        lock_installation(session)
     if not lti.private_keys(session):
         key = rsa.generate_private_key(public_exponent=65537, key_size=_BITS)
         lti.add_private_key(

@@ -35,6 +35,7 @@ class Launch:
     subject: str
     student: Student
     role: Role
+    deployment: str
     context: str
     course_title: str
     members_url: str | None
@@ -73,7 +74,7 @@ def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
     if claims.get(f"{CLAIM}message_type") != "LtiResourceLinkRequest":
         raise UsageError("this launch is not one of a link in a course; Robomark answers no other")
     deployment = claims.get(f"{CLAIM}deployment_id")
-    if deployment not in pending.platform.deployments:
+    if not isinstance(deployment, str) or deployment not in pending.platform.deployments:
         raise UsageError(f"this launch comes from a deployment that is not registered here: {str(deployment)[:80]!r}")
     context = _table(claims, f"{CLAIM}context")
     context_id = context.get("id")
@@ -82,10 +83,11 @@ def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
         raise UsageError("this launch names no course or nobody; the platform has to send both")
     title = context.get("title") or context.get("label") or context_id
     return Launch(
-        subject=subject[:_LONGEST],
+        subject=subject,
         student=_student(claims, pending.platform, subject),
         role=role_of(claims.get(f"{CLAIM}roles")),
-        context=context_id[:_LONGEST],
+        deployment=deployment,
+        context=context_id,
         course_title=str(title)[:_LONGEST],
         members_url=text_of(_table(claims, MEMBERS_CLAIM), "context_memberships_url"),
         lineitems_url=text_of(_table(claims, GRADES_CLAIM), "lineitems"),
@@ -99,8 +101,11 @@ def role_of(roles: object) -> Role:
 
 
 def student_of(platform: Platform, subject: str, id: str | None, name: str | None, email: str | None) -> Student:
-    """How a course knows somebody whom a platform told of: by the institution's id where it says one."""
-    return Student((id or f"{platform.name} {subject}")[:_LONGEST], (name or "")[:_LONGEST], (email or "")[:_LONGEST])
+    """A platform's person as a student of a course: by the institution's id if the platform sends one.
+
+    Only names and addresses are cut: two ids that were cut could be equal.
+    """
+    return Student(id or f"{platform.name} {subject}", (name or "")[:_LONGEST], (email or "")[:_LONGEST])
 
 
 def _claims(pending: PendingLaunch, id_token: str) -> dict[str, Any]:

@@ -7,10 +7,11 @@ from sqlalchemy.orm import Session
 
 from service.lti.services import Score, send_scores
 from service.store.engine import Store, now
+from service.store.grades import current
 from service.store.models import AssignmentVersion, Enrolment, Job, SubmissionRow
 from service.store.people import lti
 from service.store.people.lti import CourseLink
-from service.store.states import JobState, Standing
+from service.store.states import Standing
 from sim.errors import UsageError
 
 
@@ -35,7 +36,7 @@ def send_marks(store: Store, link: CourseLink, course_id: int, assignment: str) 
 
 
 def _published(session: Session, link: CourseLink, course_id: int, assignment: str) -> list[Score]:
-    """The newest submission of each student whose grade stands and is published."""
+    """The attempt of each student that counts, where its grade is published and not all of it is excused."""
     subjects = lti.subjects(session, link.platform, course_id)
     query = (
         select(Enrolment.student, Job.marks, Job.max_marks)
@@ -44,18 +45,16 @@ def _published(session: Session, link: CourseLink, course_id: int, assignment: s
         .where(
             Enrolment.course_id == course_id,
             SubmissionRow.assignment == assignment,
-            SubmissionRow.staff_only.is_(None),
-            Job.state == JobState.DONE,
+            SubmissionRow.id.in_(current.counting(SubmissionRow.assignment == assignment)),
             Job.standing == Standing.STANDS,
-            Job.suspect.is_(None),
             Job.published_at.is_not(None),
         )
-        .order_by(SubmissionRow.attempt)
+        .order_by(SubmissionRow.id)
     )
     # A platform passes over what is not newer than what it has, and marks change after they are published.
     at = now(session)
-    newest = {}
-    for student, marks, max_marks in session.execute(query):
-        if student in subjects and marks is not None and max_marks:
-            newest[student] = Score(subjects[student], marks, max_marks, at)
-    return list(newest.values())
+    return [
+        Score(subjects[student], marks, max_marks, at)
+        for student, marks, max_marks in session.execute(query)
+        if student in subjects and marks is not None and max_marks
+    ]

@@ -18,11 +18,11 @@ from urllib.parse import urlencode
 
 import jwt
 
-from service.lti.fetching import PlatformError, fetch
+from service.lti.fetching import Fetched, PlatformError, fetch
 from service.lti.keys import signing_key
 from service.lti.launch import role_of, student_of, tables_in, text_of
 from service.store.engine import Store
-from service.store.people.lti import CourseLink, Platform
+from service.store.people.lti import CourseLink, Platform, origin_of
 from service.store.states import Role
 from submissions.people import Student
 
@@ -63,9 +63,10 @@ def members(store: Store, link: CourseLink) -> list[PlatformMember]:
     """Everybody who is active in the course. Raises PlatformError where the platform gives no list."""
     if link.members_url is None:
         raise PlatformError("The platform has told no address of its list of members")
+    _check_origin(link.platform, link.members_url)
     headers = {"accept": _MEMBERS, "authorization": f"Bearer {_token(store, link.platform, _MEMBERS_SCOPE)}"}
     found = []
-    for page in _pages(link.members_url, headers):
+    for page in _pages(link.platform, link.members_url, headers):
         for each in tables_in(page.get("members") if isinstance(page, dict) else None):
             subject = text_of(each, "user_id")
             if subject is None or each.get("status", "Active") != "Active":
@@ -85,10 +86,13 @@ def send_scores(store: Store, link: CourseLink, assignment: str, title: str, sco
     """
     if link.lineitems_url is None:
         raise PlatformError("The platform has told no address of its marks")
+    _check_origin(link.platform, link.lineitems_url)
     if not scores:
         return 0
     token = _token(store, link.platform, _GRADES_SCOPES)
-    column = _column(link.lineitems_url, token, assignment, title, max(score.max_marks for score in scores))
+    column = _column(
+        link.platform, link.lineitems_url, token, assignment, title, max(each.max_marks for each in scores)
+    )
     path, _, query = column.partition("?")
     where = f"{path.rstrip('/')}/scores" + (f"?{query}" if query else "")
     for score in scores:
@@ -102,19 +106,20 @@ def send_scores(store: Store, link: CourseLink, assignment: str, title: str, sco
             "comment": score.comment,
         }
         headers = {"content-type": _SCORE, "authorization": f"Bearer {token}"}
-        fetch(where, method="POST", body=json.dumps(body).encode(), headers=headers)
+        _ask(link.platform, where, method="POST", body=json.dumps(body).encode(), headers=headers)
     return len(scores)
 
 
-def _column(lineitems_url: str, token: str, assignment: str, title: str, max_marks: Decimal) -> str:
+def _column(platform: Platform, lineitems_url: str, token: str, assignment: str, title: str, max_marks: Decimal) -> str:
     headers = {"accept": _LINEITEMS, "authorization": f"Bearer {token}"}
     separator = "&" if "?" in lineitems_url else "?"
-    for page in _pages(f"{lineitems_url}{separator}{urlencode({'resource_id': assignment})}", headers):
+    for page in _pages(platform, f"{lineitems_url}{separator}{urlencode({'resource_id': assignment})}", headers):
         for item in tables_in(page):
             if item.get("resourceId") == assignment and isinstance(item.get("id"), str):
                 return str(item["id"])
     wanted = {"label": title, "scoreMaximum": float(max_marks), "resourceId": assignment, "tag": "robomark"}
-    made = fetch(
+    made = _ask(
+        platform,
         lineitems_url,
         method="POST",
         body=json.dumps(wanted).encode(),
@@ -152,9 +157,23 @@ def _token(store: Store, platform: Platform, scopes: str) -> str:
     return token
 
 
-def _pages(url: str, headers: Mapping[str, str]) -> Iterator[Any]:
+def _ask(platform: Platform, url: str, **request: Any) -> Fetched:
+    """Call an address that a launch or the platform named, if its origin is registered. Raises PlatformError."""
+    _check_origin(platform, url)
+    return fetch(url, **request)
+
+
+def _check_origin(platform: Platform, url: str) -> None:
+    if not platform.may_be_asked(url):
+        raise PlatformError(
+            f"The platform names {origin_of(url) or 'something that is no address'} for a service, which is not "
+            "registered for it; ask whoever runs Robomark to add this address to the platform's services"
+        )
+
+
+def _pages(platform: Platform, url: str, headers: Mapping[str, str]) -> Iterator[Any]:
     for _ in range(_MOST_PAGES):
-        fetched = fetch(url, headers=headers)
+        fetched = _ask(platform, url, headers=headers)
         yield fetched.value
         further = _NEXT.search(fetched.link)
         if further is None:

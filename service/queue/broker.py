@@ -184,7 +184,7 @@ class EmbeddedBroker:
         }
         arguments = [part for name, value in options.items() for part in (f"--{name}", value)]
         # The server inherits the lock, so it is held for exactly as long as the server lives.
-        self._process = start_process([str(binary), *arguments], os.environ.copy(), log, signal.SIGTERM, [lock])
+        self._process = start_process([str(binary), *arguments], {}, log, signal.SIGTERM, [lock])
         until = time.monotonic() + _START_SECONDS
         while not broker_answers(self._settings):
             if self._process.poll() is not None or time.monotonic() > until:

@@ -23,6 +23,10 @@ PLOT_TASK = "robomark.plot"
 #: setting, variable or task can.
 NO_SANDBOX = "robomark_no_sandbox"
 
+#: So long after a job may take no longer, an exception is raised in what still runs, and its process is killed. The
+#: sandbox and the lease end everything earlier; this frees a process that hangs all the same.
+GRACE_SECONDS = (30, 60)
+
 #: A pool child is replaced when it has grown so far (KiB); one with its zygotes' parents is far below.
 _CHILD_KIB = 1_000_000
 
@@ -31,8 +35,7 @@ def make_celery(settings: Settings) -> Celery:
     """A Celery app for this broker. ``settings.broker_url`` must name one."""
     app = Celery("robomark", broker=settings.broker_url, include=["service.queue.tasks"], set_as_current=False)
     exchange = Exchange("robomark", type="direct")
-    # The sandbox and the lease end everything earlier; these only free a worker that hangs all the same.
-    soft, hard = settings.job_seconds + 30, settings.job_seconds + 60
+    soft, hard = (settings.job_seconds + more for more in GRACE_SECONDS)
     app.conf.update(
         task_ignore_result=True,
         task_serializer="json",

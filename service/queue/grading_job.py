@@ -90,8 +90,9 @@ def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Cl
     progress = _Progress(claim)
     with store.reading() as session:
         grading_request = intake.load_grading_request(session, claim.job_id)
+    impatient = store.impatient()
     with LeaseKeeper(
-        lambda: jobs.heartbeat(store, claim, settings.lease_seconds, progress.share),
+        lambda: jobs.heartbeat(impatient, claim, settings.lease_seconds, progress.share),
         settings.lease_seconds,
         settings.job_seconds,
     ) as keeper:
@@ -107,6 +108,8 @@ def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Cl
             observe=observe,
             runner=runner,
         )
+        # Marks that were made when all had taken too long can lack what was broken off.
+        keeper.check()
         graded_at = progress.now()
         for result in graded.criteria:
             if result.unjudged:

@@ -20,7 +20,11 @@ _log = structlog.get_logger(__name__)
 #: Whoever waits sees progress so often, however long the lease.
 _PROGRESS_SECONDS = 2.0
 
-# A process that is forked in the middle of a renewal would have its locks held for ever.
+#: After a renewal that failed, as one does that finds the database locked, the next is tried so soon.
+_AGAIN_SECONDS = 0.2
+
+# A process that is forked in the middle of a renewal would have its locks held for ever. Every fork waits for a running
+# renewal, so a renewal may not wait long itself.
 _renewing = Lock()
 os.register_at_fork(before=_renewing.acquire, after_in_parent=_renewing.release, after_in_child=_renewing.release)
 
@@ -55,7 +59,9 @@ class LeaseKeeper:
 
     def _run(self) -> None:
         # What hangs for good must not be held for good.
-        while not self._ended.wait(self._every) and time.monotonic() <= self._until:
+        wait = self._every
+        while not self._ended.wait(wait) and time.monotonic() <= self._until:
+            wait = self._every
             with _renewing:
                 try:
                     self._renew()
@@ -64,6 +70,7 @@ class LeaseKeeper:
                     return
                 except DBAPIError as error:
                     # The next renewal tries again; should the lease run out meanwhile, the token tells.
+                    wait = min(self._every, _AGAIN_SECONDS)
                     _log.warning("heartbeat.failed", error=str(error))
                 except Exception:
                     _log.exception("heartbeat.failed")

@@ -1,6 +1,7 @@
 """Tells workers through the broker that there is work. A notice that is lost, doubled or late does no harm.
 
-Nothing here fails when the broker does: the lease reaper notifies again.
+No notice fails when the broker or the database does, as what it is about is committed already: the lease reaper
+notifies again.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import structlog
 from celery import Celery
 from kombu.exceptions import OperationalError as BrokerError
 from redis.exceptions import RedisError
+from sqlalchemy.exc import SQLAlchemyError
 
 from service.queue.celery_app import GRADE_TASK, PLOT_TASK, PLOTS, QUEUES, TRYOUT_TASK, TRYOUTS
 from service.settings import Settings
@@ -40,10 +42,13 @@ class Notifier:
         """Notify for ``count`` jobs of a lane that were just taken in."""
         if count <= 0:
             return
-        # Noted first: a claim passes over a row that is being written to, and the notice would have been for nothing.
-        noted = note_notices(self.store, lane, count)
-        if not self._publish(GRADE_TASK, lane.value, count):
-            forget_notices(self.store, noted)
+        try:
+            # Noted first: a claim passes over a row that is being written to, and the notice would be for nothing.
+            noted = note_notices(self.store, lane, count)
+            if not self._publish(GRADE_TASK, lane.value, count):
+                forget_notices(self.store, noted)
+        except SQLAlchemyError as error:
+            _log.warning("notify.failed", task=GRADE_TASK, count=count, error=str(error))
 
     def try_out(self, count: int = 1) -> None:
         """Notify for ``count`` programs that students try."""

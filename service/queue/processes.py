@@ -12,10 +12,11 @@ import signal
 import stat
 import subprocess
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from sim.errors import HostError
+from sim.processes import start
 
 _LOG_BYTES = 10_000_000
 _PR_SET_PDEATHSIG = 1
@@ -24,21 +25,22 @@ _libc = ctypes.CDLL(None, use_errno=True)
 
 def start_process(
     command: Sequence[str],
-    environment: dict[str, str],
+    extra: Mapping[str, str],
     log: Path,
     at_our_end: signal.Signals,
     kept_open: Sequence[int] = (),
 ) -> subprocess.Popen[bytes]:
     """A child in a session of its own that gets ``at_our_end`` when this thread ends, however it ends.
 
-    It inherits the descriptors ``kept_open`` and no other. Raises HostError when it cannot be started.
+    It has the variables ``extra`` beside a clean environment, and inherits the descriptors ``kept_open`` and no other.
+    Raises HostError when it cannot be started.
     """
     try:
         keep_small(run_file(log))
         with log.open("ab") as output:
-            return subprocess.Popen(
+            return start(
                 command,
-                env=environment,
+                extra,
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=output,

@@ -5,10 +5,8 @@ Runs no loop of its own; whoever supervises calls ``ensure`` again and again.
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,6 +17,7 @@ from service.queue.processes import end_processes, keep_small, start_process
 from service.settings import Settings
 from service.store.engine import Store
 from service.store.queue import jobs, workers
+from sim.processes import python_command
 
 #: Imports throw nothing away, and to look for garbage is a tenth of what they cost.
 _WORKER = "import gc; gc.disable(); from service.queue.worker import main; main()"
@@ -103,8 +102,7 @@ class SupervisedWorker:
     def __init__(self, settings: Settings, store: Store, log: Path) -> None:
         self._settings = settings
         self._store = store
-        environment = {**os.environ, **settings.environment()}
-        self.process = SupervisedProcess([sys.executable, "-c", _WORKER], environment, log)
+        self.process = SupervisedProcess(python_command("-c", _WORKER), settings.environment(), log)
         self._name = ""
         self._seen = 0
         self._looked = 0.0

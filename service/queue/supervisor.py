@@ -8,7 +8,6 @@ from __future__ import annotations
 import fcntl
 import os
 import socket
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import TracebackType
@@ -22,6 +21,7 @@ from service.queue.supervised import SupervisedProcess, SupervisedWorker, stop_a
 from service.settings import Settings
 from service.store.engine import Store
 from sim.errors import HostError, UsageError
+from sim.processes import python_command
 
 _GRACE_SECONDS = 5.0
 _SHORT_LIVES = 3
@@ -111,6 +111,5 @@ def alone_in(settings: Settings) -> Iterator[Callable[[str], None]]:
 
 def _web_server(settings: Settings, listening: socket.socket) -> SupervisedProcess:
     number = listening.fileno()
-    command = [sys.executable, "-m", "service.web.server", str(number)]
-    environment = {**os.environ, **settings.environment()}
-    return SupervisedProcess(command, environment, settings.home / "log" / "web.log", [number])
+    command = python_command("-m", "service.web.server", str(number))
+    return SupervisedProcess(command, settings.environment(), settings.home / "log" / "web.log", [number])

@@ -50,8 +50,10 @@ def _run(store: Store, settings: Settings, runner: TrialRunner, claimed: TryoutC
     if once is None:
         raise UsageError(f"{assignment.id} has nothing to try: no robot is run that you see.")
 
+    impatient = store.impatient()
+
     def renew() -> None:
-        if not tryouts.keep(store, claimed, settings.lease_seconds):
+        if not tryouts.keep(impatient, claimed, settings.lease_seconds):
             raise Cancelled("another worker has it")
 
     with LeaseKeeper(renew, settings.lease_seconds, settings.job_seconds) as keeper:

@@ -31,6 +31,7 @@ from service.store.queue import jobs, workers
 from service.store.queue.workers import WorkerDescription
 from service.version import GRADER_VERSION
 from sim.errors import UsageError
+from sim.processes import leave_current_folder
 
 _log = structlog.get_logger(__name__)
 #: The exit status of a worker that graded the known answer wrongly.
@@ -48,6 +49,7 @@ def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
     if not settings.broker_url:
         raise UsageError("a worker needs a broker: set ROBOMARK_BROKER_URL")
     open_home(settings.home)
+    leave_current_folder()
     undivided = control_group.divide()
     group = None if unsafe else control_group.for_this_process(settings.slot_memory_mb)
     configure_logging(settings.log_level)

@@ -10,7 +10,7 @@ import signal
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
@@ -23,11 +23,14 @@ from redis.exceptions import ConnectionError as BrokerGone
 from redis.exceptions import RedisError
 
 from service.queue.broker import broker_client
+from service.queue.celery_app import QUEUES
 from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store.engine import Store
 from service.store.queue import workers
 from service.store.queue.workers import WorkerDescription
+from service.store.revision import needs_newer_code
+from service.version import release_problem
 
 _log = structlog.get_logger(__name__)
 _ALIVE_SECONDS = 5.0
@@ -35,6 +38,8 @@ _LONGEST_REAP_SECONDS = 5.0
 _UNBLOCK_SECONDS = 1.0
 #: So many times in a row messages waited, this worker had nothing to do, and it took none.
 _DEAF_BEATS = 3
+#: Why a worker claims nothing for which the tables are too new.
+OUTDATED = "it begins nothing more, as the database needs a newer release: install that and restart"
 
 
 @dataclass(slots=True)
@@ -43,6 +48,7 @@ class _Beat:
 
     at: float = float("-inf")  # when the consumer was last seen to run
     waiting: int = 0  # messages that lie in the broker
+    is_outdated: bool = False  # the database needs newer code than this worker's
 
     @property
     def recent(self) -> bool:
@@ -79,10 +85,21 @@ def add_steps(app: Celery, store: Store, settings: Settings, worker: WorkerDescr
     notifier = Notifier(app, store, settings)
     period = min(settings.lease_seconds / 3, _LONGEST_REAP_SECONDS)
 
+    problems: set[str] = set()
+
     def catch_up() -> bool:
         """Whether the worker may go on."""
+        with store.reading() as session:
+            beat.is_outdated = beat.is_outdated or needs_newer_code(session)
+        problem = OUTDATED if beat.is_outdated else release_problem()
+        if problem and problem not in problems:
+            problems.add(problem)
+            _log.error("worker.must_be_restarted", reason=problem)
         if beat.recent:
-            workers.beat(store, worker)
+            workers.beat(store, replace(worker, problem=problem))
+        if beat.is_outdated:
+            # Others take back lost jobs and notify, with the code that fits the tables.
+            return True
         notifier.catch_up()
         beat.waiting = notifier.waiting()
         with store.reading() as session:
@@ -143,6 +160,8 @@ class _Beating(bootsteps.StartStopStep):
     client_name: str  # of our connections to the broker
 
     def start(self, parent: Any) -> None:
+        self._consumer = parent
+        self._takes = True
         self._beat()
         self._timer = parent.timer.call_repeatedly(_ALIVE_SECONDS, self._beat)
         # Told to end, the consumer would else notice when it next looks up by itself, after up to a second.
@@ -177,4 +196,11 @@ class _Beating(bootsteps.StartStopStep):
         except OSError as error:
             # A full disk must not end a worker that has work to do.
             _log.warning("alive.failed", error=str(error))
-        self.hearing.check()
+        if not self.beat.is_outdated:
+            self.hearing.check()
+        elif self._takes:
+            # The messages are for workers that can claim; what was begun is finished.
+            self._takes = False
+            for queue in QUEUES:
+                self._consumer.cancel_task_queue(queue)
+            _log.warning("worker.takes_no_messages", reason=OUTDATED)

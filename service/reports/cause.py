@@ -78,9 +78,9 @@ def diagnose(grade: Grade, submission: Submission | None = None, language: Langu
     lost = {index: each for index, each in graded.items() if each.marks < each.max_marks}
     if is_ours(grade.verdict):
         return Diagnosis(words.happened, words.next_step)
-    if grade.criteria and grade.marks >= grade.max_marks:
-        return Diagnosis(language.say(FULL_MARKS), language.say("Nothing is left to do."))
     hints = hints_of(grade)
+    if grade.criteria and grade.marks >= grade.max_marks:
+        return _of_full_marks(hints, submission, language)
     if hints:
         return _of_hint(grade, hints, lost, submission, language)
     fault = _costly_fault(grade, lost)
@@ -92,6 +92,18 @@ def diagnose(grade: Grade, submission: Submission | None = None, language: Langu
         concerned = (index for index, each in lost.items() if grade.missing in each.message)
         return Diagnosis(words.happened, words.next_step, lost=frozenset(concerned))
     return _of_criterion(grade, lost, language) if lost else Diagnosis(words.happened, words.next_step)
+
+
+def _of_full_marks(hints: tuple[str, ...], submission: Submission | None, language: Language) -> Diagnosis:
+    """Full marks, and what was accepted although the assignment asks for something else."""
+    full = language.say(FULL_MARKS)
+    if not hints:
+        return Diagnosis(full, language.say("No changes needed."))
+    cause = language.say("%(full)s Accepted with a difference: %(difference)s", full=full, difference=hints[0])
+    place = _PLACE.match(hints[0])
+    excerpt = _excerpt(submission, place[2], int(place[1])) if place is not None else None
+    step = language.say("No changes needed for the marks. Correct this if others use your program.")
+    return Diagnosis(cause, step, hints[1:], excerpt)
 
 
 def _of_hint(
@@ -112,12 +124,11 @@ def _of_hint(
         with_it = frozenset(index for index, each in lost.items() if not each.marks)
     place = _PLACE.match(hint)
     if place is None:
-        words = grade_words(grade, language)
-        step = words.next_step if words.tone == "bad" else language.say("Mend that first, and submit it again.")
+        step = language.say("Fix this first, then submit again.")
         return Diagnosis(hint, step, hints[1:], lost=with_it)
     line, name = int(place[1]), place[2]
     step = language.say(
-        "Mend what line %(line)s of %(file)s needs, run it once in the simulator, and submit it again.",
+        "Fix line %(line)s of %(file)s, run it without submitting, and submit it again.",
         line=line,
         file=name,
     )
@@ -179,6 +190,8 @@ def found(grade: Grade, result: CriterionResult, language: Language = ENGLISH) -
     told = readable(failed.message, 600, lines=6)
     if failed.t is None:
         return told
+    if not failed.t or f"{failed.t:.2f} s" in told:
+        return told + _where(grade, failed, language)
     at = language.say("%(found)s, at %(seconds)s s.", found=told.rstrip("."), seconds=f"{failed.t:.2f}")
     return at + _where(grade, failed, language)
 
@@ -207,7 +220,7 @@ def _where(grade: Grade, evidence: Evidence, language: Language) -> str:
     trial = grade.trials[evidence.trial]
     several = sum(each.scenario == trial.scenario for each in grade.trials) > 1
     where = trial_words(trial, language) if several else one_line(trial.scenario, 60)
-    return " " + language.say("That was in %(where)s.", where=where)
+    return " " + language.say("That was in scenario %(where)s.", where=where)
 
 
 def _costly_fault(grade: Grade, lost: dict[int, CriterionResult]) -> Fault | None:

@@ -20,6 +20,7 @@ from sim.recorded import faults_of
 from sim.recording import Fault, Verdict
 from submissions.agent_files import code_of
 from submissions.assignment.second_robot import second_program_of
+from submissions.magic_lines import magic_place
 from submissions.source_text import decode_source
 from submissions.submission import PART_FILES, Submission
 
@@ -90,7 +91,9 @@ def _group(
 ) -> FaultGroup:
     index, fault = places[0]
     source = _source(fault, submission)
-    where = language.say("Agent %(name)s", name=fault.agent) if fault.agent else language.say(_WHERE[fault.who])
+    is_other_cell = source is not None and fault.cell is not None and magic_place(source.text) is None
+    who = translatable("Notebook") if is_other_cell and fault.who == "program" else _WHERE[fault.who]
+    where = language.say("Agent %(name)s", name=fault.agent) if fault.agent else language.say(who)
     if source is not None and not fault.file:
         where += f" ({one_line(source.name, 60)})"
     place = place_words(replace(fault, agent=""), language)

@@ -239,7 +239,6 @@ def _criterion_line(
     grade: Grade, result: CriterionResult, played: frozenset[int], language: Language, *, told: bool
 ) -> CriterionLine:
     full = result.marks >= result.max_marks
-    excused = result.set_by_hand is not None and result.set_by_hand.excused
     missed = [item for item in result.evidence if not item.passed]
     failed = next(iter(missed), None)
     watched = next((item for item in missed if item.trial + 1 in played), None) if not full else None
@@ -251,7 +250,7 @@ def _criterion_line(
         marks=number(result.marks),
         max_marks=number(result.max_marks),
         share=_share(float(result.marks), float(result.max_marks)) if result.max_marks else 100.0,
-        state="excused" if excused else _state(result.marks, result.max_marks),
+        state="excused" if result.excused else _state(result.marks, result.max_marks),
         visibility=result.visibility,
         where="" if full or failed is None else _where(grade, failed, language),
         moment="" if watched is None else moment_hash(watched.trial + 1, seconds),

@@ -5,8 +5,8 @@ What a table shows of a grade is its format's; which rows there are is for whoev
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from service.grading.grade import Grade
@@ -21,7 +21,8 @@ class TableRow(Generic[_V]):
     """One submission. ``grade`` is what is shown of its grade, None where it has none; ``reason`` says why.
 
     A grade has a reason as well where a part was not submitted. ``refused`` is what could not be taken in, so that no
-    grade will come.
+    grade will come. ``told`` is the reason in words for its student, where those are others; a row that is
+    ``for_staff`` is shown to no student.
     """
 
     student: Student
@@ -30,6 +31,8 @@ class TableRow(Generic[_V]):
     grade: _V | None = None
     reason: str = ""
     refused: bool = False
+    told: str = ""
+    for_staff: bool = False
 
     @property
     def who(self) -> str:
@@ -39,7 +42,14 @@ class TableRow(Generic[_V]):
     def shown(self, view: Callable[[_V], _W]) -> TableRow[_W]:
         """The row with what ``view`` leaves of its grade."""
         grade = None if self.grade is None else view(self.grade)
-        return TableRow(self.student, self.source, self.assignment, grade, self.reason, self.refused)
+        return TableRow(
+            self.student, self.source, self.assignment, grade, self.reason, self.refused, self.told, self.for_staff
+        )
+
+
+def rows_for_students(rows: Iterable[TableRow[_V]]) -> list[TableRow[_V]]:
+    """The rows as students may read them in a gradebook: none that is for staff alone, and no fault of ours."""
+    return [replace(row, reason=row.told or row.reason) for row in rows if not row.for_staff]
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,7 +35,15 @@ _MOST_STRETCHES, _MOST_LINES, _MOST_OF_LINE = 12, 60, 160
 def what_it_says(found: Similarity, language: Language = ENGLISH) -> str:
     """One sentence on an assignment: how many pairs, and of what nothing can be said."""
     parts: dict[str, object] = {"assignment": found.assignment, "students": found.students}
+    groups = len({*found.same, *found.same_recordings})
     said = language.say("%(assignment)s: no pairs are alike among %(students)s students", **parts)
+    if groups:
+        said = language.counted(
+            "%(assignment)s: %(count)s group has a file or all recordings in common among %(students)s students",
+            "%(assignment)s: %(count)s groups have a file or all recordings in common among %(students)s students",
+            groups,
+            **parts,
+        )
     if found.pairs:
         said = language.counted(
             "%(assignment)s: %(count)s pair is alike among %(students)s students",
@@ -45,8 +53,8 @@ def what_it_says(found: Similarity, language: Language = ENGLISH) -> str:
         )
     if found.too_short:
         said += "; " + language.counted(
-            "%(count)s has too little code of their own to compare (under %(tokens)s tokens)",
-            "%(count)s have too little code of their own to compare (under %(tokens)s tokens)",
+            "%(count)s has too little code to compare (under %(tokens)s tokens), so only their robots are compared",
+            "%(count)s have too little code to compare (under %(tokens)s tokens), so only their robots are compared",
             len(found.too_short),
             tokens=FEWEST_TOKENS,
         )
@@ -89,6 +97,7 @@ def _assignments(view: SimilarityView, texts: Texts, most: int) -> list[dict[str
             "name": found.assignment,
             "words": what_it_says(found, view.language),
             "same": found.same,
+            "same_recordings": found.same_recordings,
             "rows": similarity_rows(found, view.language)[:most],
             "more": len(found.pairs) - most,
             "pairs": [_pair(found.assignment, pair, texts, view.language) for pair in found.pairs[:most]],

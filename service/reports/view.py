@@ -6,14 +6,15 @@ rendered here, and what renders a view asks no more who reads it.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from decimal import ROUND_HALF_UP, Decimal
+from decimal import Decimal
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from service.grading.grade import CriterionResult, Grade, Shown, TrialResult
+from service.grading.grade import CriterionResult, Grade, Shown, TrialResult, unjudged_notes
 from service.grading.judging.words import shown_words
+from service.grading.statistics import marks_out_of_all
 from service.language import ENGLISH, Language
 from service.reports.words import by_hand_words
 from sim.errors import UsageError
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
 #: What a student sees before anything is published.
 BEFORE_PUBLICATION = frozenset({"visible"})
-_HUNDREDTH = Decimal("0.01")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,16 +53,8 @@ class GradebookView:
 
     @property
     def marks(self) -> Decimal | None:
-        """The marks out of all that the assignment gives, as a gradebook knows but that; None if all is excused.
-
-        Where a criterion is excused, the others count for it.
-        """
-        grade = self.entry
-        if grade.worth == grade.max_marks:
-            return grade.marks
-        if not grade.max_marks:
-            return None
-        return (grade.marks * grade.worth / grade.max_marks).quantize(_HUNDREDTH, ROUND_HALF_UP)
+        """The marks out of all that the assignment gives, as a gradebook knows but that; None if all is excused."""
+        return marks_out_of_all(self.entry.marks, self.entry.max_marks, self.entry.worth)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,11 +108,19 @@ def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION, la
             if result.id in shown
         ),
         trials=tuple(grade.trials[index] for index in kept),
-        cost=grade.cost and replace(grade.cost, spent=None),
+        notes=_notes_on(grade, shown),
+        cost=None,  # the limit of CPU time grows with the number of trials, hidden ones included
         comments=tuple(each for each in grade.comments if shown and each.criterion in ("", *shown)),
     )
     withheld = len(left.criteria) < len(grade.criteria) or len(left.trials) < len(grade.trials)
     return View(left, staff=False, withheld=withheld, language=language)
+
+
+def _notes_on(grade: Grade, shown: Set[str]) -> tuple[str, ...]:
+    """The notes on a grade, of which the one on unjudged criteria counts those that are shown and no others."""
+    seen = [result for result in grade.criteria if result.id in shown]
+    notes = [note for note in grade.notes if note not in unjudged_notes(grade.criteria)]
+    return (*notes, *unjudged_notes(seen))
 
 
 def other_trials(view: View, other: Grade, name: str, released: frozenset[str]) -> OtherTrials:

@@ -15,9 +15,10 @@ from service.grading.endings import ENDED
 from service.grading.grade import Accuracy, CriterionResult, Grade, TrialResult
 from service.language import ENGLISH, Language, translatable
 from service.reports.readable import number, one_line, readable
+from sim.recorded import faults_of
 from sim.recording import LossReason, Verdict
 
-FULL_MARKS = translatable("Full marks: everything that was asked for is there.")
+FULL_MARKS = translatable("Full marks.")
 Tone = Literal["good", "notice", "bad"]
 _MEGABYTE = 1 << 20
 
@@ -47,24 +48,22 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
             translatable("Your robot program stopped with an error before it was done."),
             translatable("The error is in your robot program."),
             translatable(
-                "Go to the line named below, mend it, and run the program once in the simulator before submitting it."
+                "Go to the line that is named, fix it, and run the program once in the simulator before submitting it."
             ),
             "bad",
         ),
         Verdict.RESPONDER_ERROR: VerdictWords(
             ENDED[Verdict.RESPONDER_ERROR],
-            translatable("Your responder raised an error, so the robot got no answer to that message."),
-            translatable("The error is in your responder, or in a function that it calls."),
-            translatable("Call the responder yourself with the message shown below and mend the line that is named."),
+            translatable("The code of your responder failed, so the robot got no answer from it."),
+            translatable("The error is in your responder, or in the code beside it."),
+            translatable("Fix this in your responder, call it once yourself with a message, and submit it again."),
             "bad",
         ),
         Verdict.PROTOCOL_ERROR: VerdictWords(
             ENDED[Verdict.PROTOCOL_ERROR],
             translatable("Your responder answered, but not in a form that the robot can read."),
             translatable("The answer that your responder returns is at fault."),
-            translatable(
-                "Return a string; one that starts with JSON:: must go on with valid JSON, as json.dumps makes it."
-            ),
+            translatable("Return a string. After JSON:: it must contain valid JSON, as json.dumps makes it."),
             "bad",
         ),
         Verdict.TIME_LIMIT: VerdictWords(
@@ -75,7 +74,7 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
                 "where it was to end, it is one."
             ),
             translatable(
-                "If the program was meant to end, check what its loops wait for, and whether that ever happens."
+                "If the program is meant to end, check what its loops wait for, and whether that ever happens."
             ),
             "notice",
         ),
@@ -87,7 +86,7 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
                 "or a calculation is too long."
             ),
             translatable(
-                "Check when the loop in the line below ends. In a robot program, put a sensor reading or a short "
+                "Check when the loop in that line ends. In a robot program, put a sensor reading or a short "
                 "time.sleep inside it; in a responder, make the calculation smaller."
             ),
             "bad",
@@ -127,7 +126,7 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
         Verdict.ASSIGNMENT_ERROR: VerdictWords(
             ENDED[Verdict.ASSIGNMENT_ERROR],
             translatable("The assignment itself has a mistake, so your work could not be marked fairly."),
-            translatable("This is not your fault: the instructor has to mend the assignment."),
+            translatable("This is not your fault: the instructor has to fix the assignment."),
             translatable("You need not do anything but tell your instructor; your work can be graded again."),
             "notice",
         ),
@@ -170,7 +169,7 @@ def _said(words: VerdictWords, language: Language) -> VerdictWords:
 _NO_ROBOT = VerdictWords(
     translatable("code checked"),
     translatable("Your functions were called and your code was read; no robot was run."),
-    translatable("What came of it is told at each criterion."),
+    translatable("Each criterion below says what happened."),
     translatable("Call the function yourself with the values that are named there."),
     "good",
 )
@@ -204,7 +203,7 @@ _AGENT_ERROR = VerdictWords(
     translatable("An agent of yours raised an error, so whoever asked it got no answer."),
     translatable("The error is in the agent that is named below, or in a function that it calls."),
     translatable(
-        "Call the agent's function yourself with the message that it was sent, and mend the line that is named."
+        "Call the agent's function yourself with the message that it was sent, and fix the line that is named."
     ),
     "bad",
 )
@@ -231,7 +230,17 @@ def _next_step(grade: Grade, words: VerdictWords, language: Language) -> str:
         missing=number(lost.max_marks - lost.marks),
         of=number(lost.max_marks),
     )
-    return f"{most} {words.next_step}"
+    advice = words.next_step if _costs_marks_by_time(grade) else _said(_WORDS[Verdict.FINISHED], language).next_step
+    return f"{most} {advice}"
+
+
+def _costs_marks_by_time(grade: Grade) -> bool:
+    """Whether the advice on the grade's verdict is due: time that was up counts only where a criterion names it."""
+    if grade.missing or grade.verdict is not Verdict.TIME_LIMIT:
+        return True
+    told = [each.message for one in grade.criteria if one.marks < one.max_marks for each in one.evidence]
+    faults = (fault for trial in grade.trials for fault in faults_of(trial.recording))
+    return any(fault.verdict is Verdict.TIME_LIMIT and fault.message in each for fault in faults for each in told)
 
 
 def _what_happened(grade: Grade, language: Language) -> VerdictWords:
@@ -282,7 +291,7 @@ def hints_of(grade: Grade) -> tuple[str, ...]:
 
 
 def is_ours(verdict: Verdict) -> bool:
-    """Whether the student has nothing to mend."""
+    """Whether the student has nothing to fix."""
     return verdict in (Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
 
 
@@ -323,12 +332,13 @@ def comments_of(grade: Grade) -> tuple[str, ...]:
 
 
 def accuracy_words(grade: Grade) -> str:
-    """One sentence with value, interval and n; empty without a classification."""
-    accuracy = grade.accuracy
-    if accuracy is None:
+    """One sentence with value, interval and n; empty without a classification. It says if none of it is marked."""
+    result, accuracy = grade.recognition, grade.accuracy
+    if result is None or accuracy is None:
         return ""
+    practice = "" if result.worth else " in practice, which is not marked:"
     return (
-        f"Accuracy {accuracy.value:.3f} (95 % interval {accuracy.low:.3f} to {accuracy.high:.3f}, "
+        f"Accuracy{practice} {accuracy.value:.3f} (95 % interval {accuracy.low:.3f} to {accuracy.high:.3f}, "
         f"{accuracy.n} {accuracy_counted(accuracy)[1]})."
     )
 
@@ -351,8 +361,8 @@ def channel_words(grade: Grade, language: Language = ENGLISH) -> str:
 
 
 def cost_words(grade: Grade, language: Language = ENGLISH) -> str:
-    """One sentence with what all trials cost together, or may cost where that is not told; empty if nobody knows."""
-    if grade.cost is None:
+    """Return one sentence with what all trials cost together; empty where that is not shown."""
+    if grade.cost is None or grade.cost.spent is None:
         return ""
     limits, spent = grade.cost.limits, grade.cost.spent
     most = {
@@ -360,12 +370,6 @@ def cost_words(grade: Grade, language: Language = ENGLISH) -> str:
         "most_sleep": f"{limits.sleep_seconds:g}",
         "most_output": limits.kept_bytes >> 20,
     }
-    if spent is None:
-        return language.say(
-            "All trials together may use %(most_cpu)s s of CPU, %(most_sleep)s s of sleep and "
-            "%(most_output)s MB of output.",
-            **most,
-        )
     return language.say(
         "Used %(cpu)s of %(most_cpu)s s of CPU, %(sleep)s of %(most_sleep)s s of sleep, "
         "%(output)s of %(most_output)s MB of output.",

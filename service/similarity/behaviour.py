@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal
 
+import numpy as np
+
 from service.grading.grade import TrialResult
 from sim.recorded import faults_of
 from sim.recording import Fault, Recording, Verdict
@@ -23,6 +25,9 @@ Aspect = Literal["path", "messages", "faults"]
 FEWEST_STUDENTS = 8
 #: The part of them that may share what is rare; always two.
 RARE_PART = 0.1
+
+#: Changes between left and right from which on a path is winding: more than a way that was planned has.
+WINDING_TURNS = 20
 
 #: The machine decides how far such a trial comes.
 _CUT = frozenset({Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR})
@@ -47,18 +52,43 @@ class SameInTrial:
     students: int
 
 
-#: A digest for each thing that can be compared; what did not happen has none.
-Behaviour = Mapping[tuple[TrialName, Aspect], str]
+@dataclass(frozen=True, slots=True)
+class Behaviour:
+    """What is compared of a student's trials."""
+
+    aspects: Mapping[tuple[TrialName, Aspect], str]  # a digest of each; what did not happen has none
+    winding: frozenset[TrialName]  # trials in which the robot turned often enough that few come upon the same path
+    recordings: str  # a digest of all recordings; empty where a trial was cut short, or nothing was done or said
+
+    @property
+    def trials(self) -> int:
+        """How many trials can be compared."""
+        return len({trial for trial, _ in self.aspects})
 
 
 def behaviour_of(trials: Iterable[TrialResult]) -> Behaviour:
     """What is compared of a student's trials; those that the machine cut short are not."""
-    return {
-        (_name(trial), aspect): digest
-        for trial in trials
-        if trial.verdict not in _CUT
-        for aspect, digest in _aspects(trial.recording)
-    }
+    trials = list(trials)
+    compared = [trial for trial in trials if trial.verdict not in _CUT]
+    aspects = {(_name(trial), aspect): digest for trial in compared for aspect, digest in _aspects(trial.recording)}
+    did_something = any(aspect != "faults" for _, aspect in aspects)
+    whole = did_something and len(compared) == len(trials)
+    return Behaviour(
+        aspects,
+        frozenset(_name(trial) for trial in compared if _turns(trial.recording) >= WINDING_TURNS),
+        _digest(_whole(trial) for trial in trials) if whole else "",
+    )
+
+
+def same_recordings(behaviours: Mapping[str, Behaviour]) -> tuple[tuple[str, ...], ...]:
+    """Groups of students all of whose recordings are the same, the largest first, however many they are."""
+    groups: dict[str, list[str]] = defaultdict(list)
+    for student in sorted(behaviours):
+        groups[behaviours[student].recordings].append(student)
+    groups.pop("", None)
+    return tuple(
+        sorted((tuple(each) for each in groups.values() if len(each) > 1), key=lambda each: (-len(each), each))
+    )
 
 
 def same_in_trials(behaviours: Mapping[str, Behaviour]) -> dict[tuple[str, str], tuple[SameInTrial, ...]]:
@@ -66,7 +96,7 @@ def same_in_trials(behaviours: Mapping[str, Behaviour]) -> dict[tuple[str, str],
     sharing: dict[tuple[TrialName, Aspect], dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
     active: dict[TrialName, set[str]] = defaultdict(set)
     for student in sorted(behaviours):
-        for (trial, aspect), digest in behaviours[student].items():
+        for (trial, aspect), digest in behaviours[student].aspects.items():
             sharing[trial, aspect][digest].append(student)
             active[trial].add(student)
     found: dict[tuple[str, str], list[SameInTrial]] = defaultdict(list)
@@ -103,6 +133,17 @@ def _aspects(recording: Recording) -> Iterable[tuple[Aspect, str]]:
     faults = [f"{fault.t} {fault.verdict} {fault.who} {fault.message}" for fault in _mistakes(recording)]
     if faults:
         yield "faults", _digest(fault.encode("utf-8", "surrogatepass") for fault in faults)
+
+
+def _whole(trial: TrialResult) -> bytes:
+    return f"{trial.scenario} {trial.index} {trial.recording.sha256}".encode()
+
+
+def _turns(recording: Recording) -> int:
+    """How often the robot changed from turning left to turning right, or back."""
+    turning = np.sign(np.diff(recording.ticks.heading).round(3))
+    turning = turning[turning != 0]
+    return int(np.count_nonzero(turning[1:] != turning[:-1]))
 
 
 def _moved(recording: Recording) -> bool:

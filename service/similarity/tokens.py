@@ -14,6 +14,8 @@ from keyword import iskeyword
 import numpy as np
 from numpy.typing import NDArray
 
+from service.similarity.normalising import Word, normalised
+
 #: What is read of one file; a program of a thousand lines has about 10 000 tokens.
 MOST_TOKENS = 20_000
 
@@ -53,13 +55,20 @@ class _Piece:
 
 
 def tokens_of(source: str) -> Tokens:
-    """The tokens of a Python file; comments, layout, imports and texts that nothing is done with are none."""
-    pieces = [piece for statement in _statements(source) for piece in _worth_comparing(statement)]
-    own = _own_names(pieces)
-    words = [_word(piece, own) for piece in pieces]
+    """The tokens of a Python file; comments, layout, imports and texts that nothing is done with are none.
+
+    Operands that may change places are in one order, so that lines need not ascend within a statement.
+    """
+    statements = [_worth_comparing(statement) for statement in _statements(source)]
+    own = _own_names([piece for statement in statements for piece in statement])
+    words = [
+        word
+        for statement in statements
+        for word in normalised([Word(_text(piece, own), piece.line) for piece in statement])
+    ]
     return Tokens(
-        np.array([zlib.crc32(word.encode("utf-8", "surrogatepass")) for word in words], np.uint64),
-        np.array([piece.line for piece in pieces], np.int64),
+        np.array([zlib.crc32(word.text.encode("utf-8", "surrogatepass")) for word in words], np.uint64),
+        np.array([word.line for word in words], np.int64),
     )
 
 
@@ -112,7 +121,7 @@ def _own_names(pieces: Sequence[_Piece]) -> frozenset[str]:
     return frozenset(own)
 
 
-def _word(piece: _Piece, own: frozenset[str]) -> str:
+def _text(piece: _Piece, own: frozenset[str]) -> str:
     if piece.kind in ("text", "number"):
         return piece.kind
     return "name" if piece.text in own else piece.text

@@ -227,9 +227,10 @@ def _run(own: Mapping[int, int], others: Mapping[int, int], begin: int, at: int)
 def _stretch(one: _Indexed, other: _Indexed, grams_in_row: tuple[int, int, int]) -> Stretch:
     begin, at, count = grams_in_row
     size = count + GRAM - 1
-    lines, other_lines = one.source.tokens.lines, other.source.tokens.lines
-    return Stretch(
-        (int(lines[begin]), int(lines[begin + size - 1])),
-        (int(other_lines[at]), int(other_lines[at + size - 1])),
-        size,
-    )
+    lines = one.source.tokens.lines[begin : begin + size]
+    other_lines = other.source.tokens.lines[at : at + size]
+    return Stretch(_span(lines), _span(other_lines), size)
+
+
+def _span(lines: NDArray[np.int64]) -> tuple[int, int]:
+    return int(lines.min()), int(lines.max())

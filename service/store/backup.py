@@ -19,8 +19,8 @@ from sqlalchemy.exc import OperationalError
 
 from service.store.engine import open_engine
 from service.store.migrate import upgrade
-from service.store.models import Course, Installation, Job
-from service.store.revision import current_revision
+from service.store.models import Course, Installation, Job, SchemaCompatibility
+from service.store.revision import current_revision, newest_revision
 from service.store.web_tables import METADATA
 from sim.errors import HostError, UsageError
 
@@ -93,7 +93,15 @@ def _copy_file(source: Path, target: Path) -> None:
 
 
 def _copy_rows(source: Engine, target: Engine) -> None:
-    """Every row of every table, as one moment has them."""
+    """Every row of every table, as one moment has them. Raises HostError for tables of another release."""
+    for engine in (source, target):
+        revision = current_revision(engine)
+        if revision != newest_revision():
+            where = engine.url.render_as_string(hide_password=True)
+            raise HostError(
+                f"The tables of {where} are at revision {revision}, this Robomark copies those at {newest_revision()}: "
+                "use the release that they are of."
+            )
     reading = source.execution_options(isolation_level="REPEATABLE READ") if source.dialect.name != "sqlite" else source
     with reading.connect() as rows, target.begin() as into:
         if into.scalar(select(func.count()).select_from(Course)) or into.scalar(select(func.count()).select_from(Job)):
@@ -101,6 +109,7 @@ def _copy_rows(source: Engine, target: Engine) -> None:
             raise UsageError(f"the database {where} is not empty, expected one in which nothing was submitted yet")
         # Each was made with its tables; the worlds of what is brought in follow from its own.
         into.execute(delete(Installation))
+        into.execute(delete(SchemaCompatibility))
         for table in METADATA.sorted_tables:
             _copy_table(table, rows, into)
 

@@ -10,7 +10,20 @@ from datetime import UTC, datetime
 from decimal import Decimal
 from typing import Any
 
-from sqlalchemy import JSON, DateTime, Dialect, Numeric, String, Text, TypeDecorator
+from sqlalchemy import (
+    JSON,
+    ClauseElement,
+    ColumnElement,
+    DateTime,
+    Dialect,
+    Float,
+    Numeric,
+    String,
+    Text,
+    TypeDecorator,
+    cast,
+)
+from sqlalchemy.sql.operators import OperatorType
 from sqlalchemy.types import TypeEngine
 
 from service.store.codec import Json
@@ -57,10 +70,24 @@ class UtcDateTime(TypeDecorator[datetime]):
 
 
 class ExactDecimal(TypeDecorator[Decimal]):
-    """Marks, exactly: NUMERIC on PostgreSQL, text on SQLite (whose own numbers are binary)."""
+    """Marks, exactly: NUMERIC on PostgreSQL, text on SQLite (whose own numbers are binary).
+
+    Queries compare them as numbers: as text "8" is not "8.0", and "10" comes before "9".
+    """
 
     impl = String(32)
     cache_ok = True
+
+    class Comparator(TypeDecorator.Comparator[Decimal]):
+        """Compares the number, whatever the database stores."""
+
+        def operate(self, op: OperatorType, *other: Any, **kwargs: Any) -> ColumnElement[Any]:
+            """The operation on the numbers of both sides."""
+            numbers = (cast(each, Float) if _is_expression(each) else each for each in other)
+            compared: ColumnElement[Any] = op(cast(self.expr, Float), *numbers, **kwargs)
+            return compared
+
+    comparator_factory: Any = Comparator
 
     def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
         """NUMERIC on PostgreSQL, else text of at most 32 characters."""
@@ -75,6 +102,10 @@ class ExactDecimal(TypeDecorator[Decimal]):
     def process_result_value(self, value: Decimal | str | None, dialect: Dialect) -> Decimal | None:
         """The number, with every digit that was stored."""
         return None if value is None else Decimal(value)
+
+
+def _is_expression(value: Any) -> bool:
+    return isinstance(value, ClauseElement) or hasattr(value, "__clause_element__")
 
 
 class SafeText(TypeDecorator[str]):

@@ -7,28 +7,71 @@ from __future__ import annotations
 
 import os
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import wraps
 from pathlib import Path
-from typing import Self
+from typing import ParamSpec, Self, TypeVar
 
 from sqlalchemy import Engine, create_engine, event, func, make_url, select
 from sqlalchemy.engine import Connection
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import DBAPIError, NoResultFound, OperationalError
 from sqlalchemy.orm import Session
+from sqlalchemy.orm.exc import ObjectDeletedError, StaleDataError
 from sqlalchemy.pool import NullPool
 
 from service.home import open_home
 from service.settings import Settings
 from service.store.migrate import upgrade
-from service.store.revision import current_revision, newest_revision
+from service.store.revision import schema_state
 from sim.errors import HostError
 from submissions.seeds import Secret
 
 SQLITE_BUSY_SECONDS = 30
+IMPATIENT_SECONDS = 0.5
 _ONLY_READS = "robomark_only_reads"
+_BUSY_SECONDS = "robomark_busy_seconds"
+#: SQLSTATE of transactions that PostgreSQL ended because of another one: deadlock, serialization failure.
+_CONFLICTS = ("40P01", "40001")
+#: A row with the same unique values exists by now, or the row of a foreign key does not: SQLSTATE, and SQLite's names.
+_OVERTAKEN = ("23505", "23503", "SQLITE_CONSTRAINT_UNIQUE", "SQLITE_CONSTRAINT_FOREIGNKEY")
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def is_conflict(error: BaseException) -> bool:
+    """Return whether the database ended a transaction because of another one; run again, it would succeed."""
+    return _state_of(error) in _CONFLICTS
+
+
+def is_overtaken(error: BaseException) -> bool:
+    """Return whether another transaction inserted the same row, or removed one, while this one relied on it."""
+    is_gone = isinstance(error, NoResultFound | StaleDataError | ObjectDeletedError)
+    return is_gone or _state_of(error) in _OVERTAKEN
+
+
+def _state_of(error: BaseException) -> str | None:
+    """The SQLSTATE of an error, or SQLite's name of it."""
+    orig = error.orig if isinstance(error, DBAPIError) else None
+    return getattr(orig, "sqlstate", None) or getattr(orig, "sqlite_errorname", None)
+
+
+def retry_conflicts(transact: Callable[P, R]) -> Callable[P, R]:
+    """Decorate a function that is one transaction: run it a second time if the database ended the first by conflict."""
+
+    @wraps(transact)
+    def transact_again(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return transact(*args, **kwargs)
+        except DBAPIError as error:
+            if not is_conflict(error):
+                raise
+        return transact(*args, **kwargs)
+
+    return transact_again
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +96,10 @@ class Store:
         engine = self.engine.execution_options(**{_ONLY_READS: True})
         with Session(engine, expire_on_commit=False) as session, session.begin():
             yield session
+
+    def impatient(self) -> Store:
+        """The same database, for transactions that rather fail than wait long for SQLite's write lock."""
+        return replace(self, engine=self.engine.execution_options(**{_BUSY_SECONDS: IMPATIENT_SECONDS}))
 
     def close(self) -> None:
         """Close the connections that are kept for later."""
@@ -100,14 +147,18 @@ def _prepare_sqlite(connection: sqlite3.Connection, _record: object) -> None:
 
 
 def _begin_immediate(connection: Connection) -> None:
-    only_reads = connection.get_execution_options().get(_ONLY_READS, False)
+    options = connection.get_execution_options()
+    only_reads = options.get(_ONLY_READS, False)
+    if _BUSY_SECONDS in options:
+        # The connection is closed after its one transaction.
+        connection.exec_driver_sql(f"PRAGMA busy_timeout = {int(options[_BUSY_SECONDS] * 1000)}")
     connection.exec_driver_sql("BEGIN" if only_reads else "BEGIN IMMEDIATE")
 
 
 def open_store(settings: Settings) -> Store:
     """The database of these settings, brought up to the newest tables.
 
-    Raises HostError when it cannot be reached or is newer than this Robomark, UsageError for a home that others share.
+    Raises HostError when it cannot be reached or needs a newer Robomark, UsageError for a home that others share.
     """
     parsed = make_url(settings.database)
     file = Path(str(parsed.database)).absolute() if parsed.get_backend_name() == "sqlite" else None
@@ -119,7 +170,7 @@ def open_store(settings: Settings) -> Store:
         with suppress(OSError):
             os.close(os.open(file, os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600))
     try:
-        if current_revision(engine.execution_options(**{_ONLY_READS: True})) != newest_revision():
+        if not schema_state(engine.execution_options(**{_ONLY_READS: True})).is_usable:
             upgrade(engine)
     except OperationalError as error:
         engine.dispose()

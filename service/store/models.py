@@ -12,7 +12,7 @@ from decimal import Decimal
 from enum import StrEnum
 from typing import Any
 
-from sqlalchemy import BigInteger, CheckConstraint, Enum, ForeignKey, Index, LargeBinary, MetaData, String
+from sqlalchemy import BigInteger, CheckConstraint, Enum, ForeignKey, Index, LargeBinary, MetaData, String, text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 from service.store.columns import ExactDecimal, SafeJson, SafeText, UtcDateTime
@@ -68,6 +68,15 @@ class Installation(Base):
     made_at: Mapped[datetime]
 
 
+class SchemaCompatibility(Base):
+    """One row, which the migrations write."""
+
+    __tablename__ = "schema_compatibility"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    oldest_compatible: Mapped[str] = mapped_column(String(32))  # the revision whose code can still use the tables
+
+
 class Course(Base):
     """A course; no two have the same name."""
 
@@ -79,15 +88,14 @@ class Course(Base):
 
 
 class Person(Base):
-    """Somebody who is in a course; what the course knows them by is in the enrolment."""
+    """Somebody who is in a course; their id, name and address are those that each course has of them."""
 
     __tablename__ = "person"
 
     id: Mapped[int] = mapped_column(primary_key=True)
-    name: Mapped[str] = mapped_column(default="")  # empty where nobody said, like the address
-    email: Mapped[str | None]
     operator: Mapped[bool] = mapped_column(default=False)  # runs the whole installation
     created_at: Mapped[datetime]
+    signed_in_at: Mapped[datetime | None]  # first, or had a token; since then no platform may take their place
 
 
 class Enrolment(Base):
@@ -102,6 +110,8 @@ class Enrolment(Base):
     student: Mapped[str]  # the id, in its normal form
     written: Mapped[str]  # the id as it was first written
     role: Mapped[Role]
+    name: Mapped[str] = mapped_column(default="", server_default="")
+    email: Mapped[str] = mapped_column(default="", server_default="")
 
 
 class AssignmentVersion(Base):
@@ -157,6 +167,9 @@ class SubmissionRow(Base):
     staff_only: Mapped[str | None]  # the limit that this submission is over: it is marked, and shown to staff alone
 
 
+_STANDS = text("standing = 'stands'")
+
+
 class Job(Base):
     """One grading of one submission. The row is the job; the broker only notices."""
 
@@ -169,6 +182,7 @@ class Job(Base):
         Index(None, "worker", "finished_at"),
         # All that the counts of a batch are made of, so that they read no job.
         Index(None, "batch_id", "state", "plots", "suspect"),
+        Index("uq_job_standing", "submission_id", unique=True, sqlite_where=_STANDS, postgresql_where=_STANDS),
         CheckConstraint("(state = 'running') = (lease IS NOT NULL)", name="lease"),
     )
 
@@ -310,6 +324,7 @@ class Policy(Base):
     late_days: Mapped[int] = mapped_column(default=0)
     attempts: Mapped[int | None]
     cool_down_seconds: Mapped[float] = mapped_column(default=0.0)
+    zone: Mapped[str] = mapped_column(String(64), default="")  # late days are days of it; empty: of the server's zone
 
 
 class Extension(Base):
@@ -361,6 +376,7 @@ class Heartbeat(Base):
     concurrency: Mapped[int]  # gradings at a time
     grader_version: Mapped[str]
     sandbox: Mapped[str]  # what stands round student code there
+    problem: Mapped[str | None]  # why it must be restarted
     started_at: Mapped[datetime]
     seen_at: Mapped[datetime] = mapped_column(index=True)
 

@@ -15,7 +15,7 @@ from typing import Any
 from sqlalchemy import Select, and_, delete, func, or_, select, update
 from sqlalchemy.orm import Session
 
-from service.store.engine import Store, now
+from service.store.engine import Store, now, retry_conflicts
 from service.store.models import Batch, Enrolment, Job, SubmissionRow
 from service.store.states import UNFINISHED, JobState
 from service.store.web_tables import Delivery, OpenAssignment, Webhook
@@ -97,6 +97,7 @@ def appeal_opened(session: Session, submission_id: int, appeal_id: int) -> None:
     _tell(session, _of_course(session, course_id), WebhookEvent.APPEAL_OPENED, told)
 
 
+@retry_conflicts
 def claim(store: Store, most: int) -> list[ClaimedDelivery]:
     """Take what is due; nobody else has it for a while."""
     with store.reading() as session:
@@ -114,7 +115,7 @@ def claim(store: Store, most: int) -> list[ClaimedDelivery]:
             .where(*due)
             .order_by(Delivery.due_at, Delivery.id)
             .limit(most)
-            .with_for_update(of=Delivery, skip_locked=True)
+            .with_for_update(of=Delivery, skip_locked=True, key_share=True)
         )
         claimed = []
         for delivery, hook in session.execute(query):
@@ -135,6 +136,7 @@ def claim(store: Store, most: int) -> list[ClaimedDelivery]:
         return claimed
 
 
+@retry_conflicts
 def delivered(store: Store, claimed: ClaimedDelivery) -> None:
     """It has arrived."""
     with store.transaction() as session:
@@ -142,6 +144,7 @@ def delivered(store: Store, claimed: ClaimedDelivery) -> None:
         session.execute(update(Delivery).where(Delivery.id == claimed.id).values(**values))
 
 
+@retry_conflicts
 def failed(store: Store, claimed: ClaimedDelivery, error: str) -> None:
     """It has not arrived: it is tried again later, or given up when a day has gone."""
     wait = min(_FIRST_WAIT * 2 ** min(claimed.attempt - 1, 20), _LONGEST_WAIT)

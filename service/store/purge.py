@@ -6,6 +6,7 @@ With submissions go grades, recordings and what was said of them. What is done t
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -13,7 +14,8 @@ from sqlalchemy import Column, Integer, MetaData, Table, delete, func, insert, o
 from sqlalchemy.orm import Session, aliased
 
 from service.store import audit
-from service.store.engine import Store
+from service.store.engine import Store, now, retry_conflicts
+from service.store.locks import lock_jobs, lock_submissions
 from service.store.models import AssignmentVersion, Audit, Batch, Enrolment, Extension, Job, Person, SubmissionRow
 from service.store.states import UNFINISHED, JobState, Role
 from service.store.web_tables import (
@@ -48,6 +50,7 @@ class Purged:
     students: int
 
 
+@retry_conflicts
 def purge(
     store: Store, before: datetime, actor: str, *, course_id: int | None = None, only_count: bool = False
 ) -> Purged:
@@ -68,32 +71,29 @@ def purge(
         return found
 
 
-def erase_student(store: Store, enrolment_id: int, actor: str) -> Purged:
-    """Remove all there is of one student of a course: what was submitted and what came of it, and who they are.
-
-    Somebody who is in other courses, too, is only removed from this one. A grade that is a copy of one of theirs stays.
-    Raises UsageError for an instructor, and while something of theirs is being graded.
-    """
-    with store.transaction() as session:
-        return _erase(session, enrolment_id, actor)
+def remove_student(session: Session, enrolment_id: int, actor: str) -> None:
+    """Remove a student who has submitted nothing from a course. Raises UsageError for one who has, or instructs it."""
+    if has_submitted(session, enrolment_id):
+        student = session.get_one(Enrolment, enrolment_id).student
+        raise UsageError(f"{student} has submitted something; robomark course delete-student removes that, too")
+    erase_student(session, enrolment_id, actor)
 
 
-def remove_student(store: Store, enrolment_id: int, actor: str) -> None:
-    """Take somebody out of a course who has submitted nothing to it. Raises UsageError for who has, or instructs it."""
-    with store.transaction() as session:
-        if has_submitted(session, enrolment_id):
-            student = session.get_one(Enrolment, enrolment_id).student
-            raise UsageError(f"{student} has submitted something; robomark course delete-student removes that, too")
-        _erase(session, enrolment_id, actor)
-
-
-def has_submitted(session: Session, enrolment_id: int) -> bool:
-    """Whether anything of theirs was taken in."""
-    own = select(SubmissionRow.id).where(SubmissionRow.enrolment_id == enrolment_id)
+def has_submitted(session: Session, enrolment_id: int, without: Set[str] = frozenset()) -> bool:
+    """Return whether a student has submitted anything, leaving out some assignments."""
+    own = select(SubmissionRow.id).where(
+        SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment.not_in(without)
+    )
     return session.scalar(own.limit(1)) is not None
 
 
-def _erase(session: Session, enrolment_id: int, actor: str) -> Purged:
+def erase_student(session: Session, enrolment_id: int, actor: str) -> Purged:
+    """Remove all there is of one student of a course: what was submitted and what came of it, and who they are.
+
+    Somebody who is in other courses, too, is only removed from this one. A grade that is a copy of one of theirs stays.
+    The caller has locked the course. Raises UsageError for an instructor, and while a submission of theirs is being
+    graded.
+    """
     enrolment = session.get_one(Enrolment, enrolment_id)
     if enrolment.role is not Role.STUDENT:
         raise UsageError(f"{enrolment.student} is no student of this course")
@@ -156,7 +156,10 @@ def _choose(session: Session, before: datetime, course_id: int | None) -> None:
 def _remove(session: Session) -> None:
     of_them = Job.submission_id.in_(_going)
     theirs = select(Job.id).where(of_them)
-    session.execute(update(Job).where(or_(of_them, Job.copied_from.in_(theirs))).values(copied_from=None))
+    copies = or_(of_them, Job.copied_from.in_(theirs))
+    lock_submissions(session, SubmissionRow.id.in_(_going))
+    lock_jobs(session, copies)
+    session.execute(update(Job).where(copies).values(copied_from=None))
     session.execute(update(Job).where(of_them).values(regrade_of=None))
     # Its trials, results and artifacts go with a job.
     session.execute(delete(Job).where(of_them))
@@ -177,6 +180,7 @@ def _remove(session: Session) -> None:
         session.execute(delete(column.class_).where(column.in_(_leaving)))
     needed = [select(table.assignment_version_id) for table in (Job, OpenAssignment, Tryout)]
     session.execute(delete(AssignmentVersion).where(*(AssignmentVersion.id.not_in(each) for each in needed)))
+    _sign_out_leaving(session)
     session.execute(delete(Enrolment).where(Enrolment.id.in_(_leaving)))
     in_a_course = select(Enrolment.person_id)
     for start in range(0, len(people), _AT_ONCE):
@@ -187,6 +191,14 @@ def _remove(session: Session) -> None:
         for column in (Credential.person_id, LtiPerson.person_id):
             session.execute(delete(column.class_).where(column.in_(gone)))
         session.execute(delete(Person).where(*some))
+
+
+def _sign_out_leaving(session: Session) -> None:
+    """End what those who leave a course sign in with, as far as it reaches that course."""
+    reaches = or_(Credential.course_id.is_(None), Credential.course_id == Enrolment.course_id)
+    left = select(Enrolment.id).where(Enrolment.id.in_(_leaving), Enrolment.person_id == Credential.person_id, reaches)
+    ended = update(Credential).where(Credential.revoked_at.is_(None), left.exists()).values(revoked_at=now(session))
+    session.execute(ended.execution_options(synchronize_session=False))
 
 
 def _count(session: Session, table: Table) -> int:

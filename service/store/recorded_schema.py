@@ -11,7 +11,7 @@ import tempfile
 from datetime import UTC, datetime
 from pathlib import Path
 
-from sqlalchemy import insert, inspect
+from sqlalchemy import insert, inspect, select
 from sqlalchemy.engine import Connection
 
 _FILE = Path(__file__).with_name("migrations") / "schema.sql"
@@ -45,12 +45,16 @@ def write_schema() -> None:
     """Write down what the migrations of this checkout make."""
     from service.store.engine import open_engine
     from service.store.migrate import migrate
+    from service.store.models import SchemaCompatibility
 
     with tempfile.TemporaryDirectory() as folder:
         engine = open_engine(f"sqlite:///{folder}/new.db")
         with engine.begin() as connection:
             migrate(connection)
-            _FILE.write_text(_BETWEEN.join(statements_of(connection)) + "\n", encoding="utf-8")
+            oldest = connection.scalar(select(SchemaCompatibility.oldest_compatible))
+            compatibility = f"INSERT INTO {SchemaCompatibility.__tablename__} VALUES (1, '{oldest}')"
+            statements = [*statements_of(connection), compatibility]
+            _FILE.write_text(_BETWEEN.join(statements) + "\n", encoding="utf-8")
         engine.dispose()
 
 

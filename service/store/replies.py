@@ -10,7 +10,7 @@ from datetime import timedelta
 
 from sqlalchemy import delete, select, update
 
-from service.store.engine import Store, now
+from service.store.engine import Store, now, retry_conflicts
 from service.store.inserting import insert_if_new
 from service.store.web_tables import IdempotentReply
 
@@ -34,6 +34,7 @@ class InProgress(Exception):
     """The first request with this key is not answered yet."""
 
 
+@retry_conflicts
 def begin(store: Store, credential_id: str, key: str) -> Reply | None:
     """What was answered to this key; None where it is new, and is held from now on. Raises InProgress."""
     mine = (IdempotentReply.credential_id == credential_id, IdempotentReply.key == key)
@@ -51,6 +52,7 @@ def begin(store: Store, credential_id: str, key: str) -> Reply | None:
         return Reply(row.request_sha256, row.status, row.body)
 
 
+@retry_conflicts
 def keep(store: Store, credential_id: str, key: str, reply: Reply) -> None:
     """Write down what was answered."""
     mine = (IdempotentReply.credential_id == credential_id, IdempotentReply.key == key)
@@ -59,6 +61,7 @@ def keep(store: Store, credential_id: str, key: str, reply: Reply) -> None:
         session.execute(update(IdempotentReply).where(*mine).values(**values))
 
 
+@retry_conflicts
 def forget(store: Store, credential_id: str, key: str) -> None:
     """Nothing came of the request, so the key is free again."""
     mine = (IdempotentReply.credential_id == credential_id, IdempotentReply.key == key)

@@ -15,7 +15,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 from service.store.ids import LENGTH as ID_LENGTH
 from service.store.ids import new_id
 from service.store.models import Base
-from service.store.states import CredentialKind
+from service.store.states import CredentialKind, Role
 
 
 class Credential(Base):
@@ -28,8 +28,11 @@ class Credential(Base):
     kind: Mapped[CredentialKind]
     sha256: Mapped[str] = mapped_column(String(64), unique=True)  # of the secret
     name: Mapped[str] = mapped_column(default="")  # what its owner calls it
-    scopes: Mapped[Any] = mapped_column(default=list)  # of a token: what it may do
-    course_id: Mapped[int | None] = mapped_column(ForeignKey("course.id"))  # of a token: where alone it counts
+    scopes: Mapped[Any] = mapped_column(default=list)  # what it may do; empty for a session without such a limit
+    # How far it reaches: one course, one role, the courses of one platform. None where that is no limit.
+    course_id: Mapped[int | None] = mapped_column(ForeignKey("course.id"))
+    role: Mapped[Role | None]
+    platform_id: Mapped[int | None] = mapped_column(ForeignKey("lti_platform.id"))
     created_at: Mapped[datetime]
     expires_at: Mapped[datetime]
     used_at: Mapped[datetime | None]
@@ -181,6 +184,8 @@ class LtiPlatform(Base):
     authorization_url: Mapped[str]
     token_url: Mapped[str]
     keys_url: Mapped[str]
+    # Where else its services may be asked than at the addresses above.
+    service_origins: Mapped[Any] = mapped_column(default=list, server_default="[]")
     created_at: Mapped[datetime]
 
 
@@ -188,10 +193,12 @@ class LtiCourse(Base):
     """Which course a platform's context is, and where the platform's services for it are."""
 
     __tablename__ = "lti_course"
-    __table_args__ = (Index(None, "platform_id", "context", unique=True),)
+    __table_args__ = (Index(None, "platform_id", "deployment", "context", unique=True),)
 
     id: Mapped[int] = mapped_column(primary_key=True)
     platform_id: Mapped[int] = mapped_column(ForeignKey("lti_platform.id"))
+    # A context's id is unique within its deployment. Empty where an older release did not record it.
+    deployment: Mapped[str] = mapped_column(default="", server_default="")
     context: Mapped[str]
     course_id: Mapped[int] = mapped_column(ForeignKey("course.id"), index=True)
     members_url: Mapped[str | None]

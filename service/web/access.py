@@ -11,26 +11,33 @@ import secrets
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from fastapi import Depends, Path, Request
+from fastapi import Depends, Form, Path, Query, Request
 from sqlalchemy.orm import Session
 from starlette.exceptions import HTTPException
 
 from service.language import translatable
+from service.operations.context import Actor
 from service.store.grades import appeals
-from service.store.models import Batch, Course, Enrolment, Job, SubmissionRow
+from service.store.models import Course
 from service.store.people import credentials
 from service.store.people.credentials import Identity
 from service.store.states import CredentialKind, Role
 from service.web.context import Context
+from service.web.page_scopes import scope_of_page
 from sim.errors import RobomarkError
 
 SESSION_COOKIE = "robomark"
 CSRF_FIELD = "csrf"
 CSRF_HEADER = "x-csrf-token"
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
-#: Numbers and names of rows in a path, within what every database can be asked for.
-RowNumber = Annotated[int, Path(ge=1, le=2**31 - 1)]
+#: Numbers and names of rows in a path, a query or a form, within what every database can be asked for.
+HIGHEST_NUMBER = 2**31 - 1
+RowNumber = Annotated[int, Path(ge=1, le=HIGHEST_NUMBER)]
 RowName = Annotated[str, Path(pattern="^[0-9a-z]{1,32}$")]
+RowNumberAfter = Annotated[int, Query(ge=0, le=HIGHEST_NUMBER)]
+RowNameAfter = Annotated[str, Query(pattern="^[0-9a-z]{0,32}$")]
+SentRowNumber = Annotated[int, Form(ge=0, le=HIGHEST_NUMBER)]
+SentRowName = Annotated[str, Form(pattern="^[0-9a-z]{0,32}$")]
 
 
 class SignInNeeded(RobomarkError):
@@ -50,6 +57,11 @@ class Reader:
         """Who is written down for what they do."""
         return actor_of(self.identity)
 
+    @property
+    def acting(self) -> Actor:
+        """The reader as operations know them."""
+        return actor_from(self.identity)
+
 
 @dataclass(frozen=True, slots=True)
 class InCourse:
@@ -64,6 +76,23 @@ class InCourse:
     def actor(self) -> str:
         """Who is written down for what they do."""
         return self.reader.actor
+
+    @property
+    def acting(self) -> Actor:
+        """The reader as operations know them."""
+        return self.reader.acting
+
+
+def actor_from(identity: Identity) -> Actor:
+    """The actor that operations know a signed-in person as."""
+    return Actor(
+        actor_of(identity),
+        identity.person_id,
+        identity.operator,
+        identity.roles,
+        identity.reach,
+        identity.credential_id,
+    )
 
 
 def actor_of(identity: Identity) -> str:
@@ -93,9 +122,13 @@ def reader_of(request: Request, context: Context) -> Reader | None:
 MaybeReader = Annotated[Reader | None, Depends(reader_of)]
 
 
-def _signed_in(reader: MaybeReader) -> Reader:
+def _signed_in(request: Request, reader: MaybeReader, context: Context) -> Reader:
     if reader is None:
         raise SignInNeeded("sign in first")
+    context.limits.page_calls.spend(str(reader.identity.person_id))
+    needed = scope_of_page(request.method, request.scope["route"].path)
+    if reader.identity.scopes is not None and needed is not None and needed not in reader.identity.scopes:
+        raise HTTPException(403, translatable("You signed in with a token whose scopes do not include this."))
     return reader
 
 
@@ -106,7 +139,7 @@ async def same_site(request: Request, reader: MaybeReader) -> None:
     """What changes something has to come from a page of ours: by its word, and by what the browser says of itself."""
     if request.method in _SAFE:
         return
-    if request.headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
+    if not _is_from_here(request):
         raise HTTPException(403, translatable("This came from another site; open the page here and send it again."))
     if reader is None:
         return
@@ -117,6 +150,19 @@ async def same_site(request: Request, reader: MaybeReader) -> None:
         raise HTTPException(
             403, translatable("This page was open for too long, or came from another site; load it and send again.")
         )
+
+
+def _is_from_here(request: Request) -> bool:
+    """Return what the browser says of where the request comes from; older ones send the origin alone, programs none."""
+    site = request.headers.get("sec-fetch-site")
+    if site is not None:
+        return site in ("same-origin", "none")
+    origin = request.headers.get("origin")
+    if origin is None:
+        return True
+    public = request.app.state.context.settings.public_url
+    here = request.headers.get("host", "").lower()
+    return origin.lower() in {public.lower(), f"http://{here}", f"https://{here}"} - {""}
 
 
 def nothing_here() -> HTTPException:
@@ -154,50 +200,3 @@ def _operating(reader: SignedIn) -> Reader:
 Instructing = Annotated[InCourse, Depends(_instructing)]
 Studying = Annotated[InCourse, Depends(_studying)]
 Operating = Annotated[Reader, Depends(_operating)]
-
-
-def batch_in(session: Session, course_id: int, batch_id: str) -> Batch:
-    """A batch of the course."""
-    row = session.get(Batch, batch_id)
-    if row is None or row.course_id != course_id:
-        raise nothing_here()
-    return row
-
-
-def job_in(session: Session, course_id: int, job_id: str) -> Job:
-    """A job of the course."""
-    row = session.get(Job, job_id)
-    if row is None or session.get_one(Enrolment, row.enrolment_id).course_id != course_id:
-        raise nothing_here()
-    return row
-
-
-def submission_in(session: Session, course_id: int, submission_id: int) -> SubmissionRow:
-    """A submission in the course."""
-    row = session.get(SubmissionRow, submission_id)
-    if row is None or session.get_one(Enrolment, row.enrolment_id).course_id != course_id:
-        raise nothing_here()
-    return row
-
-
-def member_in(session: Session, course_id: int, enrolment_id: int, role: Role) -> Enrolment:
-    """Somebody who has this role in the course."""
-    row = session.get(Enrolment, enrolment_id)
-    if row is None or row.course_id != course_id or row.role is not role:
-        raise nothing_here()
-    return row
-
-
-def own_submission(session: Session, identity: Identity, course_id: int, submission_id: int) -> SubmissionRow:
-    """A student's own submission in the course."""
-    row = submission_in(session, course_id, submission_id)
-    if session.get_one(Enrolment, row.enrolment_id).person_id != identity.person_id:
-        raise nothing_here()
-    return row
-
-
-def enrolment_in(session: Session, identity: Identity, course_id: int) -> Enrolment:
-    """What somebody is in the course; several enrolments of one person in one course there are not."""
-    for row in session.query(Enrolment).filter_by(course_id=course_id, person_id=identity.person_id).limit(1):
-        return row
-    raise nothing_here()

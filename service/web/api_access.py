@@ -11,11 +11,12 @@ from fastapi.security import HTTPBearer
 from fastapi.security.utils import get_authorization_scheme_param
 from starlette.exceptions import HTTPException
 
+from service.operations.context import Actor
+from service.operations.scopes import SCOPES
 from service.store.people import credentials
 from service.store.people.credentials import Identity
 from service.store.states import CredentialKind, Role
-from service.web.access import RowNumber, SignInNeeded, actor_of, course_of_role, nothing_here
-from service.web.api_scopes import SCOPES
+from service.web.access import RowNumber, SignInNeeded, actor_from, actor_of, course_of_role, nothing_here
 from service.web.context import Context
 
 #: Says in the description of the API how to sign in; who it is, is found below.
@@ -33,6 +34,11 @@ class Caller:
         """Who is written down for what they do."""
         return actor_of(self.identity)
 
+    @property
+    def acting(self) -> Actor:
+        """The caller as operations know them."""
+        return actor_from(self.identity)
+
 
 @dataclass(frozen=True, slots=True)
 class CallerInCourse:
@@ -45,6 +51,11 @@ class CallerInCourse:
     def actor(self) -> str:
         """Who is written down for what they do."""
         return self.caller.actor
+
+    @property
+    def acting(self) -> Actor:
+        """The caller as operations know them."""
+        return self.caller.acting
 
 
 def caller_of(request: Request, context: Context) -> Caller:

@@ -11,7 +11,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
 from service.web.api_routes import KEY_HEADER, LONGEST_KEY
-from service.web.security import LARGEST_BODY
+from service.web.request_bodies import LARGEST_FORM, MEGABYTE
 
 _ABOUT = f"""
 Everything that the pages do, for programs.
@@ -25,7 +25,8 @@ its owner may do, and of that what its scopes name. What somebody may not see an
 
 **Errors** are `application/problem+json`, with a sentence in `detail`.
 
-**Bounds**: {LARGEST_BODY // 2**20} MB a request; so many calls a minute of a token, then 429 with `Retry-After`.
+**Limits**: {LARGEST_FORM // MEGABYTE} MB for a request that is no upload; a number of calls a minute for each token,
+then 429 with `Retry-After`.
 
 Moments are ISO 8601 with their zone, marks numbers, times seconds, lengths millimetres, angles degrees.
 """
@@ -56,7 +57,7 @@ _ALWAYS = {
     "404": "There is nothing here, or nothing that the token's owner may see.",
     "422": "What was sent is not what was expected, or cannot be done.",
     "429": "Too often; `Retry-After` says when to come again.",
-    "503": "The database does not answer, or something of ours failed; nothing was changed.",
+    "503": "The database does not answer, or the service failed; check what is stored before you try again.",
 }
 _OF_CHANGES = {
     "409": "The first request with this key is not answered yet.",

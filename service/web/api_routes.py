@@ -13,21 +13,29 @@ from datetime import UTC, datetime
 from types import MappingProxyType
 from typing import Annotated, Any, Generic, TypeVar
 
+import structlog
 from fastapi import APIRouter, Query, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, Field
+from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive
 
 from service.store import replies
+from service.store.people.credentials import Identity
 from service.store.replies import InProgress, Reply
 from service.web.api_access import caller_of
 from service.web.context import WebContext
+from sim.readers.json_text import read_json
+from sim.readers.unreadable import Unreadable
 
+_log = structlog.get_logger(__name__)
 KEY_HEADER = "idempotency-key"
 LONGEST_KEY = 200
+#: Lists, tables and their entries in the JSON of a body.
+_MOST_VALUES = 20_000
 #: For a route that takes no key: it changes nothing, or answers a secret that is to be kept nowhere.
 NO_KEY: Mapping[str, Any] = MappingProxyType({"x-no-key": True})
 _Item = TypeVar("_Item")
@@ -65,7 +73,7 @@ def place_after(after: str, *kinds: type) -> tuple[Any, ...] | None:
     if not after:
         return None
     try:
-        place = json.loads(base64.b64decode(after + "=" * (-len(after) % 4), altchars=b"-_", validate=True))
+        place = read_json(base64.b64decode(after + "=" * (-len(after) % 4), altchars=b"-_", validate=True))
         return tuple(_part(part, kind) for part, kind in zip(place, kinds, strict=True))
     except (ValueError, TypeError, OverflowError):
         raise HTTPException(422, "after: expected the `next` of the page before.") from None
@@ -89,6 +97,19 @@ def tagged(request: Request, body: bytes, media_type: str, **headers: str) -> Re
     return Response(body, media_type=media_type, headers=told)
 
 
+class ApiRequest(Request):
+    """A request whose JSON is bounded, and parsed where it holds up nobody else."""
+
+    async def json(self) -> Any:
+        """Return the body's value. Raises HTTPException 422 where reading it would take too much work."""
+        if not hasattr(self, "_json"):
+            try:
+                self._json = await run_in_threadpool(read_json, await self.body(), most_values=_MOST_VALUES)
+            except Unreadable as error:
+                raise HTTPException(422, f"The JSON of the body cannot be read: {error}.") from None
+        return self._json
+
+
 class RepeatableRoute(APIRoute):
     """A route that answers the same to the same request with the same ``Idempotency-Key``, and does it once."""
 
@@ -97,6 +118,7 @@ class RepeatableRoute(APIRoute):
         run = super().get_route_handler()
 
         async def handler(request: Request) -> Response:
+            request = ApiRequest(request.scope, request.receive)
             key = request.headers.get(KEY_HEADER)
             if key is None or request.method != "POST" or NO_KEY.keys() <= (self.openapi_extra or {}).keys():
                 return await run(request)
@@ -115,7 +137,8 @@ async def _once(request: Request, key: str, run: Callable[[Request], Awaitable[R
         raise HTTPException(422, f"Idempotency-Key: expected from 1 to {LONGEST_KEY} printable characters.")
     context: WebContext = request.app.state.context
     caller = await run_in_threadpool(caller_of, request, context)
-    mine = (context.store, caller.identity.credential_id, key)
+    # A reply is that to the caller's role: with another one the request is a new one, and is refused or done as such.
+    mine = (context.store, caller.identity.credential_id, f"{_standing(request, caller.identity)} {key}")
     hashed = _Hashed(request)
     try:
         known = await run_in_threadpool(replies.begin, *mine)
@@ -129,13 +152,24 @@ async def _once(request: Request, key: str, run: Callable[[Request], Awaitable[R
         media_type = "application/json" if known.body else None
         return Response(known.body, known.status, {"idempotent-replay": "true"}, media_type)
     try:
-        answer = await run(Request(request.scope, hashed.receive))
+        answer = await run(ApiRequest(request.scope, hashed.receive))
     except BaseException:
         await run_in_threadpool(replies.forget, *mine)
         raise
     reply = Reply(await hashed.whole(), answer.status_code, bytes(answer.body))
-    await run_in_threadpool(replies.keep, *mine, reply)
+    try:
+        await run_in_threadpool(replies.keep, *mine, reply)
+    except SQLAlchemyError as error:
+        # It is done: whoever asked is answered so, and a repetition is refused until the key expires.
+        _log.error("web.reply_not_kept", path=request.url.path, error=str(error))
     return answer
+
+
+def _standing(request: Request, identity: Identity) -> str:
+    """The caller's role in the course of the path, and whether they are an operator."""
+    course = str(request.path_params.get("course_id", ""))
+    role = identity.roles.get(int(course)) if course.isdecimal() and len(course) < 20 else None
+    return f"{role or ''}{' operator' if identity.operator else ''}"
 
 
 class _Hashed:

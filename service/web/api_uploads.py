@@ -14,8 +14,13 @@ from fastapi import Depends, Request
 from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
 
-from submissions.raw_files import MAX_FILES, SentFile
+from submissions.raw_files import MAX_FILES, MAX_TOTAL_BYTES, MEGABYTE, SentFile
 
+#: The longest upload of each kind; what may be in it is for its reader to say.
+LARGEST_BATCH = 200 * MEGABYTE
+LARGEST_ASSIGNMENT = 130 * MEGABYTE
+LARGEST_SUBMISSION = MAX_TOTAL_BYTES + 2 * MEGABYTE
+LARGEST_TABLE = 11 * MEGABYTE
 _ZIP = "application/zip"
 _ZIPS = (_ZIP, "application/x-zip-compressed", "application/octet-stream")
 #: How the description tells of such a body.

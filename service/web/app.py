@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from functools import partial
+from functools import cache, partial
 
-from fastapi import Depends, FastAPI
+from fastapi import APIRouter, Depends, FastAPI
 from fastapi.responses import JSONResponse, PlainTextResponse, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 from sqlalchemy.exc import SQLAlchemyError
@@ -31,6 +31,7 @@ from service.web.errors import add_error_pages
 from service.web.metrics import metrics_text
 from service.web.rate_limits import RateLimit, RateLimits
 from service.web.rendering import static_files
+from service.web.request_bodies import BodyGate
 from service.web.security import Guarded
 
 
@@ -38,13 +39,19 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
     """The application for one database and one broker."""
     # The pages that FastAPI brings for its descriptions load scripts from elsewhere.
     app = FastAPI(
-        title="Robomark", version=GRADER_VERSION, docs_url=None, redoc_url=None, openapi_url="/api/openapi.json"
+        title="Robomark",
+        version=GRADER_VERSION,
+        docs_url=None,
+        redoc_url=None,
+        openapi_url="/api/openapi.json",
+        routes=list(_pages_and_api().routes),
     )
     app.router.redirect_slashes = False
     calls = settings.api_calls_per_minute
-    limits = RateLimits(api_calls=RateLimit(round(calls), calls))
+    limits = RateLimits(api_calls=RateLimit(round(calls), calls), page_calls=RateLimit(round(calls), calls))
     app.state.context = WebContext(settings, store, Notifier(make_celery(settings), store, settings), limits)
-    app.add_middleware(Guarded, public_url=settings.public_url)
+    app.add_middleware(BodyGate)
+    app.add_middleware(Guarded, public_url=settings.public_url, probe_hosts=settings.probe_hosts)
     add_error_pages(app)
     _add_probes(app, settings, store)
 
@@ -56,17 +63,24 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
         media_type, data = static_files()[name]
         return Response(data, media_type=media_type, headers={"cache-control": "public, max-age=31536000, immutable"})
 
+    app.openapi = partial(described, app)  # type: ignore[method-assign]
+    return app
+
+
+@cache
+def _pages_and_api() -> APIRouter:
+    """The routes of all modules, which are the same in every application and take half a second to prepare."""
+    all_routes = APIRouter()
     for module in pkgutil.iter_modules(pages.__path__, f"{pages.__name__}."):
         found = importlib.import_module(module.name)
         if router := getattr(found, "router", None):
-            app.include_router(router, dependencies=[Depends(same_site)], include_in_schema=False)
+            all_routes.include_router(router, dependencies=[Depends(same_site)], include_in_schema=False)
         if router := getattr(found, "cross_site_router", None):
-            app.include_router(router, include_in_schema=False)
+            all_routes.include_router(router, include_in_schema=False)
     for module in pkgutil.iter_modules(api.__path__, f"{api.__name__}."):
         if router := getattr(importlib.import_module(module.name), "router", None):
-            app.include_router(router, prefix="/api/v1")
-    app.openapi = partial(described, app)  # type: ignore[method-assign]
-    return app
+            all_routes.include_router(router, prefix="/api/v1")
+    return all_routes
 
 
 def _add_probes(app: FastAPI, settings: Settings, store: Store) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from threading import BoundedSemaphore
 from typing import Annotated
 
 from fastapi import Depends, Request
 
+from service.operations.context import Service
 from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store.engine import Store
@@ -21,6 +23,13 @@ class WebContext:
     store: Store
     notifier: Notifier
     limits: RateLimits
+    #: Held by whoever unpacks a batch: one at a time.
+    unpacking: BoundedSemaphore = field(default_factory=BoundedSemaphore)
+
+    @property
+    def service(self) -> Service:
+        """The part of it that operations take."""
+        return Service(self.settings, self.store, self.notifier)
 
 
 def _context(request: Request) -> WebContext:

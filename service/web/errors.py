@@ -11,11 +11,14 @@ import structlog
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import RedirectResponse, Response
-from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.exc import DisconnectionError, InterfaceError, OperationalError, SQLAlchemyError
+from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from starlette.exceptions import HTTPException
 
 from service.language import ENGLISH, Language
 from service.lti.fetching import PlatformError
+from service.operations.errors import Conflict, Forbidden, NotFound
+from service.store.engine import is_conflict, is_overtaken
 from service.web.access import SignInNeeded, reader_of
 from service.web.language import language_of
 from service.web.problems import API, problem
@@ -33,7 +36,20 @@ _OF_THE_ROUTER = {
     ),
 }
 _OURS = Sentence("Something went wrong here, not with you; it is written down. Try again in a minute.")
-_NO_DATABASE = Sentence("The database does not answer; nothing was changed. Try again in a minute.")
+#: HTTP status of each kind of refusal; every other one is 422.
+_STATUS: dict[type[UsageError], int] = {NotFound: 404, Forbidden: 403, Conflict: 409}
+_NO_DATABASE = Sentence("The database does not answer. Try again in a minute.")
+#: A request can have changed something before its last question to the database failed.
+_NO_DATABASE_CHANGING = Sentence(
+    "The database does not answer. Before you try again in a minute, check whether your change was saved."
+)
+_CONFLICT = Sentence(
+    "Somebody else changed the same thing at the same moment. Load the page again to see it, then try again."
+)
+#: What is raised where the database cannot be reached, is busy for too long, or stops.
+_AWAY = (OperationalError, InterfaceError, DisconnectionError, PoolTimeoutError)
+#: Class of SQLSTATE of values that PostgreSQL cannot store; its driver raises the same error for a lost connection.
+_PROGRAM_LIMIT = "54"
 
 
 def add_error_pages(app: FastAPI) -> None:
@@ -44,7 +60,7 @@ def add_error_pages(app: FastAPI) -> None:
     app.add_exception_handler(UsageError, _usage)
     app.add_exception_handler(PlatformError, _platform)
     app.add_exception_handler(HostError, _host)
-    app.add_exception_handler(SQLAlchemyError, _no_database)
+    app.add_exception_handler(SQLAlchemyError, _database)
     app.add_exception_handler(Exception, _surprise)
 
 
@@ -75,7 +91,8 @@ async def _misread(request: Request, error: Exception) -> Response:
 
 async def _usage(request: Request, error: Exception) -> Response:
     assert isinstance(error, UsageError)
-    return answer(request, 422, error)
+    status = next((status for kind, status in _STATUS.items() if isinstance(error, kind)), 422)
+    return answer(request, status, error)
 
 
 async def _host(request: Request, error: Exception) -> Response:
@@ -88,13 +105,25 @@ async def _platform(request: Request, error: Exception) -> Response:
     return answer(request, 502, error)
 
 
-async def _no_database(request: Request, error: Exception) -> Response:
+async def _database(request: Request, error: Exception) -> Response:
+    if is_conflict(error) or is_overtaken(error):
+        _log.warning("web.conflict", path=request.url.path, exc_info=error)
+        return answer(request, 409, _CONFLICT)
+    if not _is_away(error):
+        _log.error("web.surprise", path=request.url.path, exc_info=error)
+        return answer(request, 500, _OURS)
     _log.error("web.no_database", path=request.url.path, error=str(error))
-    return answer(request, 503, _NO_DATABASE)
+    return answer(request, 503, _NO_DATABASE if request.method in ("GET", "HEAD") else _NO_DATABASE_CHANGING)
+
+
+def _is_away(error: Exception) -> bool:
+    exceeds_limit = str(getattr(getattr(error, "orig", None), "sqlstate", None)).startswith(_PROGRAM_LIMIT)
+    return isinstance(error, _AWAY) and not exceeds_limit
 
 
 async def _surprise(request: Request, error: Exception) -> Response:
-    _log.error("web.surprise", path=request.url.path, exc_info=error)
+    # The server logs the trace of what nothing else has handled.
+    _log.error("web.surprise", path=request.url.path, error=f"{type(error).__name__}: {error}")
     return answer(request, 500, _OURS)
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from service.store.codec import decode, encode
 from sim.errors import UsageError
+from sim.readers.json_text import read_json
 from submissions.people import Refusal
 from submissions.raw_files import SentFile, shown
 
@@ -137,7 +138,7 @@ class KeptUploads:
 
     def _read(self, upload_id: str) -> KeptUpload | None:
         try:
-            return decode(KeptUpload, json.loads((self._folder / upload_id / _NOTE).read_text(encoding="utf-8")))
+            return decode(KeptUpload, read_json((self._folder / upload_id / _NOTE).read_text(encoding="utf-8")))
         except (OSError, ValueError, TypeError):
             return None
 

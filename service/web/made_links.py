@@ -13,9 +13,8 @@ from datetime import datetime
 from typing import Annotated
 
 from fastapi import Query, Request
-from sqlalchemy.orm import Session
 
-from service.store.people import credentials
+from service.operations import sign_in_links
 from service.web.access import Reader
 from service.web.context import WebContext
 
@@ -43,13 +42,12 @@ def secret_word(reader: Reader, word: str) -> str:
     return base64.urlsafe_b64encode(hmac.digest(reader.link_key, word.encode(), "sha256")).decode().rstrip("=")
 
 
-def made_link(session: Session, request: Request, context: WebContext, reader: Reader, word: str) -> MadeLink | None:
-    """The link of an address's word; None where there is none, or it counts no more."""
-    secret = credentials.link_of(secret_word(reader, word))
-    owner = credentials.owner(session, secret) if word else None
-    if owner is None:
+def made_link(request: Request, context: WebContext, reader: Reader, word: str) -> MadeLink | None:
+    """The link of an address's word; None where there is none, or it was used or has expired."""
+    found = sign_in_links.find_link(context.service, secret_word(reader, word)) if word else None
+    if found is None:
         return None
-    return MadeLink(sign_in_address(request, context, secret), owner.person_id, owner.name, owner.expires_at)
+    return MadeLink(sign_in_address(request, context, found.secret), found.person_id, found.name, found.expires_at)
 
 
 def sign_in_address(request: Request, context: WebContext, secret: str) -> str:

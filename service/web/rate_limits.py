@@ -25,15 +25,8 @@ class RateLimit:
         self._lock = threading.Lock()
         self._left: OrderedDict[str, tuple[float, float]] = OrderedDict()  # what is left, and when that was
 
-    def check(self, who: str) -> None:
-        """Raises HTTPException 429, which says when to come again, where ``who`` has nothing left."""
-        with self._lock:
-            left, _ = self._now(who)
-        if left < 1:
-            self._refuse(left)
-
     def spend(self, who: str) -> None:
-        """Count one for ``who``; raises as ``check`` does."""
+        """Count one for ``who``. Raises HTTPException 429, which says when to come again, where nothing is left."""
         with self._lock:
             left, at = self._now(who)
             self._left.pop(who, None)
@@ -58,13 +51,15 @@ class RateLimit:
 class RateLimits:
     """Those of one web server, by what they count."""
 
-    #: Tries to sign in that failed, by address; behind a proxy all come from one.
+    #: Tries to sign in that failed, by address; behind a proxy that is not trusted all come from one.
     failed_sign_ins: RateLimit = field(default_factory=lambda: RateLimit(burst=30, per_minute=30))
-    #: Launches from learning platforms, by address.
-    launches: RateLimit = field(default_factory=lambda: RateLimit(burst=300, per_minute=300))
+    #: Launches from platforms that are not registered, by address.
+    unknown_platforms: RateLimit = field(default_factory=lambda: RateLimit(burst=300, per_minute=300))
     #: Submissions of one person, whatever the course and the way.
     submissions: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
     #: Programs of one person that are tried; how many are run in all is the store's to say.
     tryouts: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
     #: Calls of the API, by token; the settings say how many.
     api_calls: RateLimit = field(default_factory=lambda: RateLimit(burst=600, per_minute=600))
+    #: Pages and their images, by person; as many as calls of the API.
+    page_calls: RateLimit = field(default_factory=lambda: RateLimit(burst=600, per_minute=600))

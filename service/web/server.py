@@ -9,33 +9,46 @@ import socket
 import sys
 
 import uvicorn
+from starlette.types import ASGIApp
 
-from service.home import keep_private
+from service.home import keep_private, open_home
 from service.outside import ALL_OTHERS, NO_OTHERS
 from service.queue.broker import broker_url
 from service.queue.logs import configure_logging
 from service.settings import Settings, load_settings
 from service.store.engine import open_store
 from service.web.app import make_app
+from service.web.temporary_files import own_temporary_folder
 from service.web.webhook_sender import WebhookSender
+from sim.processes import leave_current_folder
 
 
 def serve_on(settings: Settings, listening: socket.socket) -> None:
-    """Answer until told to stop. Raises HostError when the database cannot be used."""
+    """Answer until told to stop, with uploads in the home. Raises HostError when the database cannot be used."""
     configure_logging(settings.log_level)
+    open_home(settings.home)
+    leave_current_folder()
     if not settings.broker_url:
         settings = settings.with_broker(broker_url(settings))
-    with open_store(settings) as store:
-        config = uvicorn.Config(
-            make_app(settings, store),
-            log_config=None,
-            access_log=False,
-            server_header=False,
-            lifespan="off",
-            timeout_graceful_shutdown=5,
-        )
+    with own_temporary_folder(), open_store(settings) as store:
+        config = server_config(settings, make_app(settings, store))
         with WebhookSender(store, ALL_OTHERS if settings.webhooks_inside else NO_OTHERS):
             uvicorn.Server(config).run(sockets=[listening])
+
+
+def server_config(settings: Settings, application: ASGIApp) -> uvicorn.Config:
+    """How uvicorn serves the application."""
+    return uvicorn.Config(
+        application,
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        lifespan="off",
+        # By default it believes whoever asks from this machine, which a proxy on it does for everybody.
+        proxy_headers=bool(settings.trusted_proxies),
+        forwarded_allow_ips=settings.trusted_proxies or None,
+        timeout_graceful_shutdown=5,
+    )
 
 
 if __name__ == "__main__":

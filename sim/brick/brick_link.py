@@ -5,7 +5,9 @@ It knows no physics: positions, sensor values and the time come with the answers
 
 from __future__ import annotations
 
+import math
 import struct
+import sys
 from collections.abc import Callable, Mapping
 from typing import Any, NoReturn, Protocol
 
@@ -13,6 +15,8 @@ Frame = dict[str, Any]
 
 SECOND = 3_000_000  # thirds of a microsecond
 READ = SECOND // 100
+#: The longest time that the world lets pass at once: longer than any trial.
+MOST_UNITS = 10**15
 FREE_READS = 100_000
 
 _WAITS = frozenset({"until", "until_said", "paid_motor"})
@@ -103,7 +107,7 @@ class Link:
         for name, value in set_points.items():
             left -= 1
             self._wire.act_later(
-                _packed(_MOTOR, part, _SET_POINTS[name], 0 if left else _COMMANDS[command], float(value))
+                _packed(_MOTOR, part, _SET_POINTS[name], 0 if left else _COMMANDS[command], finite(name, value))
             )
         if not set_points and command is not None:
             self._wire.act_later(_packed(_MOTOR, part, 0, _COMMANDS[command], 0))
@@ -165,13 +169,20 @@ class Link:
         self.wait_units(round(seconds * SECOND))
 
     def wait_units(self, units: int) -> None:
-        """The same, in thirds of a microsecond."""
+        """The same, in thirds of a microsecond; a trial ends long before the longest."""
         self._free = 0
-        self._wire.act(_packed(_WAIT, 0, 0, 0, units))
+        self._wire.act(_packed(_WAIT, 0, 0, 0, min(units, MOST_UNITS)))
         self._answer()
 
 
 link = Link()
+
+
+def finite(name: str, value: float) -> float:
+    """The nearest number that the world knows. Raises ValueError for NaN."""
+    if math.isnan(value):
+        raise ValueError(f"{name} is not a number ({value})")
+    return min(max(float(value), -sys.float_info.max), sys.float_info.max)
 
 
 def number(value: float) -> float:

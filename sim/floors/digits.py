@@ -54,7 +54,7 @@ def black_sheet(seed: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorL
 
 def _sheet(seed: int, paper: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
     """The sheet number ``seed`` on paper of grey ``paper``; each place gets any of the 1000 images, all as likely."""
-    images, shown = _digit_images()
+    images, shown = sheet_digits()
     chance = Stream(seed, "digit sheet")
     level = np.full((HEIGHT, WIDTH), paper, dtype=np.uint8)
     labels = []
@@ -81,6 +81,7 @@ def _put(level: NDArray[np.uint8], piece: NDArray[np.uint8], left: int, top: int
 
 
 @functools.cache
-def _digit_images() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+def sheet_digits() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """The images that sheets are printed from, shape (1000, 14, 14), and the digits that they show, shape (1000,)."""
     with resources.files(__package__).joinpath("digits_14x14.npz").open("rb") as stream, np.load(stream) as packed:
         return packed["images"], packed["labels"]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import difflib
 import functools
-import io
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -19,6 +18,8 @@ from PIL import Image
 
 from sim.errors import UsageError
 from sim.floors.canvas import HEIGHT, WIDTH, Pixels
+from sim.readers.raster_image import read_image
+from sim.readers.unreadable import Unreadable
 from sim.recording import Pose
 
 Obstacle = tuple[float, float, float, float]
@@ -189,16 +190,14 @@ def floor_from_image(name: str, data: bytes, default_pose: Pose = Pose(200, 800,
     Raises UsageError when the bytes are no such image. See-through parts show white.
     """
     try:
-        with Image.open(io.BytesIO(data), formats=("PNG", "JPEG")) as image:
-            if image.size != (WIDTH, HEIGHT):
-                raise UsageError(
-                    f"The background image {name!r} is {image.width} x {image.height} pixels; "
-                    f"it must be {WIDTH} x {HEIGHT}, one a millimetre."
-                )
-            paper = Image.new("RGBA", image.size, (255, 255, 255, 255))
-            pixels = np.asarray(Image.alpha_composite(paper, image.convert("RGBA")).convert("RGB"))
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise UsageError(f"The background image {name!r} cannot be read as PNG or JPEG.") from error
+        image = read_image(data, WIDTH, HEIGHT)
+    except Unreadable as error:
+        raise UsageError(
+            f"The background image {name!r} cannot be used: {error}; "
+            f"it must be a PNG or JPEG of {WIDTH} x {HEIGHT} pixels, one a millimetre."
+        ) from error
+    paper = Image.new("RGBA", image.size, (255, 255, 255, 255))
+    pixels = np.asarray(Image.alpha_composite(paper, image).convert("RGB"))
     return Floor(name, _read_only(pixels), default_pose)
 
 

@@ -18,7 +18,7 @@ from submissions.source_text import decode_source
 _MOST = 8
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
 #: What a responder has under these names already, or a report calls otherwise.
-_TAKEN = frozenset({"robot", "program", "responder", "network", "bridge", "host", "assignment", "msg", "eds"})
+_TAKEN = frozenset({"robot", "program", "responder", "bridge", "host", "assignment", "msg", "eds"})
 
 
 def read_agents(

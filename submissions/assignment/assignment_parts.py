@@ -44,12 +44,18 @@ _HEAD = tuple(HeadTable.model_fields)
 _TABLES = ("world", "parts", "agents", "limits", "training", "scenario", "criterion")
 _IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 _MAX_TRIALS = 5000
+#: Entries of any list or table in the file: a list of poses is the longest, and each is a trial at least.
+_MAX_ENTRIES = 5000
+_MAX_TABLES = 500
 
 Files = Mapping[str, bytes]
 
 
 def build_assignment(document: Mapping[str, object], files: Files, problems: Problems) -> Assignment | None:
     """The assignment, or None; whatever is wrong goes into ``problems``."""
+    _check_lengths(document, (), problems)
+    if problems.found:
+        return None
     for key in document:
         if key not in _HEAD and key not in _TABLES:
             known = (*_HEAD, *_TABLES)
@@ -109,10 +115,23 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         training=training,
         secret=head.secret,
     )
-    if sum(1 for _ in assignment.trials()) > _MAX_TRIALS:
+    if assignment.trial_count > _MAX_TRIALS:
         problems.add(("scenario",), f"the scenarios ask for too many trials, expected at most {_MAX_TRIALS} in all")
         return None
     return assignment
+
+
+def _check_lengths(value: object, place: Place, problems: Problems) -> None:
+    """Names lists and tables that are so long that comparing their entries would take minutes."""
+    if not isinstance(value, list | dict):
+        return
+    most = _MAX_TABLES if isinstance(value, list) and any(isinstance(entry, dict) for entry in value) else _MAX_ENTRIES
+    if len(value) > most:
+        name = ".".join(str(part) for part in place)[:60] or "the file"
+        problems.add(place, f"{name} has {len(value)} entries, expected at most {most}")
+        return
+    for key, entry in value.items() if isinstance(value, dict) else enumerate(value):
+        _check_lengths(entry, (*place, key), problems)
 
 
 def _version(files: Files, given: Files, packaged: Mapping[str, str]) -> str:

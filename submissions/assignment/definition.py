@@ -75,6 +75,12 @@ class Scenario:
     sweep: Sweep = NO_SWEEP
     second_poses: tuple[Pose, ...] = ()  # as many as poses, or none
 
+    @property
+    def trial_count(self) -> int:
+        """Poses, swept levels, levels of noise and repetitions, multiplied."""
+        poses = 1 if self.choose == "random" else len(self.poses)
+        return poses * self.sweep.count * len(self.light_noise) * len(self.motor_noise) * self.trials
+
     def varies(self, condition: str) -> bool:
         """Whether its trials differ in a condition that can be swept; noise that is listed counts as well."""
         noises = {"light_noise": self.light_noise, "motor_noise": self.motor_noise}
@@ -153,6 +159,11 @@ class Assignment:
     def max_marks(self) -> Decimal:
         """The marks that all criteria together can give."""
         return sum((criterion.marks for criterion in self.criteria), Decimal(0))
+
+    @property
+    def trial_count(self) -> int:
+        """How many trials there are, without making them."""
+        return sum(scenario.trial_count for scenario in self.scenarios)
 
     def trials(self, secret: Secret = PUBLIC) -> Iterator[Trial]:
         """Every trial as the installation with this secret has it, in an order that never changes."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 import textwrap
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Decimal
@@ -15,6 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from sim.readers.toml_text import read_toml
 from submissions.assignment.folder import FILE_NAME
 
 #: What the parts of the course's materials are called, by the number that sections begin with.
@@ -59,7 +59,7 @@ class AssignmentOverview:
 
 def overview(folder: Path) -> AssignmentOverview:
     """Of the assignment in this folder of the catalogue."""
-    table = tomllib.loads((folder / FILE_NAME).read_text(encoding="utf-8"), parse_float=Decimal)
+    table = read_toml((folder / FILE_NAME).read_text(encoding="utf-8"), Decimal)
     return AssignmentOverview(
         table.get("section", ""),
         table["id"],

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from sim.errors import AssignmentError
 from submissions.assignment.toml_lines import Path, line_of
 
+_MOST = 100
+
 
 class AssignmentProblems(AssignmentError):
     """Everything that is wrong with an assignment; ``problems`` has one ``file:line: sentence`` each."""
@@ -32,8 +34,13 @@ class Problems:
     found: list[tuple[int, str]] = field(default_factory=list)
 
     def add(self, path: Path, sentence: str) -> None:
-        """Note what is wrong at the line where this key stands."""
+        """Note what is wrong at the line where this key stands.
+
+        Raises AssignmentProblems where there are so many that nobody reads them: a file can have one in every key.
+        """
         self.found.append((line_of(self.lines, path), sentence))
+        if len(self.found) > _MOST:
+            raise AssignmentProblems((*self.sorted(), f"{self.where}:1: has more mistakes, which were not looked for"))
 
     def sorted(self) -> tuple[str, ...]:
         """``file:line: sentence``, in the order of the lines."""

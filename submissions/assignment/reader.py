@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import os
 import re
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
 from sim.errors import UsageError
+from sim.readers.toml_text import TOMLDecodeError, read_toml
+from sim.readers.unreadable import Unreadable
 from submissions.assignment.assignment_parts import build_assignment
 from submissions.assignment.definition import Assignment
 from submissions.assignment.folder import FILE_NAME, assignment_folder, catalogue
@@ -85,11 +86,11 @@ def parse(data: bytes, where: str) -> tuple[str, dict[str, object]]:
         line = data.count(b"\n", 0, error.start) + 1
         raise AssignmentProblems((f"{where}:{line}: the text is not UTF-8, expected a file saved as UTF-8",)) from None
     try:
-        return text, tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        return text, read_toml(text)
+    except TOMLDecodeError as error:
         raise AssignmentProblems((_syntax_problem(str(error), where, text),)) from None
-    except (ValueError, RecursionError):
-        raise AssignmentProblems((f"{where}:1: has a value that is too large, expected ordinary TOML",)) from None
+    except Unreadable as error:
+        raise AssignmentProblems((f"{where}:1: {error}, expected ordinary TOML",)) from None
 
 
 def _syntax_problem(message: str, where: str, text: str) -> str:

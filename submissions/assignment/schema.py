@@ -24,6 +24,8 @@ from submissions.sweep import CONDITIONS
 
 T = TypeVar("T", bound=BaseModel)
 Levels = Annotated[tuple[float, ...], Field(max_length=100)]
+#: More of one table are not put into words; comparing them takes the square of their number.
+_MOST_PROBLEMS = 200
 Slug = Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=80)
 
 
@@ -158,8 +160,8 @@ class ScenarioTable(StrictTable):
     choose: Literal["each", "random", "shuffled"] = "each"
     trials: int = Field(default=1, ge=1, le=1000)
     seconds: float = Field(default=60.0, gt=0, le=3600)
-    light_noise: tuple[float, ...] = Field(default=(0.0,), min_length=1)
-    motor_noise: tuple[float, ...] = Field(default=(0.0,), min_length=1)
+    light_noise: Levels = Field(default=(0.0,), min_length=1)
+    motor_noise: Levels = Field(default=(0.0,), min_length=1)
     channel: ChannelTable = ChannelTable()
     start_jitter: Annotated[tuple[float, float, float], Shape("[mm in x, mm in y, degrees]")] = (0.0, 0.0, 0.0)
     sweep: SweepTable = SweepTable()
@@ -230,7 +232,7 @@ def read_table(schema: type[T], table: object) -> T | list[TableProblem]:
         # JSON is strict about types, and lets a list be a tuple.
         return schema.model_validate_json(json.dumps(table, default=_foreign), strict=True)
     except ValidationError as error:
-        found = error.errors(include_url=False)
+        found = error.errors(include_url=False)[:_MOST_PROBLEMS]
         places = [details["loc"] for details in found]
         return [problem_of(schema, details) for details in found if not _follows(details, places)]
 

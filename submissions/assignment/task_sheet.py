@@ -44,7 +44,7 @@ def task_sheet(assignment: Assignment) -> TaskSheet:
         assignment.section,
         assignment.description.strip(),
         _asked(assignment),
-        assignment.training is None and not assignment.parts.agents and assignment.world.robots == 1,
+        assignment.training is None and assignment.world.robots == 1,
         shown,
         marks,
         assignment.max_marks - marks,

@@ -7,8 +7,11 @@ it before.
 from __future__ import annotations
 
 import contextlib
-import tomllib
+from bisect import bisect_right
 from collections.abc import Mapping
+from itertools import accumulate
+
+from sim.readers.toml_text import read_toml
 
 Path = tuple[str | int, ...]
 
@@ -35,6 +38,7 @@ class _Scanner:
     def __init__(self, text: str) -> None:
         self._text = text + "\n"
         self._at = 0
+        self._line_starts = [0, *accumulate(len(line) + 1 for line in self._text.split("\n"))]
         self.lines: dict[Path, int] = {}
         self._tables_in: dict[Path, int] = {}  # how many [[tables]] each array has so far
 
@@ -83,7 +87,7 @@ class _Scanner:
             start = self._at
             if self._text[self._at] in "\"'":
                 self._string()
-                parts.append(str(tomllib.loads(f"key = {self._text[start : self._at]}")["key"]))
+                parts.append(str(read_toml(f"key = {self._text[start : self._at]}")["key"]))
             else:
                 while self._text[self._at] not in " \t.=]\n":
                     self._at += 1
@@ -154,4 +158,4 @@ class _Scanner:
 
     def _note(self, path: Path, at: int | None = None) -> None:
         at = self._at if at is None else at
-        self.lines.setdefault(path, self._text.count("\n", 0, at) + 1)
+        self.lines.setdefault(path, bisect_right(self._line_starts, at))

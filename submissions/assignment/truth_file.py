@@ -1,22 +1,23 @@
-"""Reading an instructor's own truths: a CSV file of x, y, label beside the assignment.
+"""Reading an instructor's own truths from a CSV file beside the assignment: labelled places, or calls of a function.
 
-What is at which place, and nothing else; judging by it is the service's.
+Only what is true; judging by it is the service's.
 """
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 from sim.errors import UsageError
+from sim.readers.csv_text import read_rows
+from sim.readers.unreadable import Unreadable
 from submissions.strict_table import Shape
 
 #: x, y (mm) and what is there.
 LabelledPlace = Annotated[tuple[float, float, str], Shape("[x, y, label]")]
 _MOST_PLACES = 10_000
+_MOST_CALLS = 1000
 
 
 def read_places(name: str, files: Mapping[str, bytes]) -> tuple[LabelledPlace, ...]:
@@ -24,13 +25,7 @@ def read_places(name: str, files: Mapping[str, bytes]) -> tuple[LabelledPlace, .
 
     Raises UsageError, with the line, for a file or a row that cannot be used.
     """
-    if name not in files:
-        raise UsageError(f'places is "{name[:60]}", expected a CSV file of x, y, label beside this file')
-    try:
-        text = files[name].decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise UsageError(f"{name} is not UTF-8, expected a CSV file saved as UTF-8") from None
-    rows = list(csv.reader(io.StringIO(text)))
+    rows = _rows(name, files, "places", "x, y, label")
     if len(rows) > _MOST_PLACES:
         raise UsageError(f"{name} has {len(rows)} rows, expected at most {_MOST_PLACES}")
     first = 1 if rows and [cell.strip().casefold() for cell in rows[0]] == ["x", "y", "label"] else 0
@@ -40,6 +35,34 @@ def read_places(name: str, files: Mapping[str, bytes]) -> tuple[LabelledPlace, .
     if not places:
         raise UsageError(f"{name} has no places in it, expected rows of x, y, label")
     return places
+
+
+def read_table(name: str, files: Mapping[str, bytes]) -> tuple[tuple[str, ...], ...]:
+    """The rows of the file below its headings, each as long as these.
+
+    Raises UsageError, with the line, for a file or a row that cannot be used.
+    """
+    headings, *rows = _rows(name, files, "table", "an answer and arguments") or [[]]
+    kept = [(number, row) for number, row in enumerate(rows, start=2) if any(row)]
+    if not kept or len(kept) > _MOST_CALLS:
+        raise UsageError(f"{name} has {len(kept)} rows, expected headings and 1 to {_MOST_CALLS} rows")
+    for number, row in kept:
+        if len(row) != len(headings):
+            raise UsageError(f"{name}:{number} has {len(row)} cells, expected {len(headings)} as in the first row")
+    return tuple(tuple(row) for _, row in kept)
+
+
+def _rows(name: str, files: Mapping[str, bytes], key: str, columns: str) -> list[list[str]]:
+    if name not in files:
+        raise UsageError(f'{key} is "{name[:60]}", expected a CSV file of {columns} beside this file')
+    try:
+        text = files[name].decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise UsageError(f"{name} is not UTF-8, expected a CSV file saved as UTF-8") from None
+    try:
+        return read_rows(text)
+    except Unreadable as error:
+        raise UsageError(f"{name} cannot be read: {error}, expected rows of {columns}") from None
 
 
 def _place(row: Sequence[str], where: str) -> LabelledPlace:

@@ -6,11 +6,13 @@ Only what is asked; the text is read and the functions are called by the service
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from sim.errors import UsageError
+from submissions.assignment.truth_file import read_table
 from submissions.criteria.common import HOLDS_ANSWERS, Criterion, Misfit, Surroundings, TextOrTexts, Texts
 from submissions.magics import Flags, parse_magic
 from submissions.strict_table import StrictTable
@@ -39,14 +41,15 @@ IMPORT = "import "
 
 
 class SourceRules(Criterion):
-    """What the text of the program (or of the responder) has and has not; it is read, never run.
+    """What the text of the program (or of the responder) has and has not.
 
     ``uses`` and ``avoids`` list constructs (``for``, ``while``, ``if``, ``break`` ...), calls (``say()``,
     ``tank_drive.on()``, ``on_for_*()`` with any ending), imports (``import time``) and names (``colorLeft``,
     ``colorLeft.rgb``). A name without a dot is found behind a dot as well: ``on()`` is also
     ``tank_drive.on()``. ``in_loop`` lists calls that must stand inside a loop, ``defines`` functions that must
-    be defined. ``flags`` are flags that the magic line must have: ``["-b Simple_Shapes", "-R"]``. A module that
-    it ``avoids`` cannot be imported either when the part is run.
+    be defined. What it ``uses`` or has ``in_loop`` must have been run, and must not be a name that the text makes
+    itself, unless ``defines`` has it. ``flags`` are flags that the magic line must have:
+    ``["-b Simple_Shapes", "-R"]``. A module that it ``avoids`` cannot be imported either when the part is run.
 
     The score is the part of all this that holds.
     """
@@ -102,13 +105,17 @@ class SourceRules(Criterion):
 
 
 class ExpectedCall(StrictTable):
-    """A call of a function, and what it must return: exactly ``returns``, or one of ``one_of``."""
+    """A call of a function, and what it must return: exactly ``returns``, or one of ``one_of``.
+
+    Of a ``hidden`` call students learn nothing but whether it counts among those that are right.
+    """
 
     function: str = ""  # the criterion's, if not given
     arguments: tuple[Any, ...] = ()
     named: dict[str, Any] = Field(default_factory=dict)
     returns: Any = None
     one_of: tuple[Any, ...] = ()
+    hidden: bool = False
 
     @model_validator(mode="after")
     def _expects_something(self) -> Self:
@@ -127,12 +134,17 @@ class Functions(Criterion):
     that is compared. With ``each`` an expected list is compared entry by entry, and ``at_least`` of the
     entries must be right: that is how predictions are marked.
 
-    The score is the part of the calls (of the entries) that is right.
+    A call that is ``hidden`` comes after those that are not; students read how many of these are right. In place of
+    ``calls``, ``table`` is a CSV file beside the assignment with a hidden call in each row below its headings: the
+    value that must be returned, then the arguments, as texts. Then ``at_least`` of the calls must be right.
+
+    The score is the part of the calls (of the entries) that is right; of a ``table`` in steps of 5 %.
     """
 
     check: Literal["functions"]
     function: str = Field(default="responder", min_length=1, max_length=100)
-    calls: tuple[ExpectedCall, ...] = Field(min_length=1)
+    calls: tuple[ExpectedCall, ...] = ()
+    table: str = Field(default="", max_length=100)
     tolerance: float = Field(default=1e-6, ge=0)
     ignore_case: bool = False
     path: str | None = Field(default=None, min_length=1)
@@ -146,15 +158,38 @@ class Functions(Criterion):
         """The one whose functions it calls."""
         return frozenset({"responder"})
 
+    def completed(self, around: Surroundings) -> Self:
+        """With a call for each row of its table."""
+        if not self.table:
+            return self
+        if self.calls:
+            raise Misfit("table", "needs calls or a table, expected one of them")
+        try:
+            rows = read_table(self.table, around.files)
+        except UsageError as error:
+            raise Misfit("table", str(error)) from None
+        calls = tuple(
+            ExpectedCall(arguments=tuple(arguments), returns=int(answer) if answer.isdecimal() else answer, hidden=True)
+            for answer, *arguments in rows
+        )
+        return self.model_copy(update={"calls": calls})
+
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
         """The responder whose functions it calls has to be there."""
         yield from _without("check", "responder", around)
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
+        if not self.calls and not self.table:
+            raise ValueError("needs calls or a table, expected one of them")
+        if any(before.hidden and not after.hidden for before, after in pairwise(self.calls)):
+            # It could keep what it was called with, and tell it when a call is shown.
+            raise ValueError("has a hidden call before one that is not, expected the hidden ones last")
         if self.each and not all(isinstance(call.returns, list | tuple) and call.returns for call in self.calls):
             raise ValueError("has each with a call that returns no list, expected a list in every returns")
-        if self.at_least < 1 and not self.each:
+        if self.each and self.table:
+            raise ValueError("has each beside a table, expected a value in each row")
+        if self.at_least < 1 and not self.each and not self.table:
             raise ValueError("has at_least without each, expected each = true beside it")
         return self
 

@@ -5,16 +5,22 @@ Only what is asked; finding the legs in the path is the service's.
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
 from submissions.criteria.common import Criterion, Texts
 from submissions.criteria.places import Range
 
+_Legs = Annotated[int, Field(ge=1, le=100)]
+_Angle = Annotated[float, Field(gt=0, le=180)]
+
 
 class Drawing(Criterion):
     """Figures of straight legs, drawn one after the other: ``figures`` of ``legs`` legs each, no more, no fewer.
+
+    ``legs`` can be a list with the number of legs of each figure, for example [3, 4] for a triangle and a square; then
+    ``angle`` can be a list as well.
 
     In each figure every leg has at least ``shortest`` mm, all are equal within ``equal_within`` (a share of
     their mean), and the angles between one leg and the next are ``angle`` degrees within ``angle_within``.
@@ -26,12 +32,12 @@ class Drawing(Criterion):
 
     check: Literal["drawing"]
     measures: ClassVar[Texts] = ("legs", "leg #", "corner #", "from start to end")
-    legs: int = Field(ge=1)
+    legs: _Legs | Annotated[tuple[_Legs, ...], Field(min_length=1, max_length=50)]
     figures: int = Field(default=1, ge=1)
     at_least: bool = False
     shortest: float = Field(default=60.0, gt=0)
     equal_within: float = Field(default=0.1, gt=0, le=1)
-    angle: float = Field(default=90.0, gt=0, le=180)
+    angle: _Angle | tuple[_Angle, ...] = 90.0
     angle_within: float = Field(default=6.0, gt=0, le=90)
     closes: bool = False
     closes_within: float = Field(default=25.0, gt=0)
@@ -39,10 +45,34 @@ class Drawing(Criterion):
     growing: bool = False
     pen: bool = True
 
+    @property
+    def legs_of_each(self) -> tuple[int, ...]:
+        """The number of legs of each figure."""
+        return self.legs if isinstance(self.legs, tuple) else (self.legs,) * self.figures
+
+    @property
+    def figure_count(self) -> int:
+        """The number of figures that are asked for."""
+        return len(self.legs_of_each)
+
+    @property
+    def angle_of_each(self) -> tuple[float, ...]:
+        """The angle of each figure, degrees."""
+        return self.angle if isinstance(self.angle, tuple) else (self.angle,) * len(self.legs_of_each)
+
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        if self.sizes and len(self.sizes) != self.figures:
+        if isinstance(self.legs, tuple) and self.figures not in (1, len(self.legs)):
+            raise ValueError(f"has {len(self.legs)} numbers in legs, expected one for each of {self.figures} figures")
+        if isinstance(self.angle, tuple) and len(self.angle) != self.figure_count:
             raise ValueError(
-                f"has {len(self.sizes)} sizes for {self.figures} figures, expected one [least, most] for each figure"
+                f"has {len(self.angle)} numbers in angle, expected one for each of {self.figure_count} figures"
+            )
+        if self.at_least and isinstance(self.legs, tuple):
+            raise ValueError("has at_least beside a list of legs, expected one number of legs for all figures")
+        if self.sizes and len(self.sizes) != self.figure_count:
+            raise ValueError(
+                f"has {len(self.sizes)} sizes for {self.figure_count} figures, "
+                "expected one [least, most] for each figure"
             )
         return self

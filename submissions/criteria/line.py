@@ -15,12 +15,13 @@ from submissions.strict_table import Shape
 
 
 class Follows(Criterion):
-    """The robot drives along a line, from where it first comes upon it.
+    """The robot drives along a line.
 
-    It is on the line while it is ``within`` mm of it; ``covers`` is the share of the line, from there to the
-    line's end, that it must be on, in the line's direction and without leaving parts out. ``at_most`` is the
-    farthest it may ever be from the line while it follows. ``one_side`` asks that it is on one and the same
-    side of the line for this share of the time.
+    It is on the line while it is ``within`` mm of it; ``covers`` is the share of the line that it must be on, in the
+    line's direction and without leaving parts out. A line with two ends counts from where the robot first comes
+    upon it, or from the share ``joins_by`` of its length if the robot comes upon it later than that; a closed line
+    counts as a whole. ``at_most`` is the farthest it may ever be from the line while it follows. ``one_side`` asks
+    that it is on one and the same side of the line for this share of the time.
     """
 
     check: Literal["follows"]
@@ -28,6 +29,7 @@ class Follows(Criterion):
     line: LineToFollow
     within: float = Field(default=50.0, gt=0)
     covers: float = Field(default=0.9, gt=0, le=1)
+    joins_by: float = Field(default=0.1, ge=0, lt=1)
     at_most: float | None = Field(default=None, gt=0)
     one_side: float | None = Field(default=None, gt=0.5, le=1)
     of: Part = "robot"

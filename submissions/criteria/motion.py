@@ -110,7 +110,7 @@ class Excursions(Criterion):
 
     ``heights`` are how far it goes out each time, in proportion (``[1, 2, 1]``), within ``tolerance`` as a
     share; the first is at least ``at_least`` mm. Each time it must come back to within ``returns_within`` mm
-    of the start. There must be neither more nor fewer.
+    of the start, and it must end there. There must be neither more nor fewer.
     """
 
     check: Literal["excursions"]

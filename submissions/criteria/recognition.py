@@ -43,7 +43,8 @@ class Recognition(Criterion):
     wherever the robot stood: by the ``"first"`` of them, ``"any"`` that is right, or the ``"majority"``; a trial
     that has images of fewer than ``patterns`` patterns gets a wrong answer for each that is missing. With
     ``near_start`` only images count whose sensor was at most so many mm from where it was at the start, so that the
-    robot cannot drive or turn to one that is easier. A trial without an image that counts is one wrong answer, so
+    robot cannot drive or turn to one that is easier. With ``near_spot`` only images count whose sensor was at most so
+    many mm from the middle of what it shows. A trial without an image that counts is one wrong answer, so
     that staying silent never helps.
     """
 
@@ -59,6 +60,7 @@ class Recognition(Criterion):
     aliases: dict[str, TextOrTexts] = Field(default_factory=dict)
     images: Literal["all", "first", "last"] = "all"
     near_start: float | None = Field(default=None, gt=0, le=5000)
+    near_spot: float | None = Field(default=None, gt=0, le=500)
     each_pattern: Literal["first", "any", "majority"] | None = None
     patterns: int = Field(default=0, ge=0, le=1000)
     at_least: float | None = Field(default=None, gt=0, le=1)

@@ -15,6 +15,7 @@ from submissions.criteria.places import Zone
 from submissions.strict_table import StrictTable
 
 Source = Literal["print", "speech", "either"]
+_MOST_FOR_LABELS = 0.49  # less than half of the distance between the numbers of two labels
 
 
 class Reports(AmongMany):
@@ -23,10 +24,13 @@ class Reports(AmongMany):
     ``expected`` has a list for each pose of the scenario, or a single one for all poses; each entry, a number
     or a text, must come in this order somewhere in what the program prints and says (``source`` narrows it
     down; ``reply`` looks at the responder's answers). Numbers are met within ``tolerance``, texts as whole
-    words without regard to case. ``among`` lists the words to choose from: any of them that is not expected
-    is wrong, so that saying all of them does not help; so is a report that has the entries of half of the other
-    poses, or more, as well. ``only`` asks that no other number is reported.
-    ``expected = "label"`` is what the floor has under the left light sensor at the start.
+    words without regard to case; after a text, the next entry is one of the first numbers, or of the first texts
+    in ``expected``, that follow it. ``among`` lists the words to choose from: any of them that is not expected
+    is wrong, so that saying all of them does not help; so is a report that has the entries of other poses as well,
+    if it has those of more than half of all poses. ``only`` asks that no other number is reported.
+    ``expected = "label"`` is what the floor has under the left light sensor at the start; any other label of the
+    floor is wrong, as with ``among``. The entries before a missing one are worth nothing if as many entries of more
+    than half of all poses are reported, unless these poses have the same answer.
     """
 
     check: Literal["reports"]
@@ -41,6 +45,11 @@ class Reports(AmongMany):
     def asks_responder(self) -> bool:
         """Whether it looks at answers alone."""
         return self.source == "reply"
+
+    @property
+    def leeway(self) -> float:
+        """How far off a number may be; for a label at most so far that no number is two labels."""
+        return self.tolerance if self.expected != "label" else min(self.tolerance, _MOST_FOR_LABELS)
 
     @field_validator("expected", mode="plain")
     @classmethod

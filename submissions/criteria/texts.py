@@ -89,9 +89,18 @@ class TextSequence(TextConditions, AmongMany):
 
 
 class Prints(TextSequence):
-    """What the program prints, one text a print call."""
+    """What the program prints, one text a print call.
+
+    With ``of = "responder"`` it is what the responder prints, or the cells of a notebook: one text a line.
+    """
 
     check: Literal["prints"]
+    of: Literal["program", "responder"] = "program"
+
+    @property
+    def asks_responder(self) -> bool:
+        """Whether it looks at what the responder prints."""
+        return self.of == "responder"
 
 
 class Says(TextSequence):

@@ -7,7 +7,7 @@ import shlex
 from pathlib import Path
 
 from paths import ROOT
-from service.web.api_scopes import SCOPES
+from service.operations.scopes import SCOPES
 from service.web.webhook_sender import signature
 from web import web_in
 
@@ -44,5 +44,5 @@ def test_the_signature_is_checked_as_shown() -> None:
     assert not is_ours("secret", signature("other", 1762000000, b"{}"), b"{}")
 
 
-def test_every_scope_but_the_browsers_is_told() -> None:
-    assert set(re.findall(r"^\| `([a-z-]+)` \|", DOCUMENT, re.MULTILINE)) == set(SCOPES) - {"sign-in"}
+def test_every_scope_is_told() -> None:
+    assert set(re.findall(r"^\| `([a-z-]+)` \|", DOCUMENT, re.MULTILINE)) == set(SCOPES)

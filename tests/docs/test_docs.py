@@ -64,7 +64,11 @@ def files_shown(document: Path) -> list[tuple[str, str]]:
 
 
 _SHOWING = [
-    pytest.param(document, marks=[pytest.mark.long] * (document.stem in ("instructors", "web")), id=document.stem)
+    pytest.param(
+        document,
+        marks=[pytest.mark.long] * (document.stem in ("instructors", "models", "students", "web")),
+        id=document.stem,
+    )
     for document in DOCUMENTS
     if list(commands(document))
 ]
@@ -189,6 +193,6 @@ def test_every_setting_is_in_the_table() -> None:
 
 
 def test_links_between_documents_lead_somewhere() -> None:
-    for document in [ROOT / "README.md", *DOCUMENTS]:
+    for document in [ROOT / "README.md", ROOT / "SECURITY.md", *DOCUMENTS, *(ROOT / "docs" / "decisions").iterdir()]:
         for target in re.findall(r"\]\((?!http)([^)#]+)", document.read_text()):
             assert (document.parent / target).exists(), f"{document.name}: {target}"

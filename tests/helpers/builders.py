@@ -11,6 +11,8 @@ from secrets import token_hex
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from sqlalchemy import text, update
+
 from responders.code import Code
 from service.grading.grade import Grade
 from service.queue.right_answers import right_answer
@@ -19,6 +21,7 @@ from service.store.batches.intake import Accepted, accept
 from service.store.engine import Store, open_store
 from service.store.grades import recordings
 from service.store.installation import secret_of
+from service.store.models import SchemaCompatibility
 from service.store.states import Lane
 from sim.recording import Recording
 from submissions.assignment.definition import Assignment
@@ -52,6 +55,13 @@ def opened(settings: Settings) -> Iterator[Store]:
         file.write_bytes(tables.replace(secret, token_hex(32).encode()))
     with open_store(settings) as store:
         yield store
+
+
+def upgraded_by_newer_release(store: Store, oldest_compatible: str) -> None:
+    """Mark the tables as those of a newer release, which code from ``oldest_compatible`` on can use."""
+    with store.transaction() as session:
+        session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+        session.execute(update(SchemaCompatibility).values(oldest_compatible=oldest_compatible))
 
 
 def asked_already(home: Path) -> Path:

@@ -12,6 +12,7 @@ from alembic import command
 from sqlalchemy import Column, Engine, Integer, MetaData, Table, create_engine, insert, inspect, select, text
 
 from paths import DATA
+from service.store.columns import SafeText
 from service.store.engine import open_engine
 from service.store.migrate import configuration
 from service.store.web_tables import METADATA
@@ -19,6 +20,8 @@ from service.store.web_tables import METADATA
 REVISION = "0002"
 #: What columns of then are called today.
 _TODAY = {"nudged_at": "notified_at", "walls": "sandbox", "sights": "predictions", "problems": "refusals"}
+#: What columns that are gone kept.
+_GONE = {"name": SafeText(), "email": SafeText()}
 _SQL = DATA / "first_release.sql"
 
 
@@ -45,7 +48,8 @@ def _copy(file: Path, engine: Engine) -> None:
                 continue
             # The columns of then, with today's types, which read what SQLite has and write what PostgreSQL wants.
             then = [column["name"] for column in inspect(source).get_columns(today.name)]
-            columns = [Column(name, today.c[_TODAY.get(name, name)].type) for name in then]
+            kinds = _GONE | {column.name: column.type for column in today.c}
+            columns = [Column(name, kinds[_TODAY.get(name, name)]) for name in then]
             table = Table(today.name, MetaData(), *columns)
             rows = [dict(row._mapping) for row in old.execute(select(table))]
             if rows:

@@ -34,12 +34,18 @@ class Flood:
     verdicts: tuple[Verdict, ...] = (Verdict.OUTPUT_LIMIT,)
 
 
-def _program(name: str, frame: str, *verdicts: Verdict) -> Flood:
-    return Flood(name, f"{flood(frame)}flood()", None, verdicts or (Verdict.OUTPUT_LIMIT,))
+_POLARITY = '{"do":"polarity","port":"outB","polarity":"@"}'
+#: Texts that fill a frame of which nothing is kept, and that are costly to read.
+_LONG_TEXTS = {"half characters": r"\ud800" * 10_800, "escapes": r"\n" * 32_000, "pairs": r"\ud83d\ude00" * 5_400}
+_ENDLESS = (Verdict.CPU_LIMIT, Verdict.STALLED)
 
 
-def _responder(name: str, frame: str, *verdicts: Verdict) -> Flood:
-    text = f"{flood(frame)}def responder(text): flood()"
+def _program(name: str, frame: str, *verdicts: Verdict, at_once: int = 50) -> Flood:
+    return Flood(name, f"{flood(frame, at_once)}flood()", None, verdicts or (Verdict.OUTPUT_LIMIT,))
+
+
+def _responder(name: str, frame: str, *verdicts: Verdict, at_once: int = 50) -> Flood:
+    text = f"{flood(frame, at_once)}def responder(text): flood()"
     return Flood(name, 'print("PY::x")', text, verdicts or (Verdict.OUTPUT_LIMIT,))
 
 
@@ -56,13 +62,18 @@ FLOODS = [
     _program(
         "padded questions", '{@"do":"until_said"}'.replace("@", " " * 60_000), Verdict.CPU_LIMIT, Verdict.STALLED
     ),
-    _program("polarities", long('{"do":"polarity","port":"outB","polarity":"@"}'), Verdict.CPU_LIMIT, Verdict.STALLED),
+    _program("polarities", long(_POLARITY), *_ENDLESS),
     Flood("motor commands", flood_of_acts(2, 0, 1, 3, 100.0), None, (Verdict.CPU_LIMIT,)),
     Flood("readings", flood_of_acts(0, 0, 0, 0, 1.0), None, (Verdict.TIME_LIMIT, Verdict.STALLED)),
     _responder("lines of a responder", long('{"do":"print","text":"@"}')),
     _responder("calls", CALL),
     _responder("refusals of a responder", long('{"do":"refused","what":"@","line":1,"file":null}')),
     _responder("naps", '{"do":"sleep","units":0}', Verdict.CPU_LIMIT, Verdict.STALLED),
+    _responder("padded naps", "{" + " " * 65_000 + '"do":"sleep","units":0}', *_ENDLESS, at_once=1),
+    *(
+        _program(f"polarities of {name}", _POLARITY.replace("@", text), *_ENDLESS, at_once=1)
+        for name, text in _LONG_TEXTS.items()
+    ),
     Flood("long answers", NOISY, f"def responder(text): return {BIG!r}"),
     Flood("answers of a long type", NOISY, f"long = type({BIG!r}, (), {{}})\ndef responder(text): return long()"),
     Flood("errors with long words", NOISY, f"{FIND_WIRE}def responder(text):\n    "

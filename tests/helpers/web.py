@@ -17,11 +17,15 @@ from starlette.testclient import TestClient
 
 from builders import opened, settings_in
 from service.grading.grade import Grade
+from service.operations import people as operations
+from service.operations.context import Actor
+from service.operations.people import JoinRequest
 from service.queue.broker import broker_url
 from service.settings import Settings
 from service.store.engine import Store
 from service.store.grades import results
 from service.store.people import credentials, people
+from service.store.people.credentials import Reach
 from service.store.people.people import Member
 from service.store.queue import jobs
 from service.store.states import CredentialKind
@@ -55,7 +59,12 @@ class Web:
         """The header of a program that may do this."""
         with self.store.transaction() as session:
             secret = credentials.issue(
-                session, member.person_id, CredentialKind.TOKEN, timedelta(hours=1), name="test", scopes=scopes
+                session,
+                member.person_id,
+                CredentialKind.TOKEN,
+                timedelta(hours=1),
+                name="test",
+                reach=Reach(scopes=frozenset(scopes)),
             )
         return {"authorization": f"Bearer {secret}"}
 
@@ -66,6 +75,12 @@ class Web:
     def student(self, who: str = "ada", course: str = COURSE) -> Member:
         with self.store.transaction() as session:
             return people.make_student(session, course, Student(who, who.capitalize()))
+
+    def join(self, member: Member, other: Member, *, from_platform: bool = False) -> None:
+        """Two members become one person, as an operator decides it."""
+        service = self.app.state.context.service
+        asked = JoinRequest(member.enrolment_id, other.enrolment_id, from_platform)
+        operations.join(service, Actor("operator", operator=True), asked)
 
     def operator(self, who: str = "root") -> Member:
         member = self.instructor(who, "operators")

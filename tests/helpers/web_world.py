@@ -6,7 +6,7 @@ import io
 import re
 import zlib
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 
 import report_builders
 from builders import echo, grading_request
@@ -17,6 +17,7 @@ from service.store.grades import appeals, results
 from service.store.people import credentials, webhooks
 from service.store.people.people import Member
 from service.store.queue import jobs, tryouts
+from service.store.states import CredentialKind
 from service.web.kept_uploads import KeptUploads
 from service.web.rendering import statics
 from submissions.packed import pack_submission
@@ -44,9 +45,12 @@ def make_world(web: Web) -> World:
         open_assignments.open_for_students(session, 1, given.id)
     web.token(ada, "read")
     with web.store.transaction() as session:
-        (token,) = credentials.tokens(session, ada.person_id)
+        (token,) = credentials.of_person(session, ada.person_id)
+        for kind in (CredentialKind.SESSION, CredentialKind.TOKEN):
+            credentials.issue(session, ada.person_id, kind, timedelta(hours=1))
+        other, session_ = (each.id for each in credentials.of_person(session, ada.person_id) if each.id != token.id)
         appeal = appeals.ask(session, 1, "Please look again.")
-        hook, _ = webhooks.create(session, 1, "https://hooks.example.org/", ["grade.finished"], "grace")
+        hook, _ = webhooks.create(session, 1, "https://hooks.example.org/", ["grade.finished"])
     values = {
         "course_id": "1",
         "batch_id": batch.id,
@@ -59,6 +63,9 @@ def make_world(web: Web) -> World:
         "name": statics()["robomark.css"].rpartition("/")[2],
         "link": web.link(ada),
         "token_id": token.id,
+        "session_id": session_,
+        "credential_id": other,
+        "member_id": str(web.student("guest").enrolment_id),
         "upload_id": _upload(web, grace),
         "webhook_id": hook.id,
         "criterion": report_builders.faulty_grade().criteria[0].id,

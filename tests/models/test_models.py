@@ -22,7 +22,7 @@ from models.tasks import tasks
 from models.training import train
 from sim.errors import UsageError
 from sim.floors import floor
-from sim.floors.digits import _digit_images
+from sim.floors.digits import sheet_digits
 from sim.recording import Pose
 
 #: Only the shapes are tested in seconds.
@@ -166,7 +166,7 @@ def test_a_sheet_that_no_card_counts_is_read_as_well() -> None:
 def test_no_digit_of_a_sheet_is_trained_on(handwriting: tuple[np.ndarray, np.ndarray]) -> None:
     trained, labels = digits.training_digits()
     assert np.bincount(labels).tolist() == [400] * 10
-    on_sheets, _ = _digit_images()
+    on_sheets, _ = sheet_digits()
     small = {
         np.asarray(Image.fromarray(digit).resize((14, 14), Image.Resampling.LANCZOS)).tobytes() for digit in trained
     }

@@ -11,7 +11,7 @@ from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from service.store.grades.recordings import from_bytes, to_bytes
 from sim.recorded import seconds_at, ticks_until
-from sim.recording import BROWSER_TICK, TICK, Pose, Recording
+from sim.recording import BROWSER_TICK, TICK, Pose, Recording, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.submission import Submission
 
@@ -41,6 +41,29 @@ def test_program_and_world_agree_on_when_a_value_is_new(runner: TrialRunner) -> 
     assert recording.printed[0].text == "297"
     assert recording.end_t == pytest.approx(2.97)
     assert recording.sha256 == run(runner, f"tank_turn.on(100, 20)\n{program}").sha256
+
+
+@pytest.mark.parametrize("tick", [TICK, BROWSER_TICK])
+@pytest.mark.parametrize("seconds", [1, 1.02, 1.025])
+@pytest.mark.parametrize(
+    ("reads", "deed"),
+    [(120, "gyro.angle"), (200, "colorLeft.reflected_light_intensity"), (200, "ultrasonic.distance_centimeters")],
+)
+def test_no_read_ends_after_the_time_limit(
+    runner: TrialRunner, tick: int, seconds: float, reads: int, deed: str
+) -> None:
+    """A read that is answered between two ticks takes its time, and the limit is held against it."""
+    allowed = {count: run_until(runner, count, deed, tick, seconds) for count in (10, reads)}
+    assert (allowed[10].verdict, allowed[reads].verdict) == (Verdict.FINISHED, Verdict.TIME_LIMIT)
+    assert allowed[reads].end_t == pytest.approx(seconds)
+    cost = allowed[10].end_t / 10
+    most = int(seconds / cost + 1e-6)
+    assert run_until(runner, most, deed, tick, seconds).verdict is Verdict.FINISHED
+    assert run_until(runner, most + 1, deed, tick, seconds).verdict is Verdict.TIME_LIMIT
+
+
+def run_until(runner: TrialRunner, reads: int, deed: str, tick: int, seconds: float) -> Recording:
+    return run_program(runner, f"for _ in range({reads}):\n    {deed}\n", START, tick=tick, seconds=seconds)
 
 
 def test_a_stored_recording_keeps_its_tick(runner: TrialRunner) -> None:

@@ -15,10 +15,8 @@ import pytest
 from models import weights_bytes
 from notebook_builder import NOTEBOOKS
 from responders.notebook_executor import ExecutedNotebook
-from responders.sandbox.running_child import ChildLimits
-from service.commands.run_notebook import LastRun, RunLimits, run_notebook
+from service.grading.standalone import RunOptions, run_notebook
 from service.grading.trial_runner import TrialRunner
-from submissions.magics import Flags
 from submissions.notebook import read_notebook
 
 FOLDERS = sorted(path.parent for path in (NOTEBOOKS / "course_team").glob("*/expected.toml"))
@@ -32,9 +30,8 @@ def expected_of(folder: Path) -> dict[str, Any]:
 def executed(folder: Path, seconds: float, runner: TrialRunner) -> ExecutedNotebook:
     read = read_notebook((folder / f"{folder.name}.ipynb").read_bytes(), f"{folder.name}.ipynb")
     files = {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix == ".py"}
-    limits = RunLimits(ChildLimits(10.0, 512 << 20), ChildLimits(5.0, 128 << 20), 1_000_000, seconds)
-    last = LastRun(Flags(), 0, 0)
-    return run_notebook(read.notebook, {_NETWORK: weights_bytes("shapes"), **files}, limits, last, runner)
+    files[_NETWORK] = weights_bytes("shapes")
+    return run_notebook(read.notebook, files, RunOptions(seconds=seconds), runner)
 
 
 def in_order(wanted: list[str], text: str) -> list[str]:

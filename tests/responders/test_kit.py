@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -238,6 +239,55 @@ def test_images_arrays_and_frames_lead_back(kit: Kit) -> None:
     assert (colours.shape, colours.dtype) == ((2, 2, 3), np.uint8)
 
 
+#: First parameters as the original nn_tools names them; cells of the course call some of them by keyword.
+ORIGINAL_PARAMETERS = {
+    "get_sensor_image_pair": ["image_data", "index", "mode", "threshold"],
+    "predict_from_image": ["MLP", "_image_image"],
+    "image_data_to_array": ["image_data", "index", "size"],
+    "image_from_array": ["image_array", "mode"],
+    "raw_image_data_to_array": ["tmp", "index", "size", "col"],
+    "collected_image": ["df", "index", "size"],
+    "generate_image": ["image_data_df", "index", "size", "mode", "crop", "resize", "fill", "threshold"],
+    "generate_bw_image": ["image_data", "index", "size", "threshold", "crop", "resize"],
+    "generate_signature": ["img", "threshold", "normalise", "linear", "segment", "fill", "show"],
+    "generate_signature_from_series": ["s", "fill", "threshold", "binarise"],
+    "make_image_black_and_white": ["img", "threshold"],
+    "sensor_image_focus": ["img", "centre", "resize", "bw"],
+    "trim_image": ["bw_df", "background", "reindex", "show", "colorTheme", "image", "threshold"],
+    "clear_columns": ["df", "reverse", "transpose", "background", "threshold"],
+    "crop_and_pad_to_fit": ["img", "background", "scale", "quiet", "threshold"],
+    "crop_and_zoom_to_fit": ["img", "background", "scale", "quiet"],
+    "jiggle": ["img", "background", "quiet"],
+    "get_random_image": ["images_array", "labels", "show", "index"],
+    "get_resized_images_array": ["images_array", "size"],
+    "get_images_list_from_images_array": ["images_array"],
+    "array_from_image": ["img", "size"],
+    "image_data_from_image": ["img"],
+    "image_from_df": ["df"],
+    "df_from_image": ["img", "show", "colorTheme"],
+    "style_df": ["df", "bw", "colorTheme", "threshold"],
+    "zoom_img": ["img", "size", "grid"],
+    "get_image_features": ["image"],
+    "get_images_features": ["images_list", "normalise"],
+}
+
+
+@pytest.mark.parametrize("name", ORIGINAL_PARAMETERS)
+def test_parameters_have_the_original_names(kit: Kit, name: str) -> None:
+    assert list(inspect.signature(getattr(kit.data, name)).parameters) == ORIGINAL_PARAMETERS[name]
+
+
+def test_the_widget_module_exports_progress_bars(kit: Kit) -> None:
+    widget = importlib.import_module("nbev3devsim.load_nbev3devwidget")
+    assert [*widget.tqdma(range(3))] == [0, 1, 2]
+
+
+@pytest.mark.parametrize("name", ["boundary_models", "visualize_nn"])
+def test_drawing_modules_take_any_call(kit: Kit, name: str) -> None:
+    module = importlib.import_module(f"nn_tools.{name}")
+    assert module.anything(1, colour="red") is None
+
+
 def test_an_image_that_is_not_there_is_said(kit: Kit, capsys: pytest.CaptureFixture[str]) -> None:
     assert kit.data.raw_image_data_to_array(log_shapes(kit, range(1)), 2) is None
     assert "2" in capsys.readouterr().out
@@ -408,5 +458,5 @@ def test_the_kit_needs_nothing_of_ours_and_nothing_that_draws() -> None:
     code = f"import sys; sys.path.insert(0, {str(KIT)!r}); {loads}; print(*{{n.split('.')[0] for n in sys.modules}})"
     done = subprocess.run([sys.executable, "-I", "-c", code], capture_output=True, text=True, check=True)
     loaded = set(done.stdout.split())
-    assert not loaded & {"sim", "models", "submissions", "responders", "service"}
+    assert not loaded & {"robomark", "sim", "models", "submissions", "responders", "service"}
     assert not loaded & {"matplotlib", "IPython", "tqdm", "tensorflow"}

@@ -6,6 +6,7 @@ Each flood is one submission; what the worker holds of it afterwards is measured
 from __future__ import annotations
 
 import pickle
+import time
 
 import pytest
 
@@ -37,8 +38,12 @@ def _limits(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_flood_ends_at_the_budget(each: Flood, runner: TrialRunner) -> None:
     meter = JobMeter(JobLimits(kept_bytes=BUDGET))
     collaborative = each.responder if each.responder is not None or "PY::" not in each.program else ECHO
+    before = time.process_time()
     recording = run_program(runner, each.program, responder=collaborative, output_bytes=1 << 30, meter=meter)
+    own_seconds = time.process_time() - before
     assert {fault.verdict for fault in recording.faults} & set(each.verdicts), recording.faults[:3]
+    # The worker's own time is bounded by what is charged: for computing and frames, and for what is kept.
+    assert own_seconds < 3 * meter.spent.cpu_seconds + 0.3 * (meter.spent.kept_bytes >> 20) + 0.5
     assert _held(recording) < 2 * BUDGET
     assert meter.spent.kept_bytes < BUDGET + (1 << 17)
 

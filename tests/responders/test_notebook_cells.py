@@ -46,6 +46,12 @@ def test_a_responder_sees_what_the_robot_has_logged_so_far(tmp_path: Path, runne
     assert answers(recorded(tmp_path, runner, cells)) == ["1", "2", "3"]
 
 
+def test_a_module_that_a_cell_imports_may_display(tmp_path: Path, runner: TrialRunner) -> None:
+    module = "%%writefile shown.py\ndef show(value):\n    display(value)\n    return get_ipython() is not None"
+    output = recorded(tmp_path, runner, [module, "import shown\nshown.show(7)", RESPONDER, PROGRAM]).responder_output
+    assert "--- cell 2 ---\n7\nTrue" in output
+
+
 @pytest.mark.parametrize(
     ("cells", "note"),
     [

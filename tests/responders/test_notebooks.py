@@ -98,6 +98,35 @@ def test_run_shows_every_robot_of_the_course_notebook(tmp_path: Path) -> None:
     assert len(list((tmp_path / "d").iterdir())) == 4
 
 
+def run_in(folder: Path, *arguments: str) -> str:
+    command = [sys.executable, "-P", "-c", "from service.cli import main; main()", "run", *arguments]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_run_prints_what_cells_print_around_the_robots_that_they_start(tmp_path: Path) -> None:
+    robot = "%%sim_magic_preloaded -R\nsay('{}')"
+    cells = [
+        "print('before')",
+        robot.format("first run"),
+        "print('between')",
+        robot.format("second run"),
+        "print('after')",
+    ]
+    notebook(tmp_path / "a.ipynb", cells)
+    output = run_in(tmp_path, "a.ipynb")
+    words = ["before", "started by cell 2", "first run", "between", "started by cell 4", "second run", "after"]
+    places = [output.index(word) for word in words]
+    assert places == sorted(places)
+
+
+@pytest.mark.parametrize(("tick", "end"), [("thirtieth", "1.11 s  end"), ("browser", "1.10 s  end")])
+def test_run_has_ticks_of_both_lengths(tmp_path: Path, tick: str, end: str) -> None:
+    (tmp_path / "robot.py").write_text("tank_drive.on_for_seconds(30, 30, 1)\nprint(get_clock())\n")
+    assert end in run_in(tmp_path, "robot.py", "--tick", tick)
+
+
 def test_a_robot_program_draws_no_diagrams(tmp_path: Path) -> None:
     (tmp_path / "robot.py").write_text("say('hello')")
     done = robomark("run", tmp_path / "robot.py", "--diagrams", tmp_path / "d")

@@ -27,9 +27,8 @@ from notebook_builder import MESSAGING
 from responders import library
 from responders.channel import Channel
 from responders.notebook_executor import ExecutedNotebook
-from responders.sandbox.running_child import ChildLimits
 from running import run_program
-from service.commands.run_notebook import LastRun, RunLimits, run_notebook
+from service.grading.standalone import RunOptions, run_notebook
 from service.grading.trial_runner import TrialRunner
 from service.reports.plots.diagram_parts import Highlights
 from service.reports.plots.difference import differences, in_words
@@ -39,7 +38,7 @@ from sim.recording import LossReason, Pose, Recording, Verdict
 from submissions.assignment.examples import examples
 from submissions.diagram import Diagram
 from submissions.diagram_cells import diagrams_in
-from submissions.magics import Flags, setup, split_program
+from submissions.magics import setup, split_program
 from submissions.notebook import read_notebook
 
 NETWORK = {"mlp_shapes_14x14.joblib": weights_bytes("shapes")}
@@ -58,8 +57,7 @@ DIAGRAMS = {cell.cell: cell.diagram for cell in diagrams_in(NOTEBOOK).cells}
 @pytest.fixture(scope="module")
 def executed(runner: TrialRunner) -> ExecutedNotebook:
     """The whole notebook, from top to bottom."""
-    limits = RunLimits(ChildLimits(10.0, 512 << 20), ChildLimits(5.0, 128 << 20), 1_000_000, 60)
-    return run_notebook(NOTEBOOK, NETWORK, limits, LastRun(Flags(), 0, 0), runner)
+    return run_notebook(NOTEBOOK, NETWORK, RunOptions(), runner)
 
 
 def run(executed: ExecutedNotebook, cell: int) -> Recording:

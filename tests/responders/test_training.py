@@ -14,6 +14,8 @@ from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.judging.collecting import pairs
 from service.grading.trial_runner import TrialRunner
+from service.reports.view import student_view
+from service.reports.words import accuracy_words
 from sim.errors import UsageError
 from sim.recording import Recording, Verdict
 from submissions.assignment.definition import Assignment
@@ -53,6 +55,29 @@ def training() -> Assignment:
 
 def trained(runner: TrialRunner, asked: Assignment, text: str) -> Grade:
     return grade(Submission("s", None, Code("responder.py", text)), asked, runner=runner)
+
+
+def test_training_without_images_says_that_there_are_none(runner: TrialRunner, training: Assignment) -> None:
+    own = replace(training, parts=replace(training.parts, program="student"))
+    submission = Submission("s", Code("robot.py", "print('nothing')"), Code("responder.py", NEAREST))
+    result = grade(submission, own, runner=runner)
+    fault = result.trials[-1].recording.faults[0]
+    assert fault.message == "the robot collected no images, so there is nothing to train on"
+    assert (fault.who, fault.verdict, result.marks) == ("program", Verdict.PROGRAM_ERROR, 0)
+    assert "image_data" in fault.hint
+
+
+def test_the_accuracy_of_a_grade_is_that_of_the_marked_images(runner: TrialRunner) -> None:
+    asked = find_assignment("train-a-recogniser")
+    kept = tuple(replace(each, trials=1) for each in asked.scenarios if each.id != "unseen-with-noise")
+    criteria = tuple(each for each in asked.criteria if each.id in ("practice", "unseen"))
+    result = trained(runner, replace(asked, scenarios=kept, criteria=criteria), NEAREST)
+    assert result.recognition is not None
+    assert (result.recognition.id, result.accuracy) == ("unseen", result.criteria[1].accuracy)
+    shown = student_view(result).grade
+    assert shown.recognition is not None
+    assert (shown.recognition.id, "in practice, which is not marked" in accuracy_words(shown)) == ("practice", True)
+    assert "practice" not in accuracy_words(result)
 
 
 def test_a_model_is_trained_on_some_trials_and_marked_on_the_others(runner: TrialRunner, training: Assignment) -> None:

@@ -11,7 +11,7 @@ from threading import Event, Thread
 import pytest
 
 from service import outside
-from service.outside import ALL_OTHERS, NO_OTHERS, NotPublic, NotReached, ask, is_public
+from service.outside import ALL_OTHERS, NO_OTHERS, NotReached, ask, is_public
 
 
 @contextmanager
@@ -45,7 +45,7 @@ def test_what_is_answered_is_read_as_far_as_it_is_asked_for() -> None:
 def test_a_network_may_be_reached_that_is_named() -> None:
     with answering(b"HTTP/1.1 204 No Content\r\n\r\n") as url:
         for others in (NO_OTHERS, (ip_network("10.0.0.0/8"), ip_network("::/0"))):
-            with pytest.raises(NotPublic):
+            with pytest.raises(NotReached, match="public address"):
                 get(url, others)
         assert get(url, (ip_network("127.0.0.0/8"),)).status == 204
 
@@ -62,7 +62,7 @@ def test_a_name_that_resolves_to_both_is_refused(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(socket, "getaddrinfo", resolve)
     others = (ip_network("192.168.0.0/16"),)
-    with pytest.raises(NotPublic, match="no public address"):
+    with pytest.raises(NotReached, match="public address"):
         ask("http://two.example.org/", method="POST", body=b"", headers={}, others=others)
 
 
@@ -90,10 +90,37 @@ def test_a_name_that_resolves_to_both_is_refused(monkeypatch: pytest.MonkeyPatch
         ("ff02::1", False),
         ("64:ff9b::7f00:1", False),
         ("2002:7f00:1::", False),
+        ("64:ff9b:1::a00:1", False),
+        ("192.88.99.1", False),
+        ("192.0.0.8", False),
+        ("198.18.0.1", False),
+        ("240.0.0.1", False),
+        ("fec0::1", False),
+        ("100::1", False),
+        ("2001:db8::1", False),
+        ("2001:20::1", False),
+        ("3fff::1", False),
+        ("5f00::1", False),
+        ("2a00:1450:4001:82a::200e", True),
     ],
 )
 def test_which_addresses_are_public(address: str, public: bool) -> None:
     assert is_public(address) is public
+
+
+def test_a_name_inside_is_told_from_none_at_all_by_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    def resolve(host: str, *_: object, **__: object) -> list[tuple[object, ...]]:
+        if host == "nowhere.example.org":
+            raise socket.gaierror(-2, "Name or service not known")
+        return [(2, 1, 6, "", ("10.0.0.1", 80))]
+
+    monkeypatch.setattr(socket, "getaddrinfo", resolve)
+    told = set()
+    for host in ("nowhere.example.org", "intranet.example.org"):
+        with pytest.raises(NotReached) as error:
+            get(f"http://{host}/", NO_OTHERS)
+        told.add((type(error.value), str(error.value).replace(host, "")))
+    assert len(told) == 1
 
 
 def test_who_answers_no_http_or_a_byte_at_a_time_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:

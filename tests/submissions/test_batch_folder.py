@@ -94,6 +94,27 @@ def test_each_submission_may_name_its_own_assignment(tmp_path: Path) -> None:
     assert "no-such-thing" in refusal.reason
 
 
+def test_a_submission_that_we_fail_on_is_the_only_one_that_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "class"
+    for name in ("ada", "bob"):
+        _student(folder, name)
+    _student(folder, "eve", toml=f"run = 0x{'f' * 20_000}\n")
+    checked = read_batch(folder, "echo-responder")
+    assert [each.submission.student for each in checked.grading_requests] == ["ada", "bob"]
+    assert "number that is too long" in checked.refusals[0].reason
+
+    def fails(*_arguments: object, **_named: object) -> None:
+        raise ValueError("nobody thought of this")
+
+    (folder / "bob" / "submission.toml").write_text("x = 1\n")
+    monkeypatch.setattr("submissions.bundle.read_meta", lambda data, where: fails() if data else {})
+    checked = read_batch(folder, "echo-responder")
+    assert [each.submission.student for each in checked.grading_requests] == ["ada"]
+    assert {each.source: "fault in Robomark" in each.reason for each in checked.refusals} == {"bob": True, "eve": True}
+
+
 def test_a_submission_brings_no_assignment_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "class"
     _student(folder, "eve", toml='assignment = "eve"\n')

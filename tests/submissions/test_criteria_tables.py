@@ -48,7 +48,7 @@ AREA = {"rectangle": [0, 0, 10, 10]}
             "expected a closed one (closed = true)",
         ),
         ("pose", {"areas": [{"bar": [0, 0, 1, 1]}]}, ("areas", 0, "bar"), "expected [x1, y1, x2, y2, radius]"),
-        ("pose", {}, (), "expected x and y, heading, zone or areas"),
+        ("pose", {}, (), "expected x and y, heading, zone, areas or since"),
     ],
 )
 def test_a_mistake_is_named_where_it_is(

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from notebook_builder import MESSAGING
 from sim.errors import UsageError
 from submissions.diagram import Diagram, DiagramActor, DiagramArrow, DiagramKind, Divider
-from submissions.diagram_cells import MOST_DIAGRAMS, diagrams_in
+from submissions.diagram_cells import MOST_DIAGRAMS, MOST_PARTS, diagrams_in
 from submissions.diagram_text import MAX_ACTORS, MAX_DEPTH, MAX_GROUPS, MAX_STEPS, read_diagram
 from submissions.diagram_tokens import MAX_CHARACTERS
 from submissions.notebook import read_notebook
@@ -256,6 +256,17 @@ def test_a_problem_names_the_cell_and_the_line_in_it() -> None:
     assert found.problems[0].startswith("cell 2, line 5: '@' has no meaning here")
     assert found.problems[0].endswith("; the diagram is not drawn")
     assert diagrams_in(None).cells == ()
+
+
+def test_diagrams_are_left_out_that_would_take_too_long_together() -> None:
+    steps = "\n".join(f'a -> b [label="{"long " * 20}", note="{"note " * 20}"];' for _ in range(78))
+    sources = [f"%%seqdiag\n{steps}"] * 20
+    sources.insert(5, "%%seqdiag\na -> b")
+    found = diagrams_in(Notebook("n.ipynb", tuple(Cell(number, text) for number, text in enumerate(sources, 1))))
+    assert 80 <= sum(cell.diagram.parts for cell in found.cells) <= MOST_PARTS
+    assert [cell.cell for cell in found.cells] == [1, 6]
+    assert len(found.problems) == MOST_DIAGRAMS - 2 + 1
+    assert all("not drawn" in problem or "are drawn" in problem for problem in found.problems)
 
 
 def test_of_very_many_diagrams_the_first_are_read() -> None:

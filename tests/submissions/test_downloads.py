@@ -192,7 +192,7 @@ MERGES = "m0: &m0 {k: v}\n" + "".join(f"m{n}: &m{n} {{<<: [*m{n - 1}, *m{n - 1}]
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("submission_1: [", "cannot be read at line"),
+        ("submission_1: [", "not YAML at line"),
         ("- a\n- b\n", "is no list of submissions"),
         ("[" * 100_000, "cannot be read"),
         ("a: &a [*a]\n", "cannot be read"),

@@ -249,8 +249,8 @@ def test_name_and_address_are_those_that_were_told_last(store: Store) -> None:
         known = students.enrol(Student("s1"), at)
         for told in (Student("s1", "Ada King", "ada@uni.example"), Student("s1", "Ada Lovelace"), Student("s1")):
             assert students.enrol(told, at) == known
-        person = session.scalars(select(Person)).one()
-        assert (person.name, person.email) == ("Ada Lovelace", "ada@uni.example")
+        row = session.scalars(select(Enrolment)).one()
+        assert (row.name, row.email) == ("Ada Lovelace", "ada@uni.example")
 
 
 def test_only_who_is_there_is_found(store: Store) -> None:

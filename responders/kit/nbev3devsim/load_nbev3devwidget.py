@@ -9,6 +9,9 @@ import datetime
 from collections.abc import Callable
 from typing import Any
 
+from nbev3devsim.tqdma import tqdm_notebook, tqdma
+
+__all__ = ["eds", "roboSim", "tqdm_notebook", "tqdma"]
 _EPOCH = datetime.datetime(2020, 1, 1)
 
 

@@ -279,6 +279,13 @@ def network_structure(
     return (MLP.n_features_in_, MLP.n_layers_, MLP.n_outputs_, MLP.hidden_layer_sizes) if retval else None
 
 
+def reshape_data(img: Any, n_images: int = 3000, size: tuple[int, int] = (28, 28)) -> tuple[Any, Any, Any]:
+    """The images as an array, as ``n_images`` rows of numbers, and as rows divided by their largest number."""
+    images = np.array(img)
+    rows = images.reshape(n_images, size[0] * size[1])
+    return images, rows, normalize(rows, norm="max", axis=1)
+
+
 def _shows_nothing(*_args: Any, **_kwargs: Any) -> None:
     """Draws in a notebook; nothing here."""
 

@@ -59,18 +59,18 @@ def sensor_image_focus(img: Image.Image, centre: Box = _FOCUS, resize: Any = Non
 
 
 def get_sensor_image_pair(
-    df: pd.DataFrame, index: int | None = None, mode: str = "greyscale", threshold: int = 127
+    image_data: pd.DataFrame, index: int | None = None, mode: str = "greyscale", threshold: int = 127
 ) -> tuple[Image.Image, Image.Image] | None:
     """The left and the right focus image of pair ``index`` (rows 2i and 2i+1), -1 for the last pair."""
-    if df.empty:
+    if image_data.empty:
         return None
     if index is None or index == -1:
-        if len(df) < 2:
+        if len(image_data) < 2:
             raise TypeError("an image pair needs two rows, left and right")
-        first = len(df) - 2
+        first = len(image_data) - 2
     else:
         first = 2 * index
-    left, right = (sensor_image_focus(generate_image(df, row)) for row in (first, first + 1))
+    left, right = (sensor_image_focus(generate_image(image_data, row)) for row in (first, first + 1))
     if mode == "bw":
         return make_image_black_and_white(left, threshold), make_image_black_and_white(right, threshold)
     return left, right
@@ -92,9 +92,9 @@ def as_image(image: Any) -> Image.Image:
     return image if isinstance(image, Image.Image) else image_from_array(image)
 
 
-def image_data_to_array(list_of_values: Sequence[Any], index: int = 0, size: tuple[int, ...] = _SIZE) -> np.ndarray:
+def image_data_to_array(image_data: Sequence[Any], index: int = 0, size: tuple[int, ...] = _SIZE) -> np.ndarray:
     """A list of numbers as an array of bytes of the given shape."""
-    return np.array(list(list_of_values)).reshape(size).astype(np.uint8)
+    return np.array(list(image_data)).reshape(size).astype(np.uint8)
 
 
 def get_resized_images_array(images_array: Any, size: tuple[int, int] = (20, 20)) -> np.ndarray:
@@ -110,8 +110,8 @@ def get_images_list_from_images_array(images_array: np.ndarray) -> list[Image.Im
     return [image_from_array(array) for array in images_array]
 
 
-def image_from_array(arr: np.ndarray, mode: str = "L") -> Image.Image:
-    return Image.fromarray(np.asarray(arr, dtype=np.uint8)).convert(mode)
+def image_from_array(image_array: np.ndarray, mode: str = "L") -> Image.Image:
+    return Image.fromarray(np.asarray(image_array, dtype=np.uint8)).convert(mode)
 
 
 def image_data_from_image(img: Image.Image) -> list[int]:
@@ -138,13 +138,13 @@ def zoom_img(img: Any, size: tuple[int, int] = (5, 5), grid: bool = True) -> Non
 
 
 def raw_image_data_to_array(
-    df: Any, index: int = 0, size: tuple[int, ...] = _SIZE, col: str = "vals"
+    tmp: Any, index: int = 0, size: tuple[int, ...] = _SIZE, col: str = "vals"
 ) -> np.ndarray | None:
     """The numbers of row ``index`` of a data frame or list as an array of bytes."""
-    if index >= len(df):
-        print(f"There are only {len(df)} images: index {index} is too high.")
+    if index >= len(tmp):
+        print(f"There are only {len(tmp)} images: index {index} is too high.")
         return None
-    values = df.iloc[index][col] if isinstance(df, pd.DataFrame) else df[index]
+    values = tmp.iloc[index][col] if isinstance(tmp, pd.DataFrame) else tmp[index]
     numbers = values.split(",") if isinstance(values, str) else values
     return np.array([int(number) for number in numbers]).reshape(size).astype(np.uint8)
 
@@ -156,7 +156,7 @@ def collected_image(df: Any, index: int = 0, size: tuple[int, ...] = _SIZE) -> I
 
 
 def generate_image(
-    df: Any,
+    image_data_df: Any,
     index: int = 0,
     size: tuple[int, ...] = _SIZE,
     mode: str = "greyscale",
@@ -166,7 +166,7 @@ def generate_image(
     threshold: int = 127,
 ) -> Image.Image:
     """The logged image in row ``index``: greyscale, ``bw``, or colour for any other mode; cropped, then resized."""
-    image = collected_image(df, index, size)
+    image = collected_image(image_data_df, index, size)
     if image is None:
         raise IndexError(f"there is no image {index}")
     if mode == "greyscale":
@@ -186,14 +186,14 @@ def make_image_black_and_white(img: Image.Image, threshold: int = 127) -> Image.
 
 
 def generate_bw_image(
-    df: Any,
+    image_data: Any,
     index: int = 0,
     size: tuple[int, ...] = _SIZE,
     threshold: int = 127,
     crop: Box | None = None,
     resize: Any = None,
 ) -> Image.Image:
-    return make_image_black_and_white(generate_image(df, index, size, "greyscale", crop, resize), threshold)
+    return make_image_black_and_white(generate_image(image_data, index, size, "greyscale", crop, resize), threshold)
 
 
 def generate_signature_from_series(
@@ -328,8 +328,8 @@ def get_images_features(images_list: Sequence[Image.Image], normalise: bool = Tr
     return _normalised(rows, "l2") if normalise else rows
 
 
-def predict_from_image(MLP: Any, img: Image.Image) -> Any:
-    return MLP.predict(_normalised([get_image_features(img)], "max"))[0]
+def predict_from_image(MLP: Any, _image_image: Image.Image) -> Any:
+    return MLP.predict(_normalised([get_image_features(_image_image)], "max"))[0]
 
 
 def _normalised(rows: list[list[int]], norm: str) -> Any:

@@ -11,6 +11,7 @@ import os
 import resource
 import signal
 import socket
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -39,6 +40,12 @@ def _thread() -> None:
         threading.Thread(target=lambda: None).start()
     except RuntimeError as error:
         raise OSError(str(error)) from None
+
+
+def _random_hash() -> None:
+    """Whether texts are hashed alike in every child is decided when the zygote starts."""
+    if not sys.flags.hash_randomization:
+        raise OSError("refused")
 
 
 #: What is tried: every attempt must raise OSError.
@@ -71,6 +78,9 @@ ATTEMPTS: dict[str, Callable[[], object]] = {
     "count what came from the disk": lambda: resource.getrusage(resource.RUSAGE_SELF),
     "ask how much memory is free": _system_call(99, ctypes.addressof(_SPACE)),
     "read the parent's limits": lambda: resource.prlimit(os.getppid(), resource.RLIMIT_NOFILE),
+    "draw the kernel's chance": _system_call(318, ctypes.addressof(_SPACE), 16, 0),
+    "open the kernel's chance": lambda: os.open("/dev/urandom", os.O_RDONLY),
+    "hash texts by chance": _random_hash,
     "read the parent's clock": lambda: time.clock_gettime((~os.getppid() << 3) | 2),
 }
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import string
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,6 +49,18 @@ def cell_magic(source: str) -> CellMagic | None:
             return None
         return CellMagic(match["name"], match["line"] or "", "\n".join(lines[place + 1 :]), place + 1)
     return None
+
+
+def cell_magics(lines: Iterable[str]) -> Iterator[tuple[int, str]]:
+    """Index and name of each magic that the lines begin with: that of the cell, and those that it wraps in turn."""
+    for place, line in enumerate(lines):
+        stripped = line.lstrip("\ufeff").strip()
+        if not stripped or stripped.startswith("#"):
+            continue
+        match = _CELL_MAGIC.match(stripped)
+        if match is None:
+            return
+        yield place, match["name"]
 
 
 def wrapped(line: str) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import gc
 import os
 import resource
 import signal
@@ -53,12 +54,15 @@ def start(
 ) -> None:
     """Never returns. ``descriptors`` are the wire's two and, if the spec has a folder, the folder."""
     try:
+        lockdown.run_on(bytes.fromhex(spec["processors"]))
         _own_session(prepared.changed_signals)
         _first_to_go()
         _descriptors([*descriptors[:2], prepared.door, *descriptors[2:]])
         _limits(spec)
         wire = Wire(_WRITING, _READING)
         wire.send(_sandbox(spec, prepared))
+        gc.enable()
+        gc.collect()  # from here on it collects after as many new objects in every child
         role(wire, dataclasses.replace(prepared.grants, without=tuple(spec["without"])))
     finally:
         os._exit(0)
@@ -125,7 +129,7 @@ def _limits(spec: dict[str, Any]) -> None:
         mapped = int(statm.read().split()[0]) * resource.getpagesize()
     memory = mapped + spec["memory"]
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-    seconds = int(spec["cpu"]) + 2
+    seconds = 2 * int(spec["cpu"]) + 2  # the worker may watch it for twice as long as it may compute
     # The worker is there long before the second limit: a SIGKILL that it did not send is never this one's.
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 60))
     resource.setrlimit(resource.RLIMIT_FSIZE, (spec["file_size"], spec["file_size"]))
@@ -142,6 +146,7 @@ def _sandbox(spec: dict[str, Any], prepared: Prepared) -> Frame:
     landlock, seccomp, own_user = 0, False, False
     without_doorkeeper: str | None = "it was not asked for"
     memory = _own_memory()
+    fixed_addresses = lockdown.has_fixed_addresses()
     try:
         own_user = _own_user(spec, prepared.grants)
         _end_with(prepared.zygote)
@@ -164,6 +169,7 @@ def _sandbox(spec: dict[str, Any], prepared: Prepared) -> Frame:
         "landlock": landlock,
         "seccomp": seccomp,
         "own_user": own_user,
+        "fixed_addresses": fixed_addresses,
         "without_doorkeeper": without_doorkeeper,
         "policy": lockdown.POLICY,
         "missing": missing,

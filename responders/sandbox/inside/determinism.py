@@ -19,6 +19,8 @@ from typing import Any
 
 SECOND = 3_000_000  # units of a third of a microsecond
 EPOCH = 1_577_836_800  # 2020-01-01, UTC
+#: Clocks that count from 1970: CLOCK_REALTIME, the same in coarse, and CLOCK_TAI.
+_WALL_CLOCKS = frozenset({0, 5, 11})
 
 
 def install_clock(now: Callable[[], int], sleep: Callable[[int], None]) -> None:
@@ -39,13 +41,18 @@ def install_clock(now: Callable[[], int], sleep: Callable[[int], None]) -> None:
     def nanoseconds(seconds: int) -> Callable[[], int]:
         return lambda: seconds * 10**9 + now() * 1000 // 3
 
+    def times() -> os.times_result:
+        return os.times_result((since_start(), 0.0, 0.0, 0.0, since_start()))
+
+    wall_nanoseconds, nanoseconds_since_start = nanoseconds(EPOCH), nanoseconds(0)
+
     real_gmtime, real_strftime, real_asctime = time.gmtime, time.strftime, time.asctime
     changed: dict[str, Any] = {
         "sleep": sleep_seconds,
         "time": wall,
-        "time_ns": nanoseconds(EPOCH),
-        "clock_gettime": lambda _: since_start(),
-        "clock_gettime_ns": lambda _: nanoseconds(0)(),
+        "time_ns": wall_nanoseconds,
+        "clock_gettime": lambda clock: wall() if clock in _WALL_CLOCKS else since_start(),
+        "clock_gettime_ns": lambda clock: wall_nanoseconds() if clock in _WALL_CLOCKS else nanoseconds_since_start(),
         "gmtime": lambda seconds=None: real_gmtime(wall() if seconds is None else seconds),
         "strftime": lambda form, moment=None: real_strftime(form, real_gmtime(wall()) if moment is None else moment),
         "asctime": lambda moment=None: real_asctime(real_gmtime(wall()) if moment is None else moment),
@@ -54,9 +61,13 @@ def install_clock(now: Callable[[], int], sleep: Callable[[int], None]) -> None:
     changed["localtime"] = changed["gmtime"]
     for name in ("monotonic", "perf_counter", "process_time", "thread_time"):
         changed[name] = since_start
-        changed[name + "_ns"] = nanoseconds(0)
+        changed[name + "_ns"] = nanoseconds_since_start
     for name, function in changed.items():
         setattr(time, name, function)
+    os.times = times
+    loaded = sys.modules.get("timeit")
+    if loaded is not None:
+        loaded.default_timer = since_start  # type: ignore[attr-defined]
 
     def moment(cls: type[datetime.datetime], tz: datetime.tzinfo | None = None) -> datetime.datetime:
         utc = cls.fromtimestamp(wall(), datetime.UTC)
@@ -85,6 +96,14 @@ def _change(kind: type, **methods: Callable[..., Any]) -> None:
     ctypes.pythonapi.PyType_Modified(ctypes.py_object(kind))
 
 
+_seed_with = random.Random.seed
+
+
+def _seed(self: random.Random, a: Any = None, version: int = 2) -> None:
+    """Seed a generator; without a seed Python would ask the kernel for one, by no name that can be replaced."""
+    _seed_with(self, int.from_bytes(os.urandom(32), "little") if a is None else a, version)
+
+
 def install_chance(seed: int) -> None:
     """Seed ``random`` and numpy, and let everything that asks the system for chance draw from ``seed`` instead."""
     drawn = 0
@@ -96,6 +115,8 @@ def install_chance(seed: int) -> None:
 
     os.urandom = urandom
     random._urandom = urandom  # type: ignore[attr-defined]
+    random.Random.seed = _seed  # type: ignore[method-assign]
+    random.seed = random._inst.seed
     random.seed(seed)
     uuid._generate_time_safe = None  # type: ignore[attr-defined]
     uuid._UuidCreate = None  # type: ignore[attr-defined]

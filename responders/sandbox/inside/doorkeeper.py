@@ -17,6 +17,7 @@ import select
 import signal
 import socket
 import struct
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from . import lockdown
@@ -29,7 +30,6 @@ _GO_ON = 1
 _LONGEST = 4096
 _FROM_HERE = -100  # AT_FDCWD
 _PR_SET_PDEATHSIG = 1
-_NO_NAME = 0o20000000  # O_TMPFILE without O_DIRECTORY
 #: How many files a child may make, even if it removes them again: it uses up numbers, which others could see.
 _MOST_FILES = 300
 
@@ -44,17 +44,18 @@ class _Guest:
     made: int = 0
 
 
-def start(grants: lockdown.Grants, control: int) -> socket.socket:
+def start(grants: lockdown.Grants, controls: Iterable[int]) -> socket.socket:
     """Stay behind as the doorkeeper, and go on in a fork: through the socket its children make themselves known.
 
-    Whichever of the two ends takes the other along. ``control`` is the fork's alone.
+    Whichever of the two ends takes the other along. The descriptors ``controls`` are the fork's alone.
     """
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     keeper = os.getpid()
     if os.fork() != 0:
         try:
             ours.close()
-            os.close(control)
+            for control in controls:
+                os.close(control)
             _serve(theirs, _Known(grants))
         finally:
             os._exit(0)
@@ -94,7 +95,7 @@ class _Known:
         above = _above(path)
         if path in self._exactly or path in self._beneath or not self._beneath.isdisjoint(above):
             return True
-        return folder != b"/" and (folder in (path, *above) or path in _above(folder))
+        return folder != b"/" and folder in (path, *above)
 
 
 def _above(path: bytes) -> list[bytes]:
@@ -165,6 +166,6 @@ def _refusal(guest: _Guest, known: _Known, number: int, arguments: list[int]) ->
         if b".." in path.split(b"/") if known_by_opening else not known.has(path, guest.folder):
             return errno.EACCES if number in OPENS else errno.ENOENT
     flags = arguments[OPENS[number]] if number in OPENS else 0
-    if flags & _NO_NAME or (flags & os.O_CREAT and not os.path.lexists(os.path.join(guest.folder, path))):
+    if flags & os.O_CREAT and not os.path.lexists(os.path.join(guest.folder, path)):
         guest.made += 1
     return errno.EDQUOT if guest.made > _MOST_FILES else 0

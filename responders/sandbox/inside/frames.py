@@ -9,12 +9,18 @@ import functools
 import json
 import os
 import struct
+from collections.abc import Iterator
 from typing import Any
 
 Frame = dict[str, Any]
 
 #: The longest line that the worker accepts, bytes.
 MOST = 65536
+_LONGEST_NUMBER = 20
+#: The bytes that a character takes at most: one of the first 65,536, and any.
+_WIDE, _WIDEST = 6, 12
+#: A text of so many characters is never cut.
+_SHORT = 100
 
 #: What begins a packet, where a line begins with a brace: zero, how many entries follow, and the packet's number.
 _HEADER = struct.Struct("<BxHxxxxQ")
@@ -59,10 +65,13 @@ class Wire:
         self._write(self._line(frame))
 
     def _line(self, frame: Frame) -> bytes:
-        """It, beginning with its number; both sides count."""
+        """It, beginning with its number, both sides count; texts that are too long for a line are cut."""
         number = self._sent
         self._sent += 1
-        return b'{"n":%d,%s\n' % (number, _encode(frame).encode("ascii")[1:])
+        text = _encode(frame)
+        if len(text) > MOST - _LONGEST_NUMBER:
+            text = _encode(fitted(frame))
+        return b'{"n":%d,%s\n' % (number, text.encode("ascii")[1:])
 
     def _hold_acts(self) -> None:
         """What was done so far comes before what is sent next."""
@@ -130,13 +139,33 @@ def _numbers(count: int) -> struct.Struct:
 
 def fits(text: str) -> bool:
     """Whether a frame can carry ``text``."""
-    # Six bytes a character at the most, and some room for the rest of the frame.
-    return len(text) * 6 < MOST - 200 or len(_encode(text)) < MOST - 200
+    # Some room is left for the rest of the frame.
+    return len(text) * _WIDEST < MOST - 200 or len(_encode(text)) < MOST - 200
 
 
-def fitted(text: str) -> str:
-    """``text``, cut so that a frame can carry it."""
-    return text if fits(text) else clip(text, MOST // 6 - 100)
+def fitted(frame: Frame) -> Frame:
+    """``frame`` with its long texts cut, the same length each, so that a line can carry it."""
+    texts = [value for value in _values(frame) if isinstance(value, str)]
+    long = sum(len(text) > _SHORT for text in texts)
+    space = MOST // max(long, 1) - _WIDEST * _SHORT * len(texts)
+
+    def cut(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {name: each if name == "do" else cut(each) for name, each in value.items()}
+        if not isinstance(value, str) or len(value) <= _SHORT:
+            return value
+        return clip(value, space // (_WIDEST if max(value) > "\uffff" else _WIDE))
+
+    fitting: Frame = cut(frame)
+    return fitting
+
+
+def _values(frame: Frame) -> Iterator[Any]:
+    for name, value in frame.items():
+        if isinstance(value, dict):
+            yield from _values(value)
+        elif name != "do":
+            yield value
 
 
 def clip(text: str, most: int = 2000) -> str:

@@ -41,7 +41,6 @@ _SYSTEM = (
     "/etc/localtime",
     "/dev/null",
     "/dev/zero",
-    "/dev/urandom",
     "/etc/ld.so.cache",
 )
 

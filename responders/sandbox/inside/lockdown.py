@@ -21,6 +21,7 @@ from .system_calls import asking, program
 _libc = ctypes.CDLL(None, use_errno=True)
 
 _PR_SET_NO_NEW_PRIVS = 38
+_PERSONALITY_AS_IT_IS, _ADDR_NO_RANDOMIZE = 0xFFFFFFFF, 0x40000
 _SYS_CAPGET, _SYS_CAPSET = 125, 126
 _CAPABILITIES = struct.pack("=Ii", 0x20080522, 0)  # the third version of the interface, this process
 _CHOWN, _DAC_OVERRIDE, _KILL, _SETGID, _SETUID = 0, 1, 5, 6, 7
@@ -66,6 +67,17 @@ def landlock_version() -> int:
 def control(option: int, value: int) -> None:
     """One of the process's own settings, see prctl(2)."""
     _libc.prctl(option, value, 0, 0, 0)
+
+
+def run_on(processors: bytes) -> None:
+    """Keep this process to some processors: a bit each, see sched_setaffinity(2)."""
+    _libc.sched_setaffinity(0, ctypes.c_size_t(len(processors)), processors)
+
+
+def has_fixed_addresses() -> bool:
+    """Whether this process has its memory at the same addresses as any other that did the same."""
+    personality = _libc.personality(ctypes.c_ulong(_PERSONALITY_AS_IT_IS))
+    return personality >= 0 and bool(personality & _ADDR_NO_RANDOMIZE)
 
 
 def forbid_new_privileges() -> None:

@@ -12,6 +12,7 @@ import os
 import re
 import sys
 from collections.abc import Iterable
+from types import ModuleType
 
 _LONGEST = 60
 _MOST_KNOWN = 5000
@@ -25,6 +26,15 @@ _IMPORTS = {
     "pyState": "from ev3dev2_glue import pyState",
     "load": "from joblib import load",
 }
+#: Functions of modules under names that other languages and libraries have for them.
+_OTHER_NAMES = {
+    "time": {"wait": "sleep", "pause": "sleep", "delay": "sleep", "now": "time"},
+    "random": {"rand": "random", "number": "randint", "pick": "choice", "int": "randint"},
+    "math": {"power": "pow", "root": "sqrt"},
+    "json": {"parse": "loads", "stringify": "dumps", "encode": "dumps", "decode": "loads"},
+}
+#: What is imported more often than modules of the standard library with names like these.
+_LIBRARIES = ("joblib", "json", "matplotlib", "nbev3devsim", "nn_tools", "numpy", "pandas", "sklearn", "time")
 #: What of the brick a robot program may not have loaded yet.
 _BRICK = ("ev3dev2", "ev3dev2.motor", "ev3dev2.sensor", "ev3dev2.sensor.lego", "ev3dev2.sound", "ev3dev2_glue")
 
@@ -37,10 +47,11 @@ def meant_by(error: BaseException) -> str:
         if isinstance(error, NameError):
             return _of_name(error)
         if isinstance(error, AttributeError) and error.name is not None:
-            return _near(error.name, dir(error.obj), 0.7)
+            return _of_module_function(error) or _near(error.name, dir(error.obj), 0.7)
         if isinstance(error, ModuleNotFoundError) and str(error).startswith("No module named"):
             brick = _BRICK if "brick_link" in sys.modules else ()
-            return _near(str(error.name), [*brick, *sys.stdlib_module_names, *sys.modules], 0.8)
+            name = str(error.name)
+            return _near(name, [*brick, *_LIBRARIES], 0.8) or _near(name, [*sys.stdlib_module_names, *sys.modules], 0.8)
         if isinstance(error, FileNotFoundError) and isinstance(error.filename, str) and os.getcwd() != "/":
             return _near(error.filename, os.listdir(), 0.7)
         found = _CANNOT_IMPORT.search(str(error)) if isinstance(error, ImportError) else None
@@ -62,6 +73,12 @@ def _of_name(error: NameError) -> str:
     if trace is not None:
         known = [*trace.tb_frame.f_locals, *trace.tb_frame.f_globals, *known]
     return _near(name, known, 0.7)
+
+
+def _of_module_function(error: AttributeError) -> str:
+    module = getattr(error.obj, "__name__", "") if isinstance(error.obj, ModuleType) else ""
+    meant = _OTHER_NAMES.get(module, {}).get(str(error.name).lower())
+    return f"Did you mean {module}.{meant}?" if meant else ""
 
 
 def _near(name: str, known: Iterable[object], least: float) -> str:

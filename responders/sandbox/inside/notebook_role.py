@@ -49,7 +49,10 @@ class NotebookRole(ResponderRole):
         self._prepare()
         roboSim.look = self._look
         unseen.install(self._shell)
-        self._namespace.update(get_ipython=lambda: self._shell, display=unseen.display, In=[], Out={})
+        self._namespace.update(In=[], Out={})
+        # As in IPython, modules that a cell imports have these two as well.
+        builtins.display = unseen.display  # type: ignore[attr-defined]
+        builtins.get_ipython = lambda: self._shell  # type: ignore[attr-defined]
         builtins.exit = builtins.quit = _leave  # type: ignore[assignment]
         text = "".join(source + "\n" for source in self._spec["cells"])
         linecache.cache[self._name] = (len(text), None, text.splitlines(keepends=True), self._name)
@@ -171,7 +174,6 @@ class NotebookRole(ResponderRole):
             "_robomark_name": magic.name,
             "_robomark_line": magic.line,
             "_robomark_body": magic.body,
-            "get_ipython": lambda: self._shell,
         }
         exec(compile(tree, self._name, "exec", dont_inherit=True), names)
 

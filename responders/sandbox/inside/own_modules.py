@@ -17,7 +17,7 @@ from types import CodeType, ModuleType
 from typing import Any
 
 from .libraries import WORDS
-from .student_code import StudentFiles, compile_source, is_module_file
+from .student_code import StudentFiles, is_module_file
 
 Source = Callable[[str], str | None]
 
@@ -94,4 +94,4 @@ class _OwnModules(MetaPathFinder, Loader):
         assert found is not None
         assert found.origin is not None
         self._files.imported.add(found.origin)
-        exec(compile_source(found.loader_state, found.origin), module.__dict__)
+        self._files.execute(found.loader_state, found.origin, module.__dict__)

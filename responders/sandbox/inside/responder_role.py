@@ -15,8 +15,9 @@ from types import FrameType
 from typing import Any
 
 from . import determinism, function_calls, model_files, other_agents, own_modules, refusals, student_code
-from .frames import Frame, Wire, clip, fits, fitted
+from .frames import Frame, Wire, clip, fits
 from .lockdown import Grants
+from .statement_watch import StatementWatch
 
 _NOTED = ("parser", "agent", "logger")
 _FUNCTIONS = (types.FunctionType, types.MethodType, types.BuiltinFunctionType, functools.partial)
@@ -31,6 +32,8 @@ class ResponderRole:
         self._spec = spec
         self._name: str = spec["name"]
         self._files = student_code.StudentFiles(self._name)
+        if spec.get("watch"):
+            self._files.watch = StatementWatch(wire.send, self._name)
         self._function: str | None = spec["function"]
         self._own_name = "responder"
         self._units = 0
@@ -84,7 +87,7 @@ class ResponderRole:
     def _load(self, text: str) -> Frame | None:
         """Run the module; the error that stopped it, or that there is no responder in it."""
         try:
-            exec(student_code.compile_source(text, self._name), self._namespace)
+            self._files.execute(text, self._name, self._namespace)
             if self._function != function_calls.NO_RESPONDER:
                 self._find()
         except BaseException as error:
@@ -102,6 +105,9 @@ class ResponderRole:
             return self._namespace[self._function]  # type: ignore[no-any-return]
         if callable(roboSim.pyresponder):
             return roboSim.pyresponder
+        if roboSim.pyresponder is not None:
+            kind = type(roboSim.pyresponder).__name__
+            raise LookupError(f"roboSim.pyresponder is a {kind} and no function: assign the function without brackets")
         if callable(self._namespace.get("responder")):
             return self._namespace["responder"]  # type: ignore[no-any-return]
         found = {
@@ -188,7 +194,7 @@ class ResponderRole:
         self._units = max(self._units, until)
 
     def _emit(self, text: str) -> None:
-        self._wire.send({"do": "print", "text": fitted(self._files.without_folders(text))})
+        self._wire.send({"do": "print", "text": self._files.without_folders(text)})
 
     def _refused(self, what: str) -> None:
         self._wire.send({"do": "refused", "what": what, **self._files.place(sys._getframe())})

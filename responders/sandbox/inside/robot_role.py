@@ -15,8 +15,9 @@ from types import CodeType, FrameType
 from typing import Any
 
 from . import determinism, own_modules, refusals, student_code
-from .frames import Frame, Wire, clip, fitted
+from .frames import Frame, Wire, clip
 from .lockdown import Grants
+from .statement_watch import StatementWatch
 
 #: What every robot program needs.
 NEEDED = ("brick_link", "brick_preambles", "ev3dev2_glue")
@@ -41,6 +42,8 @@ def run(wire: Wire, grants: Grants) -> None:
 
     spec = wire.receive()
     files = student_code.StudentFiles(spec["name"])
+    if spec.get("watch"):
+        files.watch = StatementWatch(wire.send, files.main)
 
     def stuck() -> None:
         _leave(wire, {"do": "stuck", **files.place(sys._getframe())})
@@ -49,7 +52,7 @@ def run(wire: Wire, grants: Grants) -> None:
         _leave(wire, {"do": "busy", **files.place(frame)})
 
     def emit(text: str) -> None:
-        link.tell({"do": "print", "text": fitted(text)})
+        link.tell({"do": "print", "text": text})
 
     def now() -> int:
         link.read_freely()
@@ -80,7 +83,7 @@ def _execute(spec: Frame, namespace: dict[str, Any], files: student_code.Student
     """The error that ended the program, or None."""
     try:
         exec(preamble_codes()[spec["preamble"]], namespace)
-        exec(student_code.compile_source(spec["text"], files.main), namespace)
+        files.execute(spec["text"], files.main, namespace)
     except SystemExit as ending:
         if ending.code in (None, 0):
             return None

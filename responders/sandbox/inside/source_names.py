@@ -6,7 +6,10 @@ Nothing is looked up and nothing is run; what a whole file has in it is ``source
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Iterator, Sequence, Set
+
+from .source_words import DOUBTFUL_PARTS, PLAIN_MODULES
 
 _MOST_PARTS = 10
 _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
@@ -31,25 +34,52 @@ def root(node: ast.AST) -> str:
     return node.id if isinstance(node, ast.Name) else ""
 
 
+def leads_to_doubt(name: str) -> bool:
+    """Whether a dotted name of something imported leads through its module to another that is doubtful.
+
+    What a plain module keeps for itself, with an underscore, may run a text or take any name.
+    """
+    top, *parts = name.split(".")
+    if top in PLAIN_MODULES and any(map(_is_private, parts)):
+        return True
+    top = top.lstrip("_")
+    doubtful = DOUBTFUL_PARTS | (sys.stdlib_module_names - PLAIN_MODULES if top in sys.stdlib_module_names else set())
+    return not doubtful.isdisjoint(part.lstrip("_") for part in parts)
+
+
+def _is_private(name: str) -> bool:
+    """Whether a name begins with an underscore and is none of Python's own, such as ``__name__``."""
+    return name.startswith("_") and not (name.startswith("__") and name.endswith("__"))
+
+
 def text_of(node: ast.AST) -> str | None:
-    """The text that a constant is, or that constants come to when they are joined by ``+`` or in an f-string."""
+    """Return ``source_of`` as text, with bytes decoded as Latin-1."""
+    source = source_of(node)
+    return source.decode("latin-1") if isinstance(source, bytes) else source
+
+
+def source_of(node: ast.AST) -> str | bytes | None:
+    """Return the text or bytes of a constant, or of constants joined by ``+`` or in an f-string."""
     match node:
-        case ast.Constant(value=str() as text):
-            return text
-        case ast.Constant(value=bytes() as data):
-            return data.decode("latin-1")
+        case ast.Constant(value=str() | bytes() as source):
+            return source
         case ast.BinOp(op=ast.Add(), left=left, right=right):
             return _joined((left, right))
         case ast.JoinedStr(values=values):
             return _joined(values)
         case ast.FormattedValue(value=value, conversion=-1, format_spec=None):
-            return text_of(value)
+            text = source_of(value)
+            return text if isinstance(text, str) else None
     return None
 
 
-def _joined(nodes: Sequence[ast.AST]) -> str | None:
-    texts = [text_of(node) for node in nodes]
-    return None if None in texts else "".join(text for text in texts if text is not None)
+def _joined(nodes: Sequence[ast.AST]) -> str | bytes | None:
+    sources = [source_of(node) for node in nodes]
+    texts = [source for source in sources if isinstance(source, str)]
+    if len(texts) == len(sources):
+        return "".join(texts)
+    data = [source for source in sources if isinstance(source, bytes)]
+    return b"".join(data) if len(data) == len(sources) else None
 
 
 def truth(node: ast.AST) -> bool | None:
@@ -178,6 +208,44 @@ def bound_by(node: ast.AST) -> set[str]:
         case ast.arg(arg=name):
             return {name}
     return set()
+
+
+def made_in(tree: ast.Module) -> set[str]:
+    """The names that a text gives to something of its own: functions, classes, values.
+
+    Not to what it has from elsewhere: something imported by its name, an instance of a class that is not its own.
+    """
+    nodes = list(ast.walk(tree))
+    made = {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)}
+    for node in nodes:
+        match node:
+            case ast.Assign(targets=targets, value=value):
+                made |= {name for target in targets for name in _made_by(target, value, made)}
+            case ast.AnnAssign(target=target, value=ast.expr() as value) | ast.NamedExpr(target=target, value=value):
+                made |= _made_by(target, value, made)
+            case ast.For(target=target) | ast.AsyncFor(target=target):
+                made |= bound_in([target])
+            case ast.Import(names=aliases) | ast.ImportFrom(names=aliases):
+                made |= {each.asname for each in aliases if each.asname and not _is_last(each.name, each.asname)}
+    return made
+
+
+def _made_by(target: ast.expr, value: ast.expr, made: Set[str]) -> set[str]:
+    match target, value:
+        case ((ast.Tuple(elts=targets) | ast.List(elts=targets)), (ast.Tuple(elts=values) | ast.List(elts=values))):
+            pairs = zip(targets, values, strict=False)
+            return {name for one, other in pairs for name in _made_by(one, other, made)}
+        case ast.Name(id=name), ast.Call(func=function):
+            kind = dotted(function).rpartition(".")[2]
+            is_instance = kind[:1].isupper() and kind not in made and root(function) not in made
+            return set() if is_instance else {name}
+        case ast.Name(id=name), ast.Attribute():
+            return set() if _is_last(dotted(value), name) and root(value) not in made else {name}
+    return bound_in([target])
+
+
+def _is_last(dotted_name: str, name: str) -> bool:
+    return dotted_name.rpartition(".")[2] == name
 
 
 def surely_bound(statement: ast.stmt) -> set[str]:

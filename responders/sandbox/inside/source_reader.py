@@ -7,16 +7,18 @@ from __future__ import annotations
 
 import ast
 import importlib.machinery
+import itertools
 import sys
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from fnmatch import fnmatchcase
 from typing import Any
 
 from . import cell_source
+from .source_names import leads_to_doubt
 from .source_units import Mention, SourcePlace, Unit
 from .source_walk import Walk
-from .source_words import CONSTRUCTS
+from .source_words import CONSTRUCTS, PLAIN_MODULES
 from .withheld import rule_for
 
 _IMPORT = "import "
@@ -27,31 +29,34 @@ _LONGEST_IN_ALL = 1_000_000
 _DEEPEST_WALK = 30_000
 _MOST_DOUBTS = 4
 _LONGEST_NAME = 60
-#: What robot programs import, which is not on a responder's path, and what a notebook has stand-ins for.
-_OF_THE_COURSE = frozenset({"ev3dev2", "ev3dev2_glue", "brick_link", "brick_preambles"})
-_SHOWING = frozenset({"matplotlib", "seaborn", "IPython", "ipywidgets", "tqdm", "plotly", "pylab", "mpl_toolkits"})
+#: What is there for robot programs, though not to be imported by them, and not on a responder's path.
+_OF_THE_COURSE = frozenset({"brick_link", "brick_preambles"})
 
 Answer = list[Any] | None
 #: Of each kind of mention, the first place of each name.
 Places = Mapping[str, Mapping[str, SourcePlace]]
 
 
-def read(files: Sequence[Mapping[str, Any]], asked: Mapping[str, Sequence[str]]) -> dict[str, Any]:
+def read(
+    files: Sequence[Mapping[str, Any]], asked: Mapping[str, Sequence[str]], ran: Sequence[Sequence[Any]] | None = None
+) -> dict[str, Any]:
     """The answers for rules ``asked``: lists of ``uses``, ``avoids``, ``in_loop``, ``defines``, ``shown``, ``entries``.
 
     Each of ``files`` has a ``name`` (empty: the part itself) and a ``text``, ``bytes`` (as Latin-1) or ``cells``.
-    An answer is a file's name and a line, or None. ``unread`` is the first file that cannot be read, and why; of files
-    beside the part, and of cells, that are no Python it is not told, because they cannot be run either.
+    ``ran`` are the statements that were run (file, line, column), where that is known: then nothing else is used, or
+    called in a loop. An answer is a file's name and a line, or None. ``unread`` is the first file that cannot be read,
+    and why; of files beside the part, and of cells, that are no Python it is not told, because they cannot be run.
     """
     reading = _Reading(files)
     units = reading.units
-    everything = _places((mention, place) for unit in units for mention, place in unit.mentions.items())
-    run = _places(_run(units, asked["entries"]))
+    everything = _places((mention, places[0]) for unit in units for mention, places in unit.mentions.items())
+    run = _places(_run(units, asked["entries"], None if ran is None else {(name, (*at,)) for name, *at in ran}))
+    given = _without(run, reading.made - set(asked["defines"]), reading.own)
     return {
         "unread": reading.unread,
-        "uses": [_first(run, rule, _USED) for rule in asked["uses"]],
+        "uses": [_first(given, rule, _USED) for rule in asked["uses"]],
         "avoids": [_first(everything, rule, _AVOIDED) for rule in asked["avoids"]],
-        "in_loop": [_first(run, rule, {"()": ("looped",)}) for rule in asked["in_loop"]],
+        "in_loop": [_first(given, rule, {"()": ("looped",)}) for rule in asked["in_loop"]],
         "defines": [_answer(run["function"].get(name)) for name in asked["defines"]],
         "shown": [_first(everything, rule, _AVOIDED) for rule in asked["shown"]],
         "doubts": _doubts(everything, asked["avoids"])[:_MOST_DOUBTS] if asked["avoids"] else [],
@@ -65,13 +70,14 @@ class _Reading:
         self.units: list[Unit] = []
         self.unread: list[Any] | None = None
         self._left = _LONGEST_IN_ALL
-        self._own = {str(file["name"]).partition(".")[0] for file in files}
+        self.made: set[str] = set()
+        self.own = {str(file["name"]).partition(".")[0] for file in files}
         for file in files:
             self._read(file)
 
     def _read(self, file: Mapping[str, Any]) -> None:
         name = str(file["name"])
-        walk = Walk(self._is_known)
+        walk = Walk(self._doubt_about)
         if "cells" in file:
             for number, cell in file["cells"]:
                 self._read_cell(walk, f"cell {number}", cell)
@@ -82,8 +88,9 @@ class _Reading:
                 unit = Unit(name.partition(".")[0], always=not name)
                 self._guarded(name, lambda: walk.read(tree, name, unit))
         self.units += walk.units
+        self.made |= walk.made
         for written, text in walk.written:
-            self._own.add(written.partition(".")[0])
+            self.own.add(written.partition(".")[0])
             self._read({"name": written or "a file", "text": text})
 
     def _read_cell(self, walk: Walk, name: str, cell: str) -> None:
@@ -129,14 +136,23 @@ class _Reading:
         if self.unread is None:
             self.unread = [name[:_LONGEST_NAME], why, line]
 
-    def _is_known(self, top: str) -> bool:
-        if top in sys.stdlib_module_names or top in self._own | _OF_THE_COURSE | _SHOWING:
-            return True
-        return importlib.machinery.PathFinder.find_spec(top) is not None
+    def _doubt_about(self, module: str) -> str:
+        top = module.partition(".")[0]
+        if top in PLAIN_MODULES:
+            return module if leads_to_doubt(module) else ""
+        if top in sys.stdlib_module_names:
+            return top
+        if not top or top in self.own:
+            return ""
+        if top in _OF_THE_COURSE or importlib.machinery.PathFinder.find_spec(top) is not None:
+            return top
+        return f"the module {top}, which is not among the files,"
 
 
-def _run(units: Sequence[Unit], entries: Sequence[str]) -> Iterable[tuple[Mention, SourcePlace]]:
-    """What is mentioned by code that can be run at all; ``looped`` is true where a loop leads to it.
+def _run(
+    units: Sequence[Unit], entries: Sequence[str], ran: Set[tuple[Any, ...]] | None
+) -> Iterable[tuple[Mention, SourcePlace]]:
+    """What is mentioned by code that can be run at all, or was ``ran``; ``looped`` is true where a loop leads to it.
 
     A function is run if its name is used by what is run, whoever's function of that name it is; all are if something
     may be taken by any name.
@@ -159,6 +175,12 @@ def _run(units: Sequence[Unit], entries: Sequence[str]) -> Iterable[tuple[Mentio
         entry = unit.made_in is not None and any(fnmatchcase(unit.name, pattern) for pattern in entries)
         return any(ways) if ways or entry or unit.always or any_name else None
 
+    def run_in(unit: Unit) -> Iterator[tuple[Mention, SourcePlace]]:
+        for mention, places in unit.mentions.items():
+            if mention.live:
+                was_run = (each for each in places if ran is None or (each.file, each.statement) in ran)
+                yield from ((mention, place) for place in itertools.islice(was_run, 1))
+
     waiting = list(units)
     while waiting:
         unit = waiting.pop()
@@ -167,8 +189,8 @@ def _run(units: Sequence[Unit], entries: Sequence[str]) -> Iterable[tuple[Mentio
             continue
         looped[unit] = way
         waiting += unit.units
-        for mention in unit.mentions:
-            if not mention.live or mention.kind in ("construct", "function", "doubt", "any_name"):
+        for mention, _ in run_in(unit):
+            if mention.kind in ("construct", "function", "doubt", "any_name"):
                 continue
             in_loop = way or mention.looped
             for name in mention.name.split("."):
@@ -176,11 +198,12 @@ def _run(units: Sequence[Unit], entries: Sequence[str]) -> Iterable[tuple[Mentio
                     used[name] = in_loop
                     waiting += by_name.get(name, ())
     for unit, way in looped.items():
-        for mention, place in unit.mentions.items():
-            if mention.live:
-                yield mention._replace(looped=way or mention.looped), place
+        for mention, place in run_in(unit):
+            yield mention._replace(looped=way or mention.looped), place
 
 
+#: The kinds of mention that are of names.
+_NAMED = frozenset({"call", "looped", "name"})
 #: Which kinds of mention answer a call, a module and a name.
 _USED = {"()": ("call",), _IMPORT: ("import", "through"), "": ("name",)}
 _AVOIDED = {"()": ("call", "handed_on", "base"), _IMPORT: ("import", "through"), "": ("name", "taken")}
@@ -192,6 +215,20 @@ def _places(mentions: Iterable[tuple[Mention, SourcePlace]]) -> Places:
         for kind in (mention.kind, "looped") if mention.kind == "call" and mention.looped else (mention.kind,):
             found[kind][mention.name] = min(place, found[kind].get(mention.name, place))
     return found
+
+
+def _without(places: Places, made: Set[str], own: Set[str]) -> Places:
+    """The places of what the submission has not made itself: names that begin with none of its own."""
+
+    def is_made(name: str) -> bool:
+        first, last = name.partition(".")[0], name.rpartition(".")[2]
+        return first in made or (first in own and (last in made or last == first))
+
+    kept = {
+        kind: {name: place for name, place in found.items() if kind not in _NAMED or not is_made(name)}
+        for kind, found in places.items()
+    }
+    return defaultdict(dict, kept)
 
 
 def _first(places: Places, rule: str, kinds: Mapping[str, Sequence[str]]) -> Answer:

@@ -6,10 +6,12 @@ It follows assignments and imports as they stand, and knows nothing of values.
 from __future__ import annotations
 
 import ast
+import builtins
 import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from .source_lookups import makes_text
 from .source_names import bound_in, dotted, root
 from .source_words import TABLE_CALLS
 
@@ -33,6 +35,8 @@ class Naming:
         self._scopes = [_Scope("module")]
         self._stands_for: dict[str, set[str]] = {}
         self._imported: set[str] = set()
+        self._functions: set[str] = set()
+        self._texts: set[str] = set()
         #: Names that are bound or unbound from elsewhere.
         self._unsure: set[str] = set()
 
@@ -56,6 +60,8 @@ class Naming:
                     self._assigned(target, value)
                 case ast.arguments():
                     self._defaults(node)
+                case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
+                    self._functions.add(name)
                 case ast.Global(names=names):
                     self._unsure |= set(names)
                 case ast.Delete(targets=deleted):
@@ -64,19 +70,39 @@ class Naming:
 
     def names(self, node: ast.AST) -> list[str]:
         """The dotted name of a chain, and what it is where its first name stands for something else."""
-        name, first = dotted(node), root(node)
-        found, waiting = [name], [first] if first else []
+        found = [dotted(node)]
+        waiting = list(found) if root(node) else []
         while waiting and len(found) < _MOST_NAMES:
-            for other in sorted(self._stands_for.get(waiting.pop(), ())):
-                whole = f"{other}{name.removeprefix(first)}"
+            first, dot, rest = waiting.pop().partition(".")
+            for other in sorted(self._stands_for.get(first, ())):
+                whole = f"{other}{dot}{rest}"
                 if whole not in found:
                     found.append(whole)
-                    waiting.append(other)
+                    # What stands for a part of itself (x = x.next) would go on for ever.
+                    waiting += [whole] if other.partition(".")[0] != first else []
         return found
 
     def is_imported(self, node: ast.AST) -> bool:
         """Whether a chain begins with something that was imported."""
         return root(node) in self._imported
+
+    def may_be_imported(self, node: ast.AST) -> bool:
+        """Whether a chain begins with something that was imported, or with another name of it."""
+        return any(name.partition(".")[0] in self._imported for name in self.names(node) if root(node))
+
+    def is_text(self, node: ast.AST) -> bool:
+        """Whether an expression is a text, or the name of one."""
+        return makes_text(node) or (isinstance(node, ast.Name) and not self._texts.isdisjoint(self.names(node)))
+
+    def is_function(self, node: ast.AST) -> bool:
+        """Whether an expression is a lambda, or the name of a function of the text, of a module or of Python."""
+        if not isinstance(node, ast.Name | ast.Attribute):
+            return isinstance(node, ast.Lambda)
+        names = self.names(node)
+        if self.is_text(node) or not root(node):
+            return False
+        own = any(name.rpartition(".")[2] in self._functions for name in names)
+        return own or self.may_be_imported(node) or hasattr(builtins, root(node))
 
     def own(self, name: str) -> bool | None:
         """Whether a name that is read here is one that the text gave to something itself; None if that is not sure."""
@@ -131,6 +157,10 @@ class Naming:
                 self._note(target.id, dotted(value.func))
             elif root(value):
                 self._note(target.id, dotted(value))
+            elif isinstance(value, ast.Lambda):
+                self._functions.add(target.id)
+            elif makes_text(value):
+                self._texts.add(target.id)
 
     def _defaults(self, arguments: ast.arguments) -> None:
         given = [*arguments.posonlyargs, *arguments.args]

@@ -25,17 +25,18 @@ class Mention(NamedTuple):
 
 
 class SourcePlace(NamedTuple):
-    """A file's name, as messages have it, and a line."""
+    """A file's name, as messages have it, and a line; and where the statement begins that has to be run for it."""
 
     file: str
     line: int
+    statement: tuple[int, int] = (0, 0)
 
 
 @dataclass(eq=False, slots=True)
 class Unit:
     """Code that is run at one go: a file's or a function's own. ``owner`` is the class that it is a method of.
 
-    Of each mention the first place is kept.
+    Of each mention the first places are kept.
     """
 
     name: str
@@ -43,5 +44,5 @@ class Unit:
     made_in: Unit | None = None
     made: bool = True  # its definition can be come to
     always: bool = False  # it is run without being named
-    mentions: dict[Mention, SourcePlace] = field(default_factory=dict)
+    mentions: dict[Mention, list[SourcePlace]] = field(default_factory=dict)
     units: list[Unit] = field(default_factory=list)

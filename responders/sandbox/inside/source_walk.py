@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from . import cell_source
+from .source_lookups import may_unpickle, name_arguments
 from .source_names import (
     arguments_of,
     blocks,
@@ -17,6 +18,9 @@ from .source_names import (
     declared_elsewhere,
     ends,
     is_empty,
+    leads_to_doubt,
+    made_in,
+    source_of,
     surely_bound,
     text_of,
     truth,
@@ -27,10 +31,11 @@ from .source_words import (
     CONSTRUCTS,
     DOUBTFUL,
     DOUBTFUL_ALONE,
-    DOUBTFUL_MODULES,
+    DOUBTFUL_METHODS,
     GETTERS,
     IMPORTERS,
     MAGICS,
+    NAME_TAKERS,
     RUNNERS,
     TABLES,
     TAKES_NAME,
@@ -38,6 +43,8 @@ from .source_words import (
 )
 
 _DEEPEST = 8
+#: How many places of one mention are kept.
+_MOST_PLACES = 200
 
 
 class _Here(NamedTuple):
@@ -48,23 +55,27 @@ class _Here(NamedTuple):
 class Walk:
     """What stands in one file, or in the cells of one notebook."""
 
-    def __init__(self, is_known: Callable[[str], bool]) -> None:
-        """``is_known`` tells of a top module whether it is a library or among the files."""
+    def __init__(self, doubt_about: Callable[[str], str]) -> None:
+        """``doubt_about`` returns what is doubtful about importing a module, in words; empty if nothing is."""
         self.units: list[Unit] = []
         #: Files that a notebook writes: names and texts.
         self.written: list[tuple[str, str]] = []
-        self._is_known = is_known
+        self._doubt_about = doubt_about
         self._naming = Naming()
         self._file = ""
         self._unit = Unit("")
         self._owner = ""
         self._understood: set[ast.AST] = set()  # pieces that are doubtful, but show what they take
         self._depth = 0
+        self._statement = (0, 0)  # where the one begins that is read
+        #: The names that the text gives to something of its own.
+        self.made: set[str] = set()
 
     def read(self, tree: ast.Module, file: str, unit: Unit) -> None:
         """Add what stands in ``tree``; ``file`` is its name in messages."""
         self._begin(file, unit)
         self._naming.learn(tree)
+        self.made |= made_in(tree)
         self._statements(tree.body, _Here())
 
     def read_magic(self, magic: cell_source.CellMagic, file: str, unit: Unit) -> None:
@@ -76,23 +87,35 @@ class Walk:
         self._file, self._unit = file, unit
         self.units.append(unit)
 
-    def _add(self, kind: str, name: str, node: ast.AST, here: _Here) -> None:
+    def _add(self, kind: str, name: str, node: ast.AST, here: _Here, statement: tuple[int, int] | None = None) -> None:
+        """``statement`` is where the one begins that has to be run for it, if not the one that is read."""
         if name:
-            place = SourcePlace(self._file, getattr(node, "lineno", 0))
-            self._unit.mentions.setdefault(Mention(kind, name, here.live, here.looped), place)
+            place = SourcePlace(self._file, getattr(node, "lineno", 0), statement or self._statement)
+            places = self._unit.mentions.setdefault(Mention(kind, name, here.live, here.looped), [])
+            if len(places) < _MOST_PLACES:
+                places.append(place)
 
     def _by_text(self, text: str, node: ast.AST, here: _Here) -> None:
         self._add("handed_on", text, node, here)
         self._add("name", text, node, here)
+        for part in sorted(DOUBTFUL.intersection(text.split("."))):
+            self._add("any_name" if part in TABLES | RUNNERS | MAGICS else "doubt", part, node, here)
 
     # statements
 
     def _statements(self, body: Sequence[ast.stmt], here: _Here) -> None:
+        before = self._statement
         for statement in body:
+            self._statement = self._beginning(statement)
             self._visit(statement, here)
             if here.live:
                 self._naming.bind(surely_bound(statement))
             here = here._replace(live=here.live and not ends(statement))
+        self._statement = before
+
+    def _beginning(self, statement: ast.stmt) -> tuple[int, int]:
+        """Line and column; of one in a text that is run those of the statement that runs it."""
+        return self._statement if self._depth else (statement.lineno, statement.col_offset)
 
     def _block(self, body: Sequence[ast.stmt], here: _Here, bound: Sequence[ast.AST] = ()) -> None:
         """A block that may be passed by; ``bound`` is what it begins with."""
@@ -104,9 +127,11 @@ class Walk:
     def _visit(self, node: ast.AST, here: _Here) -> None:
         construct = CONSTRUCTS.get(type(node))
         if construct is not None:
-            self._add("construct", construct, node, here)
+            # Of a loop the body has to be run, of everything else the statement itself.
+            body = node.body[0] if isinstance(node, ast.For | ast.AsyncFor | ast.While) else None
+            self._add("construct", construct, node, here, self._beginning(body) if body else None)
         if isinstance(node, ast.If | ast.For | ast.AsyncFor | ast.While) and node.orelse:
-            self._add("construct", "else", node, here)
+            self._add("construct", "else", node, here, self._beginning(node.orelse[0]))
         _WAYS.get(type(node), Walk._parts)(self, node, here)
 
     def _parts(self, node: ast.AST, here: _Here) -> None:
@@ -157,6 +182,8 @@ class Walk:
 
     def _function(self, node: ast.FunctionDef | ast.AsyncFunctionDef, here: _Here) -> None:
         self._add("function", node.name, node, here)
+        if node.name in DOUBTFUL and node.name.startswith("__"):
+            self._add("doubt", node.name, node, here)
         # Its arguments with their defaults and annotations are worked out where it is made.
         self._each([*node.decorator_list, node.args, node.returns], here)
         within = Unit(node.name, self._owner, self._unit, here.live, bool(node.decorator_list))
@@ -222,8 +249,15 @@ class Walk:
             if self._naming.is_imported(node):
                 self._add("through", names[-1], node, here)
             self._before_dot(node.value, here)
+        if isinstance(node.ctx, ast.Load) and kind != "call" and (own is not True or self._naming.is_imported(node)):
+            self._doubt_name_taker(names, node, here)
         if own is not True and node not in self._understood:
             self._doubt_chain(names, node, here)
+
+    def _doubt_name_taker(self, names: list[str], node: ast.AST, here: _Here) -> None:
+        """``map(getattr, ...)``: handed on, it may be called with any name."""
+        for last in {name.rpartition(".")[2] for name in names} & NAME_TAKERS:
+            self._add("any_name", last, node, here)
 
     def _before_dot(self, node: ast.expr, here: _Here) -> None:
         if isinstance(node, ast.Name | ast.Attribute):
@@ -232,11 +266,15 @@ class Walk:
             self._visit(node, here)
 
     def _doubt_chain(self, names: list[str], node: ast.AST, here: _Here) -> None:
-        last = names[0].rpartition(".")[2]
-        if last in DOUBTFUL or (last in DOUBTFUL_ALONE and isinstance(node, ast.Name)):
-            self._add("any_name" if last in TABLES | RUNNERS | MAGICS else "doubt", last, node, here)
+        alone = DOUBTFUL_ALONE if isinstance(node, ast.Name) else DOUBTFUL_METHODS
+        lasts = [name.rpartition(".")[2] for name in names]
+        doubtful = next((last for last in lasts if last in DOUBTFUL), lasts[0] if lasts[0] in alone else "")
+        if doubtful:
+            self._add("any_name" if doubtful in TABLES | RUNNERS | MAGICS else "doubt", doubtful, node, here)
         elif "sys.modules" in names:
             self._add("doubt", "sys.modules", node, here)
+        elif self._naming.may_be_imported(node):
+            self._add("doubt", next(filter(leads_to_doubt, names), ""), node, here)
 
     def _index(self, node: ast.Subscript, here: _Here) -> None:
         self._ask_table(node.value, node.slice, node, here)
@@ -265,18 +303,23 @@ class Walk:
             self._ask_table(function.value, node.args[0], node, here)
         for call in sorted(calls & TAKES_NAME.keys()):
             place = TAKES_NAME[call]
-            self._take(call, texts[place] if len(texts) > place else None, node, here)
+            is_known = len(texts) > place and not any(isinstance(each, ast.Starred) for each in node.args[:place])
+            self._take(call, texts[place] if is_known else None, node, here)
         for call in sorted(calls & TAKES_NAMES):
             for argument, text in zip(node.args, texts, strict=True):
                 if text is not None or not isinstance(argument, ast.Constant):
                     self._take(call, text, node, here)
         named = next((text for text in texts if text), None)
         if calls & IMPORTERS and named is not None:
-            self._understood.add(function)
+            if texts[0] is not None:
+                self._understood.add(function)
             self._add("import", named.replace(":", "."), node, here)
-        if calls & RUNNERS and texts and texts[0] is not None:
+        source = source_of(node.args[0]) if calls & RUNNERS and node.args else None
+        if source is not None and self._run_text(_without_indent(source, calls), node.lineno, here):
             self._understood.add(function)
-            self._run_text(texts[0], node.lineno, here)
+        if may_unpickle(node, calls):
+            self._add("doubt", "allow_pickle", node, here)
+        self._look_up_names(node, calls, here)
         for call in sorted(calls & MAGICS):
             self._call_magic(call, texts, node, here)
         if isinstance(function, ast.Name | ast.Attribute):
@@ -284,6 +327,24 @@ class Walk:
         else:
             self._visit(function, here)
         self._each([*node.args, *node.keywords], here)
+
+    def _look_up_names(self, node: ast.Call, calls: set[str], here: _Here) -> None:
+        """``series.agg("mean")``: the text is known, or the argument is a function, or it may be any name."""
+        if (
+            isinstance(node.func, ast.Name)
+            and self._naming.own(node.func.id)
+            and not self._naming.is_imported(node.func)
+        ):
+            return
+        for words, argument in name_arguments(node, calls):
+            text = text_of(argument)
+            if text is not None:
+                self._by_text(text, node, here)
+            elif not (isinstance(argument, ast.Constant) or self._naming.is_function(argument)):
+                self._add("any_name", words, node, here)
+        # In scikit-learn its argument is data, in pandas it may be a name.
+        if "transform" in calls and node.args and self._naming.is_text(node.args[0]):
+            self._take("transform", text_of(node.args[0]), node, here)
 
     def _take(self, call: str, text: str | None, node: ast.AST, here: _Here) -> None:
         if text is None:
@@ -300,34 +361,35 @@ class Walk:
     def _import_from(self, node: ast.ImportFrom, here: _Here) -> None:
         self._import_module(node.module or "", node, here)
         for alias in node.names:
-            self._add("import", f"{node.module or ''}.{alias.name}", node, here)
+            whole = f"{node.module or ''}.{alias.name}"
+            self._add("import", whole, node, here)
             self._add("taken", alias.name, node, here)
+            if alias.name in DOUBTFUL or leads_to_doubt(whole):
+                self._add("doubt", whole, node, here)
             if alias.asname not in (None, alias.name):
                 self._add("handed_on", alias.name, node, here)
 
     def _import_module(self, module: str, node: ast.AST, here: _Here) -> None:
         self._add("import", module, node, here)
-        top = module.partition(".")[0]
-        if top in DOUBTFUL_MODULES:
-            self._add("doubt", top, node, here)
-        elif top and not self._is_known(top):
-            self._add("doubt", f"the module {top}, which is not among the files,", node, here)
+        self._add("doubt", self._doubt_about(module), node, here)
 
     # texts that are run
 
-    def _run_text(self, text: str, line: int, here: _Here) -> None:
-        """Python in a text, as if it stood in the place of the text."""
+    def _run_text(self, source: str | bytes, line: int, here: _Here) -> bool:
+        """Read Python in a text as code in the place of the text; return whether it could be read."""
         if self._depth >= _DEEPEST:
-            return
+            return False
         try:
-            tree = ast.parse(text)
+            tree = ast.parse(source)
         except (SyntaxError, ValueError, RecursionError, MemoryError):
-            return
+            return False
         ast.increment_lineno(tree, line - 1)
         self._naming.learn(tree)
+        self.made |= made_in(tree)
         self._depth += 1
         self._block(tree.body, here)
         self._depth -= 1
+        return True
 
     def _call_magic(self, call: str, texts: list[str | None], node: ast.Call, here: _Here) -> None:
         known = [text for text in texts if text is not None]
@@ -344,22 +406,30 @@ class Walk:
         """What a magic runs: the expressions in its line; of some the line, or the rest of the cell."""
         place = ast.Pass(lineno=number)
         expressions = list(cell_source.expressions(line))
-        for expression in expressions:
-            self._run_text(expression, number, here)
+        readable = [self._run_text(expression.lstrip(" \t"), number, here) for expression in expressions]
         if name in cell_source.LINE_WRAPPERS and body is None:
             if expressions:
                 self._add("any_name", f"a value in the line of %{name}", place, here)
-            self._run_text(cell_source.wrapped(line), number, here)
+            readable.append(self._run_text(cell_source.wrapped(line).lstrip(" \t"), number, here))
         elif name in cell_source.WRAPPERS and body is not None:
             inner = cell_source.cell_magic(body)
             if inner is not None:
                 self._magic(inner.name, inner.line, inner.body, number + inner.number, here)
             else:
-                self._run_text(cell_source.python_source(body), number + 1, here)
+                readable.append(self._run_text(cell_source.python_source(body), number + 1, here))
         elif name == "run" and body is None:
             self._add("import", line.split()[0].removesuffix(".py") if line.split() else "", place, here)
         elif name in ("writefile", "file") and body is not None:
             self.written.append(("".join(line.split()[-1:]).strip("'\""), body))
+        if not all(readable):
+            self._add("any_name", f"the text of a magic called {name}", place, here)
+
+
+def _without_indent(source: str | bytes, calls: set[str]) -> str | bytes:
+    """Remove the leading blanks and tabs of a text as ``eval`` does; ``exec`` and ``compile`` refuse them."""
+    if "eval" not in calls:
+        return source
+    return source.lstrip(" \t") if isinstance(source, str) else source.lstrip(b" \t")
 
 
 _WAYS: Mapping[type[ast.AST], Callable[[Walk, Any, _Here], None]] = {

@@ -17,6 +17,7 @@ from typing import Any
 
 from .frames import Frame, clip
 from .near_names import meant_by
+from .statement_watch import StatementWatch
 
 _MOST_WARNINGS, _LONGEST_WARNING = 20, 180
 Namespace = dict[str, Any]
@@ -33,12 +34,18 @@ class StudentFiles:
 
     def __init__(self, main: str) -> None:
         self.main = main
+        self.watch: StatementWatch | None = None  # only where it is asked which statements are run
         self.imported: set[str] = set()
         here = os.getcwd()
         self._folder = f"{here}/" if here != "/" else None
         folders = {here, sys.prefix, sys.base_prefix, *sys.path, os.path.dirname(os.__file__)} - {"", "/"}
         # The longest first: one may lie in another.
         self._folders = [f"{folder}/" for folder in sorted(folders, key=len, reverse=True)]
+
+    def execute(self, text: str, name: str, namespace: Namespace) -> None:
+        """Run a whole file of this name."""
+        code = compile_source(text, name)
+        exec(code if self.watch is None else self.watch.compile(text, name, namespace), namespace)
 
     def has(self, name: str) -> bool:
         """Whether code with this file name is the student's."""

@@ -16,28 +16,45 @@ import os
 import signal
 import socket
 import sys
+from collections.abc import Callable, Mapping
 from typing import Any
+
+from . import child, grants, lockdown
+from .frames import Wire
 
 _PR_SET_PDEATHSIG = 1
 _PR_SET_DUMPABLE = 4
 _ENDED = (ctypes.c_char * 152)()  # the status and, from the eighth byte, what was used; zeroes but for a moment
-
-
-#: All that student code finds: libraries loaded late must not start threads either.
-_ENVIRONMENT = {
-    "HOME": "/",
-    "LANG": "C.UTF-8",
-    "OPENBLAS_NUM_THREADS": "1",
-    "OMP_NUM_THREADS": "1",
-    "ORT_DISABLE_TELEMETRY": "1",
-}
+_STATUS, _USED = ctypes.byref(_ENDED), ctypes.byref(_ENDED, 8)
+_ANY_CHILD = b"\xff" * 4  # -1, as wait4(2) takes it
+_PRACTICE = 2
+_wait4 = ctypes.CDLL(None).wait4
+#: What of its own environment student code finds, beside a home: libraries loaded late must not start threads either,
+#: nor compute otherwise.
+_KEPT = (
+    "LANG",
+    "NPY_DISABLE_CPU_FEATURES",
+    "OMP_NUM_THREADS",
+    "OPENBLAS_CORETYPE",
+    "OPENBLAS_NUM_THREADS",
+    "ORT_DISABLE_TELEMETRY",
+)
 
 
 def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> None:
-    """Serve specs on descriptor 3 until the worker closes it.
+    """Fork children as descriptor 3 orders until the worker closes it; their specs come on descriptor 4.
+
+    The worker may close it before it reads an answer.
 
     ``folders`` is where children have theirs, ``without`` are modules that none of them may have.
     """
+    try:
+        _start(role_name, folders, without, roots)
+    except ConnectionError:
+        os._exit(0)
+
+
+def _start(role_name: str, folders: str, without: list[str], roots: list[str]) -> None:
     _before_the_worker()
     prctl = ctypes.CDLL(None).prctl
     prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
@@ -45,9 +62,9 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.dont_write_bytecode = True
     sys.path[:0] = roots
-    from . import battery, child, determinism, doorkeeper, grants, libraries, lockdown, refusals, withheld  # noqa: F401
+    from . import battery, determinism, doorkeeper, libraries, refusals, withheld  # noqa: F401
 
-    control = socket.socket(fileno=3)
+    control, specs = socket.socket(fileno=3), socket.socket(fileno=4)
     if role_name == "robot":
         from . import robot_role as role
     elif role_name == "robot with libraries":
@@ -56,12 +73,13 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
         from . import responder_zygote as role  # type: ignore[no-redef]
     else:
         from . import responder_with_libraries as role  # type: ignore[no-redef]
+    determinism.install_chance(0)  # libraries draw as they are loaded, and what they draw decides what lies where
     for name in role.NEEDED:
         importlib.import_module(name)
     closed = withheld.keep_out(tuple(without))
     readable = grants.readable(roots, closed)
     allowed = lockdown.Grants(readable, grants.listable(roots, closed), open_to_others=grants.open_to_others(readable))
-    door = doorkeeper.start(allowed, control.fileno())
+    door = doorkeeper.start(allowed, (control.fileno(), specs.fileno()))
     role.preload(without)
     prepared = child.Prepared(
         allowed, lockdown.reading_rules(allowed), child.changed_signals(), os.getpid(), door.fileno()
@@ -69,46 +87,64 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
     with_libraries = role_name.endswith("with libraries")
     run = role.run if with_libraries else functools.partial(libraries.run_without, role.run)
     roles = {"role": run, "battery": battery.run}
+    kept = {name: os.environ[name] for name in _KEPT if name in os.environ}
     os.environ.clear()
-    os.environ.update(_ENVIRONMENT)
+    os.environ.update(kept, HOME="/")
     _one_thread()
     gc.collect()
+    gc.disable()
     gc.freeze()
     inside = os.open(folders, os.O_RDONLY | os.O_DIRECTORY)
     _reply(control, {"ready": True}, [inside])
     os.close(inside)
-    while True:
-        spec, descriptors = _receive(control)
-        if spec is None:
-            os._exit(0)
-        if spec["do"] == "spawn":
-            os.sched_setaffinity(0, spec["processors"])
-            pid = os.fork()
-            if pid == 0:
-                child.start(spec, descriptors, roles[spec["work"]], prepared)
-            _hand_over(control, pid)
-            for fd in descriptors:
-                os.close(fd)
-        else:
-            _reap(control, spec["pid"])
+    _practise()
+    _serve(control, functools.partial(_become_child, specs, roles, prepared))
+    os._exit(0)
 
 
-def _hand_over(control: socket.socket, pid: int) -> None:
-    """Give the worker what it can end the child with."""
+def _serve(control: socket.socket, become_child: Callable[[], object]) -> None:
+    """Fork a child for each order of zero, and wait for the end of the child that any other order names.
+
+    A child reads its own spec and hands itself over. This process makes no object meanwhile that it keeps, so the
+    memory that children start from, and the addresses in it, do not depend on what was forked before.
+    """
+    order = bytearray(4)
+    while control.recv_into(order):
+        if any(order):
+            _reap(control, int.from_bytes(order, "little"))
+        elif os.fork() == 0:
+            become_child()
+
+
+def _practise() -> None:
+    """Serve children that end at once: what is done for the first time leaves its traces in memory before any other."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    for _ in range(_PRACTICE):
+        theirs.send(bytes(4))
+        theirs.send(_ANY_CHILD)
+    theirs.shutdown(socket.SHUT_WR)
+    _serve(ours, functools.partial(os._exit, 0))
+    ours.close()
+    theirs.close()
+
+
+def _become_child(
+    specs: socket.socket, roles: Mapping[str, Callable[[Wire, lockdown.Grants], None]], prepared: child.Prepared
+) -> None:
+    """Never returns."""
     try:
-        pidfd = os.pidfd_open(pid)
+        spec, descriptors = _receive(specs)
+        pidfd = os.pidfd_open(os.getpid())
     except OSError as error:
-        os.kill(pid, signal.SIGKILL)
-        os.waitpid(pid, 0)
-        _reply(control, {"missing": f"pidfd_open: {error.strerror}"})
-        return
-    _reply(control, {"pid": pid}, [pidfd])
-    os.close(pidfd)
+        _reply(specs, {"missing": f"pidfd_open: {error.strerror}"})
+        os._exit(0)
+    _reply(specs, {"pid": os.getpid()}, [pidfd])
+    child.start(spec, descriptors, roles[spec["work"]], prepared)
 
 
 def _reap(control: socket.socket, pid: int) -> None:
-    """Hand on how a child ended without looking: what this process has held once, the next child finds in its copy."""
-    if ctypes.CDLL(None).wait4(pid, ctypes.byref(_ENDED), 0, ctypes.byref(_ENDED, 8)) != pid:
+    """Pass on how a child ended without looking: what this process has held once, the next child finds in its copy."""
+    if _wait4(pid, _STATUS, 0, _USED) < 0:
         raise ChildProcessError(f"no child {pid}")
     control.send(_ENDED)
     ctypes.memset(_ENDED, 0, ctypes.sizeof(_ENDED))
@@ -127,12 +163,12 @@ def _one_thread() -> None:
         raise SystemExit(f"the zygote has {threads} threads; it can fork safely only with one")
 
 
-def _receive(control: socket.socket) -> tuple[dict[str, Any] | None, list[int]]:
-    data, ancillary, _, _ = control.recvmsg(65536, socket.CMSG_SPACE(8 * 4))
+def _receive(specs: socket.socket) -> tuple[dict[str, Any], list[int]]:
+    data, ancillary, _, _ = specs.recvmsg(65536, socket.CMSG_SPACE(8 * 4))
     descriptors = array.array("i")
     for _, _, payload in ancillary:
         descriptors.frombytes(payload[: len(payload) - len(payload) % 4])
-    return (json.loads(data) if data else None), list(descriptors)
+    return json.loads(data), list(descriptors)
 
 
 def _reply(control: socket.socket, answer: dict[str, Any], descriptors: list[int] | None = None) -> None:

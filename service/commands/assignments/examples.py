@@ -11,7 +11,7 @@ from rich.progress import track
 
 from service.commands.assignments.which import count_words
 from service.commands.example_table import catalogue_table, examples_table, measures_table
-from service.commands.shown import document, progress, show, tell
+from service.commands.shown import document, note, progress, show, tell
 from service.commands.statistics_shown import statistics_parts
 from service.grading.example_check import CheckedAssignment, check_examples
 from service.grading.statistics import statistics_of
@@ -38,6 +38,9 @@ def check(assignment: str | None, *, write_expected: bool) -> None:
     if assignment is not None:
         show(*statistics_parts(statistics))
     document(assignments=list(map(_told, checked)), statistics=statistics)
+    for each in checked:
+        for warning in each.warnings:
+            note(f"robomark: {each.assignment.id}: {warning}")
     problems = [f"{each.assignment.id}: {problem}" for each in checked for problem in each.problems]
     if problems:
         raise AssignmentError("\n".join(problems))
@@ -63,6 +66,7 @@ def _told(checked: CheckedAssignment) -> dict[str, Any]:
             for each in checked.measures
         ],
         "problems": checked.problems,
+        "warnings": checked.warnings,
     }  # fmt: skip
 
 
@@ -80,7 +84,7 @@ def _noted(assignment: str, checked: CheckedAssignment) -> CheckedAssignment:
 def _show(checked: CheckedAssignment) -> None:
     found = checked.assignment
     criteria = count_words(len(found.criteria), "criterion", "criteria")
-    trials = count_words(sum(1 for _ in found.trials()), "trial", "trials")
+    trials = count_words(found.trial_count, "trial", "trials")
     tell(f"{found.id}: in order; {criteria}, {found.max_marks:g} marks, {trials} (version {found.version[:12]})")
     if checked.examples:
         show(examples_table(checked))

@@ -16,10 +16,11 @@ from responders.sandbox.manager import Sandboxes
 from service.commands.shown import note, progress
 from service.queue.embedded import EmbeddedServices
 from service.settings import Settings
-from service.store.engine import Store
 
 if TYPE_CHECKING:
     from service.commands.batch.waiting import Waiting
+    from service.operations.context import Actor, Service
+    from service.operations.types import Lane
 
 _GRACE_SECONDS = 15.0
 
@@ -44,6 +45,20 @@ class AwaitedBatches:
 
 
 @dataclass(frozen=True, slots=True)
+class NotifiedLater:
+    """No notices to workers, where the batches are awaited: ``Services.awaited`` notifies workers of its own."""
+
+    def grade(self, lane: Lane, count: int = 1) -> None:
+        """Do nothing."""
+
+    def try_out(self, count: int = 1) -> None:
+        """Do nothing."""
+
+    def plot(self, count: int = 1) -> None:
+        """Do nothing."""
+
+
+@dataclass(frozen=True, slots=True)
 class Services:
     """Who grades: what the settings name, or a broker and a worker of our own."""
 
@@ -52,12 +67,12 @@ class Services:
     keep_up: Callable[[], None]
     end: Callable[[], object]
 
-    def awaited(self, store: Store, batch_ids: Sequence[str], new: int) -> AwaitedBatches:
+    def awaited(self, service: Service, actor: Actor, batch_ids: Sequence[str], new: int) -> AwaitedBatches:
         """Batches of which ``new`` jobs were queued just now.
 
         Raises HostError where student code is to be run here and cannot be enclosed.
         """
-        unfinished = _unfinished(store, batch_ids)
+        unfinished = _unfinished(service, actor, batch_ids)
         if not unfinished:
             return AwaitedBatches((), _nothing)
         with Sandboxes() as sandboxes:
@@ -65,55 +80,55 @@ class Services:
                 sandboxes.begin("robot", ())
             # It begins meanwhile, and so does the worker.
             from service.commands.batch.waiting import Waiting
+            from service.operations.types import Lane
             from service.queue.celery_app import make_celery
             from service.queue.notifier import Notifier
-            from service.store.states import Lane
 
             if self.ours:
                 # Here the reason can be said; a worker that refuses would only be seen to end.
                 sandboxes.check()
-        notifier = Notifier(make_celery(self.settings), store, self.settings)
+        notifier = Notifier(make_celery(self.settings), service.store, self.settings)
         notifier.grade(Lane.BATCH, new)
-        waiting = [Waiting(store, notifier, batch_id, progress(), self.keep_up) for batch_id in unfinished]
+        waiting = [Waiting(service, actor, notifier, each, progress(), self.keep_up) for each in unfinished]
         return AwaitedBatches(waiting, self.end)
 
 
 @contextmanager
-def started(store: Store, settings: Settings) -> Iterator[Services]:
+def started(service: Service) -> Iterator[Services]:
     """Services that begin to start, and are waited for no more than they must be; ours end with the ``with``."""
+    settings = service.settings
     if settings.broker_url:
         yield Services(settings, False, _nothing, _nothing)
         return
-    with EmbeddedServices(settings, store) as embedded, ThreadPoolExecutor(1) as beside:
+    with EmbeddedServices(settings, service.store) as embedded, ThreadPoolExecutor(1) as beside:
         end = partial(beside.submit, embedded.stop, _GRACE_SECONDS)
         yield Services(embedded.settings, True, embedded.ensure, end)
 
 
 @contextmanager
-def awaited(store: Store, settings: Settings, batch_ids: Sequence[str], new: int) -> Iterator[AwaitedBatches]:
+def awaited(service: Service, actor: Actor, batch_ids: Sequence[str], new: int) -> Iterator[AwaitedBatches]:
     """Batches of which ``new`` jobs were queued just now; services of our own have ended when the ``with`` ends."""
-    if not _unfinished(store, batch_ids):
+    if not _unfinished(service, actor, batch_ids):
         yield AwaitedBatches((), _nothing)
         return
-    with started(store, settings) as services:
-        yield services.awaited(store, batch_ids, new)
+    with started(service) as services:
+        yield services.awaited(service, actor, batch_ids, new)
 
 
-def _unfinished(store: Store, batch_ids: Sequence[str]) -> list[str]:
+def _unfinished(service: Service, actor: Actor, batch_ids: Sequence[str]) -> list[str]:
     """The batches to wait for; one that is paused would keep its waiter for ever, and is only named."""
-    from service.store.batches import batches
-    from service.store.states import BatchState
+    from service.operations.batch_views import look
+    from service.operations.types import BatchState
 
     unfinished = []
-    with store.reading() as session:
-        for batch_id in dict.fromkeys(batch_ids):
-            far = batches.progress(session, batch_id)
-            if far.ended == far.jobs and not far.plots_due:
-                continue
-            if batches.batch(session, batch_id).state is BatchState.OPEN:
-                unfinished.append(batch_id)
-            else:
-                note(f"batch {batch_id} is paused: robomark batch resume {batch_id}")
+    for batch_id in dict.fromkeys(batch_ids):
+        far, state = look(service, actor, batch_id)
+        if far.ended == far.jobs and not far.plots_due:
+            continue
+        if state is BatchState.OPEN:
+            unfinished.append(batch_id)
+        else:
+            note(f"batch {batch_id} is paused: robomark batch resume {batch_id}")
     return unfinished
 
 

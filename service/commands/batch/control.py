@@ -1,7 +1,4 @@
-"""``robomark batch pause``, ``resume``, ``cancel`` and ``retry``: each says in one sentence what it changed.
-
-What they do stands in ``store/batch_control.py``.
-"""
+"""``robomark batch pause``, ``resume``, ``cancel`` and ``retry``: each prints in one sentence what it changed."""
 
 from __future__ import annotations
 
@@ -9,12 +6,8 @@ from typing import Annotated
 
 import typer
 
+from service.commands.operating import operating
 from service.commands.shown import document, tell
-from service.settings import load_settings
-from service.store import audit
-from service.store.batches import batches
-from service.store.engine import Store, open_store
-from service.store.queue import batch_control
 from sim.errors import UsageError
 
 BatchId = Annotated[str, typer.Argument(help="The batch's id, or the beginning of it.")]
@@ -22,34 +15,40 @@ BatchId = Annotated[str, typer.Argument(help="The batch's id, or the beginning o
 
 def pause(batch: BatchId) -> None:
     """Begin no more of a batch; what is being graded is graded to its end."""
-    with open_store(load_settings()) as store:
-        batch_id = _find(store, batch)
-        held = batch_control.pause(store, batch_id, actor=audit.this_user())
+    from service.operations import batches as operations
+
+    with operating() as (service, actor):
+        found = operations.find(service, actor, batch)
+        held = operations.pause(service, actor, found.course_id, found.id)
     was = "is paused" if held.changed else "was paused already"
-    document(batch=batch_id, changed=held.changed, waiting=held.waiting, running=held.running)
-    tell(f"batch {batch_id} {was}: {held.waiting} waiting, {held.running} graded to their end")
+    document(batch=found.id, changed=held.changed, waiting=held.waiting, running=held.running)
+    tell(f"batch {found.id} {was}: {held.waiting} waiting, {held.running} graded to their end")
 
 
 def resume(batch: BatchId) -> None:
     """Let a paused batch go on."""
-    with open_store(load_settings()) as store:
-        batch_id = _find(store, batch)
-        held = batch_control.resume(store, batch_id, actor=audit.this_user())
+    from service.operations import batches as operations
+
+    with operating() as (service, actor):
+        found = operations.find(service, actor, batch)
+        held = operations.resume(service, actor, found.course_id, found.id)
     was = "goes on" if held.changed else "was not paused"
-    document(batch=batch_id, changed=held.changed, waiting=held.waiting, running=held.running)
-    tell(f"batch {batch_id} {was}: {held.waiting} waiting, {held.running} being graded")
+    document(batch=found.id, changed=held.changed, waiting=held.waiting, running=held.running)
+    tell(f"batch {found.id} {was}: {held.waiting} waiting, {held.running} being graded")
 
 
 def cancel(batch: BatchId) -> None:
     """End what of a batch is not graded yet; marks that are there stay."""
-    with open_store(load_settings()) as store:
-        batch_id = _find(store, batch)
-        ended = batch_control.cancel(store, batch_id, actor=audit.this_user())
-    document(batch=batch_id, changed=ended.changed, waiting=ended.waiting, running=ended.running)
+    from service.operations import batches as operations
+
+    with operating() as (service, actor):
+        found = operations.find(service, actor, batch)
+        ended = operations.cancel(service, actor, found.course_id, found.id)
+    document(batch=found.id, changed=ended.changed, waiting=ended.waiting, running=ended.running)
     if ended.changed:
-        tell(f"batch {batch_id} is cancelled: {ended.waiting} not begun, {ended.running} stopped")
+        tell(f"batch {found.id} is cancelled: {ended.waiting} not begun, {ended.running} stopped")
     else:
-        tell(f"batch {batch_id}: nothing changed, all of it has ended already")
+        tell(f"batch {found.id}: nothing changed, all of it has ended already")
 
 
 def retry(
@@ -57,11 +56,13 @@ def retry(
     every: Annotated[bool, typer.Option("--all", help="The dead of all batches.")] = False,
 ) -> None:
     """Queue again what could not be graded."""
+    from service.operations import batches as operations
+
     if (batch is not None) == every:
         raise UsageError("name one batch, or --all for the dead of all batches")
-    with open_store(load_settings()) as store:
-        batch_id = None if batch is None else _find(store, batch)
-        retried = batch_control.retry(store, batch_id, actor=audit.this_user())
+    with operating() as (service, actor):
+        batch_id = None if batch is None else operations.find(service, actor, batch).id
+        retried = operations.retry_dead(service, actor, batch_id)
     where = "all batches" if batch_id is None else f"batch {batch_id}"
     document(batch=batch_id, queued=retried.queued, outdated=retried.outdated)
     if retried.queued + retried.outdated == 0:
@@ -69,8 +70,3 @@ def retry(
         return
     outdated = f"; {retried.outdated} left, because a newer submission came" if retried.outdated else ""
     tell(f"{where}: {retried.queued} queued again{outdated}")
-
-
-def _find(store: Store, start: str) -> str:
-    with store.reading() as session:
-        return batches.find_batch(session, start)

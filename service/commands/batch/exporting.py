@@ -10,19 +10,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import BinaryIO
 
-from service.batch_rows import rows_of, why_not_shown
 from service.commands.batch.words import unjudged_words
+from service.commands.operating import operating
 from service.commands.shown import document, note, tell
-from service.grading.grade import Grade
 from service.home import for_the_user
-from service.report_files import report_pages
+from service.operations import batches
+from service.operations.exports import Export, ExportRequest, export
 from service.reports.formats import FORMATS, Format
-from service.reports.rows import TableRow
-from service.reports.written import file_stems, refused_stems
-from service.settings import load_settings
-from service.store.batches import batches, publishing
-from service.store.engine import open_store
-from service.store.states import JobState
 from sim.errors import UsageError
 
 #: Rows that a sentence names.
@@ -37,49 +31,45 @@ def export_batch(batch: str, form: str, output: Path | None, worksheet: Path | N
         raise UsageError(f"{form} is no text for a screen; name {what} with --output")
     if (chosen.filled_in is None) != (worksheet is None):
         raise UsageError("--worksheet names what --format moodle-worksheet fills in; expected both or neither")
-    with open_store(load_settings()) as store:
-        with store.reading() as session:
-            batch_id = batches.find_batch(session, batch)
-            lines = batches.job_lines(session, batch_id)
-            refusals = batches.batch(session, batch_id).refusals
-            waiting = publishing.unpublished_regrades(session, batch_id)
-        for line in lines:
-            if line.state is JobState.DONE and line.suspect is None and line.staff_only is not None:
-                _warn(f"{line.student} is for staff only: {line.staff_only}; robomark show {line.id}")
-        if waiting:
-            _warn(f"{waiting} regrades are not published: these are the grades that stand")
-        shown = [line for line in lines if not why_not_shown(line, published=published)]
-        if unjudged := unjudged_words(shown):
-            _warn(unjudged)
+    one_each = output is not None and _is_for_files(chosen, output)
+    asked = ExportRequest(form, published, None if worksheet is None else _read(worksheet), one_each)
+    with operating() as (service, actor):
+        found = batches.find(service, actor, batch)
         if chosen.packed is not None and output is not None:
             with for_the_user(), _opened(output) as sink:
-                left_over = chosen.packed(report_pages(store, shown, refusals), sink)
-            _name_left_over(left_over, "left out, for Moodle would not know whose it is")
-            return
-        rows = rows_of(store, lines, refusals, published=published)
-    if output is not None and _is_for_files(chosen, output):
-        _write_each(chosen, rows, output)
-        return
-    text = _document(chosen, rows, worksheet)
-    if output is None:
-        sys.stdout.write(text)
+                made = export(service, actor, found.course_id, found.id, asked, sink)
+        else:
+            made = export(service, actor, found.course_id, found.id, asked)
+    _warn_of(made)
+    if chosen.packed is not None:
+        _name_left_over(made.left_over, "left out, for Moodle would not know whose it is")
+    elif one_each and output is not None:
+        _write_each(made, output)
     else:
-        _write(output, text)
+        if worksheet is not None:
+            _name_left_over(made.left_over, f"not in {worksheet.name}")
+        if output is None:
+            sys.stdout.write(made.text)
+        else:
+            _write(output, made.text)
 
 
-def _document(chosen: Format, rows: Sequence[TableRow[Grade]], worksheet: Path | None) -> str:
-    if chosen.filled_in is not None and worksheet is not None:
-        try:
-            given = worksheet.read_bytes().decode("utf-8")
-        except OSError as error:
-            raise UsageError(f"{worksheet} cannot be read: {error.strerror}") from None
-        except UnicodeDecodeError:
-            raise UsageError(f"{worksheet} is not UTF-8; expected it as Moodle wrote it") from None
-        filled = chosen.filled_in(rows, given)
-        _name_left_over(filled.left_over, f"not in {worksheet.name}")
-        return filled.text
-    assert chosen.table is not None
-    return chosen.table(rows)
+def _warn_of(made: Export) -> None:
+    for line in made.for_staff:
+        _warn(f"{line.student} is for staff only: {line.staff_only}; robomark show {line.id}")
+    if made.waiting_regrades:
+        _warn(f"{made.waiting_regrades} regrades are not published: these are the grades that stand")
+    if unjudged := unjudged_words(made.unjudged):
+        _warn(unjudged)
+
+
+def _read(worksheet: Path) -> str:
+    try:
+        return worksheet.read_bytes().decode("utf-8")
+    except OSError as error:
+        raise UsageError(f"{worksheet} cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise UsageError(f"{worksheet} is not UTF-8; expected it as Moodle wrote it") from None
 
 
 def _is_for_files(chosen: Format, output: Path) -> bool:
@@ -89,25 +79,16 @@ def _is_for_files(chosen: Format, output: Path) -> bool:
     return chosen.table is None or output.is_dir() or (not output.suffix and not output.exists())
 
 
-def _write_each(chosen: Format, rows: Sequence[TableRow[Grade]], folder: Path) -> None:
-    """A file a submission, named after its student, and after its assignment where one student has several."""
+def _write_each(made: Export, folder: Path) -> None:
     try:
         with for_the_user():
             folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"{folder} cannot be made: {error.strerror}") from None
-    written, refusal = chosen.document, chosen.refusal
-    graded = [row for row in rows if row.grade is not None]
-    refused = [row for row in rows if row.refused]
-    texts = [written(row.grade) for row in graded if row.grade is not None] if written is not None else []
-    stems = file_stems([(row.student.id, row.assignment) for row in graded])
-    if refusal is not None:
-        texts += map(refusal, refused)
-        stems += refused_stems([(row.source, row.student.id) for row in refused])
-    for stem, text in zip(stems, texts, strict=True):
-        _write(folder / f"{stem}{chosen.suffix}", text)
-    document(output=folder, files=len(texts))
-    tell(f"{len(texts)} files in {folder}")
+    for name, text in made.files:
+        _write(folder / name, text)
+    document(output=folder, files=len(made.files))
+    tell(f"{len(made.files)} files in {folder}")
 
 
 def _opened(path: Path) -> BinaryIO:

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from service.commands.operating import operating
 from service.commands.shown import document, note, show, table, tell
+from service.operations import batches
+from service.operations.similarity import show_similar_in_batch
 from service.reports.similarity import as_plain, similarity_page, similarity_rows, what_it_says
 from service.reports.view import SimilarityView, staff_similarity
 from service.reports.written import prepare_folder, write_page
-from service.settings import load_settings
-from service.store.batches import batches
-from service.store.batches.similarities import SourceTexts, similarities
-from service.store.engine import open_store
 
 #: Pairs on the screen and on the page; the JSON has all.
 _MOST_SHOWN = 100
@@ -24,14 +23,12 @@ def find_similar(batch: str, given: Path | None, output: Path | None) -> None:
     """Show the pairs, and write the page with the evidence. Raises UsageError for what cannot be read or written."""
     if output is not None:
         prepare_folder(output)
-    with open_store(load_settings()) as store:
-        with store.reading() as session:
-            batch_id = batches.find_batch(session, batch)
-            name = batches.batch(session, batch_id).name
-            lines = batches.job_lines(session, batch_id)
-        view = staff_similarity(similarities(store, lines, given))
+    with operating() as (service, actor):
+        found = batches.find(service, actor, batch)
+        shown = show_similar_in_batch(service, actor, found.course_id, found.id, given)
+        view = staff_similarity(shown.found or ())
         if output is not None:
-            page = similarity_page(view, SourceTexts(store, lines).of, f"Alike in {name}", _MOST_SHOWN)
+            page = similarity_page(view, shown.source, f"Alike in {shown.batch.name}", _MOST_SHOWN)
             path = write_page(output, "similar.html", page)
             note(f"evidence: {path}")
     document(assignments=as_plain(view))
@@ -41,6 +38,9 @@ def find_similar(batch: str, given: Path | None, output: Path | None) -> None:
 def _show(view: SimilarityView) -> None:
     for found in view.found:
         tell(what_it_says(found))
+        for kind, groups in (("a whole file in common", found.same), ("the same recordings", found.same_recordings)):
+            for group in groups[:_MOST_SHOWN]:
+                tell(f"{kind}: {', '.join(group)}")
         alike = table("student", "student", "alike", "where", "did the same")
         for row in similarity_rows(found)[:_MOST_SHOWN]:
             alike.add_row(*row)

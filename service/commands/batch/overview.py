@@ -1,7 +1,4 @@
-"""``robomark batch overview``: what came of a batch at a glance, as its page on the web has it.
-
-What is in it is ``store/overview.py``'s.
-"""
+"""``robomark batch overview``: what came of a batch at a glance, as its page on the web has it."""
 
 from __future__ import annotations
 
@@ -12,22 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.commands.batch.control import BatchId
+from service.commands.operating import operating
 from service.commands.shown import document, show, table, tell
 from service.commands.statistics_shown import named, statistics_parts
-from service.settings import load_settings
-from service.store.batches import batches
-from service.store.batches.batch_table import table_lines
-from service.store.batches.overview import PASS_SHARE, missing, overview
-from service.store.courses.hidden_names import hidden_names
-from service.store.engine import open_store
-from service.store.installation import secret_of
-from service.store.models import Batch
+from service.grading.statistics import PASS_SHARE
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from service.store.batches.batch_table import TableLine
-    from service.store.batches.overview import ClassOverview
+    from service.operations.batch_views import ClassOverview, TableLine
     from submissions.people import Student
 
 _WHY = {"low": "far below the others", "slow": "took far longer than the others", "close": "close to the pass mark"}
@@ -40,18 +30,14 @@ def show_overview(
     ] = int(PASS_SHARE * 100),
 ) -> None:
     """Marks and their distribution, criteria, causes, whom to look at, and who has not submitted."""
-    with open_store(load_settings()) as store:
-        secret = secret_of(store)
-        with store.reading() as session:
-            batch_id = batches.find_batch(session, batch)
-            course_id = session.get_one(Batch, batch_id).course_id
-            own = batches.batch(session, batch_id)
-            lines = table_lines(session, batch_id, own.refusals, hidden_names(session, course_id, secret))
-            classes = overview(session, course_id, lines, Decimal(pass_mark) / 100)
-            asked = own.web_assignment if not classes else None
-            nobody = missing(session, course_id, asked) if asked else ()
-    document(batch=batch_id, classes=classes, refusals=own.refusals, missing=nobody)
-    by_id = {line.id: line for line in lines}
+    from service.operations import batch_views, batches
+
+    with operating() as (service, actor):
+        found = batches.find(service, actor, batch)
+        shown = batch_views.show_overview(service, actor, found.course_id, found.id, Decimal(pass_mark) / 100)
+    classes, refusals = shown.classes, shown.batch.refusals
+    document(batch=found.id, classes=classes, refusals=refusals, missing=shown.missing)
+    by_id = {line.id: line for line in shown.lines}
     for each in classes:
         show(*statistics_parts([each.statistics]), _distribution(each))
         tell(f"{each.passed} of {each.statistics.n} have {pass_mark} % or more")
@@ -60,8 +46,8 @@ def show_overview(
         for same in each.identical:
             tell(f"the very same: {named(tuple(line.student for line in same))}")
         _tell_missing(each.missing)
-    _tell_missing(nobody)
-    for refusal in own.refusals:
+    _tell_missing(shown.missing)
+    for refusal in refusals:
         tell(f"refused: {refusal.source}: {refusal.reason}")
 
 

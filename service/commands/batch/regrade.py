@@ -1,25 +1,21 @@
-"""``robomark batch regrade`` and ``publish``: grade a batch again, see what changes and why, let it stand.
-
-What they do stands in ``store/regrades.py`` and ``store/publishing.py``.
-"""
+"""``robomark batch regrade`` and ``publish``: grade a batch again, see what changes and why, let it stand."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from service.commands.batch.control import BatchId
-from service.commands.batch.tables import changes_table
+from service.commands.operating import operating
 from service.commands.shown import document, note, show, tell
-from service.settings import load_settings
-from service.store import audit
-from service.store.batches import batches, publishing, regrades
-from service.store.batches.publishing import Published
-from service.store.batches.regrades import Regraded
-from service.store.engine import Store, open_store
-from service.store.states import JobState, Lane
 from sim.errors import HostError
+
+if TYPE_CHECKING:
+    from service.operations.regrades import Published, Regraded
+    from submissions.assignment.definition import Assignment
 
 
 def regrade(
@@ -30,30 +26,29 @@ def regrade(
     wait: Annotated[bool, typer.Option("--wait", help="Wait for the new grades and show what they change.")] = False,
 ) -> None:
     """Grade a batch again after its assignment or the grader changed; the old grades stand until you publish."""
-    # The queue takes long to load, which whoever publishes need not wait for.
-    from service.commands.batch.awaited import awaited
-    from service.queue.celery_app import make_celery
-    from service.queue.logs import configure_logging
-    from service.queue.notifier import Notifier
-    from submissions.assignment.reader import find_assignment
+    # The queue takes long to load, which publishing need not wait for.
+    from service.commands.batch.awaited import NotifiedLater, awaited
+    from service.operations import batches
+    from service.operations import regrades as operations
+    from service.operations.types import JobState
 
-    settings = load_settings()
-    configure_logging(settings.log_level)
-    changed = None if assignment is None else find_assignment(assignment)
-    with open_store(settings) as store:
-        batch_id = _find(store, batch)
-        made = regrades.regrade(store, batch_id, changed, max_attempts=settings.max_attempts, actor=audit.this_user())
+    changed = _assignment(assignment)
+    with operating() as (service, actor):
+        found = batches.find(service, actor, batch)
+        by = replace(service, notifier=NotifiedLater()) if wait else service
+        made = operations.regrade_batch(by, actor, found.course_id, found.id, changed)
         tell(f"batch {made.batch_id}: {made.jobs} queued to be graded again{_left_out(made)}")
         if not wait:
-            if settings.broker_url:
-                Notifier(make_celery(settings), store, settings).grade(Lane.BATCH, made.jobs)
             note(f"what changes, and why: robomark batch status {made.batch_id}")
             document(batch=made.batch_id, regraded=made)
             return
-        with awaited(store, settings, [made.batch_id], made.jobs) as regraded:
+        from service.commands.batch.tables import changes_table
+        from service.queue.logs import configure_logging
+
+        configure_logging(service.settings.log_level)
+        with awaited(service, actor, [made.batch_id], made.jobs) as regraded:
             regraded.for_marks()
-            with store.reading() as session:
-                changes = regrades.changes(session, made.batch_id)
+            changes = operations.list_changes(service, actor, found.course_id, made.batch_id)
             show(changes_table(changes))
             note(f"to let the new grades stand: robomark batch publish {made.batch_id}")
             regraded.for_plots()
@@ -70,11 +65,14 @@ def publish(
     ] = False,
 ) -> None:
     """Let the newest grades of a batch stand, and release them to the students."""
-    with open_store(load_settings()) as store:
-        batch_id = _find(store, batch)
-        done = publishing.publish(store, batch_id, actor=audit.this_user(), anyway=anyway)
-    document(batch=batch_id, published=done)
-    _tell_published(f"batch {batch_id}", done)
+    from service.operations import batches
+    from service.operations import regrades as operations
+
+    with operating() as (service, actor):
+        found = batches.find(service, actor, batch)
+        done = operations.publish(service, actor, found.course_id, found.id, anyway=anyway)
+    document(batch=found.id, published=done)
+    _tell_published(f"batch {found.id}", done)
 
 
 def publish_one(
@@ -84,12 +82,24 @@ def publish_one(
     ] = False,
 ) -> None:
     """Let the newest grade of one submission stand, and release it to its student."""
-    with open_store(load_settings()) as store:
-        with store.reading() as session:
-            job_id = batches.find_job(session, grade)
-        done = publishing.publish_one(store, job_id, actor=audit.this_user(), anyway=anyway)
-    document(grade=job_id, published=done)
-    _tell_published(f"grade {job_id}", done)
+    from service.operations import batches
+    from service.operations import regrades as operations
+
+    with operating() as (service, actor):
+        found = batches.find_grade(service, actor, grade)
+        done = operations.publish_one(service, actor, found.course_id, found.id, anyway=anyway)
+    document(grade=found.id, published=done)
+    _tell_published(f"grade {found.id}", done)
+
+
+def _assignment(name: str | None) -> Assignment | str:
+    """The id of an assignment of the course or the catalogue, or the assignment in a folder of this machine."""
+    from submissions.assignment.folder import catalogue
+    from submissions.assignment.reader import find_assignment
+
+    if name is None:
+        return ""
+    return find_assignment(name) if Path(name).exists() and name not in catalogue() else name
 
 
 def _tell_published(of_what: str, done: Published) -> None:
@@ -114,8 +124,3 @@ def _left_out(made: Regraded) -> str:
     if made.unfinished:
         left.append(f"{made.unfinished} left, not graded yet")
     return "".join(f"; {sentence}" for sentence in left)
-
-
-def _find(store: Store, start: str) -> str:
-    with store.reading() as session:
-        return batches.find_batch(session, start)

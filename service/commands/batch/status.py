@@ -10,46 +10,38 @@ from service.commands.batch.tables import (
     rank_table,
 )
 from service.commands.batch.words import summary, unjudged_words
+from service.commands.operating import operating
 from service.commands.shown import document, show, tell
 from service.commands.statistics_shown import statistics_parts
-from service.grading.statistics import statistics_of
-from service.settings import load_settings
-from service.store import audit
-from service.store.batches import batches, publishing, rankings, regrades
-from service.store.engine import open_store
-from service.store.grades.marked import marked
-from service.store.queue import metrics
 
 
 def status(batch: BatchId) -> None:
     """How far a batch is, the marks that are there, and their statistics."""
-    with open_store(load_settings()) as store, store.reading() as session:
-        line = batches.batch(session, batches.find_batch(session, batch))
-        lines = batches.job_lines(session, line.id)
-        ranks = rankings.rank_tables(session, lines)
-        changes = [] if line.regrade_of is None else regrades.changes(session, line.id)
-        waiting = 0 if line.regrade_of is not None else publishing.unpublished_regrades(session, line.id)
-        history = audit.entries(session, "batch", line.id)
-        pace = metrics.pace(session, line.id)
-        statistics = statistics_of(marked(session, lines))
+    from service.operations import batches
+    from service.operations.batch_views import show_status
+
+    with operating() as (service, actor):
+        found = batches.find(service, actor, batch)
+        shown = show_status(service, actor, found.course_id, found.id)
+    graded, line, pace = shown.graded, shown.graded.view.batch, shown.graded.view.pace
     document(
         batch=line,
         pace=pace,
-        jobs=lines,
-        changes=changes,
-        ranks=ranks,
-        unpublished_regrades=waiting,
-        statistics=statistics,
-        history=history,
+        jobs=graded.lines,
+        changes=shown.changes,
+        ranks=shown.ranks,
+        unpublished_regrades=graded.waiting_regrades,
+        statistics=graded.statistics,
+        history=shown.history,
     )
     tell(f"batch {line.id}: {line.name}: {summary(line)}")
     if pace is not None:
         tell(f"{pace.per_minute:.0f} a minute, {pace.left} left")
-    show(marks_table(lines, line.refusals) if line.regrade_of is None else changes_table(changes))
-    show(*map(rank_table, ranks), *statistics_parts(statistics))
-    if unjudged := unjudged_words(lines):
+    show(marks_table(graded.lines, line.refusals) if line.regrade_of is None else changes_table(shown.changes))
+    show(*map(rank_table, shown.ranks), *statistics_parts(graded.statistics))
+    if unjudged := unjudged_words(graded.lines):
         tell(unjudged)
-    if waiting:
-        tell(f"{waiting} regrades are done and not published: robomark batch publish {line.id}")
-    if history:
-        show(history_table(history))
+    if graded.waiting_regrades:
+        tell(f"{graded.waiting_regrades} regrades are done and not published: robomark batch publish {line.id}")
+    if shown.history:
+        show(history_table(shown.history))

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from service.commands.operating import operating
 from sim.errors import UsageError
 
 
@@ -45,7 +46,7 @@ def submit(
     else:
         from service.commands.batch import submitting
 
-        refused = submitting.submit(grading_requests, assignment, again=again, people=people, course=course)
+        refused = submitting.submit(submitting.BatchToSubmit(grading_requests, assignment, people, course, again))
     if refused:
         raise UsageError(f"{refused} of the submissions could not be taken in; the others were")
 
@@ -63,17 +64,13 @@ def submit_and_wait(
     from service.commands.batch.awaited import started
     from service.queue.logs import configure_logging
     from service.reports.written import prepare_folder
-    from service.settings import load_settings
-    from service.store.engine import open_store
 
     if output is not None:
         prepare_folder(output)
-    settings = load_settings()
-    configure_logging(settings.log_level)
-    with open_store(settings) as store, started(store, settings) as services:
+    with operating() as (service, actor), started(service) as services:
+        configure_logging(service.settings.log_level)
         # The worker begins while this loads, and while submissions are read and stored.
-        from service.commands.batch.submitting import submit_to
+        from service.commands.batch.submitting import BatchToSubmit, submit_to
 
-        return submit_to(
-            services, store, grading_requests, assignment, output=output, again=again, people=people, course=course
-        )
+        batch = BatchToSubmit(grading_requests, assignment, people, course, again)
+        return submit_to(services, service, actor, batch, output)

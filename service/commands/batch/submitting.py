@@ -6,48 +6,51 @@ Reading the folder is ``batch_folder.py``'s; the grading itself is the workers'.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service.commands.batch.awaited import AwaitedBatches, Services
+from service.commands.batch.awaited import AwaitedBatches, NotifiedLater, Services
+from service.commands.operating import operating
 from service.commands.shown import document, note, show, table, tell
-from service.queue.logs import configure_logging
-from service.settings import Settings, load_settings
-from service.store.batches import batches, intake
-from service.store.batches.batches import JobLine
-from service.store.engine import Store, open_store
-from service.store.people.students import DEFAULT_COURSE
-from service.store.queue import workers
-from service.store.queue.workers import WorkerDescription
-from service.store.states import JobState, Lane
+from service.operations import batches as operations
+from service.operations.batch_views import (
+    JobLine,
+    WorkerDescription,
+    list_submitted,
+    list_workers,
+    show_statistics,
+)
+from service.operations.batches import AlreadySubmitted, SubmitRequest, SubmittedBatch
+from service.operations.context import Actor, Service
+from service.operations.types import JobState
 from sim.errors import Cancelled, HostError, UsageError
-from submissions.batch_folder import BatchContents, read_batch
+from submissions.batch_folder import read_batch
 from submissions.people import Refusal, read_people
 
 if TYPE_CHECKING:
     from service.grading.statistics import AssignmentStatistics
 
 
-def submit(
-    grading_requests: Path, assignment: str | None, *, again: bool, people: Path | None, course: str | None
-) -> int:
-    """Queue submissions, say who grades them, and return how many were refused."""
-    settings = load_settings()
-    configure_logging(settings.log_level)
-    with open_store(settings) as store:
-        checked = _checked(grading_requests, assignment, people)
-        accepted = _accept(store, settings, grading_requests, checked, again=again, course=course)
-        if settings.broker_url:
-            from service.queue.celery_app import make_celery
-            from service.queue.notifier import Notifier
+@dataclass(frozen=True, slots=True)
+class BatchToSubmit:
+    """The options of ``batch submit``."""
 
-            Notifier(make_celery(settings), store, settings).grade(Lane.BATCH, _new(accepted))
-        if accepted.batch is not None:
-            with store.reading() as session:
-                note(_who_grades([seen.worker for seen in workers.known_workers(session) if seen.lately]))
-    refusals = (*checked.refusals, *accepted.refused)
-    document(**_accepted_keys(accepted, refusals))
-    return len(refusals)
+    path: Path
+    assignment: str | None
+    people: Path | None
+    course: str | None
+    again: bool
+
+
+def submit(asked: BatchToSubmit) -> int:
+    """Queue submissions, print who grades them, and return how many were refused."""
+    with operating() as (service, actor):
+        done = _submit(service, actor, asked)
+        if done.batch is not None:
+            note(_who_grades(list_workers(service, actor)))
+    document(**_accepted_keys(done))
+    return len(done.refusals)
 
 
 def _who_grades(lively: Sequence[WorkerDescription]) -> str:
@@ -58,97 +61,71 @@ def _who_grades(lively: Sequence[WorkerDescription]) -> str:
     return f"{many} them, {slots} at a time"
 
 
-def submit_to(
-    services: Services,
-    store: Store,
-    grading_requests: Path,
-    assignment: str | None,
-    *,
-    output: Path | None,
-    again: bool,
-    people: Path | None,
-    course: str | None,
-) -> int:
+def submit_to(services: Services, service: Service, actor: Actor, asked: BatchToSubmit, output: Path | None) -> int:
     """Queue submissions, have the services grade them, and show the marks.
 
     Returns how many were refused. What was submitted already is graded ``again``, or shown as it is. Raises
     UsageError when none could be taken in, HostError when one could not be graded, Cancelled when one was
     cancelled meanwhile.
     """
-    checked = _checked(grading_requests, assignment, people)
-    accepted = _accept(store, services.settings, grading_requests, checked, again=again, course=course)
-    refusals = (*checked.refusals, *accepted.refused)
-    own = [] if accepted.batch is None else [accepted.batch.id]
-    batch_ids = [*own, *(known.batch_id for known in accepted.known if known.batch_id)]
+    done = _submit(replace(service, notifier=NotifiedLater()), actor, asked)
+    own = [] if done.batch is None else [done.batch.id]
+    batch_ids = [*own, *(known.batch_id for known in done.known if known.batch_id)]
     try:
-        batch = services.awaited(store, batch_ids, _new(accepted))
-        lines, statistics, page = _shown(store, batch, accepted, refusals, grading_requests.name, output)
+        batch = services.awaited(service, actor, batch_ids, done.queued)
+        lines, statistics, page = _shown(service, actor, batch, done, asked.path.name, output)
     except KeyboardInterrupt:
-        where = f"status {accepted.batch.id}" if accepted.batch else "list"
+        where = f"status {done.batch.id}" if done.batch else "list"
         raise Cancelled(f"stopped; what is not graded stays queued: robomark batch {where}") from None
-    document(**_accepted_keys(accepted, refusals), jobs=lines, statistics=statistics, report=page)
+    document(**_accepted_keys(done), jobs=lines, statistics=statistics, report=page)
     failed = [line for line in lines if line.state is JobState.DEAD]
     if failed:
         raise HostError(f"{len(failed)} of {len(lines)} could not be graded; {failed[0].source}: {failed[0].error}")
     cancelled = [line for line in lines if line.state is JobState.CANCELLED]
     if cancelled:
         raise Cancelled(f"{len(cancelled)} of {len(lines)} not graded; {cancelled[0].source}: {cancelled[0].error}")
-    return len(refusals)
+    return len(done.refusals)
 
 
-def _checked(grading_requests: Path, assignment: str | None, people: Path | None) -> BatchContents:
-    checked = read_batch(grading_requests, assignment, None if people is None else read_people(people))
+def _submit(service: Service, actor: Actor, asked: BatchToSubmit) -> SubmittedBatch:
+    """Take in what can be read, and say what was new of it."""
+    checked = read_batch(asked.path, asked.assignment, None if asked.people is None else read_people(asked.people))
     _show_refusals(checked.refusals)
     if not checked.grading_requests:
-        raise UsageError(f"{grading_requests}: none of {len(checked.refusals)} submissions can be taken in")
-    return checked
-
-
-def _accept(
-    store: Store, settings: Settings, path: Path, checked: BatchContents, *, again: bool, course: str | None
-) -> intake.AcceptedNew:
-    """Take in what passed, and say what was new of it."""
-    batch = (path.name, checked.grading_requests, checked.refusals)
-    course, most = course or DEFAULT_COURSE, settings.max_attempts
-    if again:
-        made = intake.accept_batch(store, *batch, course=course, max_attempts=most)
-        accepted = intake.AcceptedNew(made, (), made.refused)
-    else:
-        accepted = intake.accept_new(store, *batch, course=course, max_attempts=most)
-    _show_refusals(accepted.refused)
-    if accepted.known:
+        raise UsageError(f"{asked.path}: none of {len(checked.refusals)} submissions can be taken in")
+    course_id = operations.course_of_batches(service, actor, asked.course)
+    done = operations.submit(service, actor, course_id, SubmitRequest(asked.path.name, checked, asked.again))
+    _show_refusals(done.refused_now)
+    if done.known:
         known_ones = table("nothing new of", "why")
-        for known in accepted.known:
+        for known in done.known:
             known_ones.add_row(known.student, f"already submitted as {known.job_id}{_hint(known)}")
         show(known_ones)
-    if accepted.batch is None and not accepted.known:
-        raise UsageError(f"{path}: none of {len(checked.grading_requests)} submissions can be taken in")
-    if accepted.batch is None:
+    if done.batch is None:
         tell("nothing new; --again grades it again")
-    else:
-        copied = sum(job.copied_from is not None for job in accepted.batch.jobs)
-        alike = f"; {copied} identical to a graded one, and so graded already" if copied else ""
-        tell(f"batch {accepted.batch.id}: {_new(accepted)} queued{alike}")
-        over = [job for job in accepted.batch.jobs if job.staff_only]
-        if over:
-            for_staff = table("for staff only", "why")
-            for job in over:
-                for_staff.add_row(job.student, job.staff_only)
-            show(for_staff)
-    return accepted
+        return done
+    alike = f"; {done.copied} identical to a graded one, and so graded already" if done.copied else ""
+    tell(f"batch {done.batch.id}: {done.queued} queued{alike}")
+    over = [job for job in done.jobs if job.staff_only]
+    if over:
+        for_staff = table("for staff only", "why")
+        for job in over:
+            for_staff.add_row(job.student, job.staff_only)
+        show(for_staff)
+    return done
 
 
-def _accepted_keys(accepted: intake.AcceptedNew, refusals: Sequence[Refusal]) -> dict[str, object]:
+def _accepted_keys(done: SubmittedBatch) -> dict[str, object]:
     """What a document says of what was taken in."""
     return {
-        "batch": None if accepted.batch is None else accepted.batch.id,
-        "queued": _new(accepted),
-        "known": accepted.known,
-        "refusals": refusals,
+        "batch": None if done.batch is None else done.batch.id,
+        "queued": done.queued,
+        "known": done.known,
+        "refusals": done.refusals,
     }
 
 
-def _hint(known: intake.AlreadySubmitted) -> str:
+def _hint(known: AlreadySubmitted) -> str:
     if known.state is JobState.DEAD:
         return f", dead: robomark batch retry {known.batch_id}"
     if known.other_grader and known.batch_id is not None:
@@ -156,49 +133,29 @@ def _hint(known: intake.AlreadySubmitted) -> str:
     return ""
 
 
-def _new(accepted: intake.AcceptedNew) -> int:
-    return 0 if accepted.batch is None else sum(job.copied_from is None for job in accepted.batch.jobs)
-
-
 def _shown(
-    store: Store,
-    batch: AwaitedBatches,
-    accepted: intake.AcceptedNew,
-    refusals: Sequence[Refusal],
-    name: str,
-    output: Path | None,
+    service: Service, actor: Actor, batch: AwaitedBatches, done: SubmittedBatch, name: str, output: Path | None
 ) -> tuple[list[JobLine], tuple[AssignmentStatistics, ...], Path | None]:
     """Show the marks of what was new and of what was known when they are there, and write their reports."""
     # Whoever grades starts meanwhile.
     from service.commands.batch.tables import marks_table
     from service.commands.statistics_shown import statistics_parts
-    from service.grading.statistics import statistics_of
     from service.report_files import write_batch
     from service.reports import html
-    from service.store.grades.marked import marked
 
     if output is not None:
         html.prepare()
     batch.for_marks()
-    lines = _lines(store, accepted)
-    show(marks_table(lines, refusals))
+    lines = list_submitted(service, actor, done)
+    show(marks_table(lines, done.refusals))
     batch.for_plots()
-    with store.reading() as session:
-        statistics = statistics_of(marked(session, lines))
+    statistics = show_statistics(service, actor, lines)
     show(*statistics_parts(statistics))
     page = None
     if output is not None:
-        page = write_batch(store, f"Batch {name}", lines, refusals, output)
+        page = write_batch(service.store, f"Batch {name}", lines, done.refusals, output)
         note(f"report: {page}")
     return lines, statistics, page
-
-
-def _lines(store: Store, accepted: intake.AcceptedNew) -> list[JobLine]:
-    with store.reading() as session:
-        lines = [batches.job_line(session, known.job_id) for known in accepted.known]
-        if accepted.batch is not None:
-            lines += batches.job_lines(session, accepted.batch.id)
-    return sorted(lines, key=lambda line: (line.student, line.id))
 
 
 def _show_refusals(refusals: Sequence[Refusal]) -> None:

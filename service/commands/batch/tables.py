@@ -11,16 +11,15 @@ from rich.text import Text
 
 from service.commands.batch.words import out_of, remarks
 from service.commands.shown import table
-from service.store.states import JobState, Standing
+from service.operations.types import JobState, Standing
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
 
     from service.grading.ranks import RankTable
-    from service.store.audit import AuditEntry
-    from service.store.batches.batches import JobLine
-    from service.store.batches.regrades import Change, CriterionChange
+    from service.operations.batch_views import AuditEntry, JobLine
+    from service.operations.regrades import Change, CriterionChange
     from submissions.people import Refusal
 
 _STYLES: Mapping[JobState, str] = MappingProxyType(

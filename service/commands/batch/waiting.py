@@ -21,14 +21,12 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 from rich.text import Text
-from sqlalchemy import select
 
 from service.commands.shown import note
+from service.operations.batch_views import BatchProgress, look
+from service.operations.context import Actor, Service
+from service.operations.types import BatchState
 from service.queue.notifier import Notifier
-from service.store.batches import batches
-from service.store.engine import Store
-from service.store.models import Batch
-from service.store.states import BatchState
 
 #: Whoever has waited for long sees the end a little later, and takes no time from those who grade.
 _SHORTEST_LOOK_SECONDS = 0.05
@@ -57,7 +55,8 @@ class Waiting:
     ``keep_up`` is called again and again, to start again what has ended; what it raises ends the waiting.
     """
 
-    store: Store
+    service: Service
+    actor: Actor
     notifier: Notifier
     batch_id: str
     console: Console
@@ -72,13 +71,12 @@ class Waiting:
         most = self._look()[0].plots_due
         self._wait("plots", lambda state: (max(most, state.plots_due), most - state.plots_due, 0.0))
 
-    def _look(self) -> tuple[batches.BatchProgress, bool]:
+    def _look(self) -> tuple[BatchProgress, bool]:
         """How far it is, and whether it is paused; each look takes time from those who grade."""
-        with self.store.reading() as session:
-            state = session.scalar(select(Batch.state).where(Batch.id == self.batch_id))
-            return batches.progress(session, self.batch_id), state is BatchState.PAUSED
+        far, state = look(self.service, self.actor, self.batch_id)
+        return far, state is BatchState.PAUSED
 
-    def _wait(self, what: str, count: Callable[[batches.BatchProgress], tuple[int, int, float]]) -> None:
+    def _wait(self, what: str, count: Callable[[BatchProgress], tuple[int, int, float]]) -> None:
         """``count`` gives how many there are, how many are done, and how much of the next ones."""
         total, before, _ = count(self._look()[0])
         columns = (

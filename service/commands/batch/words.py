@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from decimal import Decimal
+from typing import TYPE_CHECKING
 
-from service.store.batches.batches import BatchLine, JobLine
-from service.store.courses.policies import in_days
-from service.store.states import BatchState, JobState
+from service.operations.types import BatchState, JobState
+
+if TYPE_CHECKING:
+    from service.operations.batch_views import BatchLine, JobLine
 
 #: Students that a sentence names.
 _MOST_NAMED = 10
@@ -25,6 +27,8 @@ def summary(line: BatchLine) -> str:
 
 def remarks(line: JobLine) -> list[str]:
     """What else is to be known of a grade, beside its marks."""
+    from service.operations.batch_views import in_days
+
     told = {
         f"same as {line.copied_from}": line.copied_from is not None,
         f"{in_days(line.days_late)} late": line.days_late > 0 and line.staff_only is None,
@@ -34,6 +38,7 @@ def remarks(line: JobLine) -> list[str]:
         f"{line.set_by_hand} criteria set by hand": line.set_by_hand > 0,
         f"{line.surprises} trials that the log explains": line.surprises > 0,
         "suspect": line.suspect is not None,
+        f"attempt {line.newer_attempt} is newer and does not count": line.newer_attempt is not None,
         "published": line.published_at is not None,
     }
     return [remark for remark, holds in told.items() if holds]

@@ -50,6 +50,11 @@ class Case:
         ]
 
 
+def has_hidden(trials: Indexed) -> bool:
+    """Whether any of the trials is not shown to students at once."""
+    return any(trial.visibility != "visible" for _, trial in trials)
+
+
 def as_had_by(robot: int, trial: TrialResult) -> TrialResult:
     """The trial with the recording of that robot; of the first, where there is one."""
     partner = trial.recording.partner

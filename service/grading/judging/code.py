@@ -11,11 +11,12 @@ from fnmatch import fnmatchcase
 from fractions import Fraction
 from typing import Any
 
-from responders.function_calls import Called, FunctionCall, Returned
+from responders.function_calls import Called, FunctionCall, Returned, no_function
 from service.grading.grade import CriterionResult, Measure, TrialResult
 from service.grading.judging.answers import NOTHING, as_text, at_path, parsed
 from service.grading.judging.case import Case
 from service.grading.judging.judges import by_trial, judges_case, once
+from service.grading.judging.marks import in_steps
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.source_answers import SPEECH, SourceAnswers
 from service.grading.judging.words import fault_words, quoted
@@ -132,20 +133,51 @@ def _returned(criterion: Functions, called: Called | None) -> Outcome:
     if called.fault is not None:
         return failed(f"Expected the responder to be loaded, but: {fault_words(called.fault)}.")
     scores: list[Fraction] = []
-    first = ""
+    first = for_staff = ""
+    least = Fraction(str(criterion.at_least)) if criterion.each else Fraction(1)
     for call, gave in zip(criterion.calls, called.returned, strict=True):
         score, what = _compare(criterion, call, gave)
         scores.append(score)
-        if score < Fraction(str(criterion.at_least)) and not first:
-            first = f"Expected {_call_words(criterion, call)} to return {_wanted(call)}, but {what}"
+        if score < least:
+            told = f"Expected {_call_words(criterion, call)} to return {_wanted(call)}, but {what}"
+            if call.hidden:
+                for_staff = for_staff or f"The first hidden call that went wrong: {told}."
+            else:
+                first = first or told
+    return _of_calls(criterion, scores, first or _hidden_words(criterion, called, scores, least), for_staff)
+
+
+def _of_calls(criterion: Functions, scores: Sequence[Fraction], wrong: str, for_staff: str) -> Outcome:
+    """What the calls are worth; ``wrong`` says what went wrong, if something did."""
     share = sum(scores, Fraction(0)) / len(scores)
     measures = (Measure("right", float(share)),)
-    if not first:
+    if not wrong or (criterion.table and share >= Fraction(str(criterion.at_least))):
         some = f"{float(share):.0%} right" if criterion.each else f"{len(scores)} of {len(scores)} calls right"
-        return passed(f"The functions returned what they must: {some}.", measures=measures)
+        some = f"at least {criterion.at_least:.0%} of {len(scores)} calls right" if criterion.table else some
+        return passed(f"The functions returned what they must: {some}.", measures=measures, for_staff=for_staff)
     right = sum(score == 1 for score in scores)
-    tally = f" ({right} of {len(scores)} calls right)" if len(scores) > 1 else ""
-    return failed(f"{first}{tally}.", score=share, measures=measures)
+    tally = f" ({right} of {len(scores)} calls right)" if len(scores) > 1 and not criterion.table else ""
+    score = in_steps(share) if criterion.table else share
+    return failed(f"{wrong}{tally}.", score=score, measures=measures, for_staff=for_staff)
+
+
+def _hidden_words(criterion: Functions, called: Called, scores: Sequence[Fraction], least: Fraction) -> str:
+    """What students read where only hidden calls went wrong; no value and no error, as a program chooses these."""
+    calls = criterion.calls
+    if not any(score < least for score in scores):
+        return ""
+    faults = [gave.fault.message if gave.fault is not None else "" for gave in called.returned]
+    if all(
+        fault == no_function(call.function or criterion.function) for call, fault in zip(calls, faults, strict=True)
+    ):
+        return f"Expected all functions to be there, but {faults[0]}"
+    hidden = [score for call, score in zip(calls, scores, strict=True) if call.hidden]
+    if criterion.table:
+        share = in_steps(sum(scores, Fraction(0)) / len(scores))
+        asked = f"Expected {criterion.function} to be right in {criterion.at_least:.0%} of {len(scores)} calls"
+        return f"{asked}, but it was in about {float(share):.0%}"
+    right = sum(score >= least for score in hidden)
+    return f"Expected the right values in all {len(hidden)} hidden calls as well, but {right} of them were right"
 
 
 def _checked(criterion: PythonCheck, gave: Returned) -> Outcome:

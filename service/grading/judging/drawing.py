@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -18,10 +18,11 @@ from service.grading.judging.geometry import pen_down, place_at, positions, stre
 from service.grading.judging.judges import judges
 from service.grading.judging.moves import straight
 from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.words import listed
 from sim.recording import Floats, Recording
 from submissions.criteria.drawing import Drawing
 
-#: Two straight parts that differ by less than this, degrees, are one leg.
+#: Two straight parts that differ by less than this, degrees, may be one leg.
 _SAME_DIRECTION = 3.0
 #: A shorter straight part belongs to a corner, mm.
 _STUB = 20.0
@@ -52,18 +53,27 @@ def legs_of(recording: Recording, pen: bool) -> tuple[Leg, ...]:
     points = positions(recording)
     ahead, _ = travel(recording)
     going = straight(recording)
-    if pen:
-        going &= pen_down(recording)[1:]
+    drawn = pen_down(recording) if pen else np.ones(len(points), dtype=bool)
+    going &= drawn[:-1] & drawn[1:]
     parts = [_leg(points, first, last) for way in (1, -1) for first, last in stretches(going & (np.sign(ahead) == way))]
     legs: list[Leg] = []
     for part in sorted(parts, key=lambda leg: leg.first):
         if part.length < _STUB:
             continue
-        if legs and abs(between(legs[-1].direction, part.direction)) < _SAME_DIRECTION:
+        if legs and _goes_on(legs[-1], part) and drawn[legs[-1].last : part.first + 1].all():
             legs[-1] = _leg(points, legs[-1].first, part.last)
         else:
             legs.append(part)
     return tuple(legs)
+
+
+def _goes_on(leg: Leg, part: Leg) -> bool:
+    """Whether a part has the leg's direction and begins in the leg's line, not beside it or back along it."""
+    along = math.radians(leg.direction)
+    x, y = part.start[0] - leg.end[0], part.start[1] - leg.end[1]
+    ahead, aside = x * math.cos(along) + y * math.sin(along), y * math.cos(along) - x * math.sin(along)
+    same_direction = abs(between(leg.direction, part.direction)) < _SAME_DIRECTION
+    return same_direction and ahead > -_STUB and abs(aside) < _STUB
 
 
 def between(before: float, after: float) -> float:
@@ -82,14 +92,13 @@ def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
             recording.start,
         )
     legs = legs_of(recording, criterion.pen)
-    wanted = criterion.legs * criterion.figures
+    wanted = sum(criterion.legs_of_each)
     measures = _measures(legs)
-    whole, left_over = divmod(len(legs), criterion.legs)
-    enough = whole >= criterion.figures and not left_over if criterion.at_least else len(legs) == wanted
-    figures = [legs[first : first + criterion.legs] for first in range(0, whole * criterion.legs, criterion.legs)]
+    figures, left_over = _figures(criterion, legs)
+    enough = len(figures) >= criterion.figure_count and not left_over if criterion.at_least else len(legs) == wanted
     problems = [_problem(criterion, number, figure) for number, figure in enumerate(figures)]
-    right = sum(problem is None for problem in problems[: criterion.figures])
-    score = Fraction(right, criterion.figures)
+    right = sum(problem is None for problem in problems[: criterion.figure_count])
+    score = Fraction(right, criterion.figure_count)
     if not enough:
         lengths = ", ".join(f"{leg.length:.0f}" for leg in legs[:12])
         told = f"{len(legs)}, of {lengths} mm" if legs else "none"
@@ -118,6 +127,19 @@ def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
     )
 
 
+def _figures(criterion: Drawing, legs: Sequence[Leg]) -> tuple[list[Sequence[Leg]], int]:
+    """The whole figures that the legs make up, in order, and the number of legs that are left."""
+    counts: Iterable[int] = criterion.legs if isinstance(criterion.legs, tuple) else itertools.repeat(criterion.legs)
+    figures: list[Sequence[Leg]] = []
+    first = 0
+    for count in counts:
+        if first + count > len(legs):
+            break
+        figures.append(legs[first : first + count])
+        first += count
+    return figures, len(legs) - first
+
+
 @dataclass(frozen=True, slots=True)
 class _Problem:
     """What is wrong with a figure, and the row where that is seen."""
@@ -127,17 +149,19 @@ class _Problem:
 
 
 def _figures_words(criterion: Drawing) -> str:
+    if isinstance(criterion.legs, tuple):
+        return f"figures of {listed(tuple(map(str, criterion.legs)))} straight legs ({sum(criterion.legs)} in all)"
     legs = f"{criterion.legs} straight leg{'' if criterion.legs == 1 else 's'}"
     least = "at least " if criterion.at_least else ""
-    if criterion.figures == 1:
+    if criterion.figure_count == 1:
         return f"{least}one figure of {legs}" if least else legs
-    return f"{least}{criterion.figures} figures of {legs} ({criterion.figures * criterion.legs} in all)"
+    return f"{least}{criterion.figure_count} figures of {legs} ({criterion.figure_count * criterion.legs} in all)"
 
 
 def _problem(criterion: Drawing, number: int, figure: Sequence[Leg]) -> _Problem | None:
     """The first thing that is wrong with the figure, if something is."""
     mean = _mean(figure)
-    which = f" of figure {number + 1}" if criterion.figures > 1 else ""
+    which = f" of figure {number + 1}" if criterion.figure_count > 1 else ""
     for place, leg in enumerate(figure, 1):
         if leg.length < criterion.shortest:
             return _Problem(
@@ -153,9 +177,10 @@ def _problem(criterion: Drawing, number: int, figure: Sequence[Leg]) -> _Problem
             )
     for place, (before, after) in enumerate(itertools.pairwise(figure), 1):
         angle = abs(between(before.direction, after.direction))
-        if abs(angle - criterion.angle) > criterion.angle_within:
+        asked = criterion.angle_of_each[min(number, len(criterion.angle_of_each) - 1)]
+        if abs(angle - asked) > criterion.angle_within:
             return _Problem(
-                f"Expected a turn of {criterion.angle:g}° (within {criterion.angle_within:g}°) after each leg, "
+                f"Expected a turn of {asked:g}° (within {criterion.angle_within:g}°) after each leg, "
                 f"but after leg {place}{which} the robot turned {angle:.1f}°.",
                 after.first,
             )

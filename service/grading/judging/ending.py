@@ -13,9 +13,10 @@ from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import distance_to
 from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, cut, failed, passed
-from service.grading.judging.words import fault_words
+from service.grading.judging.words import fault_words, quoted
+from sim.recorded import pose_at
 from sim.recording import Fault, Recording, Verdict
-from submissions.criteria.ending import EndPose, Finishes
+from submissions.criteria.ending import EndPose, Finishes, SinceEvent
 
 
 @judges(Finishes)
@@ -102,7 +103,46 @@ def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
                 end,
                 measures=measures,
             )
+    if criterion.since is not None and (problem := _since_problem(criterion.since, trial.recording)):
+        return failed(problem, t, end, measures=measures)
     return passed(f"The robot ended at {where}.", t, end, measures)
+
+
+def _since_problem(since: SinceEvent, recording: Recording) -> str:
+    """What is wrong at the end with the way and the time since the event; empty if nothing is."""
+    came = next((t for t, text in _texts(since, recording) if since.contains in text), None)
+    what = f"{quoted(since.contains)} was {since.of}"
+    if came is None:
+        return f"Expected that {what}, but it never was."
+    then, end = pose_at(recording, came), recording.end
+    moved = math.hypot(end.x - then.x, end.y - then.y)
+    if since.moved is not None and not since.moved[0] <= moved <= since.moved[1]:
+        return (
+            f"Expected the robot to end {since.moved[0]:g} to {since.moved[1]:g} mm from where it was when {what}, "
+            f"but it ended {moved:.1f} mm away."
+        )
+    seconds = recording.end_t - came
+    if since.seconds is not None and not since.seconds[0] - 1e-9 <= seconds <= since.seconds[1] + 1e-9:
+        return (
+            f"Expected the program to end {since.seconds[0]:g} to {since.seconds[1]:g} s after {what}, "
+            f"but it ended {seconds:.2f} s after."
+        )
+    return ""
+
+
+def _texts(since: SinceEvent, recording: Recording) -> list[tuple[float, str]]:
+    """When each text of this kind came, in order of time."""
+    match since.of:
+        case "sent":
+            found = [(each.t, each.text) for each in recording.messages if each.sender == "robot"]
+        case "answered":
+            answers = [each for each in recording.messages if each.sender == "responder"]
+            found = [(each.delivered, each.received) for each in answers if each.delivered is not None]
+        case "said":
+            found = [(each.t, each.text) for each in recording.spoken]
+        case "printed":
+            found = [(each.t, each.text) for each in recording.printed]
+    return sorted(found)
 
 
 def _way(recording: Recording) -> tuple[Measure, ...]:

@@ -110,7 +110,11 @@ def part_at(recording: Recording, part: Spot, pose: Pose) -> tuple[float, float]
     """World mm of the middle of a light sensor, or of the axle, with the robot at ``pose``."""
     if part == "middle":
         return pose.x, pose.y
-    sensor = light_of(recording, part)
+    return sensor_at(light_of(recording, part), pose)
+
+
+def sensor_at(sensor: LightSensor, pose: Pose) -> tuple[float, float]:
+    """World mm of the middle of a light sensor, with the robot at ``pose``."""
     turn = math.radians(pose.heading - 90)
     sine, cosine = math.sin(turn), math.cos(turn)
     return pose.x + cosine * sensor.x - sine * sensor.y, pose.y + sine * sensor.x + cosine * sensor.y
@@ -235,7 +239,7 @@ def covered(found: Along, within: float, begin: float, end: float) -> float:
     for low, high in sorted(pieces):
         total += max(high - max(low, reached), 0.0)
         reached = max(reached, high)
-    return total / (end - begin) if end > begin else 1.0
+    return total / (end - begin) if end > begin else 0.0
 
 
 class _Line:

@@ -11,8 +11,8 @@ from fractions import Fraction
 from typing import Any, TypeVar
 
 from service.grading.grade import CriterionResult, Evidence, Shown, TrialResult
-from service.grading.judging.case import Case, Indexed
-from service.grading.judging.marks import earned, share_of
+from service.grading.judging.case import Case, Indexed, has_hidden
+from service.grading.judging.marks import earned, in_steps, share_of
 from service.grading.judging.outcome import Outcome
 from service.grading.judging.words import early_end, place_words, shown_words
 from submissions.criteria import Criterion
@@ -69,10 +69,11 @@ def by_trial(
     """The result from the outcome of each trial, which is asked for by its index in the grade."""
     trials = case.looked_at_by(criterion)
     outcomes = [outcome_of(index, trial) for index, trial in trials]
+    share = share_of(outcomes, criterion.over)
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,
-        marks=earned(criterion.marks, share_of(outcomes, criterion.over)),
+        marks=earned(criterion.marks, in_steps(share) if has_hidden(trials) else share),
         max_marks=criterion.marks,
         message=told(trials, outcomes),
         visibility=criterion.visibility,

@@ -22,7 +22,7 @@ from submissions.criteria.line import Follows, Laps
 
 @judges(Follows)
 def judge_follows(criterion: Follows, trial: TrialResult) -> Outcome:
-    """The part of the line that counts begins where it is first come upon; of a closed line all counts."""
+    """The share of the line that was driven along, of all that counts."""
     recording = trial.recording
     who, line = PART_NAMES[criterion.of], criterion.line.name
     found = along(criterion.line, positions(recording, criterion.of), criterion.within)
@@ -32,8 +32,7 @@ def judge_follows(criterion: Follows, trial: TrialResult) -> Outcome:
             recording.end_t,
             recording.end,
         )
-    begin = float(found.progress[0])
-    end = begin + found.length if criterion.line.is_closed else found.length
+    begin, end = _part_that_counts(criterion, found)
     share = covered(found, criterion.within, begin, end)
     on_it = _until_the_end(found, end)
     offsets = np.abs(found.offset[:on_it])
@@ -56,9 +55,11 @@ def judge_follows(criterion: Follows, trial: TrialResult) -> Outcome:
             measures=measures,
         )
     if share < criterion.covers - 1e-9:
+        met = float(found.progress[0])
+        late = f"came upon it only {met / found.length:.0%} of the way along, and " if met > begin else ""
         return failed(
             f"Expected {who} to follow {criterion.covers:.0%} of {line} within {criterion.within:g} mm, "
-            f"but it followed {share:.0%} of it.",
+            f"but it {late}followed {share:.0%} of it.",
             *place_at(recording, found.first + _where_it_ended(found, criterion.within)),
             score=score,
             measures=measures,
@@ -78,8 +79,16 @@ def judge_follows(criterion: Follows, trial: TrialResult) -> Outcome:
     )
 
 
+def _part_that_counts(criterion: Follows, found: Along) -> tuple[float, float]:
+    """From where to where the line counts, mm along it: without a bound, its last mm alone would be all of it."""
+    met = float(found.progress[0])
+    if criterion.line.is_closed:
+        return met, met + found.length
+    return min(met, criterion.joins_by * found.length), found.length
+
+
 @dataclass(frozen=True, slots=True)
-class _Crossing:
+class Crossing:
     """When the robot crossed the start line, and how far it had come along the circuit."""
 
     t: float
@@ -101,7 +110,7 @@ def judge_laps(criterion: Laps, trial: TrialResult) -> Outcome:
             recording.end,
         )
     crossings = _crossings(criterion, points, found, recording.ticks.per_second)
-    laps, spoilt = _laps(criterion, found, crossings)
+    laps, spoilt = whole_laps(criterion, found, crossings)
     off = float(np.abs(found.offset[: _last_row(found, crossings)]).max())
     driven = float(found.progress.max() - found.progress[0])
     measures = (
@@ -147,7 +156,7 @@ def _laps_words(count: int) -> str:
     return "a whole lap" if count == 1 else f"{count} whole laps"
 
 
-def _crossings(criterion: Laps, points: Floats, found: Along, per_second: float) -> list[_Crossing]:
+def _crossings(criterion: Laps, points: Floats, found: Along, per_second: float) -> list[Crossing]:
     """Each time the path, of so many points a second, crosses the start line in the circuit's direction."""
     x1, y1, x2, y2 = criterion.start_line
     first, line = np.array([x1, y1]), np.array([x2 - x1, y2 - y1])
@@ -164,31 +173,38 @@ def _crossings(criterion: Laps, points: Floats, found: Along, per_second: float)
         before, after = found.progress[row - 1 - found.first], found.progress[row - found.first]
         if 0 <= where <= 1 and after > before:
             t = (row - 1 + share) / per_second
-            crossings.append(_Crossing(t, row, float(before + share * (after - before))))
+            crossings.append(Crossing(t, row, float(before + share * (after - before))))
     return crossings
 
 
-def _laps(criterion: Laps, found: Along, crossings: list[_Crossing]) -> tuple[list[tuple[float, int]], int | None]:
-    """Time and last row of each whole lap, and where a lap was spoilt by leaving the line, if one was."""
+def whole_laps(criterion: Laps, found: Along, crossings: list[Crossing]) -> tuple[list[tuple[float, int]], int | None]:
+    """Time and last row of each whole lap, and where a lap was spoilt by leaving the line, if one was.
+
+    A lap begins at the last crossing from which it is whole, so it has the least time and the fewest ways to be
+    spoilt; no two laps overlap.
+    """
     laps, spoilt = [], None
-    begin = None
-    for crossing in crossings:
+    free = 0
+    for number, crossing in enumerate(crossings):
+        whole = (
+            begin
+            for begin in reversed(crossings[free:number])
+            if crossing.progress - begin.progress >= criterion.progress * found.length
+        )
+        begin = next(whole, None)
         if begin is None:
-            begin = crossing
-            continue
-        if crossing.progress - begin.progress < criterion.progress * found.length:
             continue
         rows = slice(begin.row - found.first, crossing.row - found.first + 1)
         off = np.abs(found.offset[rows])
         if off.max() <= criterion.within:
             laps.append((crossing.t - begin.t, crossing.row))
+            free = number
         elif spoilt is None:
             spoilt = begin.row - found.first + int(np.argmax(off))
-        begin = crossing
     return laps, spoilt
 
 
-def _last_row(found: Along, crossings: list[_Crossing]) -> int:
+def _last_row(found: Along, crossings: list[Crossing]) -> int:
     return crossings[-1].row - found.first + 1 if len(crossings) > 1 else len(found.offset)
 
 

@@ -48,7 +48,9 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
             measures=measures,
         )
     if not values and (criterion.at_least or criterion.plateaus or criterion.between or criterion.covers):
-        return failed(f'Expected the program to log {name}, but the datalog has none (print "{name}: 42").')
+        return failed(
+            f'Expected the program to log {name}, but the datalog has none: nothing like "{name}: 42" was printed.'
+        )
     checks = _datalog_checks(criterion, samples, recording)
     if criterion.plateaus:
         checks.append(_plateau_check(criterion, values))
@@ -128,7 +130,9 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
     measures = (Measure("images", float(len(log))),)
     wrong = next((words for reached, words in checks if reached < 1), None)
     if wrong is None:
-        return passed(f"The program logged {len(log)} images as expected.", measures=measures)
+        return passed(
+            f"The program logged {len(log)} {'image' if len(log) == 1 else 'images'} as expected.", measures=measures
+        )
     last = seconds_at(recording, log[-1][2]) if log else None
     pose = None if last is None else pose_at(recording, last)
     held = sum((reached for reached, _ in checks), Fraction(0)) / len(checks)

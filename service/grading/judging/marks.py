@@ -15,6 +15,7 @@ from service.grading.judging.outcome import Outcome
 Over = Literal["share", "all", "mean", "median", "worst"]
 
 _CENT = Decimal("0.01")
+_STEPS = 20
 
 
 def earned(marks: Decimal, share: Fraction) -> Decimal:
@@ -44,6 +45,16 @@ def share_of(outcomes: Sequence[Outcome], over: Over) -> Fraction:
             return (scores[(count - 1) // 2] + scores[count // 2]) / 2
         case "worst":
             return scores[0]
+
+
+def in_steps(share: Fraction) -> Fraction:
+    """``share`` rounded to steps of 5 %; one below 1 stays below 1.
+
+    Of trials that are not shown no more is told, so that marks don't give away what a program counted there.
+    """
+    if share >= 1:
+        return share
+    return min(Fraction((2 * share * _STEPS + 1) // 2, _STEPS), Fraction(_STEPS - 1, _STEPS))
 
 
 def share_of_accuracy(right: int, count: int, at_least: float | None, over: Over) -> Fraction:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import place_at, positions, standing, stretches, times, travel
 from service.grading.judging.judges import judges
+from service.grading.judging.matching import most_in_order, most_pairs
 from service.grading.judging.moves import Move, facing, measures_of, misses, move_between, moves_of, range_words, shown
 from service.grading.judging.outcome import Outcome, failed, passed
 from sim.camera import HEIGHT, WIDTH
@@ -73,7 +74,7 @@ def judge_moves(criterion: Moves, trial: TrialResult) -> Outcome:
     """Each move that is asked for is looked for among those that were made."""
     recording = trial.recording
     made = moves_of(recording)
-    found = _in_order(criterion, made) if criterion.in_order else _in_any_order(criterion, made)
+    found = _paired(criterion, made)
     score = Fraction(sum(move is not None for move in found), len(found))
     measures = tuple(
         measure
@@ -99,7 +100,7 @@ def judge_moves(criterion: Moves, trial: TrialResult) -> Outcome:
 
 @judges(Excursions)
 def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
-    """Peaks of the way along the start's heading, and how near the start the robot came after each."""
+    """Peaks of the way along the start's heading, and how near the start the robot was after each."""
     recording = trial.recording
     ahead = _ahead(recording)
     turns = _turning_points(ahead)
@@ -141,18 +142,22 @@ def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
                 score=right,
                 measures=measures,
             )
-    for number, turn in enumerate((turn for turn in turns if not turn.out), 1):
-        if abs(float(ahead[turn.row])) > criterion.returns_within:
+    away = np.hypot(*(positions(recording) - (recording.start.x, recording.start.y)).T)
+    # It is back from the last time out where the run ends, not where it came nearest before.
+    back = [*[turn.row for turn in turns if not turn.out][: wanted - 1], len(ahead) - 1]
+    for number, row in enumerate(back, 1):
+        if away[row] > criterion.returns_within:
+            came = f"the {_nth(number)} time it came back to {shown(float(away[row]))} mm"
             return failed(
                 f"Expected the robot to come back to within {criterion.returns_within:g} mm of its start each time, "
-                f"but the {_nth(number)} time it came back to {shown(float(ahead[turn.row]))} mm.",
-                *place_at(recording, turn.row),
+                f"but {came if number < wanted else f'it ended {shown(float(away[row]))} mm from it'}.",
+                *place_at(recording, row),
                 score=right + Fraction(number - 1, 2 * wanted),
                 measures=measures,
             )
     return passed(
         f"The robot went out and came back {_times(wanted)}, {abs(float(ahead[outs[0].row])):.0f} mm the first time, "
-        f"and ended {shown(float(ahead[-1]))} mm from its start.",
+        f"and ended {shown(float(away[-1]))} mm from its start.",
         recording.end_t,
         recording.end,
         measures,
@@ -230,22 +235,15 @@ def _turning_points(ahead: Floats) -> list[_Turn]:
     return turns
 
 
-def _in_order(criterion: Moves, made: tuple[Move, ...]) -> list[Move | None]:
-    found: list[Move | None] = []
-    after = 0
-    for wanted in criterion.moves:
-        place = next((place for place in range(after, len(made)) if misses(wanted, made[place]) is None), None)
-        found.append(None if place is None else made[place])
-        after = after if place is None else place + 1
-    return found
+def _paired(criterion: Moves, made: tuple[Move, ...]) -> list[Move | None]:
+    """The move that was made for each that is asked for, with as many as possible."""
+    suits = [[misses(wanted, move) is None for move in made] for wanted in criterion.moves]
 
+    def first_from(wish: int, start: int) -> int | None:
+        return next((place for place in range(start, len(made)) if suits[wish][place]), None)
 
-def _in_any_order(criterion: Moves, made: tuple[Move, ...]) -> list[Move | None]:
-    found: list[Move | None] = []
-    for wanted in criterion.moves:
-        free = (move for move in made if move not in found)
-        found.append(next((move for move in free if misses(wanted, move) is None), None))
-    return found
+    places = most_in_order(len(suits), first_from) if criterion.in_order else most_pairs(suits)
+    return [None if place is None else made[place] for place in places]
 
 
 def _missing_move(

@@ -12,6 +12,7 @@ import numpy as np
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import distance_to, place_at, positions, standing, stretches
 from service.grading.judging.judges import judges
+from service.grading.judging.matching import most_in_order
 from service.grading.judging.outcome import Outcome, failed, passed
 from sim.recording import Floats, Recording
 from submissions.criteria.path import KeepsOut, StaysInside, TouchesNothing, Visits
@@ -37,18 +38,10 @@ def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
     """Each place after the one before it (or at any time); a place is visited when its edge is reached."""
     recording = trial.recording
     points = positions(recording, criterion.of)
-    rows: list[int] = []
-    missed: Area | None = None
-    reached = 0
-    for place in criterion.places:
-        inside = distance_to(place, points) <= 0
-        after = rows[-1] if rows and criterion.in_order else 0
-        found = np.flatnonzero(inside[after:])
-        if not len(found):
-            missed = missed or place
-            continue
-        reached += 1
-        rows.append(after + int(found[0]))
+    visited = _visited(criterion, points)
+    rows = [row for row in visited if row is not None]
+    missed = next((place for place, row in zip(criterion.places, visited, strict=True) if row is None), None)
+    reached = len(rows)
     measures = (Measure("places visited", reached),)
     enough = criterion.at_least or len(criterion.places)
     score = Fraction(min(reached, enough), enough)
@@ -77,6 +70,20 @@ def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
         )
     places = str(criterion.places[0]) if len(criterion.places) == 1 else f"{reached} of {len(criterion.places)} places"
     return passed(f"{_upper(who)} came to {places}.", *place_at(recording, max(rows)), measures)
+
+
+def _visited(criterion: Visits, points: Floats) -> list[int | None]:
+    """The row in which each place is visited, None for one that is not; with ``in_order`` as many as possible."""
+    inside = [np.flatnonzero(distance_to(place, points) <= 0) for place in criterion.places]
+
+    def first_from(place: int, row: int) -> int | None:
+        number = int(np.searchsorted(inside[place], row))
+        return int(inside[place][number]) if number < len(inside[place]) else None
+
+    if criterion.in_order:
+        # One row may be in several places, which overlap.
+        return most_in_order(len(inside), first_from, step=0)
+    return [first_from(place, 0) for place in range(len(inside))]
 
 
 @judges(StaysInside)

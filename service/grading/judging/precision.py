@@ -17,7 +17,7 @@ _OTHERS = 20
 
 @dataclass(frozen=True, slots=True)
 class Strays:
-    """What came beside what was looked for; ``words`` tell of it in a sentence, after "but"."""
+    """What came beside what was looked for; ``words`` tell of it in a sentence, after "besides"."""
 
     words: str
     misplaced: int = 0  # of what is looked for, where it does not belong
@@ -35,7 +35,7 @@ def tempered(outcome: Outcome, criterion: AmongMany, wanted: int, strays: Strays
     if excess <= 0:
         return outcome
     return failed(
-        f"{outcome.message} But {strays.words}: naming everything is not finding it.",
+        f"{outcome.message} Besides, {strays.words}, which costs marks: naming everything is not finding it.",
         outcome.t,
         outcome.pose,
         outcome.score * wanted / (wanted + excess),

@@ -64,12 +64,18 @@ def reply_to(recording: Recording, answers: Answers, number: int) -> Reply:
     arrived = [pair for pair in statuses if pair[0] != "unanswered"]
     if not arrived:
         return _silence(recording, answers, image.message, came)
-    status, message = min(arrived, key=lambda pair: _BEST_FIRST.index(pair[0]))
+    status, message = min(arrived, key=_precedence)
     text = message.text
     duplicates = len(arrived) - 1
     if status == "malformed":
         return Reply(status, None, "the answer begins with JSON:: but is not JSON", duplicates)
     return Reply(status, text, "", duplicates)
+
+
+def _precedence(arrived: tuple[ReplyStatus, Message]) -> tuple[int, float]:
+    """In what order answers count: by status, then by arrival; one that was still under way at the end came last."""
+    status, message = arrived
+    return _BEST_FIRST.index(status), math.inf if message.delivered is None else message.delivered
 
 
 def _status(message: Message, following: float | None) -> ReplyStatus:

@@ -7,6 +7,7 @@ elsewhere.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from fractions import Fraction
 
 from responders.message_format import JSON
@@ -20,7 +21,10 @@ from service.grading.judging.texts import conditions, meets, same_text
 from service.grading.judging.words import listed, quoted
 from sim.recorded import pose_at
 from sim.recording import Message
-from submissions.criteria.replies import Replies
+from submissions.criteria.replies import Replies, right_answers
+
+#: Messages that were sent instead are named up to this count and length.
+_MOST_SENT, _LONGEST_SENT = 3, 60
 
 _NOTHING_TO_ANSWER = "The channel lost every message on its way by chance, so there was nothing to answer."
 
@@ -38,6 +42,8 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
     ]
     if criterion.expect:
         return _judge_expected(criterion, asked, sent, pair)
+    if criterion.in_order:
+        return _judge_order(criterion, asked, pair)
     # A message that is sent again asks nothing new.
     questions: dict[str, list[tuple[int, Message]]] = {}
     for index, message in asked:
@@ -79,14 +85,16 @@ def _judge_expected(criterion: Replies, asked: list[tuple[int, Message]], sent: 
     first: Outcome | None = None
     for text, answer in criterion.expect.items():
         heard = [(index, each) for index, each in asked if same_text(each.received, text, criterion.ignore_case)]
-        wanted = quoted(as_text(answer)) + (f" at {criterion.path}" if criterion.path else "")
+        right_ones = right_answers(answer)
+        words = " or ".join(quoted(as_text(each)) for each in right_ones)
+        wanted = words + (f" at {criterion.path}" if criterion.path else "")
         if not heard:
             tries = [message for message in sent if same_text(message.text, text, criterion.ignore_case)]
             if tries and all(map(by_chance, tries)):
                 continue
-            outcome = failed(f"Expected {pair.told} to be sent {quoted(text)}, but {_unsent(tries)}.")
+            outcome = failed(f"Expected {pair.told} to be sent {quoted(text)}, but {_unsent(tries, sent)}.")
         else:
-            mistakes = [_wrong_answer(criterion, answers, index, answer) for index, _ in heard]
+            mistakes = [_wrong_answer(criterion, answers, index, right_ones) for index, _ in heard]
             place = next((i for i, mistake in enumerate(mistakes) if mistake), None)
             if place is None:
                 right += 1
@@ -107,14 +115,50 @@ def _judge_expected(criterion: Replies, asked: list[tuple[int, Message]], sent: 
     return failed(f"{first.message[:-1]} ({right} of {count} right).", first.t, first.pose, Fraction(right, count))
 
 
-def _unsent(tries: list[Message]) -> str:
-    """Why a text never reached the responder."""
+def _judge_order(criterion: Replies, asked: list[tuple[int, Message]], pair: Pair) -> Outcome:
+    """The answers to all messages that are asked about, in the order of these, against the list."""
+    answers = Answers(pair.recording)
+    heard = [(index, each) for index, each in asked if _is_asked_about(criterion, each.received)]
+    wrong = [
+        (message, wanted, mistake)
+        for (index, message), wanted in zip(heard, criterion.in_order, strict=False)
+        if (mistake := _mismatch(criterion, answers, index, wanted))
+    ]
+    count = len(criterion.in_order)
+    right = max(0, min(count, len(heard)) - len(wrong) - max(0, len(heard) - count))
+    score = Fraction(right, count)
+    if wrong:
+        message, wanted, mistake = wrong[0]
+        return failed(
+            f"Expected {pair.told} to answer {quoted(message.received)} with {quoted(wanted)}, but {mistake} "
+            f"({right} of {count} right).",
+            message.t,
+            pose_at(pair.recording, message.t),
+            score,
+        )
+    if len(heard) != count:
+        few = f"{len(heard)} reached it" if heard else "none reached it"
+        return failed(f"Expected {pair.told} to answer {count} messages, but {few}.", score=score)
+    return passed(f"{pair.told.capitalize()} answered {count} of {count} messages as expected.")
+
+
+def _unsent(tries: Sequence[Message], sent: Sequence[Message]) -> str:
+    """Why a text never reached the responder, and what was sent instead."""
     astray = next((message for message in tries if out_of_reach(message)), None)
-    return f"the channel lost it ({loss_words(astray)})" if astray else "it never was"
+    if astray:
+        return f"the channel lost it ({loss_words(astray)})"
+    texts = tuple(dict.fromkeys(message.text for message in sent if len(message.text) <= _LONGEST_SENT))
+    return f"it never was; it was sent {listed(texts[:_MOST_SENT])}" if texts else "it never was"
 
 
-def _wrong_answer(criterion: Replies, answers: Answers, index: int, answer: object) -> str:
-    """What is wrong with the answer to the message at ``index``; empty if it is the expected one."""
+def _wrong_answer(criterion: Replies, answers: Answers, index: int, right_ones: Sequence[object]) -> str:
+    """What is wrong with the answer to the message at ``index``; empty if it is one of the right ones."""
+    mistakes = [_mismatch(criterion, answers, index, each) for each in right_ones]
+    return "" if "" in mistakes else mistakes[0] if mistakes else "nothing is right"
+
+
+def _mismatch(criterion: Replies, answers: Answers, index: int, answer: object) -> str:
+    """How the answer to the message at ``index`` differs from this one; empty if it does not."""
     reply = answers.to(index)
     if reply is None:
         return answers.silence(index)

@@ -6,23 +6,26 @@ How often a single text comes is judged in ``texts.py``, words one after the oth
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 
 from service.grading.grade import Measure, TrialResult
+from service.grading.judging.entries import Entry, Report, Row, are_alike, is_near, suits
 from service.grading.judging.geometry import in_zone, part_at, part_at_time, zone_words
 from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.precision import Strays, tempered
 from service.grading.judging.readings import INSTRUMENTS, were_read
 from service.grading.judging.words import Token, find_words, listed, quoted, tokens_of, words_of
+from sim.floors import label_names
 from sim.recorded import floor_of, pose_at
 from sim.recording import Line, Recording
 from submissions.criteria.places import Zone
 from submissions.criteria.reporting import EventAt, Events, Reports
 
-Entry = float | str
-
 _DEEDS = {"print": "print", "speech": "say", "either": "report", "reply": "answer"}
+#: The label of a place without one.
+NO_LABEL = "nothing"
 
 
 @judges(Reports)
@@ -31,51 +34,68 @@ def judge_reports(criterion: Reports, trial: TrialResult) -> Outcome:
     wanted = _expected_entries(criterion, trial)
     lines = _texts(criterion, trial.recording)
     told = [(token, line.t) for line in lines for token in tokens_of(line.text)]
-    outcome = _reported(criterion, wanted, [line.text for line in lines], [token for token, _ in told])
+    rows = _rows(criterion, trial.recording)
+    outcome = _reported(criterion, wanted, rows, [line.text for line in lines], [token for token, _ in told])
     guesses = _guesses(criterion, wanted, told, trial.recording)
     return tempered(outcome, criterion, len(wanted), Strays(f"{guesses} other numbers came as well", others=guesses))
 
 
-def _reported(criterion: Reports, wanted: Sequence[Entry], texts: Sequence[str], tokens: Sequence[Token]) -> Outcome:
+def _reported(
+    criterion: Reports, wanted: Row, rows: frozenset[Row], texts: Sequence[str], tokens: Sequence[Token]
+) -> Outcome:
     who = "the responder" if criterion.source == "reply" else "the program"
     deed = _DEEDS[criterion.source]
     asked = f"Expected {who} to {deed} {_entries(wanted)}{_leeway(criterion, wanted)}"
     if not texts:
         return failed(f"{asked}, but it did not {deed} anything.")
-    found, values = _found(wanted, tokens, criterion.tolerance)
-    measures = tuple(Measure(f"reported {place}", value) for place, value in enumerate(values, 1))
+    report = Report(tokens, rows, criterion.leeway)
+    found = report.find(wanted)
+    measures = tuple(Measure(f"reported {place}", value) for place, value in enumerate(found.values, 1))
     heard = quoted(" | ".join(texts))
-    foreign = _foreign(criterion, wanted, tokens)
+    foreign = _foreign(criterion, wanted, tokens) or _other_label(criterion, wanted, rows, report)
     if foreign:
         return failed(f"{asked}, but {foreign}: {heard}.", measures=measures)
-    if found < len(wanted):
-        missing = _entries(wanted[found : found + 1])
-        where = f" after {_entries(wanted[found - 1 : found])}" if found else ""
+    guessed = _is_guess(criterion, wanted, report, found.count)
+    if found.count < len(wanted):
+        missing = _entries(wanted[found.count : found.count + 1])
+        where = f" after {_entries(wanted[found.count - 1 : found.count])}" if found.count else ""
+        beside = ", and as many entries of most other poses came as well" if guessed else ""
         return failed(
-            f"{asked}, but {missing} did not come{where}: {heard}.",
-            score=Fraction(found, len(wanted)),
+            f"{asked}, but {missing} did not come{where}{beside}: {heard}.",
+            score=Fraction(0 if guessed else found.count, len(wanted)),
             measures=measures,
         )
-    if _suits_others(criterion, wanted, tokens):
+    if guessed:
         return failed(
             f"{asked} and not what belongs to other poses, but that came as well: {heard}.", measures=measures
         )
     return passed(f"{who.capitalize()} reported {_entries(wanted)}.", measures=measures)
 
 
-def _expected_entries(criterion: Reports, trial: TrialResult) -> tuple[Entry, ...]:
+def _expected_entries(criterion: Reports, trial: TrialResult) -> Row:
     if criterion.expected != "label":
         rows = criterion.expected
         return rows[min(trial.place, len(rows) - 1)]
-    label = label_at_start(trial.recording)
+    return row_of_label(label_at_start(trial.recording))
+
+
+def row_of_label(label: str) -> Row:
+    """Return the row that has to be reported where the floor has this label."""
     return (float(label) if label.isdecimal() else label,)
 
 
+def _rows(criterion: Reports, recording: Recording) -> frozenset[Row]:
+    """The rows of all poses; for labels, one row for each label that the floor can have."""
+    if criterion.expected != "label":
+        return frozenset(criterion.expected)
+    return frozenset(map(row_of_label, (*label_names(recording.background), NO_LABEL)))
+
+
 def label_at_start(recording: Recording) -> str:
-    """What the floor has under the left light sensor at the start; ``nothing`` where it has no label."""
+    """What the floor has under the left light sensor at the start, or ``NO_LABEL``."""
     floor = floor_of(recording)
     label = floor.label_at(*part_at(recording, "left", recording.start)) if floor else None
-    return label or "nothing"
+    return label or NO_LABEL
 
 
 def _texts(criterion: Reports, recording: Recording) -> list[Line]:
@@ -90,32 +110,6 @@ def _texts(criterion: Reports, recording: Recording) -> list[Line]:
     return sorted([*printed, *spoken], key=lambda line: line.t)
 
 
-def _found(wanted: Sequence[Entry], tokens: Sequence[Token], tolerance: float) -> tuple[int, list[float]]:
-    """How many of the wanted entries come in order, and the numbers that stand for them."""
-    words = [token.word for token in tokens]
-    start = 0
-    values: list[float] = []
-    for count, entry in enumerate(wanted):
-        if isinstance(entry, str):
-            parts = words_of(entry)
-            place = find_words(words, parts, start)
-            length = len(parts)
-        else:
-            near = (i for i in range(start, len(tokens)) if _is_near(tokens[i].value, entry, tolerance))
-            place, length = next(near, None), 1
-        if place is None:
-            return count, values
-        value = tokens[place].value
-        if value is not None:
-            values.append(value)
-        start = place + length
-    return len(wanted), values
-
-
-def _is_near(value: float | None, wanted: float, tolerance: float) -> bool:
-    return value is not None and abs(value - wanted) <= tolerance + 1e-9
-
-
 def _guesses(
     criterion: Reports, wanted: Sequence[Entry], told: Sequence[tuple[Token, float]], recording: Recording
 ) -> int:
@@ -123,7 +117,7 @@ def _guesses(
     others = [
         (token.value, t)
         for token, t in told
-        if token.value is not None and not _is_one_of(token.value, wanted, criterion.tolerance)
+        if token.value is not None and not _is_one_of(token.value, wanted, criterion.leeway)
     ]
     values, at = [value for value, _ in others], [t for _, t in others]
     read = int(were_read(values, at, INSTRUMENTS, recording).sum())
@@ -131,46 +125,35 @@ def _guesses(
 
 
 def _is_one_of(value: float, wanted: Sequence[Entry], tolerance: float) -> bool:
-    return any(_is_near(value, entry, tolerance) for entry in wanted if not isinstance(entry, str))
+    return any(is_near(value, entry, tolerance) for entry in wanted if not isinstance(entry, str))
 
 
-def _suits_others(criterion: Reports, wanted: Sequence[Entry], tokens: Sequence[Token]) -> bool:
-    """Whether what belongs to half of the other poses or more was reported as well: then nothing was read off."""
-    rows = set(criterion.expected) if criterion.expected != "label" else set()
-    others = [row for row in rows if not _alike(row, wanted, 2 * criterion.tolerance)]
-    told = sum(
-        any(_stands_at(place, row, tokens, criterion.tolerance) for place in range(len(tokens))) for row in others
-    )
-    return bool(others) and 2 * told >= len(others)
+def _is_guess(criterion: Reports, wanted: Row, report: Report, count: int) -> bool:
+    """Whether the report has the first ``count`` entries of more than half of the poses, and their answers differ.
+
+    Once all entries of ``wanted`` are there, only whole rows of other poses count. Poses are counted, not rows: a row
+    that many poses share is easier to guess.
+    """
+    if criterion.expected == "label" or not count:
+        return False
+    whole = count == len(wanted)
+    reported = {
+        row
+        for row in frozenset(criterion.expected)
+        if report.find(row).count >= (len(row) if whole else min(count, len(row)))
+    }
+    is_same = suits if whole else are_alike
+    if all(is_same(row, wanted, criterion.tolerance) for row in reported):
+        return False
+    return 2 * sum(row in reported for row in criterion.expected) > len(criterion.expected)
 
 
-def _alike(row: Sequence[Entry], other: Sequence[Entry], tolerance: float) -> bool:
-    """Whether one report may suit both."""
-    return len(row) == len(other) and all(
-        one == two or (not isinstance(one, str) and not isinstance(two, str) and _is_near(one, two, tolerance))
-        for one, two in zip(row, other, strict=True)
-    )
-
-
-def _stands_at(place: int, row: Sequence[Entry], tokens: Sequence[Token], tolerance: float) -> bool:
-    """Whether the entries come from there on, one right after the other; of the numbers after a word any will do."""
-    after_word = False
-    for entry in row:
-        if isinstance(entry, str):
-            parts = words_of(entry)
-            if [token.word for token in tokens[place : place + len(parts)]] != parts:
-                return False
-            place += len(parts)
-        else:
-            while after_word and place < len(tokens) and tokens[place].value is not None:
-                if _is_near(tokens[place].value, entry, tolerance):
-                    break
-                place += 1
-            if place >= len(tokens) or not _is_near(tokens[place].value, entry, tolerance):
-                return False
-            place += 1
-        after_word = isinstance(entry, str)
-    return True
+def _other_label(criterion: Reports, wanted: Row, rows: frozenset[Row], report: Report) -> str:
+    """Which other label of the floor was reported, in words; empty if none was."""
+    if criterion.expected != "label":
+        return ""
+    others = sorted(_entries(row) for row in rows if report.has(row) and not suits(row, wanted, criterion.leeway))
+    return f"it named {others[0]}" if others else ""
 
 
 def _foreign(criterion: Reports, wanted: Sequence[Entry], tokens: Sequence[Token]) -> str:
@@ -184,9 +167,7 @@ def _foreign(criterion: Reports, wanted: Sequence[Entry], tokens: Sequence[Token
             return f"it named {quoted(text)}"
     if criterion.only:
         others = (each for each in tokens if each.value is not None)
-        foreign = next(
-            (each for each in others if not _is_one_of(each.value or 0.0, wanted, criterion.tolerance)), None
-        )
+        foreign = next((each for each in others if not _is_one_of(each.value or 0.0, wanted, criterion.leeway)), None)
         if foreign is not None:
             return f"it reported {quoted(foreign.word)[1:-1]} as well"
     return ""
@@ -195,101 +176,120 @@ def _foreign(criterion: Reports, wanted: Sequence[Entry], tokens: Sequence[Token
 def _leeway(criterion: Reports, wanted: Sequence[Entry]) -> str:
     """How far off a number may be, where it is far enough to matter to whoever compares."""
     numbers = any(not isinstance(entry, str) for entry in wanted)
-    return f" (within {criterion.tolerance:g})" if numbers and criterion.tolerance >= 1 else ""
+    return f" (within {criterion.leeway:g})" if numbers and criterion.leeway >= 1 else ""
 
 
 def _entries(entries: Sequence[Entry]) -> str:
     return listed(tuple(entry if isinstance(entry, str) else f"{entry:g}" for entry in entries))
 
 
+@dataclass(frozen=True, slots=True)
+class _Mention:
+    """A line that names texts of events, and the place of the sensor when it came."""
+
+    line: Line
+    texts: frozenset[str]
+    place: tuple[float, float]
+
+
 @judges(Events)
 def judge_events(criterion: Events, trial: TrialResult) -> Outcome:
     """Each event is looked for after the one before it; the first mention at the right place counts.
 
-    What is said where another event belongs as well does not tell the places apart, and does not count.
+    A mention where another event belongs as well does not tell the places apart, and does not count.
     """
-    lines = _lines(criterion, trial.recording)
-    outcome = _told_in_places(criterion, lines, trial.recording)
-    elsewhere = _elsewhere(criterion, lines, trial.recording)
+    mentions = _mentions(criterion, trial.recording)
+    outcome = _found_in_places(criterion, mentions, trial.recording)
+    elsewhere = _elsewhere(criterion, mentions)
     beside = Strays(f"these texts came {elsewhere} times where they do not belong", elsewhere)
     return tempered(outcome, criterion, len(criterion.events), beside)
 
 
-def _told_in_places(criterion: Events, lines: Sequence[Line], recording: Recording) -> Outcome:
-    found: list[Line] = []
+def _mentions(criterion: Events, recording: Recording) -> list[_Mention]:
+    """Return the lines that name texts of events, by time."""
+    printed = recording.printed if criterion.source != "speech" else ()
+    spoken = recording.spoken if criterion.source != "print" else ()
+    lines = sorted({(line.t, line.text): line for line in (*printed, *spoken)}.values(), key=lambda line: line.t)
+    phrases = {text: _phrase(text) for event in criterion.events for text in event.text}
+    mentions = []
+    for line in lines:
+        said = _phrase(line.text)
+        texts = frozenset(text for text, phrase in phrases.items() if phrase in said)
+        if texts:
+            mentions.append(_Mention(line, texts, part_at_time(recording, criterion.sensor, line.t)))
+    return mentions
+
+
+def _phrase(text: str) -> str:
+    """Return the words with a space around each, so that ``in`` finds whole words only."""
+    return " ".join(("", *words_of(text), ""))
+
+
+def _found_in_places(criterion: Events, mentions: Sequence[_Mention], recording: Recording) -> Outcome:
+    found: list[_Mention] = []
     start = 0
-    strays = _strays(criterion, lines, recording)
+    strays = _strays(criterion, mentions)
     for event in criterion.events:
         if event in strays:
             return _stray(criterion, event, strays[event], found, recording)
-        place = next((i for i in range(start, len(lines)) if _happens(criterion, event, lines[i], recording)), None)
+        place = next((i for i in range(start, len(mentions)) if _happens(criterion, event, mentions[i])), None)
         if place is None:
-            return _missed(criterion, event, found, lines[start:], recording)
-        found.append(lines[place])
+            return _missed(criterion, event, found, mentions[start:], recording)
+        found.append(mentions[place])
         start = place + 1
-    places = [part_at_time(recording, criterion.sensor, line.t) for line in found]
     names = tuple(event.text[0] for event in criterion.events)
-    measures = tuple(Measure(f"x at {name}", x, "mm") for name, (x, _) in zip(names, places, strict=True))
-    texts = listed(names)
-    end = found[-1]
-    return passed(f"{texts} came in order, each at its place.", end.t, pose_at(recording, end.t), measures)
+    measures = tuple(Measure(f"x at {name}", each.place[0], "mm") for name, each in zip(names, found, strict=True))
+    end = found[-1].line.t
+    return passed(f"{listed(names)} came in order, each at its place.", end, pose_at(recording, end), measures)
 
 
-def _lines(criterion: Events, recording: Recording) -> list[Line]:
-    printed = recording.printed if criterion.source != "speech" else ()
-    spoken = recording.spoken if criterion.source != "print" else ()
-    return sorted({(line.t, line.text): line for line in (*printed, *spoken)}.values(), key=lambda line: line.t)
+def _names(mention: _Mention, event: EventAt) -> bool:
+    return not mention.texts.isdisjoint(event.text)
 
 
-def _mentions(texts: Sequence[str], line: Line) -> bool:
-    words = words_of(line.text)
-    return any(find_words(words, words_of(text)) is not None for text in texts)
+def _is_at(criterion: Events, event: EventAt, mention: _Mention) -> bool:
+    return in_zone(mention.place, event.zone, criterion.margin)
 
 
-def _happens(criterion: Events, event: EventAt, line: Line, recording: Recording) -> bool:
-    return _mentions(event.text, line) and in_zone(
-        part_at_time(recording, criterion.sensor, line.t), event.zone, criterion.margin
-    )
+def _happens(criterion: Events, event: EventAt, mention: _Mention) -> bool:
+    return _names(mention, event) and _is_at(criterion, event, mention)
 
 
-def _elsewhere(criterion: Events, lines: Sequence[Line], recording: Recording) -> int:
-    """How many texts of events came outside of every place that they belong to."""
+def _elsewhere(criterion: Events, mentions: Sequence[_Mention]) -> int:
+    """Return how many texts of events came outside of every place that they belong to."""
     own: dict[tuple[str, ...], list[Zone]] = {}
     for event in criterion.events:
         own.setdefault(event.text, []).append(event.zone)
-    count = 0
-    for line in lines:
-        told = [zones for texts, zones in own.items() if _mentions(texts, line)]
-        if told:
-            place = part_at_time(recording, criterion.sensor, line.t)
-            count += sum(not any(in_zone(place, zone, criterion.margin) for zone in zones) for zones in told)
-    return count
+    return sum(
+        not mention.texts.isdisjoint(texts)
+        and not any(in_zone(mention.place, zone, criterion.margin) for zone in zones)
+        for mention in mentions
+        for texts, zones in own.items()
+    )
 
 
-def _strays(criterion: Events, lines: Sequence[Line], recording: Recording) -> dict[EventAt, Line]:
-    """For each event that was mentioned at the place of one with other words the first such line."""
-    strays: dict[EventAt, Line] = {}
-    for line in lines:
-        mentioned = [event for event in criterion.events if event not in strays and _mentions(event.text, line)]
-        if not mentioned:
-            continue
-        place = part_at_time(recording, criterion.sensor, line.t)
-        for event in mentioned:
-            others = (other for other in criterion.events if set(event.text).isdisjoint(other.text))
-            own = (other for other in criterion.events if not set(event.text).isdisjoint(other.text))
-            if any(in_zone(place, each.zone, criterion.margin) for each in own):
+def _strays(criterion: Events, mentions: Sequence[_Mention]) -> dict[EventAt, _Mention]:
+    """For each event that was mentioned at the place of one with other words the first such mention."""
+    strays: dict[EventAt, _Mention] = {}
+    for mention in mentions:
+        here = [other for other in criterion.events if _is_at(criterion, other, mention)]
+        for event in criterion.events:
+            if event in strays or not _names(mention, event):
                 continue
-            if any(in_zone(place, other.zone, criterion.margin) for other in others):
-                strays[event] = line
+            # At the place of an event with the same words, it belongs.
+            if here and all(set(event.text).isdisjoint(other.text) for other in here):
+                strays[event] = mention
     return strays
 
 
-def _stray(criterion: Events, event: EventAt, line: Line, found: list[Line], recording: Recording) -> Outcome:
-    x, y = part_at_time(recording, criterion.sensor, line.t)
+def _stray(
+    criterion: Events, event: EventAt, mention: _Mention, found: Sequence[_Mention], recording: Recording
+) -> Outcome:
+    (x, y), t = mention.place, mention.line.t
     return failed(
         f"{_expected(criterion, event)} and not where another belongs, but it came at ({x:.1f}, {y:.1f}) as well.",
-        line.t,
-        pose_at(recording, line.t),
+        t,
+        pose_at(recording, t),
         Fraction(len(found), len(criterion.events)),
     )
 
@@ -301,17 +301,20 @@ def _expected(criterion: Events, event: EventAt) -> str:
 
 
 def _missed(
-    criterion: Events, event: EventAt, found: list[Line], after: Sequence[Line], recording: Recording
+    criterion: Events,
+    event: EventAt,
+    found: Sequence[_Mention],
+    after: Sequence[_Mention],
+    recording: Recording,
 ) -> Outcome:
     expected = _expected(criterion, event)
     score = Fraction(len(found), len(criterion.events))
-    elsewhere = next((line for line in after if _mentions(event.text, line)), None)
+    elsewhere = next((mention for mention in after if _names(mention, event)), None)
     if elsewhere is None:
-        behind = f" after {quoted(found[-1].text)}" if found else ""
-        t = found[-1].t if found else None
+        last = found[-1].line if found else None
+        behind = f" after {quoted(last.text)}" if last else ""
+        t = last.t if last else None
         pose = None if t is None else pose_at(recording, t)
         return failed(f"{expected}, but it did not come{behind}.", t, pose, score)
-    x, y = part_at_time(recording, criterion.sensor, elsewhere.t)
-    return failed(
-        f"{expected}, but it came with it at ({x:.1f}, {y:.1f}).", elsewhere.t, pose_at(recording, elsewhere.t), score
-    )
+    (x, y), t = elsewhere.place, elsewhere.line.t
+    return failed(f"{expected}, but it came with it at ({x:.1f}, {y:.1f}).", t, pose_at(recording, t), score)

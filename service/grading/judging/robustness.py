@@ -9,8 +9,9 @@ from dataclasses import replace
 from fractions import Fraction
 
 from service.grading.grade import AccuracyCurve, CriterionResult
-from service.grading.judging.case import Case, Indexed
+from service.grading.judging.case import Case, Indexed, has_hidden
 from service.grading.judging.judges import judges_case
+from service.grading.judging.marks import in_steps
 from service.grading.judging.recognition import classify, pooled, recognised
 from service.grading.judging.sweeps import area, curve_along, curves_of, levels_along, part_above, range_above
 from submissions.criteria.robustness import Robustness
@@ -30,7 +31,9 @@ def judge_robustness(criterion: Robustness, case: Case) -> CriterionResult:
         curve = curve_along(criterion.along, found.samples, swept)
         others = (other for other in curves_of(found.samples, swept) if other.along != criterion.along)
         curves = (replace(curve, asked=criterion.level), *others)
-        return recognised(criterion, found, _share(criterion, curve), _words(criterion, curve), curves, swept)
+        share = _share(criterion, curve)
+        share = in_steps(share) if has_hidden(trials) else share
+        return recognised(criterion, found, share, _words(criterion, curve), curves, swept)
 
     return pooled(case.looked_at_by(criterion), judged)
 

@@ -31,9 +31,7 @@ def judge_word_sequence(criterion: WordSequence, trial: TrialResult) -> Outcome:
     if not heard:
         return failed(f"Expected the robot to {verb} {_shown(criterion)}, but it {past} nothing.")
     words = [word for word, _ in heard]
-    starts = range(len(words)) if criterion.lead_in else range(1)
-    runs = [(start, *_run(wanted, words, start)) for start in starts]
-    begin, found, end = max(runs, key=lambda run: run[1])
+    begin, found, end = _best_run(criterion, wanted, words)
     outcome = _in_sequence(criterion, recording, heard, found, end)
     asked = {word for alternatives in wanted for each in alternatives for word in each}
     again = sum(word in asked for word in (*words[:begin], *words[end:]))
@@ -83,15 +81,33 @@ def _in_sequence(
     return passed(f"The robot {past} {shown}.", first.t, pose_at(recording, first.t), measures)
 
 
-def _run(wanted: Sequence[Sequence[list[str]]], words: list[str], start: int) -> tuple[int, int]:
-    """How many of the wanted words come without a gap from ``start`` on, and where the next word is."""
-    place = start
+def _best_run(criterion: WordSequence, wanted: Sequence[Sequence[list[str]]], words: list[str]) -> tuple[int, int, int]:
+    """Where the best run begins, how many of the wanted words it has, and where the next word is.
+
+    Of runs with equally many words the one is best that leaves least where nothing else may come: after it, or, with
+    ``more``, anywhere beside it.
+    """
+
+    def worth(run: tuple[int, int, int]) -> tuple[int, int]:
+        begin, found, end = run
+        return found, end - begin if criterion.more or found < len(wanted) else end
+
+    starts = range(len(words)) if criterion.lead_in else range(1)
+    runs = ((start, found, end) for start in starts for found, ends in [_run(wanted, words, start)] for end in ends)
+    return max(runs, key=worth)
+
+
+def _run(wanted: Sequence[Sequence[list[str]]], words: list[str], start: int) -> tuple[int, list[int]]:
+    """How many of the wanted words come without a gap from ``start`` on, and where the next word may be."""
+    places = [start]
     for count, alternatives in enumerate(wanted):
-        length = next((len(each) for each in alternatives if words[place : place + len(each)] == each), None)
-        if length is None:
-            return count, place
-        place += length
-    return len(wanted), place
+        after = {
+            place + len(each) for place in places for each in alternatives if words[place : place + len(each)] == each
+        }
+        if not after:
+            return count, places
+        places = sorted(after)
+    return len(wanted), places
 
 
 def _hurried(lines: Sequence[Line]) -> Line | None:

@@ -9,8 +9,10 @@ import math
 from fractions import Fraction
 from typing import Literal
 
+import numpy as np
+
 from service.grading.grade import Measure, TrialResult
-from service.grading.judging.geometry import floor_share, in_zone, part_at, zone_words
+from service.grading.judging.geometry import floor_share, in_zone, part_at, standing, zone_words
 from service.grading.judging.judges import judges
 from service.grading.judging.outcome import Outcome, cut, failed, passed
 from sim.recorded import seconds_at
@@ -18,8 +20,6 @@ from sim.recording import Recording, Verdict
 from submissions.criteria.stopping import StopOn
 
 Side = Literal["left", "right"]
-
-_MM = 0.01  # less than this in a tick is no movement
 
 
 @judges(StopOn)
@@ -97,14 +97,10 @@ def _judge_side(criterion: StopOn, side: Side, recording: Recording) -> Outcome:
 
 
 def _stood_still(recording: Recording) -> float:
-    """Seconds without movement before the end."""
-    ticks = recording.ticks
-    count = 0
-    for i in range(len(ticks) - 1, 0, -1):
-        if math.hypot(ticks.x[i] - ticks.x[i - 1], ticks.y[i] - ticks.y[i - 1]) > _MM:
-            break
-        count += 1
-    return seconds_at(recording, count)
+    """Seconds before the end in which the robot neither drove nor turned."""
+    moved = np.flatnonzero(~standing(recording))
+    ticks = len(recording.ticks)
+    return seconds_at(recording, ticks - 1 - int(moved[-1]) if len(moved) else ticks)
 
 
 def _wanted(criterion: StopOn) -> str:

@@ -43,15 +43,29 @@ _NUMBER = re.compile(r"[-+]?\d[\d.,]*")
 
 _EXCUSED = "What the channel lost by chance counts as received."
 _PRINT = Deed("the program", "print", "printed")
+_RESPONDER_PRINT = Deed("the responder", "print", "printed")
 _SAY = Deed("the robot", "say", "said")
 _SEND = Deed("the robot", "send", "sent", addressed=True)
 _RECEIVE = Deed("the robot", "receive", "received")
 
 
+#: What stands above the output of each cell in a notebook's recording.
+_CELL_HEADING = re.compile(r"--- cell \d+ ---")
+
+
 @judges(Prints)
 def judge_prints(criterion: Prints, trial: TrialResult) -> Outcome:
-    """What the program printed, call by call."""
-    return judge_sequence(criterion, trial.recording.printed, _PRINT, trial.recording)
+    """What the program printed, call by call; what the responder or a notebook's cells printed, line by line."""
+    recording = trial.recording
+    if criterion.of == "responder":
+        return judge_sequence(criterion, _responder_lines(recording), _RESPONDER_PRINT, recording)
+    return judge_sequence(criterion, recording.printed, _PRINT, recording)
+
+
+def _responder_lines(recording: Recording) -> tuple[Line, ...]:
+    """What the responder printed; the recording has no times of it, so all of it came at the end."""
+    texts = recording.responder_output.split("\n") if recording.responder_output else ()
+    return tuple(Line(recording.end_t, text) for text in texts if not _CELL_HEADING.fullmatch(text))
 
 
 @judges(Says)
@@ -116,7 +130,7 @@ def conditions(criterion: TextConditions) -> str:
     if criterion.contains:
         words.append(f"contains {listed(criterion.contains)}")
     if criterion.among:
-        words.append(f"names one of {listed(criterion.among)} alone")
+        words.append(f"names only one of {listed(criterion.among)}")
     if criterion.matches is not None:
         words.append(f"matches the pattern {quoted(criterion.matches)}")
     return f"{_SOMETHING}{' and '.join(words)}" if words else ""

@@ -61,11 +61,13 @@ def _ranked(criterion: Ranking, place: int, other: CriterionResult | None) -> Ou
     if share == 1:
         return passed(f"The {found}.", evidence.t, evidence.pose, (measure,))
     bound = "at least" if criterion.highest else "at most"
-    return failed(
-        f"The {found} is worth {float(share):.0%} of the marks; all are given for {bound} {best:g}{unit}.",
+    # The share is the instructor's own number: it is not kept below a bound as a measured score is.
+    return Outcome(
+        False,
+        share,
+        f"The {found} is worth {float(share) * 100:g}% of the marks; all are given for {bound} {best:g}{unit}.",
         evidence.t,
         evidence.pose,
-        share,
         (measure,),
     )
 

@@ -13,6 +13,7 @@ from service.grading.judging.case import Indexed
 from service.grading.judging.geometry import part_at
 from service.grading.judging.label_patches import CODES, GREYS, decoded
 from sim.floors import label_names
+from sim.recorded import floor_of
 from sim.recording import Pose, Recording
 from submissions.assignment.definition import Assignment
 from submissions.assignment.truth_file import LabelledPlace
@@ -66,6 +67,8 @@ def _known(criterion: Recognition, trial: TrialResult) -> list[NumberedTruth]:
     for number, image in enumerate(recording.images):
         if criterion.near_start is not None and _look_from_start(recording, image.pose) > criterion.near_start:
             continue
+        if criterion.near_spot is not None and _look_from_spot(criterion, recording, image.pose) > criterion.near_spot:
+            continue
         truth: str | None
         match criterion.truth:
             case "label":
@@ -92,6 +95,16 @@ def _greys(criterion: Recognition, recording: Recording) -> Mapping[int, str]:
 def _look_from_start(recording: Recording, pose: Pose) -> float:
     """How far the left sensor is, with the robot at ``pose``, from where it was at the start, mm."""
     return math.dist(part_at(recording, "left", pose), part_at(recording, "left", recording.start))
+
+
+def _look_from_spot(criterion: Recognition, recording: Recording, pose: Pose) -> float:
+    """How far the left sensor is, with the robot at ``pose``, from the middle of the nearest thing with a label, mm."""
+    look = part_at(recording, "left", pose)
+    floor = floor_of(recording)
+    labels = () if floor is None else floor.labels
+    spots = [(each.x + each.width / 2, each.y + each.height / 2) for each in labels]
+    spots += [place[:2] for place in _places(criterion)]
+    return min((math.dist(look, spot) for spot in spots), default=math.inf)
 
 
 def _told(criterion: Recognition, trial: TrialResult) -> str | None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from service.grading.grade import Grade
@@ -16,7 +17,9 @@ from service.reports.rows import TableRow
 from service.reports.view import View, staff_view
 from service.reports.words import comments_of, hints_of
 
-_FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
+#: What a spreadsheet takes for a formula at the start of a cell. Where lists are separated by semicolons (German Excel)
+#: or tabs, a cell of ours is several of its own.
+_FORMULA = re.compile(r"(^|[;\t])(?=[\s'\"]*[=+\-@\t\r\uff1d\uff0b\uff0d\uff20])")
 _WHO = ("student", "name", "email", "assignment")
 _MEASURED = ("accuracy", "accuracy_low", "accuracy_high", "accuracy_n", "submission", "assignment_version")
 
@@ -40,15 +43,19 @@ def criteria_csv(rows: Sequence[TableRow[View]]) -> str:
 
 def csv_text(rows: Iterable[Sequence[str]]) -> str:
     """The rows as a file, harmless in a spreadsheet."""
+    return rows_as_given([safe_cell(value) for value in row] for row in rows)
+
+
+def rows_as_given(rows: Iterable[Sequence[str]], separator: str = ",", ending: str = "\r\n") -> str:
+    """The rows as a file, every cell as it is: for tables that somebody gave us, and wants back."""
     stream = io.StringIO()
-    csv.writer(stream, lineterminator="\r\n").writerows([safe_cell(value) for value in row] for row in rows)
+    csv.writer(stream, delimiter=separator, lineterminator=ending).writerows(rows)
     return stream.getvalue()
 
 
 def safe_cell(value: str) -> str:
-    """A cell on one line that is no formula."""
-    text = one_line(value, 4000)
-    return f"'{text}" if text.startswith(_FORMULA_STARTS) else text
+    """A cell on one line that is no formula, whatever a spreadsheet separates cells by."""
+    return _FORMULA.sub(r"\1'", one_line(value, 4000))
 
 
 def _wide(row: TableRow[View], criteria: Sequence[str]) -> list[str]:
@@ -58,8 +65,7 @@ def _wide(row: TableRow[View], criteria: Sequence[str]) -> list[str]:
 
 
 def _marked(grade: Grade, criteria: Sequence[str]) -> list[str]:
-    excused = {each.id for each in grade.criteria if each.set_by_hand is not None and each.set_by_hand.excused}
-    by_id = {result.id: "" if result.id in excused else number(result.marks) for result in grade.criteria}
+    by_id = {result.id: "" if result.excused else number(result.marks) for result in grade.criteria}
     accuracy = grade.accuracy
     measured = [f"{accuracy.value:.4f}", f"{accuracy.low:.4f}", f"{accuracy.high:.4f}"] if accuracy else [""] * 3
     return [
@@ -83,7 +89,7 @@ def _long(row: TableRow[View]) -> Iterator[list[str]]:
         return
     hints = " ".join(hints_of(row.grade.grade))
     for result in row.grade.grade.criteria:
-        marks = [number(result.marks), number(result.max_marks)]
+        marks = ["", ""] if result.excused else [number(result.marks), number(result.max_marks)]
         yield [*_who(row), result.id, result.title, *marks, result.message, hints, row.source, row.reason]
 
 

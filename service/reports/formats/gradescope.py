@@ -16,7 +16,7 @@ from service.reports.cause import diagnose, ended, excerpt_lines
 from service.reports.faults import faults_beside
 from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import json_number, readable
-from service.reports.rows import TableRow
+from service.reports.rows import TableRow, rows_for_students
 from service.reports.view import GradebookView, gradebook_view
 from service.reports.words import comments_of
 from submissions.submission import Submission
@@ -59,7 +59,7 @@ def gradescope_refusal(row: TableRow[Grade]) -> str:
 @table("gradescope", ".json", gradebook_view)
 def gradescope_list(rows: Sequence[TableRow[GradebookView]]) -> str:
     """The documents of several, each with its student and file; without a score where there is no grade."""
-    return _text([_of_several(row) for row in rows])
+    return _text([_of_several(row) for row in rows_for_students(rows)])
 
 
 def _of_several(row: TableRow[GradebookView]) -> dict[str, Any]:
@@ -83,7 +83,7 @@ def _test(number: int, result: CriterionResult) -> dict[str, Any]:
         "name": readable(result.title, 200),
         "score": json_number(result.marks),
         "max_score": json_number(result.max_marks),
-        "status": "passed" if result.marks >= result.max_marks else "failed",
+        **({} if result.excused else {"status": "passed" if result.marks >= result.max_marks else "failed"}),
         "output": readable(result.message),
         "visibility": result.visibility,
     }

@@ -68,7 +68,8 @@ def _suite(grade: Grade, who: Sequence[tuple[str, str]], submission: Submission 
     missed = sum(result.marks < result.max_marks for result in grade.criteria)
     seconds = sum(trial.recording.end_t for trial in grade.trials)
     failures, errors = (0, missed) if unmarked else (missed, 0)
-    suite = _begun(grade.assignment, len(grade.criteria), failures, errors, seconds=seconds)
+    skipped = sum(result.excused for result in grade.criteria)
+    suite = _begun(grade.assignment, len(grade.criteria), failures, errors, skipped, seconds=seconds)
     _add_properties(suite, [*who, *_properties(grade, submission)])
     for result in grade.criteria:
         _add_case(suite, grade, result, "error" if unmarked else "failure")
@@ -93,7 +94,9 @@ def _add_case(suite: ElementTree.Element, grade: Grade, result: CriterionResult,
     case = ElementTree.SubElement(
         suite, "testcase", classname=one_line(grade.assignment), name=one_line(result.title, 200), time="0"
     )
-    if result.marks < result.max_marks:
+    if result.excused:
+        ElementTree.SubElement(case, "skipped", message="excused")
+    elif result.marks < result.max_marks:
         marks = f"{number(result.marks)} of {number(result.max_marks)} marks"
         element = ElementTree.SubElement(case, outcome, type=grade.verdict.value, message=marks)
         element.text = readable(result.message)

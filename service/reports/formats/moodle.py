@@ -5,8 +5,6 @@ Moodle knows a submission again by the number in its download's names and in the
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 import zipfile
 from collections import Counter
@@ -14,14 +12,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from typing import BinaryIO
 
+from service.grading.grade import CriterionResult
 from service.reports.cause import diagnose
-from service.reports.formats.csv_output import csv_text, safe_cell
+from service.reports.formats.csv_output import csv_text, rows_as_given, safe_cell
 from service.reports.formats.registry import FilledIn, filled_in, packed, table
 from service.reports.readable import number, one_line
-from service.reports.rows import ReportPage, TableRow
+from service.reports.rows import ReportPage, TableRow, rows_for_students
 from service.reports.view import GradebookView, gradebook_view
 from service.reports.words import comments_of
 from sim.errors import UsageError
+from sim.readers.csv_text import read_rows
+from sim.readers.unreadable import Unreadable
 from submissions.downloads import moodle_number
 
 _IDENTIFIER, _GRADE, _FEEDBACK, _MAXIMUM = "Identifier", "Grade", "Feedback comments", "Maximum Grade"
@@ -35,7 +36,7 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip archive can hold
 def moodle_csv(rows: Sequence[TableRow[GradebookView]]) -> str:
     """What Moodle's grade import takes: ID number, grade, and feedback that tells nothing of hidden criteria."""
     # One that nobody is known by would end the whole import.
-    cells = [[row.student.id, _marks(row), _feedback(row)] for row in rows if row.student.id]
+    cells = [[row.student.id, _marks(row), _feedback(row)] for row in rows_for_students(rows) if row.student.id]
     return csv_text([["ID number", "Grade", "Feedback comments"], *cells])
 
 
@@ -49,7 +50,10 @@ def moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> Fil
     text = given.removeprefix("\ufeff")
     first = text.partition("\n")[0]
     separator = max(",;\t", key=first.count)
-    lines = list(csv.reader(io.StringIO(text, newline=""), delimiter=separator))
+    try:
+        lines = read_rows(text, separator)
+    except Unreadable as error:
+        raise UsageError(f"the worksheet cannot be read: {error}, expected Moodle's grading worksheet") from None
     places = {heading: place for place, heading in enumerate(lines[0])} if lines else {}
     missing = [heading for heading in (_IDENTIFIER, _GRADE) if heading not in places]
     if missing:
@@ -59,7 +63,7 @@ def moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> Fil
         )
     found = _places_of(lines, places)
     left_over = []
-    for row in rows:
+    for row in rows_for_students(rows):
         place = _place_of(row, found)
         if place is None:
             left_over.append(row.who)
@@ -73,10 +77,8 @@ def moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> Fil
         # What waits leaves standing what somebody wrote.
         if feedback is not None and (row.grade is not None or row.refused or not line[feedback]):
             line[feedback] = safe_cell(_feedback(row))
-    stream = io.StringIO()
     ending = "\r\n" if first.endswith("\r") else "\n"
-    csv.writer(stream, delimiter=separator, lineterminator=ending).writerows(lines)
-    return FilledIn(mark + stream.getvalue(), tuple(left_over))
+    return FilledIn(mark + rows_as_given(lines, separator, ending), tuple(left_over))
 
 
 @packed("moodle-feedback", ".zip")
@@ -104,7 +106,7 @@ def _marks(row: TableRow[GradebookView]) -> str:
 
 def _feedback(row: TableRow[GradebookView]) -> str:
     told = [] if row.grade is None else row.grade.shown.criteria
-    lines = [f"{each.title}: {number(each.marks)} of {number(each.max_marks)}. {each.message}" for each in told]
+    lines = [f"{each.title}: {_share(each)}. {each.message}" for each in told]
     lines += [f"Note: {note}" for note in row.grade.shown.notes[:20]] if row.grade is not None else []
     if row.reason:
         lines.insert(0, row.reason if row.grade is not None else f"Not graded: {row.reason}")
@@ -113,6 +115,10 @@ def _feedback(row: TableRow[GradebookView]) -> str:
         diagnosis = diagnose(row.grade.shown)
         first = [*comments_of(row.grade.shown), diagnosis.cause, diagnosis.next_step, *diagnosis.further]
     return one_line(" ".join([*first, "; ".join(lines)]), _LONGEST)
+
+
+def _share(result: CriterionResult) -> str:
+    return "excused" if result.excused else f"{number(result.marks)} of {number(result.max_marks)}"
 
 
 def _places_of(lines: Sequence[Sequence[str]], places: Mapping[str, int]) -> dict[tuple[str, str], int]:

@@ -24,6 +24,9 @@ from PIL import Image
 from service.reports.plots.plot import DPI
 from service.reports.readable import one_line
 
+# A file called matplotlibrc in the folder that a command is started in changes no plot.
+matplotlib.rcParams.update({name: value for name, value in matplotlib.rcParamsDefault.items() if "backend" not in name})
+
 #: Inches. A phone shows it 390 pixels wide, on which the smallest type is 11 pixels high.
 WIDTH = 3.9
 _SMALLEST = 8.0  # points

@@ -17,8 +17,16 @@ from sqlalchemy.orm import Session
 
 from service.store.batches.batches import standing_in
 from service.store.courses.hidden_names import HiddenNames
-from service.store.grades import overrides
-from service.store.models import AssignmentVersion, CriterionResultRow, Enrolment, Job, Person, SubmissionRow, TrialRow
+from service.store.grades import current, overrides
+from service.store.models import (
+    AssignmentVersion,
+    Batch,
+    CriterionResultRow,
+    Enrolment,
+    Job,
+    SubmissionRow,
+    TrialRow,
+)
 from service.store.states import JobState
 from submissions.people import Refusal
 
@@ -50,6 +58,8 @@ class TableLine:
     sha256: str
     seconds: float | None  # from its begin to its marks, where it was run
     published_at: datetime | None
+    elsewhere: bool  # submitted in another batch than the table's
+    newer_attempt: int | None  # the newest attempt after it that is not graded or over a limit
 
     @property
     def share(self) -> Decimal:
@@ -110,7 +120,7 @@ def table_lines(session: Session, batch_id: str, refusals: Sequence[Refusal], hi
             Job.id,
             Job.submission_id,
             Enrolment.student,
-            Person.name,
+            Enrolment.name,
             SubmissionRow.source,
             SubmissionRow.assignment,
             Job.state,
@@ -126,14 +136,16 @@ def table_lines(session: Session, batch_id: str, refusals: Sequence[Refusal], hi
             Job.started_at,
             Job.graded_at,
             Job.published_at,
+            SubmissionRow.batch_id,
+            current.newer_attempt(),
         )
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
-        .join(Person, Enrolment.person_id == Person.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
         .where(*standing_in(session, batch_id))
     )
-    lines = [_line(tuple(row), hidden) for row in session.execute(query)]
+    is_regrade = session.scalar(select(Batch.regrade_of).where(Batch.id == batch_id)) is not None
+    lines = [_line(tuple(row), None if is_regrade else batch_id, hidden) for row in session.execute(query)]
     lines += [_refused(refusal) for refusal in refusals]
     return sorted(lines, key=_by_student)
 
@@ -169,9 +181,9 @@ def remarked(session: Session, lines: Sequence[TableLine]) -> dict[str, Remarked
     return {job_id: Remarked(unjudged.get(job_id, 0), surprises.get(job_id, 0)) for job_id in {*unjudged, *surprises}}
 
 
-def _line(row: tuple[Any, ...], hidden: HiddenNames) -> TableLine:
+def _line(row: tuple[Any, ...], own_batch: str | None, hidden: HiddenNames) -> TableLine:
     (job_id, submission_id, student, name, source, assignment, state, verdict, marks, max_marks, error, *rest) = row
-    suspect, staff_only, days_late, attempt, sha256, started_at, graded_at, published_at = rest
+    suspect, staff_only, days_late, attempt, sha256, started_at, graded_at, published_at, batch_id, newer = rest
     nameless = assignment in hidden.assignments
     took: timedelta | None = None if started_at is None or graded_at is None else graded_at - started_at
     return TableLine(
@@ -193,6 +205,8 @@ def _line(row: tuple[Any, ...], hidden: HiddenNames) -> TableLine:
         sha256=sha256,
         seconds=None if took is None else took.total_seconds(),
         published_at=published_at,
+        elsewhere=own_batch is not None and batch_id != own_batch,
+        newer_attempt=newer,
     )
 
 
@@ -216,6 +230,8 @@ def _refused(refusal: Refusal) -> TableLine:
         sha256="",
         seconds=None,
         published_at=None,
+        elsewhere=False,
+        newer_attempt=None,
     )
 
 

@@ -1,6 +1,7 @@
 """What an instructor asks about batches and jobs: how far, what marks, what went wrong. Only reads.
 
-Of several attempts of a student in one batch the newest counts that is over no limit; the others are told elsewhere.
+A batch has a row for each student who submitted in it. The row shows the attempt that counts, which may be in another
+batch (``service.store.grades.current``).
 """
 
 from __future__ import annotations
@@ -12,18 +13,17 @@ from decimal import Decimal
 from typing import Any
 
 from sqlalchemy import ColumnElement, Row, Select, and_, case, func, or_, select, tuple_
-from sqlalchemy.orm import InstrumentedAttribute, Session
+from sqlalchemy.orm import InstrumentedAttribute, Session, aliased
 
 from service.store.codec import decode
-from service.store.courses.hidden_names import HiddenNames
-from service.store.grades import overrides
+from service.store.courses.hidden_names import NAMED, HiddenNames
+from service.store.grades import current, overrides
 from service.store.models import (
     AssignmentVersion,
     Batch,
     CriterionResultRow,
     Enrolment,
     Job,
-    Person,
     SubmissionRow,
     TrialRow,
 )
@@ -33,10 +33,10 @@ from sim.errors import UsageError
 from submissions.nearest import did_you_mean
 from submissions.people import Refusal
 
-#: What is read of each job; the last three count.
+#: What is read of each job.
 _Asked = tuple[
-    Job, str, str, str | None, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None,
-    int | None,
+    Job, str, str, str, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None,
+    int | None, str | None, int | None,
 ]  # fmt: skip
 _MOST_LISTED = 50
 #: The newest of which one may have been meant by an id that there is not.
@@ -58,7 +58,7 @@ class JobLine:
     verdict: str | None
     marks: Decimal | None
     max_marks: Decimal
-    accuracy: float | None  # of the first criterion that classifies
+    accuracy: float | None  # of the first criterion that classifies and is not excused
     attempt: int  # the student's
     error: str | None
     plots: PlotState
@@ -76,6 +76,8 @@ class JobLine:
     surprises: int  # trials in which our own code stumbled over what a child sent
     days_late: int
     published_at: datetime | None
+    batch_id: str | None  # in which it was submitted
+    newer_attempt: int | None  # the newest attempt after it that is not graded or over a limit
 
     @property
     def ended(self) -> bool:
@@ -145,10 +147,7 @@ def job_before(session: Session, job_id: str) -> str:
             SubmissionRow.enrolment_id == mine.enrolment_id,
             SubmissionRow.assignment == mine.assignment,
             SubmissionRow.attempt < mine.attempt,
-            SubmissionRow.staff_only.is_(None),
-            Job.state == JobState.DONE,
-            Job.standing == Standing.STANDS,
-            Job.suspect.is_(None),
+            *current.CAN_COUNT,
         )
         .order_by(SubmissionRow.attempt.desc())
         .limit(1)
@@ -199,21 +198,20 @@ def submissions_in(session: Session, batch_id: str) -> Select[int]:
 
 
 def counting(batch_ids: Sequence[str]) -> Select[int]:
-    """The submissions of some batches that count: of each student and assignment in each the newest over no limit."""
-    return _newest(SubmissionRow.batch_id.in_(batch_ids), SubmissionRow.batch_id)
+    """The submissions that rows of some batches show: of each student and assignment in them the current attempt."""
+    return current.shown(current.attempted_in(select(Batch.id).where(Batch.id.in_(batch_ids))))
 
 
-def _newest(which: ColumnElement[bool], *apart: InstrumentedAttribute[Any]) -> Select[int]:
-    attempts = (*apart, SubmissionRow.enrolment_id, SubmissionRow.assignment)
-    order = (SubmissionRow.staff_only.is_not(None), SubmissionRow.attempt.desc())
-    place = func.row_number().over(partition_by=attempts, order_by=order).label("place")
-    ranked = select(SubmissionRow.id, place).where(which).subquery()
-    return select(ranked.c.id).where(ranked.c.place == 1)
+def job_lines(session: Session, batch_id: str, hidden: HiddenNames = NAMED) -> list[JobLine]:
+    """The job that stands for each submission of a batch, by student as shown; of a batch of regrades its own jobs."""
+    query = _job_lines().where(*standing_in(session, batch_id)).order_by(Enrolment.student, Job.id)
+    lines = _under_their_names_in(session, batch_id, [_line(row) for row in session.execute(query)])
+    return _by_shown_names(lines, hidden)
 
 
-def job_lines(session: Session, batch_id: str) -> list[JobLine]:
-    """The job that stands for each submission of a batch, by student; of a batch of regrades its own jobs."""
-    query = _job_lines().where(*standing_in(session, batch_id))
+def attempt_lines(session: Session, batch_id: str) -> list[JobLine]:
+    """The job that stands for each submission that came with a batch, whether it counts or not."""
+    query = _job_lines().where(SubmissionRow.batch_id == batch_id, Job.standing == Standing.STANDS)
     return [_line(row) for row in session.execute(query.order_by(Enrolment.student, Job.id))]
 
 
@@ -232,15 +230,18 @@ def some_job_lines(
             .where(Job.id == after)
         )
         query = query.where(tuple_(student, Job.id) > tuple_(own.correlate(None).scalar_subquery(), after))
-    return [_line(row).hidden_by(hidden) for row in session.execute(query)]
+    lines = _under_their_names_in(session, batch_id, [_line(row) for row in session.execute(query)])
+    return [line.hidden_by(hidden) for line in lines]
 
 
-def course_lines(session: Session, course_id: int, assignments: Sequence[str]) -> list[JobLine]:
+def course_lines(
+    session: Session, course_id: int, assignments: Sequence[str], hidden: HiddenNames = NAMED
+) -> list[JobLine]:
     """The same of each student of a course for some assignments, in whichever batch it is or in none."""
     students = select(Enrolment.id).where(Enrolment.course_id == course_id, Enrolment.role == Role.STUDENT)
-    ids = _newest(and_(SubmissionRow.assignment.in_(assignments), SubmissionRow.enrolment_id.in_(students)))
+    ids = current.shown(SubmissionRow.assignment.in_(assignments), SubmissionRow.enrolment_id.in_(students))
     query = _job_lines().where(Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
-    return [_line(row) for row in session.execute(query.order_by(Enrolment.student, Job.id))]
+    return _by_shown_names([_line(row) for row in session.execute(query.order_by(Enrolment.student, Job.id))], hidden)
 
 
 def job_line(session: Session, job_id: str) -> JobLine:
@@ -277,12 +278,21 @@ def _batch_lines(session: Session, rows: Sequence[Batch]) -> list[BatchLine]:
     for batch_id, state, count in session.execute(counted.group_by(Job.batch_id, Job.state)):
         states[batch_id][state] = count
     if of_the_web:
+        member = aliased(SubmissionRow)
         attempts = (
-            select(SubmissionRow.batch_id, Job.state, func.count())
+            select(member.batch_id, Job.state, func.count(SubmissionRow.id.distinct()))
             .join(Job, Job.submission_id == SubmissionRow.id)
+            .join(
+                member,
+                and_(
+                    member.enrolment_id == SubmissionRow.enrolment_id,
+                    member.assignment == SubmissionRow.assignment,
+                    member.batch_id.in_(list(of_the_web)),
+                ),
+            )
             .where(Job.submission_id.in_(counting(list(of_the_web))), Job.standing == Standing.STANDS)
         )
-        for batch_id, state, count in session.execute(attempts.group_by(SubmissionRow.batch_id, Job.state)):
+        for batch_id, state, count in session.execute(attempts.group_by(member.batch_id, Job.state)):
             states[batch_id][state] = count
     return [
         BatchLine(
@@ -314,8 +324,8 @@ def _find(session: Session, column: InstrumentedAttribute[str], newest: Any, sta
 def _job_lines() -> Select[*_Asked]:
     accuracy = (
         select(CriterionResultRow.accuracy)
-        .where(CriterionResultRow.job_id == Job.id, CriterionResultRow.accuracy.is_not(None))
-        .order_by(CriterionResultRow.position)
+        .where(CriterionResultRow.job_id == Job.id, CriterionResultRow.accuracy.is_not(None), ~overrides.is_excused())
+        .order_by(CriterionResultRow.max_marks == 0, CriterionResultRow.position)
         .limit(1)
         .scalar_subquery()
     )
@@ -334,8 +344,8 @@ def _job_lines() -> Select[*_Asked]:
         select(
             Job,
             Enrolment.student,
-            Person.name,
-            Person.email,
+            Enrolment.name,
+            Enrolment.email,
             SubmissionRow.source,
             AssignmentVersion,
             SubmissionRow.attempt,
@@ -345,23 +355,24 @@ def _job_lines() -> Select[*_Asked]:
             unjudged,
             by_hand,
             surprises,
+            SubmissionRow.batch_id,
+            current.newer_attempt(),
         )
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
-        .join(Person, Enrolment.person_id == Person.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
     )
 
 
 def _line(row: Row[*_Asked]) -> JobLine:
-    job, student, name, email, source, version, attempt, accuracy, staff_only, days_late, *counts = row
-    unjudged, by_hand, surprises = counts
+    job, student, name, email, source, version, attempt, accuracy, staff_only, days_late = row[:10]
+    unjudged, by_hand, surprises, batch_id, newer_attempt = row[10:]
     return JobLine(
         id=job.id,
         submission_id=job.submission_id,
         student=student,
         name=name,
-        email=email or "",
+        email=email,
         source=source,
         assignment=version.assignment,
         state=job.state,
@@ -386,4 +397,30 @@ def _line(row: Row[*_Asked]) -> JobLine:
         surprises=surprises or 0,
         days_late=days_late,
         published_at=job.published_at,
+        batch_id=batch_id,
+        newer_attempt=newer_attempt,
     )
+
+
+def _by_shown_names(lines: list[JobLine], names: HiddenNames) -> list[JobLine]:
+    """The lines as instructors see them: their order, and what is counted in it, tells nothing of hidden names."""
+    if not names.assignments:
+        return lines
+    return sorted((line.hidden_by(names) for line in lines), key=lambda line: (line.student, line.id))
+
+
+def _under_their_names_in(session: Session, batch_id: str, lines: list[JobLine]) -> list[JobLine]:
+    """The lines with the names that the students' submissions came under in this batch.
+
+    By these the system that a batch was downloaded from knows its rows again, whatever else was submitted since.
+    """
+    if all(line.batch_id == batch_id for line in lines):
+        return lines
+    query = (
+        select(Enrolment.student, SubmissionRow.assignment, SubmissionRow.source)
+        .join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
+        .where(SubmissionRow.batch_id == batch_id)
+        .order_by(SubmissionRow.attempt)
+    )
+    sources = {(student, assignment): source for student, assignment, source in session.execute(query)}
+    return [replace(line, source=sources.get((line.student, line.assignment), line.source)) for line in lines]

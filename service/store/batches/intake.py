@@ -10,26 +10,29 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import TYPE_CHECKING, TypeVar
 
-from sqlalchemy import func, or_, select
+from sqlalchemy import ColumnElement, delete, func, or_, select
 from sqlalchemy.orm import Session
 
 from service.store import outbox
 from service.store.codec import encode
 from service.store.courses.policies import Ruling, rule
 from service.store.courses.versions import Frozen, assignment_from_bytes, freeze, keep
-from service.store.engine import Store, now
+from service.store.engine import Store, now, retry_conflicts
 from service.store.grades import result_cache
 from service.store.ids import new_id
 from service.store.installation import secret_of
+from service.store.locks import lock_jobs
 from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
 from service.store.people.students import DEFAULT_COURSE, Students, course_of
 from service.store.queue import jobs
 from service.store.states import BatchState, JobState, Lane, Standing
+from service.store.web_tables import Comment
 from service.version import grader_sha256
 from sim.errors import HostError, UsageError
 from submissions.grading_request import GradingRequest
 from submissions.packed import pack_submission, unpack_submission
 from submissions.people import Refusal
+from submissions.raw_files import MEGABYTE
 from submissions.submission import Submission
 
 if TYPE_CHECKING:
@@ -45,6 +48,7 @@ class Accepted:
     job_id: str
     submission_id: int
     student: str
+    assignment: str
     attempt: int
     copied_from: str | None = None  # the identical grade that it has already
     staff_only: str = ""  # the limit that it is over
@@ -66,6 +70,7 @@ class AlreadySubmitted:
     job_id: str
     batch_id: str | None
     student: str
+    assignment: str
     state: JobState
     other_grader: bool = False  # graded by another version than this
 
@@ -79,6 +84,7 @@ class AcceptedNew:
     refused: tuple[Refusal, ...] = ()
 
 
+@retry_conflicts
 def accept(
     store: Store,
     grading_request: GradingRequest,
@@ -87,10 +93,15 @@ def accept(
     max_attempts: int,
     lane: Lane = Lane.INTERACTIVE,
     batch_id: str | None = None,
+    most_bytes: int | None = None,
+    enrolment_id: int | None = None,
 ) -> Accepted:
     """Take in one submission that a person waits for; where an identical one has a grade, it has that grade at once.
 
-    It is submitted now, unless it says when. Raises UsageError where its student cannot be told from another.
+    It is submitted now, unless it says when. ``most_bytes`` is given where students submit themselves: what they have
+    for the assignment may be so much in all, and of submissions over a limit the newest is kept, ungraded until staff
+    ask for it. With ``enrolment_id`` the student has to be enrolled, as which they are signed in. Raises UsageError
+    where its student cannot be told from another, has too much here, or is not enrolled any more.
     """
     (packed,) = _pack([grading_request])
     secret = secret_of(store).sha256
@@ -99,11 +110,16 @@ def accept(
         packed = replace(
             packed, grading_request=replace(grading_request, submitted_at=grading_request.submitted_at or at)
         )
-        terms = _Terms(course_of(session, course, at), lane, max_attempts, at, secret, batch_id)
-        enrolment_id = Students(session, terms.course_id).enrol(grading_request.student, at)
+        terms = _Terms(course_of(session, course, at), lane, max_attempts, at, secret, batch_id, most_bytes=most_bytes)
+        students = Students(session, terms.course_id)
+        if enrolment_id is None:
+            enrolment_id = students.enrol(grading_request.student, at)
+        elif not students.is_enrolled(enrolment_id, grading_request.student):
+            raise UsageError("you are not a student of this course any more; nothing was submitted.")
         return _accept(session, _Item(packed, enrolment_id), terms)
 
 
+@retry_conflicts
 def accept_batch(
     store: Store,
     name: str,
@@ -112,10 +128,12 @@ def accept_batch(
     *,
     course: str = DEFAULT_COURSE,
     max_attempts: int,
+    record: Callable[[Session, AcceptedNew], None] | None = None,
 ) -> AcceptedBatch:
     """Take in a whole batch or nothing of it, each submission to be graded anew whatever was submitted before.
 
-    ``refusals`` were made when it was read. Raises UsageError when the course refuses the rest.
+    ``refusals`` were made when it was read. ``record`` is called in the same transaction with what was taken in.
+    Raises UsageError when the course refuses the rest.
     """
     packed = _pack(grading_requests)
     secret = secret_of(store).sha256
@@ -125,9 +143,13 @@ def accept_batch(
         items, refused = _enrolled(session, packed, terms)
         if refused and not items:
             raise UsageError(f"none can be taken in; {refused[0].source}: {refused[0].reason}")
-        return replace(_accept_batch(session, items, name, [*refusals, *refused], terms), refused=refused)
+        made = replace(_accept_batch(session, items, name, [*refusals, *refused], terms), refused=refused)
+        if record is not None:
+            record(session, AcceptedNew(made, (), refused))
+        return made
 
 
+@retry_conflicts
 def accept_new(
     store: Store,
     name: str,
@@ -136,12 +158,13 @@ def accept_new(
     *,
     course: str = DEFAULT_COURSE,
     max_attempts: int,
+    record: Callable[[Session, AcceptedNew], None] | None = None,
 ) -> AcceptedNew:
     """Take in what is new of a batch, so that submitting the same batch twice changes nothing.
 
     Not new is what has the bytes of the student's newest submission and is marked against the same version of the
     assignment; but for what was cancelled, which comes in again. What is new and identical to a submission with a grade
-    has that grade at once.
+    has that grade at once. ``record`` is called in the same transaction where a batch is made.
     """
     packed = _pack(grading_requests)
     secret = secret_of(store).sha256
@@ -155,7 +178,10 @@ def accept_new(
         ]
         new = [item for item, known in zip(items, found, strict=True) if known is None]
         batch = _accept_batch(session, new, name, [*refusals, *refused], terms) if new else None
-        return AcceptedNew(batch, tuple(known for known in found if known is not None), refused)
+        accepted = AcceptedNew(batch, tuple(known for known in found if known is not None), refused)
+        if record is not None and batch is not None:
+            record(session, accepted)
+        return accepted
 
 
 def load_grading_request(session: Session, job_id: str) -> GradingRequest:
@@ -218,6 +244,7 @@ class _Terms:
     secret_sha256: str
     batch_id: str | None = None
     anew: bool = False
+    most_bytes: int | None = None  # that one student may have for an assignment; None where staff submit
 
 
 def _pack(grading_requests: Sequence[GradingRequest]) -> list[_Packed]:
@@ -279,7 +306,8 @@ def already_submitted(
     if job is None:
         return None
     other_grader = job.state is JobState.DONE and job.grader_sha256 not in (None, grader_sha256())
-    return AlreadySubmitted(job.id, job.batch_id, grading_request.submission.student, job.state, other_grader)
+    student, assignment = grading_request.submission.student, newest.assignment
+    return AlreadySubmitted(job.id, job.batch_id, student, assignment, job.state, other_grader)
 
 
 def _accept_batch(
@@ -289,7 +317,11 @@ def _accept_batch(
     session.add(batch)
     session.flush()
     terms = replace(terms, batch_id=batch.id)
-    accepted = AcceptedBatch(batch.id, tuple(_accept(session, item, terms) for item in items))
+    # Students are numbered as the batch names them; numbers of submissions in another order do not tell whose each is.
+    first = {item.enrolment_id: item.packed.grading_request.submission.sha256 for item in reversed(items)}
+    order = sorted(range(len(items)), key=lambda number: first[items[number].enrolment_id])
+    taken = {number: _accept(session, items[number], terms) for number in order}
+    accepted = AcceptedBatch(batch.id, tuple(taken[number] for number in range(len(items))))
     outbox.batch_ended(session, batch.id)
     return accepted
 
@@ -301,9 +333,17 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
     version_id = keep(session, packed.frozen, at)
     of_student = (SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment == assignment.id)
     earlier = session.scalar(select(func.max(SubmissionRow.attempt)).where(*of_student)) or 0
+    # A claim skips locked jobs: none begins between the ruling, which counts only begun ones, and being superseded.
+    waiting = (Job.state == JobState.QUEUED, Job.submission_id.in_(select(SubmissionRow.id).where(*of_student)))
+    lock_jobs(session, *waiting)
     ruling = Ruling()
     if not terms.anew:
         ruling = rule(session, enrolment_id, assignment.id, submission.sha256, grading_request.submitted_at)
+    put_aside = bool(ruling.over) and terms.most_bytes is not None
+    if put_aside:
+        _forget_put_aside(session, of_student)
+    if terms.most_bytes is not None:
+        _check_quota(session, of_student, len(packed.data), terms.most_bytes)
     job_id = new_id()
     if not ruling.over:
         jobs.supersede(session, select(SubmissionRow.id).where(*of_student), job_id, at)
@@ -335,11 +375,41 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
         forced=terms.anew,
     )
     jobs.enqueue(session, job, at)
+    if put_aside:
+        jobs.put_aside(session, job_id, at)
     source = (
         None
-        if terms.anew
+        if terms.anew or put_aside
         else result_cache.find(session, result_cache.cache_key(session, job_id, grader_sha256(), terms.secret_sha256))
     )
     if source is not None:
         jobs.copy(session, job_id, source, at)
-    return Accepted(job_id, row.id, submission.student, row.attempt, source, ruling.over)
+    return Accepted(job_id, row.id, submission.student, assignment.id, row.attempt, source, ruling.over)
+
+
+def _forget_put_aside(session: Session, of_student: tuple[ColumnElement[bool], ...]) -> None:
+    """Remove the earlier submissions over a limit that nobody has asked for: only the newest is kept.
+
+    Those that have a comment are kept, too.
+    """
+    own = select(SubmissionRow.id).where(*of_student, SubmissionRow.staff_only.is_not(None))
+    waiting = (Job.submission_id.in_(own), Job.state == JobState.CANCELLED, Job.error == jobs.OVER_A_LIMIT)
+    gone = session.scalars(select(Job.submission_id).where(*waiting)).all()
+    # What was graded before, and was asked for again, has other jobs.
+    others = select(Job.submission_id).where(Job.submission_id.in_(gone), Job.error.is_distinct_from(jobs.OVER_A_LIMIT))
+    kept = set(session.scalars(others))
+    kept.update(session.scalars(select(Comment.submission_id).where(Comment.submission_id.in_(gone))))
+    ids = [each for each in gone if each not in kept]
+    session.execute(delete(Job).where(Job.submission_id.in_(ids)))
+    session.execute(delete(SubmissionRow).where(SubmissionRow.id.in_(ids)))
+
+
+def _check_quota(session: Session, of_student: tuple[ColumnElement[bool], ...], size: int, most: int) -> None:
+    used = session.scalar(select(func.coalesce(func.sum(SubmissionRow.size), 0)).where(*of_student)) or 0
+    if used + size > most:
+        raise UsageError(
+            "your submissions to this assignment would have %(size)s MB, expected at most %(most)s MB in all; "
+            "leave out files that are not needed, or ask your instructor.",
+            size=-(-(used + size) // MEGABYTE),
+            most=most // MEGABYTE,
+        )

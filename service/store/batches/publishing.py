@@ -1,23 +1,22 @@
 """Grades that are let stand and released to students: of a batch, or of one submission.
 
 The newest regrade takes the place of what stood; what may not be seen, or was not judged, is held back and counted.
-What would be done can be asked first.
+What would be done can be asked first. ``service.operations.regrades`` owns the transactions.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from sqlalchemy import Select, select
 from sqlalchemy.orm import Session
 
-from service.store import audit, outbox
-from service.store.engine import Store, now
+from service.store.engine import now
 from service.store.grades import overrides
-from service.store.models import Batch, CriterionResultRow, Enrolment, Job, SubmissionRow
+from service.store.locks import lock_jobs, lock_submissions
+from service.store.models import CriterionResultRow, Job, SubmissionRow
 from service.store.states import UNFINISHED, JobState, Standing
-from sim.errors import UsageError
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,35 +39,18 @@ class Publication:
     students: int
 
 
-def publish(store: Store, batch_id: str, *, actor: str, anyway: bool = False) -> Published:
+def publish(session: Session, batch_id: str, *, actor: str, anyway: bool = False) -> Published:
     """Let the newest regrade of each submission of the batch stand, and publish every grade that then stands.
 
     One that is suspect, of a submission over a limit, or with a criterion that could not be judged is not published,
-    the last unless ``anyway``. Raises UsageError for an unknown batch.
+    the last unless ``anyway``.
     """
-    with store.transaction() as session:
-        if session.get(Batch, batch_id) is None:
-            raise UsageError(f"there is no batch {batch_id}")
-        result = _publish(session, _of_batch(batch_id), actor=actor, anyway=anyway)
-        audit.note(session, actor, "publish", "batch", batch_id, **_worth_noting(result))
-        if result.published:
-            course_id = session.get_one(Batch, batch_id).course_id
-            outbox.grades_published(session, course_id, batch=batch_id, published=result.published)
-        return result
+    return _publish(session, _of_batch(batch_id), actor=actor, anyway=anyway)
 
 
-def publish_one(store: Store, job_id: str, *, actor: str, anyway: bool = False) -> Published:
-    """The same for the submission of one job alone. Raises UsageError for an unknown job."""
-    with store.transaction() as session:
-        if session.get(Job, job_id) is None:
-            raise UsageError(f"there is no grade {job_id}")
-        ids = select(Job.submission_id).where(Job.id == job_id)
-        result = _publish(session, ids, actor=actor, anyway=anyway)
-        audit.note(session, actor, "publish", "job", job_id, **_worth_noting(result))
-        if result.published:
-            course_id = session.get_one(Enrolment, session.get_one(Job, job_id).enrolment_id).course_id
-            outbox.grades_published(session, course_id, grade=job_id, published=result.published)
-        return result
+def publish_one(session: Session, job_id: str, *, actor: str, anyway: bool = False) -> Published:
+    """The same for the submission of one job alone."""
+    return _publish(session, select(Job.submission_id).where(Job.id == job_id), actor=actor, anyway=anyway)
 
 
 def would_publish(session: Session, batch_id: str) -> Publication:
@@ -101,9 +83,15 @@ def _of_batch(batch_id: str) -> Select[int]:
 
 def _publish(session: Session, ids: Select[int], *, actor: str, anyway: bool) -> Published:
     at = now(session)
-    plan = _plan(session, session.scalars(_gradings(ids).with_for_update()).all(), ids, anyway=anyway)
+    lock_submissions(session, SubmissionRow.id.in_(ids))
+    lock_jobs(session, Job.submission_id.in_(ids))
+    # Jobs that were read before they were locked may have changed since.
+    gradings = session.scalars(_gradings(ids).execution_options(populate_existing=True)).all()
+    plan = _plan(session, gradings, ids, anyway=anyway)
     for job in plan.outdated:
         job.standing = Standing.KEPT
+    # The database refuses a second job that stands, also within a transaction.
+    session.flush()
     for job in plan.standing:
         job.standing = Standing.STANDS
     for job in plan.released:
@@ -146,18 +134,19 @@ def _plan(session: Session, gradings: Sequence[Job], ids: Select[int], *, anyway
 def _stands(jobs: Sequence[Job], unjudged: Set[str]) -> tuple[Job | None, list[Job]]:
     """The grade of one submission that stands from now on, and those that give way to it.
 
-    What is older than the newest regrade gives way to it; one not graded yet, or ``unjudged``, stays a proposal.
+    The newest regrade replaces the job that stands, whatever the age of that, and every older proposal. One not graded
+    yet, or ``unjudged``, stays a proposal.
     """
     done = [job for job in jobs if job.state is JobState.DONE and job.suspect is None and job.id not in unjudged]
     proposed = [job for job in done if job.standing is Standing.PROPOSED]
     if not proposed:
         return next((job for job in done if job.standing is Standing.STANDS), None), []
     newest = proposed[-1]
-    return newest, [job for job in jobs if job is not newest and job.queued_at <= newest.queued_at]
-
-
-def _worth_noting(result: Published) -> dict[str, int]:
-    return {name: count for name, count in asdict(result).items() if count or name in ("published", "replaced")}
+    return newest, [
+        job
+        for job in jobs
+        if job is not newest and (job.standing is Standing.STANDS or job.queued_at <= newest.queued_at)
+    ]
 
 
 def _unjudged(session: Session, ids: Select[int]) -> set[str]:

@@ -16,6 +16,7 @@ from service.grading.ranks import RankTable, StudentMeasures, ranked
 from service.store.batches.batches import JobLine
 from service.store.codec import decode
 from service.store.courses.versions import assignment_from_bytes
+from service.store.grades import overrides
 from service.store.models import AssignmentVersion, CriterionResultRow, Job
 from service.store.states import JobState
 
@@ -27,7 +28,7 @@ _AT_ONCE = 1000
 
 
 def rank_tables(session: Session, lines: Sequence[JobLine]) -> list[RankTable]:
-    """What is ranked among these jobs, over all that are graded and not for staff alone."""
+    """What is ranked among these jobs, over all that are graded, not excused, and not for staff alone."""
     graded = [line for line in lines if line.state is JobState.DONE and line.staff_only is None]
     asked: dict[tuple[str, str], Ranking] = {}
     for content in _contents(session, graded):
@@ -68,7 +69,11 @@ def _table(session: Session, assignment: str, ranking: Ranking, lines: Sequence[
                 CriterionResultRow.job_id.in_(jobs), CriterionResultRow.criterion == ranking.id
             )
         )
+        by_hand = overrides.of_jobs(session, list(jobs))
         for job_id, kept in rows:
+            override = by_hand.get(job_id, {}).get(ranking.id)
+            if override is not None and override.marks is None:
+                continue
             evidence = decode(tuple[Evidence, ...], kept)
             found = [measure for each in evidence for measure in each.measures if measure.name == ranking.measure]
             unit = next((measure.unit for measure in found), unit)

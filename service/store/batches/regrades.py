@@ -1,6 +1,7 @@
 """Batches graded again after an assignment or the grader changed: what changes, and why.
 
 The old grades stay and stand until somebody publishes the new ones (``publishing.py``). Nothing is graded here.
+``service.operations.regrades`` owns the transactions.
 """
 
 from __future__ import annotations
@@ -9,24 +10,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from decimal import Decimal
-from typing import TYPE_CHECKING
 
 from sqlalchemy import case, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
-from service.store import audit
 from service.store.batches import batches
-from service.store.courses.versions import freeze, keep
-from service.store.engine import Store, now
+from service.store.courses.hidden_names import HiddenNames
+from service.store.courses.versions import Frozen, keep
+from service.store.engine import now
 from service.store.grades import overrides
 from service.store.grades.overrides import CriterionMarks
-from service.store.models import AssignmentVersion, Batch, Enrolment, Job, TrialRow
+from service.store.models import AssignmentVersion, Batch, Enrolment, Job, SubmissionRow, TrialRow
 from service.store.queue.jobs import enqueue
 from service.store.states import UNFINISHED, JobState, Lane, Standing
 from sim.errors import UsageError
-
-if TYPE_CHECKING:
-    from submissions.assignment.definition import Assignment
 
 _CHANGES_A_PAGE = 50
 
@@ -100,65 +97,53 @@ class ChangesPage:
     pages: int
 
 
-def regrade(store: Store, batch_id: str, assignment: Assignment | None, *, max_attempts: int, actor: str) -> Regraded:
+def regrade(session: Session, original: Batch, frozen: Frozen | None, *, max_attempts: int) -> Regraded:
     """Queue every submission of the batch that has a grade, or could not be given one, to be graded again.
 
-    Against ``assignment``, or without it the version that each was graded against. The grades that stand are not
+    Against ``frozen``, or without it the version that each was graded against. The grades that stand are not
     touched. Raises UsageError when there is nothing to grade again.
     """
-    frozen = None if assignment is None else freeze(assignment)
-    with store.transaction() as session:
-        at = now(session)
-        original = session.get(Batch, batch_id)
-        if original is None:
-            raise UsageError(f"there is no batch {batch_id}")
-        standing = _standing(session, batch_id)
-        ended = [row for row in standing if row[0].state in (JobState.DONE, JobState.DEAD)]
-        wanted = [job for job, name in ended if frozen is None or name == frozen.assignment.id]
-        unfinished = sum(job.state in UNFINISHED for job, _ in standing)
-        if not wanted:
-            raise UsageError(_nothing(batch_id, assignment, {name for _, name in standing}, unfinished))
-        version_id = None if frozen is None else keep(session, frozen, at)
-        batch = Batch(
-            course_id=original.course_id,
-            name=f"regrade of {original.name}",
-            refusals=[],
-            regrade_of=original.id,
-            created_at=at,
-        )
-        session.add(batch)
-        session.flush()
-        for job in wanted:
-            enqueue(session, _proposal(job, version_id, batch.id, Lane.BATCH, max_attempts), at)
-        audit.note(session, actor, "regrade", "batch", batch_id, as_batch=batch.id, grades=len(wanted))
-        return Regraded(batch.id, len(wanted), len(ended) - len(wanted), unfinished)
+    at = now(session)
+    standing = _standing(session, original.id)
+    ended = [row for row in standing if row[0].state in (JobState.DONE, JobState.DEAD)]
+    wanted = [job for job, name in ended if frozen is None or name == frozen.assignment.id]
+    unfinished = sum(job.state in UNFINISHED for job, _ in standing)
+    if not wanted:
+        raise UsageError(_nothing(original.id, frozen, {name for _, name in standing}, unfinished))
+    version_id = None if frozen is None else keep(session, frozen, at)
+    batch = Batch(
+        course_id=original.course_id,
+        name=f"regrade of {original.name}",
+        refusals=[],
+        regrade_of=original.id,
+        created_at=at,
+    )
+    session.add(batch)
+    session.flush()
+    for job in wanted:
+        enqueue(session, _proposal(job, version_id, batch.id, Lane.BATCH, max_attempts), at)
+    return Regraded(batch.id, len(wanted), len(ended) - len(wanted), unfinished)
 
 
-def regrade_one(store: Store, job_id: str, assignment: Assignment | None, *, max_attempts: int, actor: str) -> str:
-    """Queue the submission of one grade to be graded again, at once; the id of the job that may take its place.
+def regrade_one(session: Session, asked: Job, frozen: Frozen | None, *, max_attempts: int) -> Job:
+    """Queue the submission of one grade to be graded again, at once; the job that may take its place.
 
-    ``assignment`` as ``regrade`` has it. Raises UsageError where there is no grade yet, or for another assignment.
+    ``frozen`` as ``regrade`` has it. Raises UsageError where there is no grade yet, or for another assignment.
     """
-    frozen = None if assignment is None else freeze(assignment)
-    with store.transaction() as session:
-        at = now(session)
-        asked = session.get(Job, job_id)
-        if asked is None:
-            raise UsageError(f"there is no grade {job_id}")
-        of_submission = (Job.submission_id == asked.submission_id, Job.standing == Standing.STANDS)
-        standing = session.scalars(select(Job).where(*of_submission).order_by(Job.queued_at, Job.id)).all()
-        ended = [job for job in standing if job.state in (JobState.DONE, JobState.DEAD)]
-        if not ended:
-            raise UsageError("this submission is not graded yet")
-        name = session.get_one(AssignmentVersion, ended[-1].assignment_version_id).assignment
-        if frozen is not None and frozen.assignment.id != name:
-            raise UsageError(f"this submission is for {name}, not for {frozen.assignment.id}")
-        version_id = None if frozen is None else keep(session, frozen, at)
-        proposal = _proposal(ended[-1], version_id, None, Lane.INTERACTIVE, max_attempts)
-        enqueue(session, proposal, at)
-        session.flush()
-        audit.note(session, actor, "regrade", "job", ended[-1].id, as_job=proposal.id)
-        return proposal.id
+    at = now(session)
+    of_submission = (Job.submission_id == asked.submission_id, Job.standing == Standing.STANDS)
+    standing = session.scalars(select(Job).where(*of_submission).order_by(Job.queued_at, Job.id)).all()
+    ended = [job for job in standing if job.state in (JobState.DONE, JobState.DEAD)]
+    if not ended:
+        raise UsageError("this submission is not graded yet")
+    name = session.get_one(AssignmentVersion, ended[-1].assignment_version_id).assignment
+    if frozen is not None and frozen.assignment.id != name:
+        raise UsageError(f"this submission is for {name}, not for {frozen.assignment.id}")
+    version_id = None if frozen is None else keep(session, frozen, at)
+    proposal = _proposal(ended[-1], version_id, None, Lane.INTERACTIVE, max_attempts)
+    enqueue(session, proposal, at)
+    session.flush()
+    return proposal
 
 
 def change(session: Session, job_id: str) -> Change | None:
@@ -180,21 +165,28 @@ def gradings(session: Session, submission_id: int) -> list[Grading]:
     ]
 
 
-def changes(session: Session, batch_id: str) -> list[Change]:
-    """What a batch of regrades changes, by student."""
+def changes(session: Session, batch_id: str, hidden: HiddenNames) -> list[Change]:
+    """What a batch of regrades changes, by the students' names as they are shown."""
     before = aliased(Job)
     query = (
-        select(Job, before, Enrolment.student)
+        select(Job, before, Enrolment.student, SubmissionRow.assignment)
         .join(before, Job.regrade_of == before.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
+        .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .where(Job.batch_id == batch_id)
-        .order_by(Enrolment.student, Job.id)
     )
-    return [_change(session, after, earlier, student) for after, earlier, student in session.execute(query)]
+    found = [
+        _change(session, after, earlier, hidden.called(assignment, student))
+        for after, earlier, student, assignment in session.execute(query)
+    ]
+    return sorted(found, key=lambda each: (each.student, each.job_id))
 
 
-def changes_page(session: Session, batch_id: str, page: int) -> ChangesPage:
-    """Some of what a batch of regrades changes: other marks first, then by student."""
+def changes_page(session: Session, batch_id: str, page: int, hidden: HiddenNames) -> ChangesPage:
+    """Some of what a batch of regrades changes: other marks first, then by student.
+
+    Where names are hidden the order is that of the jobs' random ids.
+    """
     before = aliased(Job)
     differ = or_(Job.marks != before.marks, Job.max_marks != before.max_marks, Job.marks.is_(None))
     of_batch = (Job.batch_id == batch_id, Job.suspect.is_(None))
@@ -203,16 +195,21 @@ def changes_page(session: Session, batch_id: str, page: int) -> ChangesPage:
     )
     found, differing = session.execute(joined.where(*of_batch)).one()
     page = min(max(page, 1), max(1, -(-found // _CHANGES_A_PAGE)))
+    shown_order = case((SubmissionRow.assignment.in_(hidden.assignments), ""), else_=Enrolment.student)
     query = (
-        select(Job, before, Enrolment.student)
+        select(Job, before, Enrolment.student, SubmissionRow.assignment)
         .join(before, Job.regrade_of == before.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
+        .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .where(*of_batch)
-        .order_by(case((differ, 0), else_=1), Enrolment.student, Job.id)
+        .order_by(case((differ, 0), else_=1), shown_order, Job.id)
         .limit(_CHANGES_A_PAGE)
         .offset((page - 1) * _CHANGES_A_PAGE)
     )
-    shown = tuple(_change(session, after, earlier, student) for after, earlier, student in session.execute(query))
+    shown = tuple(
+        _change(session, after, earlier, hidden.called(assignment, student))
+        for after, earlier, student, assignment in session.execute(query)
+    )
     return ChangesPage(shown, found, differing, page, max(1, -(-found // _CHANGES_A_PAGE)))
 
 
@@ -227,9 +224,9 @@ def _standing(session: Session, batch_id: str) -> Sequence[tuple[Job, str]]:
     return [(job, name) for job, name in session.execute(query)]
 
 
-def _nothing(batch_id: str, assignment: Assignment | None, found: set[str], unfinished: int) -> str:
-    if assignment is not None and found and assignment.id not in found:
-        return f"batch {batch_id} has no submission for {assignment.id}, only for {', '.join(sorted(found))}"
+def _nothing(batch_id: str, frozen: Frozen | None, found: set[str], unfinished: int) -> str:
+    if frozen is not None and found and frozen.assignment.id not in found:
+        return f"batch {batch_id} has no submission for {frozen.assignment.id}, only for {', '.join(sorted(found))}"
     waits = f": {unfinished} of its submissions are not graded yet" if unfinished else ""
     return f"batch {batch_id} has nothing to grade again{waits}"
 

@@ -8,29 +8,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from sqlalchemy.orm import Session
-
 from service.similarity.behaviour import Behaviour, behaviour_of
 from service.similarity.pairs import Similarity, similarity
 from service.similarity.sources import given_with, sources_of
 from service.similarity.writing import Source, source_of
-from service.store.batches import batches, intake
+from service.store.batches import intake
 from service.store.batches.batches import JobLine
-from service.store.courses.hidden_names import hidden_names
 from service.store.engine import Store
 from service.store.grades import results
 from service.store.states import JobState
-from submissions.seeds import Secret
 
 #: Submissions that are compared while somebody waits for the answer; it takes some seconds.
 MOST_AT_ONCE = 300
-
-
-def newest_of_course(session: Session, course_id: int, batch_id: str, secret: Secret) -> list[JobLine]:
-    """What is compared with a batch: each student's newest submission for its assignments, names hidden as they are."""
-    assignments = sorted({each.assignment for each in batches.job_lines(session, batch_id)})
-    hidden = hidden_names(session, course_id, secret)
-    return [each.hidden_by(hidden) for each in batches.course_lines(session, course_id, assignments)]
 
 
 def similarities(store: Store, lines: Sequence[JobLine], given: Path | None = None) -> list[Similarity]:

@@ -1,5 +1,6 @@
-"""Whose work it is, where whoever marks is not to know: what each student is called instead, the same everywhere.
+"""Labels in place of students' names, for assignments that are marked with names hidden.
 
+A student has one label for each assignment, so that an assignment whose names are shown again tells nothing of others.
 Which assignments are marked so is ``open_assignments.py``'s to say.
 """
 
@@ -22,17 +23,22 @@ _LONG = 6
 
 @dataclass(frozen=True, slots=True)
 class HiddenNames:
-    """The assignments of a course whose students are called by a number of their own."""
+    """The assignments of a course whose students have labels in place of names."""
 
     assignments: frozenset[str]
     key: bytes
 
     def called(self, assignment: str, student: str) -> str:
-        """What the student with this id is called; their id where names are not hidden."""
+        """Return the label of the student with this id; the id itself where names are not hidden."""
         if assignment not in self.assignments:
             return student
-        digest = hmac.new(self.key, student.encode("utf-8", "surrogatepass"), hashlib.sha256).digest()
+        whose = f"{assignment}\n{student}".encode("utf-8", "surrogatepass")
+        digest = hmac.new(self.key, whose, hashlib.sha256).digest()
         return f"Participant {base64.b32encode(digest)[:_LONG].decode('ascii')}"
+
+
+#: For operators and their commands, which show every name.
+NAMED = HiddenNames(frozenset(), b"")
 
 
 def hidden_names_of(store: Store, course_id: int) -> HiddenNames:

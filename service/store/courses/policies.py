@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from datetime import datetime, timedelta
+from datetime import datetime
 from typing import Literal
 
 from sqlalchemy import delete, func, or_, select
 from sqlalchemy.orm import Session
 
+from service.store.courses.local_days import add_days, days_after, local_zone
 from service.store.engine import now
+from service.store.inserting import insert_if_new
 from service.store.models import Enrolment, Extension, Job, Policy, SubmissionRow
 from service.store.states import JobState
 
@@ -29,11 +31,16 @@ class PolicyLimits:
     late_days: int = 0
     attempts: int | None = None
     cool_down_seconds: float = 0.0
+    zone: str = ""  # of the days that are counted; empty for this server's
 
     @property
     def closed_at(self) -> datetime | None:
         """After this moment a submission is over the limit."""
-        return None if self.due_at is None else self.due_at + timedelta(days=self.late_days)
+        return None if self.due_at is None else add_days(self.due_at, self.late_days, self.zone)
+
+    def days_late(self, submitted_at: datetime) -> int:
+        """How many days of the policy's zone a submission is late, the last one begun included."""
+        return 0 if self.due_at is None else days_after(self.due_at, submitted_at, self.zone)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,16 +55,19 @@ OverLimit = Literal["attempts", "date", "cool-down"]
 
 
 def limits(session: Session, enrolment_id: int, assignment: str) -> PolicyLimits:
-    """The policy for the assignment, else the course's, with what this student is allowed beyond it."""
+    """The policy for the assignment, else the course's, with what this student is allowed beyond it.
+
+    Extensions for all assignments and for this one hold together: the latest due date, the larger number of attempts.
+    """
     course_id = session.scalar(select(Enrolment.course_id).where(Enrolment.id == enrolment_id))
     policy = _policy(session, course_id, assignment)
-    extension = _extension(session, enrolment_id, assignment)
-    if extension is None:
-        return policy
-    due_at = policy.due_at
-    if due_at is not None and extension.due_at is not None:
-        due_at = max(due_at, extension.due_at)
-    attempts = None if policy.attempts is None else policy.attempts + extension.more_attempts
+    query = select(Extension).where(Extension.enrolment_id == enrolment_id, Extension.assignment.in_(("", assignment)))
+    extensions = session.scalars(query).all()
+    due_at, attempts = policy.due_at, policy.attempts
+    if due_at is not None:
+        due_at = max([due_at, *(each.due_at for each in extensions if each.due_at is not None)])
+    if attempts is not None:
+        attempts += max((each.more_attempts for each in extensions), default=0)
     return replace(policy, due_at=due_at, attempts=attempts)
 
 
@@ -74,11 +84,9 @@ def rule(session: Session, enrolment_id: int, assignment: str, sha256: str, subm
         return Ruling(over=f"attempt {len(earlier) + 1}, allowed: {allowed.attempts}")
     if submitted_at is None:
         return Ruling()
-    days_late = 0
-    if allowed.due_at is not None and submitted_at > allowed.due_at:
-        days_late = math.ceil((submitted_at - allowed.due_at) / timedelta(days=1))
-        if days_late > allowed.late_days:
-            return Ruling(days_late, f"{in_days(days_late)} late, allowed: {allowed.late_days}")
+    days_late = allowed.days_late(submitted_at)
+    if days_late > allowed.late_days:
+        return Ruling(days_late, f"{in_days(days_late)} late, allowed: {allowed.late_days}")
     since = [submitted_at - when for when in earlier if when <= submitted_at]
     if since and min(since).total_seconds() < allowed.cool_down_seconds:
         minutes = math.floor(min(since).total_seconds() / 60)
@@ -119,13 +127,15 @@ def released(session: Session, job_id: str) -> frozenset[str]:
 
 
 def set_policy(session: Session, course_id: int, assignment: str, allowed: PolicyLimits) -> None:
-    """Make ``allowed`` the policy of a course for an assignment, or with an empty one for all that have none."""
-    row = session.scalar(select(Policy).where(Policy.course_id == course_id, Policy.assignment == assignment))
-    if row is None:
-        row = Policy(course_id=course_id, assignment=assignment)
-        session.add(row)
+    """Make ``allowed`` the policy of a course for an assignment, or with an empty one for all that have none.
+
+    Where it names no zone, its days are those of this server's zone, also should the server move to another.
+    """
+    insert_if_new(session, Policy, course_id=course_id, assignment=assignment)
+    row = session.scalars(select(Policy).where(Policy.course_id == course_id, Policy.assignment == assignment)).one()
     row.due_at, row.late_days = allowed.due_at, allowed.late_days
     row.attempts, row.cool_down_seconds = allowed.attempts, allowed.cool_down_seconds
+    row.zone = allowed.zone or local_zone()
 
 
 def drop_policy(session: Session, course_id: int, assignment: str) -> None:
@@ -141,12 +151,9 @@ def policies(session: Session, course_id: int) -> dict[str, PolicyLimits]:
 
 def extend(session: Session, enrolment_id: int, assignment: str, due_at: datetime | None, more_attempts: int) -> None:
     """Allow one student so much beyond the policy; what was allowed before for the same assignment is replaced."""
-    row = session.scalar(
-        select(Extension).where(Extension.enrolment_id == enrolment_id, Extension.assignment == assignment)
-    )
-    if row is None:
-        row = Extension(enrolment_id=enrolment_id, assignment=assignment)
-        session.add(row)
+    insert_if_new(session, Extension, enrolment_id=enrolment_id, assignment=assignment)
+    same = (Extension.enrolment_id == enrolment_id, Extension.assignment == assignment)
+    row = session.scalars(select(Extension).where(*same)).one()
     row.due_at, row.more_attempts = due_at, more_attempts
 
 
@@ -183,12 +190,7 @@ def _policy(session: Session, course_id: int | None, assignment: str) -> PolicyL
 
 
 def _limits(row: Policy) -> PolicyLimits:
-    return PolicyLimits(row.due_at, row.late_days, row.attempts, row.cool_down_seconds)
-
-
-def _extension(session: Session, enrolment_id: int, assignment: str) -> Extension | None:
-    query = select(Extension).where(Extension.enrolment_id == enrolment_id, Extension.assignment.in_(("", assignment)))
-    return session.scalar(query.order_by(func.length(Extension.assignment).desc()).limit(1))
+    return PolicyLimits(row.due_at, row.late_days, row.attempts, row.cool_down_seconds, row.zone)
 
 
 def _closed_for_all(session: Session, enrolment_id: int, assignment: str) -> datetime | None:
@@ -201,8 +203,7 @@ def _closed_for_all(session: Session, enrolment_id: int, assignment: str) -> dat
         .join(Enrolment, Extension.enrolment_id == Enrolment.id)
         .where(Enrolment.course_id == course_id, Extension.assignment.in_(("", assignment)))
     )
-    due_at = policy.due_at if latest is None else max(policy.due_at, latest)
-    return due_at + timedelta(days=policy.late_days)
+    return replace(policy, due_at=policy.due_at if latest is None else max(policy.due_at, latest)).closed_at
 
 
 def _counted(session: Session, enrolment_id: int, assignment: str, sha256: str) -> list[datetime]:

@@ -8,12 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from datetime import datetime
 
-from sqlalchemy import Select, and_, func, select
+from sqlalchemy import Select, and_, func, or_, select
 from sqlalchemy.orm import Session
 
 from service.store import audit, outbox
 from service.store.courses.hidden_names import HiddenNames
 from service.store.engine import now
+from service.store.locks import lock_submissions
 from service.store.models import AssignmentVersion, Enrolment, Job, SubmissionRow
 from service.store.states import JobState, Standing
 from service.store.web_tables import Appeal
@@ -64,7 +65,7 @@ def ask(session: Session, submission_id: int, text: str) -> int:
             "the text has %(count)s characters, expected 1 to %(most)s", count=len(text), most=LONGEST_TEXT
         )
     # One writer at a time, so that of two at once one finds the other open.
-    session.execute(select(SubmissionRow.id).where(SubmissionRow.id == submission_id).with_for_update())
+    lock_submissions(session, SubmissionRow.id == submission_id)
     if not may_appeal(session, submission_id):
         raise UsageError("there is no grade yet that could be looked at again")
     still_open = select(Appeal.id).where(Appeal.submission_id == submission_id, Appeal.answered_at.is_(None))
@@ -87,7 +88,7 @@ def answer(session: Session, course_id: int, appeal_id: int, text: str, actor: s
         raise UsageError(
             "the answer has %(count)s characters, expected 1 to %(most)s", count=len(text), most=LONGEST_TEXT
         )
-    row = session.get(Appeal, appeal_id, with_for_update=True)
+    row = session.get(Appeal, appeal_id, with_for_update={"key_share": True})
     if row is None or _course_of(session, row) != course_id:
         raise UsageError("there is no appeal %(appeal_id)s in this course", appeal_id=appeal_id)
     if row.answered_at is not None:
@@ -103,14 +104,39 @@ def waiting(session: Session, course_id: int) -> int:
     return session.scalar(query.join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id).where(*mine)) or 0
 
 
-def in_course(
-    session: Session, course_id: int, hidden: HiddenNames, *, answered: bool, limit: int = 100
+def open_in_course(
+    session: Session, course_id: int, hidden: HiddenNames, *, limit: int | None = None, after: int | None = None
 ) -> list[AppealLine]:
-    """The appeals of a course: the open ones, the longest waiting first, or the answered ones, the newest first."""
-    which = Appeal.answered_at.is_not(None) if answered else Appeal.answered_at.is_(None)
-    order = Appeal.answered_at.desc() if answered else Appeal.asked_at
-    query = _lines().where(Enrolment.course_id == course_id, which).order_by(order, Appeal.id).limit(limit)
-    found = _read(session, query)
+    """The appeals of a course that wait for an answer, the longest waiting first.
+
+    ``after`` is the id of the last appeal of the page before.
+    """
+    query = _lines().where(Enrolment.course_id == course_id, Appeal.answered_at.is_(None))
+    if after is not None:
+        query = query.where(Appeal.id > after)
+    return _called(_read(session, query.order_by(Appeal.id).limit(limit)), hidden)
+
+
+def answered_in_course(
+    session: Session,
+    course_id: int,
+    hidden: HiddenNames,
+    *,
+    limit: int | None = None,
+    after: tuple[datetime, int] | None = None,
+) -> list[AppealLine]:
+    """The answered appeals of a course, the newest answer first.
+
+    ``after`` is when the last appeal of the page before was answered, and its id.
+    """
+    query = _lines().where(Enrolment.course_id == course_id, Appeal.answered_at.is_not(None))
+    if after is not None:
+        at, last = after
+        query = query.where(or_(Appeal.answered_at < at, and_(Appeal.answered_at == at, Appeal.id < last)))
+    return _called(_read(session, query.order_by(Appeal.answered_at.desc(), Appeal.id.desc()).limit(limit)), hidden)
+
+
+def _called(found: list[AppealLine], hidden: HiddenNames) -> list[AppealLine]:
     return [replace(each, who=hidden.called(each.assignment, each.who)) for each in found]
 
 

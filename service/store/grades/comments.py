@@ -38,10 +38,14 @@ def comment(session: Session, job_id: str, criterion: str, text: str, actor: str
     """
     text = text.replace("\r\n", "\n").strip()
     if not 0 < len(text) <= LONGEST_COMMENT:
-        raise UsageError(f"the comment has {len(text)} characters, expected 1 to {LONGEST_COMMENT}")
+        raise UsageError(
+            "the comment has %(count)s characters, expected 1 to %(most)s", count=len(text), most=LONGEST_COMMENT
+        )
     known = exists().where(CriterionResultRow.job_id == job_id, CriterionResultRow.criterion == criterion)
     if criterion and not session.scalar(select(known)):
-        raise UsageError(f"grade {job_id} has no criterion {criterion[:80]!r}")
+        raise UsageError(
+            "grade %(job)s has no criterion %(criterion)s%(hint)s", job=job_id, criterion=repr(criterion[:80]), hint=""
+        )
     submission_id = session.get_one(Job, job_id).submission_id
     row = Comment(submission_id=submission_id, criterion=criterion, text=text, actor=actor, made_at=now(session))
     session.add(row)
@@ -55,7 +59,7 @@ def withdraw(session: Session, job_id: str, comment_id: int, actor: str) -> None
     submission_id = session.get_one(Job, job_id).submission_id
     row = session.get(Comment, comment_id)
     if row is None or row.submission_id != submission_id or row.withdrawn_at is not None:
-        raise UsageError(f"grade {job_id} has no comment {comment_id}")
+        raise UsageError("grade %(job)s has no comment %(comment)s", job=job_id, comment=comment_id)
     row.withdrawn_at = now(session)
     audit.note(session, actor, "withdraw comment", "submission", str(submission_id), comment=comment_id)
 

@@ -9,7 +9,7 @@ from typing import Protocol
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from service.grading.statistics import MarkedCriterion, MarkedSubmission
+from service.grading.statistics import MarkedCriterion, MarkedSubmission, marks_out_of_all
 from service.store.grades import overrides
 from service.store.models import CriterionResultRow
 from service.store.states import JobState
@@ -40,9 +40,10 @@ class MarkedLine(Protocol):
 
 
 def marked(session: Session, lines: Sequence[MarkedLine]) -> list[MarkedSubmission]:
-    """Those of the jobs that are graded and not for staff alone."""
+    """Those of the jobs that are graded, not for staff alone, and not excused altogether."""
     graded = [line for line in lines if line.state == JobState.DONE and line.staff_only is None]
     criteria: dict[str, list[MarkedCriterion]] = {line.id: [] for line in graded}
+    worths = dict.fromkeys(criteria, Decimal(0))
     for begin in range(0, len(graded), _AT_ONCE):
         some = [line.id for line in graded[begin : begin + _AT_ONCE]]
         by_hand = overrides.of_jobs(session, some)
@@ -60,14 +61,15 @@ def marked(session: Session, lines: Sequence[MarkedLine]) -> list[MarkedSubmissi
         )
         for job_id, criterion, title, marks, worth, unjudged in rows:
             override = by_hand.get(job_id, {}).get(criterion)
+            worths[job_id] += worth
             if override is not None:
                 criteria[job_id].append(MarkedCriterion(criterion, title, *override.counted(worth)))
             elif unjudged is None:
                 criteria[job_id].append(MarkedCriterion(criterion, title, marks, worth))
-    return [
-        MarkedSubmission(
-            line.student, line.assignment, line.marks, line.max_marks, line.verdict or "", tuple(criteria[line.id])
-        )
-        for line in graded
-        if line.marks is not None
-    ]
+    found = []
+    for line in graded:
+        worth, own = worths[line.id], tuple(criteria[line.id])
+        counted = None if line.marks is None else marks_out_of_all(line.marks, line.max_marks, worth)
+        if counted is not None:
+            found.append(MarkedSubmission(line.student, line.assignment, counted, worth, line.verdict or "", own))
+    return found

@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 
 from service.store import audit
 from service.store.engine import now
+from service.store.locks import lock_jobs
 from service.store.models import CriterionResultRow, Job
 from service.store.states import JobState
 from service.store.web_tables import Override
@@ -25,6 +26,10 @@ LONGEST_REASON = 500
 #: So many digits after the point.
 _FINEST = Decimal("0.0001")
 _NONE = Decimal(0)
+
+
+class MarksChanged(UsageError):
+    """Somebody changed the marks of a criterion after the caller had looked at them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,35 +67,47 @@ def read_marks(text: str) -> Decimal:
     try:
         return Decimal(text.strip().replace(",", "."))
     except InvalidOperation:
-        raise UsageError(f"marks are {text.strip()[:40]!r}, expected a number such as 2.5") from None
+        raise UsageError("marks are %(text)s, expected a number such as 2.5", text=repr(text.strip()[:40])) from None
 
 
-def set_marks(session: Session, job_id: str, criterion: str, marks: Decimal, reason: str, actor: str) -> None:
+def set_marks(
+    session: Session, job_id: str, criterion: str, marks: Decimal, reason: str, actor: str, *, seen: int | None = None
+) -> None:
     """Let a criterion of this grade's submission have these marks from now on.
 
-    Raises UsageError for a grade or criterion that there is not, marks out of its range, or no reason.
+    ``seen`` is the id of the override that whoever asks has seen, 0 for none; None where they have looked at nothing.
+    Raises UsageError for a grade or criterion that there is not, marks out of its range, or no reason, and MarksChanged
+    for another override than the one seen.
     """
-    submission_id, line = _criterion(session, job_id, criterion)
+    submission_id, line = _criterion(session, job_id, criterion, seen)
     if not marks.is_finite() or not _NONE <= marks <= line.worth or marks != marks.quantize(_FINEST):
         raise UsageError(
-            f"marks for {line.title} are {marks}, "
-            f"expected 0 to {line.worth:f}, with at most four digits after the point"
+            "marks for %(title)s are %(marks)s, expected 0 to %(worth)s, with at most four digits after the point",
+            title=line.title,
+            marks=marks,
+            worth=f"{line.worth:f}",
         )
     _replace(session, submission_id, line, abs(marks), reason, actor)
 
 
-def excuse(session: Session, job_id: str, criterion: str, reason: str, actor: str) -> None:
+def excuse(session: Session, job_id: str, criterion: str, reason: str, actor: str, *, seen: int | None = None) -> None:
     """Let neither the marks of a criterion count nor the most there are. Raises UsageError as ``set_marks`` does."""
-    submission_id, line = _criterion(session, job_id, criterion)
+    submission_id, line = _criterion(session, job_id, criterion, seen)
     _replace(session, submission_id, line, None, reason, actor)
 
 
-def withdraw(session: Session, job_id: str, criterion: str, actor: str) -> None:
-    """Let the grader's marks of a criterion count again. Raises UsageError where nothing was set by hand."""
+def withdraw(session: Session, job_id: str, criterion: str, actor: str, *, seen: int | None = None) -> None:
+    """Let the grader's marks of a criterion count again.
+
+    Raises UsageError where nothing was set by hand, and MarksChanged for another override than the one seen.
+    """
     submission_id = _submission(session, job_id)
     before = of_jobs(session, [job_id]).get(job_id, {}).get(criterion)
     if before is None:
-        raise UsageError(f"nothing is set by hand for {criterion!r} in grade {job_id}")
+        raise UsageError(
+            "nothing is set by hand for %(criterion)s in grade %(job)s", criterion=repr(criterion), job=job_id
+        )
+    _check_seen(before, seen, criterion)
     _end(session, before, now(session))
     detail = {"criterion": criterion, "before": _words(before.marks), "after": "as graded", "override": before.id}
     audit.note(session, actor, "withdraw", "submission", str(submission_id), **detail)
@@ -135,6 +152,17 @@ def recount(session: Session, job_id: str) -> None:
     session.execute(statement, execution_options={"synchronize_session": False})
 
 
+def is_excused() -> ColumnElement[bool]:
+    """Of a criterion's row beside its job's: neither its marks nor the most there are count."""
+    said = exists().where(
+        Override.submission_id == Job.submission_id,
+        Override.criterion == CriterionResultRow.criterion,
+        Override.withdrawn_at.is_(None),
+        Override.excused,
+    )
+    return said.correlate(Job, CriterionResultRow)
+
+
 def waits_for_judgement() -> ColumnElement[bool]:
     """Of a criterion's row beside its job's: it could not be judged, and nobody has said since what it counts."""
     said = (
@@ -153,18 +181,32 @@ def _submission(session: Session, job_id: str) -> int:
     """Whose grade it is; all grades of that submission are locked, so that one that comes in meanwhile counts too."""
     job = session.get(Job, job_id)
     if job is None or job.state is not JobState.DONE:
-        raise UsageError(f"{job_id} has no grade")
-    of_it = select(Job.id).where(Job.submission_id == job.submission_id)
-    session.execute(of_it.order_by(Job.queued_at, Job.id).with_for_update()).all()
+        raise UsageError("%(job)s has no grade", job=job_id)
+    lock_jobs(session, Job.submission_id == job.submission_id)
     return job.submission_id
 
 
-def _criterion(session: Session, job_id: str, criterion: str) -> tuple[int, CriterionMarks]:
+def _criterion(session: Session, job_id: str, criterion: str, seen: int | None) -> tuple[int, CriterionMarks]:
     submission_id = _submission(session, job_id)
     lines = {line.criterion: line for line in criterion_marks(session, job_id)}
     if criterion not in lines:
-        raise UsageError(f"grade {job_id} has no criterion {criterion[:80]!r}{did_you_mean(criterion, lines)}")
-    return submission_id, lines[criterion]
+        raise UsageError(
+            "grade %(job)s has no criterion %(criterion)s%(hint)s",
+            job=job_id,
+            criterion=repr(criterion[:80]),
+            hint=did_you_mean(criterion, lines),
+        )
+    line = lines[criterion]
+    _check_seen(line.override, seen, line.title)
+    return submission_id, line
+
+
+def _check_seen(override: OverrideLine | None, seen: int | None, title: str) -> None:
+    """Compare under the lock of the grade: of two people who have seen the same, the second is refused."""
+    if seen is not None and seen != (0 if override is None else override.id):
+        raise MarksChanged(
+            "Somebody else changed the marks of %(title)s. Look at them again, then repeat your change.", title=title
+        )
 
 
 def _replace(
@@ -172,7 +214,11 @@ def _replace(
 ) -> None:
     reason = reason.strip()
     if not 0 < len(reason) <= LONGEST_REASON:
-        raise UsageError(f"the reason has {len(reason)} characters, expected 1 to {LONGEST_REASON}: students read it")
+        raise UsageError(
+            "the reason has %(count)s characters, expected 1 to %(most)s: students read it",
+            count=len(reason),
+            most=LONGEST_REASON,
+        )
     at = now(session)
     if line.override is not None:
         _end(session, line.override, at)

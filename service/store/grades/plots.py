@@ -12,26 +12,31 @@ from sqlalchemy import func, or_, select, update
 from sqlalchemy.orm import Session
 
 from service.store import artifacts, phases
-from service.store.engine import Store, now
+from service.store.engine import Store, now, retry_conflicts
+from service.store.locks import locked_jobs
 from service.store.models import Job
+from service.store.revision import needs_newer_code
 from service.store.states import PlotState
 
 ATTEMPTS = 3
 _PREFIX, _SUFFIX = "plot-", ".png"
 
 
+@retry_conflicts
 def claim(store: Store, lease_seconds: float) -> str | None:
     """The job whose plots are drawn next, by age; None when none is due.
 
     Drawing twice does no harm, so the claim is only put off, not fenced. After three times it is given up.
     """
     with store.transaction() as session:
+        if needs_newer_code(session):
+            return None
         at = now(session)
         due = (Job.plots == PlotState.DUE, Job.plots_due_at <= at)
-        given_up = update(Job).where(*due, Job.plots_attempt >= ATTEMPTS).values(plots=PlotState.FAILED)
-        session.execute(given_up)
+        tried = (*due, Job.plots_attempt >= ATTEMPTS)
+        session.execute(update(Job).where(locked_jobs(*tried), *tried).values(plots=PlotState.FAILED))
         query = select(Job.id).where(*due).order_by(Job.finished_at, Job.id).limit(1)
-        job_id = session.scalar(query.with_for_update(skip_locked=True))
+        job_id = session.scalar(query.with_for_update(skip_locked=True, key_share=True))
         if job_id is not None:
             until = at + timedelta(seconds=lease_seconds)
             put_off = update(Job).where(Job.id == job_id)
@@ -39,6 +44,7 @@ def claim(store: Store, lease_seconds: float) -> str | None:
         return job_id
 
 
+@retry_conflicts
 def finish(store: Store, job_id: str, drawn: Mapping[str, bytes]) -> None:
     """Keep the plots of a job: name -> PNG."""
     files = [artifacts.File(f"{_PREFIX}{name}{_SUFFIX}", "image/png", data) for name, data in drawn.items()]
@@ -68,4 +74,5 @@ def correct_clock(session: Session, at: datetime, ahead: datetime) -> None:
     """Plots that wait for a moment after ``ahead`` are due ``at``, where a wrong clock wrote it."""
     waiting = (Job.plots == PlotState.DUE, Job.plots_due_at > ahead)
     written_later = or_(Job.finished_at > ahead, Job.started_at > ahead)
-    session.execute(update(Job).where(*waiting, written_later).values(plots_due_at=at))
+    which = (*waiting, written_later)
+    session.execute(update(Job).where(locked_jobs(*which), *which).values(plots_due_at=at))

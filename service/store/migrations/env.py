@@ -2,15 +2,35 @@
 
 from __future__ import annotations
 
-from alembic import context
+from collections.abc import Collection, Mapping
+from typing import Any
 
+from alembic import context
+from alembic.runtime.migration import MigrationContext, MigrationInfo
+from alembic.script import Script
+from sqlalchemy import delete, insert
+
+from service.store.models import SchemaCompatibility
 from service.store.web_tables import METADATA
+
+
+def _write_oldest_compatible(
+    ctx: MigrationContext, step: MigrationInfo, heads: Collection[Any], run_args: Mapping[str, Any]
+) -> None:
+    """After a migration that names one, keep the oldest revision whose code can use the tables."""
+    script = step.up_revision
+    oldest = getattr(script.module, "OLDEST_COMPATIBLE", None) if isinstance(script, Script) else None
+    if ctx.connection is not None and oldest is not None:
+        ctx.connection.execute(delete(SchemaCompatibility))
+        ctx.connection.execute(insert(SchemaCompatibility).values(id=1, oldest_compatible=oldest))
+
 
 context.configure(
     connection=context.config.attributes["connection"],
     target_metadata=METADATA,
     render_as_batch=True,
     compare_type=True,
+    on_version_apply=_write_oldest_compatible,
 )
 with context.begin_transaction():
     context.run_migrations()

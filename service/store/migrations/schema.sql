@@ -43,9 +43,7 @@ CREATE TABLE course (
 
 CREATE TABLE person (
 	id INTEGER NOT NULL, 
-	name TEXT NOT NULL, 
-	email TEXT, 
-	created_at DATETIME NOT NULL, operator BOOLEAN DEFAULT 0 NOT NULL, 
+	created_at DATETIME NOT NULL, operator BOOLEAN DEFAULT 0 NOT NULL, signed_in_at DATETIME, 
 	CONSTRAINT pk_person PRIMARY KEY (id)
 );
 
@@ -65,7 +63,7 @@ CREATE TABLE enrolment (
 	course_id INTEGER NOT NULL, 
 	person_id INTEGER NOT NULL, 
 	student TEXT NOT NULL, 
-	role VARCHAR(16) NOT NULL, written TEXT DEFAULT '' NOT NULL, 
+	role VARCHAR(16) NOT NULL, written TEXT DEFAULT '' NOT NULL, name TEXT DEFAULT '' NOT NULL, email TEXT DEFAULT '' NOT NULL, 
 	CONSTRAINT pk_enrolment PRIMARY KEY (id), 
 	CONSTRAINT fk_enrolment_course_id_course FOREIGN KEY(course_id) REFERENCES course (id), 
 	CONSTRAINT fk_enrolment_person_id_person FOREIGN KEY(person_id) REFERENCES person (id)
@@ -215,7 +213,7 @@ CREATE TABLE policy (
 	due_at DATETIME, 
 	late_days INTEGER NOT NULL, 
 	attempts INTEGER, 
-	cool_down_seconds DOUBLE NOT NULL, 
+	cool_down_seconds DOUBLE NOT NULL, zone VARCHAR(64) DEFAULT '' NOT NULL, 
 	CONSTRAINT pk_policy PRIMARY KEY (id), 
 	CONSTRAINT fk_policy_course_id_course FOREIGN KEY(course_id) REFERENCES course (id)
 );
@@ -260,7 +258,7 @@ CREATE TABLE "heartbeat" (
 	grader_version TEXT NOT NULL, 
 	sandbox TEXT NOT NULL, 
 	started_at DATETIME NOT NULL, 
-	seen_at DATETIME NOT NULL, 
+	seen_at DATETIME NOT NULL, problem TEXT, 
 	CONSTRAINT pk_presence PRIMARY KEY (worker)
 );
 
@@ -301,7 +299,7 @@ CREATE TABLE lti_platform (
 	authorization_url TEXT NOT NULL, 
 	token_url TEXT NOT NULL, 
 	keys_url TEXT NOT NULL, 
-	created_at DATETIME NOT NULL, 
+	created_at DATETIME NOT NULL, service_origins JSON DEFAULT '[]' NOT NULL, 
 	CONSTRAINT pk_lti_platform PRIMARY KEY (id)
 );
 
@@ -318,7 +316,7 @@ CREATE TABLE credential (
 	created_at DATETIME NOT NULL, 
 	expires_at DATETIME NOT NULL, 
 	used_at DATETIME, 
-	revoked_at DATETIME, 
+	revoked_at DATETIME, role VARCHAR(16), platform_id INTEGER CONSTRAINT fk_credential_platform_id_lti_platform REFERENCES lti_platform (id), 
 	CONSTRAINT pk_credential PRIMARY KEY (id), 
 	CONSTRAINT fk_credential_course_id_course FOREIGN KEY(course_id) REFERENCES course (id), 
 	CONSTRAINT fk_credential_person_id_person FOREIGN KEY(person_id) REFERENCES person (id), 
@@ -333,15 +331,13 @@ CREATE TABLE lti_course (
 	context TEXT NOT NULL, 
 	course_id INTEGER NOT NULL, 
 	members_url TEXT, 
-	lineitems_url TEXT, 
+	lineitems_url TEXT, deployment TEXT DEFAULT '' NOT NULL, 
 	CONSTRAINT pk_lti_course PRIMARY KEY (id), 
 	CONSTRAINT fk_lti_course_course_id_course FOREIGN KEY(course_id) REFERENCES course (id), 
 	CONSTRAINT fk_lti_course_platform_id_lti_platform FOREIGN KEY(platform_id) REFERENCES lti_platform (id)
 );
 
 CREATE INDEX ix_lti_course_course_id ON lti_course (course_id);
-
-CREATE UNIQUE INDEX ix_lti_course_platform_id_context ON lti_course (platform_id, context);
 
 CREATE TABLE lti_launch (
 	state_sha256 VARCHAR(64) NOT NULL, 
@@ -503,4 +499,16 @@ CREATE TABLE "open_assignment" (
 
 CREATE UNIQUE INDEX ix_open_assignment_course_id_assignment ON open_assignment (course_id, assignment);
 
-CREATE INDEX ix_open_assignment_batch_id ON open_assignment (batch_id)
+CREATE INDEX ix_open_assignment_batch_id ON open_assignment (batch_id);
+
+CREATE UNIQUE INDEX uq_job_standing ON job (submission_id) WHERE standing = 'stands';
+
+CREATE UNIQUE INDEX ix_lti_course_platform_id_deployment_context ON lti_course (platform_id, deployment, context);
+
+CREATE TABLE schema_compatibility (
+	id INTEGER NOT NULL, 
+	oldest_compatible VARCHAR(32) NOT NULL, 
+	CONSTRAINT pk_schema_compatibility PRIMARY KEY (id)
+);
+
+INSERT INTO schema_compatibility VALUES (1, '0017')

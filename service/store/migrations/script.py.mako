@@ -14,6 +14,8 @@ revision = ${repr(up_revision)}
 down_revision = ${repr(down_revision)}
 branch_labels = ${repr(branch_labels)}
 depends_on = ${repr(depends_on)}
+# The oldest revision whose code can use the tables after this one; the one before, where only something is added.
+OLDEST_COMPATIBLE = ${repr(up_revision)}
 
 
 def upgrade() -> None:

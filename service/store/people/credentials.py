@@ -1,4 +1,4 @@
-"""How people sign in: links that count once, sessions of browsers, tokens of programs; and whom each stands for.
+"""How people sign in: links that count once, sessions of browsers, tokens of programs; and how far each reaches.
 
 Only hashes of secrets are kept. What somebody may do with a role is the web's to say.
 """
@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
-from sqlalchemy import delete, select, update
+from sqlalchemy import ColumnElement, delete, func, or_, select, update
 from sqlalchemy.orm import Session
 
 from service.store.engine import now
@@ -20,10 +20,12 @@ from service.store.ids import new_id
 from service.store.inserting import insert_if_new
 from service.store.models import Enrolment, Person
 from service.store.states import CredentialKind, Role
-from service.store.web_tables import Credential
+from service.store.web_tables import Credential, LtiCourse
 
 SESSION_LIFETIME = timedelta(days=7)
 LINK_LIFETIME = timedelta(days=2)
+#: Of one person: the oldest session ends when another begins, further tokens are refused.
+MOST_SESSIONS, MOST_TOKENS = 20, 20
 #: Ahead of a secret, so that one that was left lying about is known for what it is.
 _PREFIXES = {CredentialKind.LINK: "rml_", CredentialKind.SESSION: "rms_", CredentialKind.TOKEN: "rmt_"}
 _FORGOTTEN = timedelta(days=30)
@@ -31,8 +33,26 @@ _NOTED_EVERY = timedelta(hours=1)
 
 
 @dataclass(frozen=True, slots=True)
+class Reach:
+    """How far a credential reaches: not beyond the course, role, platform and scopes of whoever issued it."""
+
+    course_id: int | None = None
+    role: Role | None = None
+    platform_id: int | None = None
+    scopes: frozenset[str] = frozenset()  # empty: all, for a session; none, for a token
+
+    @property
+    def is_everywhere(self) -> bool:
+        """Whether it reaches every course of its owner in every role."""
+        return self.course_id is None and self.role is None and self.platform_id is None
+
+
+EVERYWHERE = Reach()
+
+
+@dataclass(frozen=True, slots=True)
 class Identity:
-    """Somebody who showed a secret that counts. ``scopes`` is None for a browser, which may do all its owner may."""
+    """The owner of a valid secret, as far as it reaches. ``scopes`` is None for a browser without such a limit."""
 
     credential_id: str
     person_id: int
@@ -40,6 +60,7 @@ class Identity:
     operator: bool
     roles: Mapping[int, Role]  # by course
     scopes: frozenset[str] | None
+    reach: Reach
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +73,11 @@ class LinkOwner:
 
 
 @dataclass(frozen=True, slots=True)
-class TokenLine:
-    """A token, as its owner sees it."""
+class CredentialLine:
+    """A session or a token, as its owner sees it."""
 
     id: str
+    kind: CredentialKind
     name: str
     scopes: tuple[str, ...]
     course_id: int | None
@@ -71,24 +93,28 @@ def issue(
     lifetime: timedelta,
     *,
     name: str = "",
-    scopes: Iterable[str] = (),
-    course_id: int | None = None,
+    reach: Reach = EVERYWHERE,
 ) -> str:
-    """A new secret of this person. It is told this once; what has long expired is forgotten."""
+    """Issue a new secret for this person, and delete credentials that expired long ago."""
     at = now(session)
     _forget_expired(session, at)
     secret = _PREFIXES[kind] + secrets.token_urlsafe(32)
-    session.add(_row(person_id, kind, secret, at, at + lifetime, name=name, scopes=sorted(scopes), course_id=course_id))
+    session.add(_row(person_id, kind, secret, at, at + lifetime, name=name, **_columns(reach)))
     session.flush()
+    if kind is not CredentialKind.LINK:
+        _note_sign_in(session, person_id, at)
+    if kind is CredentialKind.SESSION:
+        _end_oldest_sessions(session, person_id, at)
     return secret
 
 
 def make_token(
-    session: Session, person_id: int, lifetime: timedelta, word: str, *, name: str, scopes: Iterable[str]
+    session: Session, person_id: int, lifetime: timedelta, word: str, *, name: str, reach: Reach = EVERYWHERE
 ) -> None:
-    """A token of this person made of a word that nobody can guess: one, however often the same is asked for."""
+    """Make a token of this person from a word that nobody can guess: one, however often the same is asked for."""
     at = now(session)
     _forget_expired(session, at)
+    _note_sign_in(session, person_id, at)
     insert_if_new(
         session,
         Credential,
@@ -97,9 +123,9 @@ def make_token(
         kind=CredentialKind.TOKEN,
         sha256=_sha256(_PREFIXES[CredentialKind.TOKEN] + word),
         name=name,
-        scopes=sorted(scopes),
         created_at=at,
         expires_at=at + lifetime,
+        **_columns(reach),
     )
 
 
@@ -110,7 +136,16 @@ def unused_token(session: Session, person_id: int, word: str) -> str:
     return "" if row is None or row.person_id != person_id or row.used_at is not None else secret
 
 
-def replace_links(session: Session, person_ids: Sequence[int], lifetime: timedelta, word: str = "") -> dict[int, str]:
+def count_tokens(session: Session, person_id: int) -> int:
+    """Number of a person's valid tokens, which the transaction then keeps others from changing."""
+    session.get_one(Person, person_id, with_for_update={"key_share": True})
+    query = select(func.count()).where(Credential.person_id == person_id, Credential.kind == CredentialKind.TOKEN)
+    return session.scalar(query.where(*_counts(now(session)))) or 0
+
+
+def replace_links(
+    session: Session, person_ids: Sequence[int], lifetime: timedelta, word: str = "", reach: Reach = EVERYWHERE
+) -> dict[int, str]:
     """The secret of a new link of each of these persons; those that they had count no more.
 
     A ``word`` that nobody can guess makes that of one, so that it can be told again by whoever has the word.
@@ -120,7 +155,8 @@ def replace_links(session: Session, person_ids: Sequence[int], lifetime: timedel
     links = (Credential.kind == CredentialKind.LINK, Credential.revoked_at.is_(None))
     session.execute(update(Credential).where(*links, Credential.person_id.in_(person_ids)).values(revoked_at=at))
     made = {person_id: link_of(word or secrets.token_urlsafe(32)) for person_id in person_ids}
-    session.add_all(_row(who, CredentialKind.LINK, secret, at, at + lifetime) for who, secret in made.items())
+    limits = _columns(reach)
+    session.add_all(_row(who, CredentialKind.LINK, secret, at, at + lifetime, **limits) for who, secret in made.items())
     session.flush()
     return made
 
@@ -133,11 +169,13 @@ def link_of(word: str) -> str:
 def owner(session: Session, link: str) -> LinkOwner | None:
     """Who would be signed in by the link; None where it does not count, or not any more."""
     row = _valid(session, link, CredentialKind.LINK)
-    return None if row is None else LinkOwner(row.person_id, person_name(session, row.person_id), row.expires_at)
+    if row is None:
+        return None
+    return LinkOwner(row.person_id, person_name(session, row.person_id, row.course_id), row.expires_at)
 
 
 def redeem(session: Session, link: str) -> str | None:
-    """The secret of a new session in exchange for a link's, which counts no more; None where it does not count."""
+    """Exchange a link for a new session that reaches as far. None if the link is not valid."""
     row = _valid(session, link, CredentialKind.LINK)
     if row is None:
         return None
@@ -145,24 +183,24 @@ def redeem(session: Session, link: str) -> str | None:
     taken = update(Credential).where(Credential.id == row.id, Credential.used_at.is_(None)).values(used_at=at)
     if session.execute(taken).rowcount != 1:  # type: ignore[attr-defined]
         return None
-    return issue(session, row.person_id, CredentialKind.SESSION, SESSION_LIFETIME)
+    return issue(session, row.person_id, CredentialKind.SESSION, SESSION_LIFETIME, reach=_reach(row))
 
 
 def identify(session: Session, secret: str, kind: CredentialKind) -> Identity | None:
-    """Whom a session or a token stands for; None where it does not count. A token may be kept to one course."""
+    """The owner of a session or a token, with the roles that it reaches. None if it is not valid."""
     row = _valid(session, secret, kind)
     if row is None:
         return None
-    person = session.get_one(Person, row.person_id)
-    query = select(Enrolment.course_id, Enrolment.role).where(Enrolment.person_id == person.id)
-    roles = {course_id: role for course_id, role in session.execute(query) if row.course_id in (None, course_id)}
+    person, reach = session.get_one(Person, row.person_id), _reach(row)
+    query = select(Enrolment.course_id, Enrolment.role).where(Enrolment.person_id == person.id, *_reached(reach))
     return Identity(
         row.id,
         person.id,
-        person_name(session, person.id),
-        person.operator and row.course_id is None,
-        roles,
-        None if kind is CredentialKind.SESSION else frozenset(row.scopes),
+        person_name(session, person.id, row.course_id),
+        person.operator and reach.is_everywhere,
+        dict(session.execute(query).all()),
+        None if kind is CredentialKind.SESSION and not reach.scopes else reach.scopes,
+        reach,
     )
 
 
@@ -174,40 +212,103 @@ def note_use(session: Session, credential_id: str) -> None:
         row.used_at = at
 
 
-def revoke(session: Session, credential_id: str, person_id: int) -> bool:
-    """From now on the secret does not count; false where this person has none of this id."""
-    row = session.get(Credential, credential_id)
-    if row is None or row.person_id != person_id or row.revoked_at is not None:
-        return False
-    row.revoked_at = now(session)
-    return True
+def revoke(session: Session, credential_id: str, person_id: int, reach: Reach = EVERYWHERE) -> bool:
+    """End a credential. Returns False if this person has none of this id within ``reach``."""
+    one = (Credential.id == credential_id, Credential.person_id == person_id, Credential.revoked_at.is_(None))
+    return _revoke(session, *one, *_within(reach)) == 1
 
 
-def tokens(session: Session, person_id: int) -> list[TokenLine]:
-    """The tokens of a person that count, the newest first."""
-    query = (
-        select(Credential)
-        .where(
-            Credential.person_id == person_id,
-            Credential.kind == CredentialKind.TOKEN,
-            Credential.revoked_at.is_(None),
-            Credential.expires_at > now(session),
-        )
-        .order_by(Credential.created_at.desc(), Credential.id)
-    )
+def revoke_all(session: Session, person_id: int, *, but: str = "", reach: Reach = EVERYWHERE) -> int:
+    """End all links, sessions and tokens of a person within ``reach``, but one; returns how many ended."""
+    theirs = (Credential.person_id == person_id, Credential.id != but, *_counts(now(session)))
+    return _revoke(session, *theirs, *_within(reach))
+
+
+def revoke_reaching(session: Session, person_id: int, course_id: int) -> int:
+    """End what a person signs in with that reaches a course; returns how many ended."""
+    reaches = or_(Credential.course_id.is_(None), Credential.course_id == course_id)
+    return _revoke(session, Credential.person_id == person_id, reaches, *_counts(now(session)))
+
+
+def _revoke(session: Session, *which: ColumnElement[bool]) -> int:
+    ended = session.execute(update(Credential).where(*which).values(revoked_at=now(session)))
+    return int(ended.rowcount)  # type: ignore[attr-defined]
+
+
+def of_person(session: Session, person_id: int, reach: Reach = EVERYWHERE) -> list[CredentialLine]:
+    """A person's valid sessions and tokens within ``reach``, newest first."""
+    of_kind = Credential.kind.in_([CredentialKind.SESSION, CredentialKind.TOKEN])
+    theirs = (Credential.person_id == person_id, of_kind, *_counts(now(session)), *_within(reach))
     return [
-        TokenLine(row.id, row.name, tuple(row.scopes), row.course_id, row.created_at, row.expires_at, row.used_at)
-        for row in session.scalars(query)
+        CredentialLine(
+            row.id, row.kind, row.name, tuple(row.scopes), row.course_id, row.created_at, row.expires_at, row.used_at
+        )
+        for row in session.scalars(
+            select(Credential).where(*theirs).order_by(Credential.created_at.desc(), Credential.id)
+        )
     ]
 
 
-def person_name(session: Session, person_id: int) -> str:
-    """What a person is called: by name, else as a course knows them."""
-    person = session.get_one(Person, person_id)
-    if person.name:
-        return person.name
-    known = select(Enrolment.written).where(Enrolment.person_id == person_id).order_by(Enrolment.id).limit(1)
-    return session.scalar(known) or f"person {person_id}"
+def person_name(session: Session, person_id: int, course_id: int | None = None) -> str:
+    """A person's name in the course, or without one in any of theirs, first where they instruct; else their id."""
+    query = select(Enrolment.name, Enrolment.written).where(Enrolment.person_id == person_id)
+    if course_id is not None:
+        query = query.where(Enrolment.course_id == course_id)
+    known = session.execute(query.order_by(Enrolment.role != Role.INSTRUCTOR, Enrolment.id)).all()
+    names = [name for name, _ in known if name] or [written for _, written in known if written]
+    return names[0] if names else f"person {person_id}"
+
+
+def _reach(row: Credential) -> Reach:
+    return Reach(row.course_id, row.role, row.platform_id, frozenset(row.scopes))
+
+
+def _columns(reach: Reach) -> dict[str, Any]:
+    return {
+        "course_id": reach.course_id,
+        "role": reach.role,
+        "platform_id": reach.platform_id,
+        "scopes": sorted(reach.scopes),
+    }
+
+
+def _reached(reach: Reach) -> list[ColumnElement[bool]]:
+    """Conditions for the enrolments that a credential reaches."""
+    found: list[ColumnElement[bool]] = []
+    if reach.course_id is not None:
+        found.append(Enrolment.course_id == reach.course_id)
+    if reach.role is not None:
+        found.append(Enrolment.role == reach.role)
+    if reach.platform_id is not None:
+        launched = select(LtiCourse.course_id).where(LtiCourse.platform_id == reach.platform_id)
+        found.append(Enrolment.course_id.in_(launched))
+    return found
+
+
+def _within(reach: Reach) -> list[ColumnElement[bool]]:
+    """Conditions for the credentials that reach no further than this: only these may be seen and ended with it."""
+    limits = (
+        (Credential.course_id, reach.course_id),
+        (Credential.role, reach.role),
+        (Credential.platform_id, reach.platform_id),
+    )
+    return [column == limit for column, limit in limits if limit is not None]
+
+
+def _counts(at: datetime) -> tuple[ColumnElement[bool], ...]:
+    is_unused = or_(Credential.kind != CredentialKind.LINK, Credential.used_at.is_(None))
+    return Credential.revoked_at.is_(None), Credential.expires_at > at, is_unused
+
+
+def _note_sign_in(session: Session, person_id: int, at: datetime) -> None:
+    session.execute(update(Person).where(Person.id == person_id, Person.signed_in_at.is_(None)).values(signed_in_at=at))
+
+
+def _end_oldest_sessions(session: Session, person_id: int, at: datetime) -> None:
+    theirs = (Credential.person_id == person_id, Credential.kind == CredentialKind.SESSION, *_counts(at))
+    newest = select(Credential.id).where(*theirs).order_by(Credential.created_at.desc(), Credential.id)
+    kept = list(session.scalars(newest.limit(MOST_SESSIONS)))
+    _revoke(session, *theirs, Credential.id.not_in(kept))
 
 
 def _valid(session: Session, secret: str, kind: CredentialKind) -> Credential | None:
@@ -220,10 +321,10 @@ def _valid(session: Session, secret: str, kind: CredentialKind) -> Credential | 
 
 
 def _row(
-    person_id: int, kind: CredentialKind, secret: str, at: datetime, expires_at: datetime, **told: Any
+    person_id: int, kind: CredentialKind, secret: str, at: datetime, expires_at: datetime, **columns: Any
 ) -> Credential:
     return Credential(
-        person_id=person_id, kind=kind, sha256=_sha256(secret), created_at=at, expires_at=expires_at, **told
+        person_id=person_id, kind=kind, sha256=_sha256(secret), created_at=at, expires_at=expires_at, **columns
     )
 
 

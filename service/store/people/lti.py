@@ -10,20 +10,32 @@ import secrets
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import timedelta
+from urllib.parse import urlsplit
 
-from sqlalchemy import delete, select
+from sqlalchemy import delete, or_, select
 from sqlalchemy.orm import Session
 
 from service.store.engine import now
+from service.store.inserting import insert_if_new
 from service.store.models import Course, Enrolment, Person
-from service.store.people.people import is_more_than
-from service.store.people.students import Students, course_of
+from service.store.people import credentials
+from service.store.people.people import is_from_platform, is_more_than, set_role
+from service.store.people.students import DEFAULT_COURSE, Students, course_of
 from service.store.states import Role
-from service.store.web_tables import LtiCourse, LtiKey, LtiLaunch, LtiPerson, LtiPlatform
+from service.store.web_tables import Credential, LtiCourse, LtiKey, LtiLaunch, LtiPerson, LtiPlatform
 from sim.errors import UsageError
 from submissions.people import Student
 
 _LAUNCH_TAKES = timedelta(minutes=10)
+
+
+#: Longest id of a subject, a context or a deployment. A longer one is refused: two cut ones could be equal.
+LONGEST_ID = 250
+_LONGEST_STUDENT = 500
+#: Longest issuer and client: an index of PostgreSQL has to hold both.
+LONGEST_REGISTERED = 255
+#: Launches that wait for their answer; anybody can begin one, so the oldest of a platform make room.
+MOST_PENDING = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +50,13 @@ class Platform:
     authorization_url: str
     token_url: str
     keys_url: str
+    service_origins: tuple[str, ...] = ()
+
+    def may_be_asked(self, url: str) -> bool:
+        """Whether an operator registered the origin of this address, with the platform's own or beside them."""
+        origin = origin_of(url)
+        own = (origin_of(each) for each in (self.authorization_url, self.token_url, self.keys_url))
+        return origin is not None and origin in {*own, *self.service_origins}
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +86,19 @@ class CourseLink:
     lineitems_url: str | None
 
 
+def origin_of(url: str) -> str | None:
+    """Scheme, host and port of an address of the web; None if it is none."""
+    try:
+        parts = urlsplit(url)
+        port = parts.port or {"https": 443, "http": 80}.get(parts.scheme)
+    except ValueError:
+        return None
+    if port is None or not parts.hostname or parts.username is not None:
+        return None
+    host = f"[{parts.hostname}]" if ":" in parts.hostname else parts.hostname
+    return f"{parts.scheme}://{host}:{port}"
+
+
 def register(
     session: Session,
     name: str,
@@ -76,20 +108,40 @@ def register(
     authorization_url: str,
     token_url: str,
     keys_url: str,
+    service_origins: Iterable[str] = (),
 ) -> int:
-    """Make a platform known, or change one of the same issuer and client; its id.
+    """Register a platform, or change the one of the same issuer and client; returns its id.
 
-    Raises UsageError for an address that is none of the web.
+    ``service_origins`` are where else the platform's services may be asked for members and marks.
+
+    Raises UsageError for an address without a host or that does not begin with https:// or http://, and for an id that
+    is too long.
     """
+    for kind, value in (("issuer", issuer), ("client", client_id)):
+        if len(value) > LONGEST_REGISTERED:
+            raise UsageError(f"the platform's {kind} is longer than {LONGEST_REGISTERED} characters")
+    deployments = sorted(deployments)
+    for deployment in deployments:
+        _check_id("deployment", deployment)
+    origins = {origin_of(each): each for each in service_origins}
+    if None in origins:
+        raise UsageError(f"the service address is {origins[None]!r}, expected one like https://platform.example.org")
     for what, url in (("login", authorization_url), ("token", token_url), ("keys", keys_url)):
-        if not url.startswith(("https://", "http://")):
-            raise UsageError(f"the {what} address is {url!r}, expected one that begins with https://")
-    row = session.scalar(select(LtiPlatform).where(LtiPlatform.issuer == issuer, LtiPlatform.client_id == client_id))
-    if row is None:
-        row = LtiPlatform(issuer=issuer, client_id=client_id, created_at=now(session))
-        session.add(row)
-    row.name, row.deployments = name, sorted(deployments)
-    row.authorization_url, row.token_url, row.keys_url = authorization_url, token_url, keys_url
+        if not url.startswith(("https://", "http://")) or origin_of(url) is None:
+            raise UsageError(f"the {what} address is {url!r}, expected one like https://platform.example.org/path")
+    values = {
+        "name": name,
+        "deployments": deployments,
+        "authorization_url": authorization_url,
+        "token_url": token_url,
+        "keys_url": keys_url,
+        "service_origins": sorted(filter(None, origins)),
+    }
+    insert_if_new(session, LtiPlatform, issuer=issuer, client_id=client_id, created_at=now(session), **values)
+    same = (LtiPlatform.issuer == issuer, LtiPlatform.client_id == client_id)
+    row = session.scalars(select(LtiPlatform).where(*same).with_for_update(key_share=True)).one()
+    for column, setting in values.items():
+        setattr(row, column, setting)
     session.flush()
     return row.id
 
@@ -109,9 +161,15 @@ def find_platform(session: Session, issuer: str, client_id: str | None) -> Platf
 
 
 def begin_launch(session: Session, platform: Platform, target: str) -> tuple[str, str]:
-    """A state and a nonce, each of which counts once and for a few minutes."""
-    at = now(session)
-    session.execute(delete(LtiLaunch).where(LtiLaunch.expires_at < at))
+    """A state and a nonce, each of which counts once and for a few minutes.
+
+    At most ``MOST_PENDING`` launches of a platform are kept.
+    """
+    _lock(session, platform)
+    at, of_platform = now(session), LtiLaunch.platform_id == platform.id
+    newest_first = select(LtiLaunch.state_sha256).where(of_platform).order_by(LtiLaunch.expires_at.desc())
+    too_old = or_(LtiLaunch.expires_at < at, LtiLaunch.state_sha256.in_(newest_first.offset(MOST_PENDING - 1)))
+    session.execute(delete(LtiLaunch).where(of_platform, too_old).execution_options(synchronize_session=False))
     state, nonce = secrets.token_urlsafe(32), secrets.token_urlsafe(32)
     session.add(
         LtiLaunch(
@@ -127,7 +185,7 @@ def begin_launch(session: Session, platform: Platform, target: str) -> tuple[str
 
 def take_launch(session: Session, state: str) -> PendingLaunch | None:
     """What was begun with this state, which counts no more; None where nothing was, or too long ago."""
-    row = session.get(LtiLaunch, _sha256(state), with_for_update=True)
+    row = session.get(LtiLaunch, _sha256(state), with_for_update={"key_share": True})
     if row is None:
         return None
     session.delete(row)
@@ -139,6 +197,7 @@ def take_launch(session: Session, state: str) -> PendingLaunch | None:
 def meet(
     session: Session,
     platform: Platform,
+    deployment: str,
     context: str,
     course_title: str,
     subject: str,
@@ -147,55 +206,124 @@ def meet(
     members_url: str | None,
     lineitems_url: str | None,
 ) -> Launched | None:
-    """Whom a launch means: enrolled where new; the course is made when one of its instructors comes first.
+    """The person and course of a launch: enrolled if new; the first launch by an instructor creates the course.
 
     None where a student comes to a course that no instructor has launched. A platform reaches no course but those that
-    it made itself, and makes nobody an instructor elsewhere.
+    were created from it. Only an instructor's launch sets the addresses of the platform's services.
+
+    Raises UsageError for ids that are too long, and where the student's id is that of somebody else.
     """
-    of_context = (LtiCourse.platform_id == platform.id, LtiCourse.context == context)
-    link = session.scalar(select(LtiCourse).where(*of_context))
+    _check_id("deployment", deployment)
+    _check_id("context", context)
+    _lock(session, platform)
+    link = _course_of_context(session, platform, deployment, context, subject)
     if link is None:
         if role is not Role.INSTRUCTOR:
             return None
-        link = LtiCourse(platform_id=platform.id, context=context, course_id=_new_course(session, course_title))
+        link = LtiCourse(
+            platform_id=platform.id,
+            deployment=deployment,
+            context=context,
+            course_id=_new_course(session, course_title),
+        )
         session.add(link)
-    link.members_url = members_url or link.members_url
-    link.lineitems_url = lineitems_url or link.lineitems_url
+    if role is Role.INSTRUCTOR:
+        link.members_url = members_url or link.members_url
+        link.lineitems_url = lineitems_url or link.lineitems_url
     session.flush()
     person_id = enrol(session, platform, link.course_id, subject, student, role)
     return Launched(person_id, link.course_id, role)
 
 
 def enrol(session: Session, platform: Platform, course_id: int, subject: str, student: Student, role: Role) -> int:
-    """The person whom the platform calls so, in the course with this role.
+    """The person of a platform's subject, enrolled in the course with this role.
 
-    Raises UsageError where their id is that of somebody who cannot be taken for them.
+    Their own enrolment changes its role. An enrolment that was there before is given to them only if nobody else has
+    it; otherwise whoever chooses an id on the platform would choose whom they are here.
+
+    Raises UsageError where their id is that of somebody else, or too long.
     """
+    _check_id("subject", subject)
+    if len(student.id) > _LONGEST_STUDENT:
+        raise UsageError("the platform's id of a person is longer than %(most)s characters", most=_LONGEST_STUDENT)
+    _lock(session, platform)
+    session.get_one(Course, course_id, with_for_update={"key_share": True})
     of_subject = (LtiPerson.platform_id == platform.id, LtiPerson.subject == subject)
     known = session.scalar(select(LtiPerson).where(*of_subject))
-    if known is not None:
-        in_course = (Enrolment.person_id == known.person_id, Enrolment.course_id == course_id)
-        row = session.scalar(select(Enrolment).where(*in_course).limit(1))
-        person = session.get_one(Person, known.person_id)
-        person.name, person.email = student.name or person.name, student.email or person.email
-        if row is not None:
-            row.role = role
-            return known.person_id
-    enrolment_id = Students(session, course_id).enrol(student, now(session))
-    row = session.get_one(Enrolment, enrolment_id)
-    claimed = select(LtiPerson.id).where(LtiPerson.platform_id == platform.id, LtiPerson.person_id == row.person_id)
-    is_another = row.role is not Role.STUDENT or is_more_than(session, row) or session.scalar(claimed) is not None
-    if known is None and is_another:
-        # Else whoever chooses an id on the platform would choose whom they are here.
-        raise UsageError(f"somebody else is called {student.id!r} in this course; ask whoever runs it")
-    row.role = role
-    if known is None:
-        session.add(LtiPerson(platform_id=platform.id, subject=subject, person_id=row.person_id))
-    else:
-        # The same person in another course of the platform.
-        row.person_id = known.person_id
+    row = None if known is None else _enrolment_of(session, known.person_id, course_id)
+    if row is None:
+        row = _new_enrolment(session, course_id, student, None if known is None else known.person_id)
+        if known is None:
+            session.add(LtiPerson(platform_id=platform.id, subject=subject, person_id=row.person_id))
+    row.name, row.email = student.name or row.name, student.email or row.email
+    set_role(session, row, role)
     session.flush()
     return row.person_id
+
+
+def _new_enrolment(session: Session, course_id: int, student: Student, person_id: int | None) -> Enrolment:
+    """An enrolment that nobody else has, of a given person or of its own."""
+    row = session.get_one(Enrolment, Students(session, course_id).enrol(student, now(session)))
+    if not _is_nobodys(session, row):
+        raise UsageError(
+            "somebody else is called '%(id)s' in this course; ask whoever runs Robomark", id=student.id[:LONGEST_ID]
+        )
+    # Links that were made for it would sign in somebody else as this person.
+    credentials.revoke_all(session, row.person_id)
+    if person_id is not None:
+        nobody, row.person_id = row.person_id, person_id
+        session.flush()
+        session.execute(delete(Credential).where(Credential.person_id == nobody))
+        session.execute(delete(Person).where(Person.id == nobody))
+    return row
+
+
+def _is_nobodys(session: Session, row: Enrolment) -> bool:
+    """Whether an enrolment is new, or a student's id that nobody has signed in as, in this course alone."""
+    person = session.get_one(Person, row.person_id)
+    has_signed_in = person.signed_in_at is not None or is_from_platform(session, person.id)
+    return not (has_signed_in or row.role is not Role.STUDENT or is_more_than(session, row))
+
+
+def _enrolment_of(session: Session, person_id: int, course_id: int) -> Enrolment | None:
+    in_course = (Enrolment.person_id == person_id, Enrolment.course_id == course_id)
+    return session.scalar(select(Enrolment).where(*in_course).limit(1))
+
+
+def _course_of_context(
+    session: Session, platform: Platform, deployment: str, context: str, subject: str
+) -> LtiCourse | None:
+    """The course of a deployment's context.
+
+    One whose deployment was not recorded is of the deployment from which one of its instructors launches it first.
+    """
+    of_context = (LtiCourse.platform_id == platform.id, LtiCourse.context == context)
+    found = session.scalar(select(LtiCourse).where(*of_context, LtiCourse.deployment == deployment))
+    if found is not None:
+        return found
+    unknown = session.scalar(select(LtiCourse).where(*of_context, LtiCourse.deployment == ""))
+    if unknown is None:
+        return None
+    instructs = (
+        select(Enrolment.id)
+        .join(LtiPerson, LtiPerson.person_id == Enrolment.person_id)
+        .where(LtiPerson.platform_id == platform.id, LtiPerson.subject == subject)
+        .where(Enrolment.course_id == unknown.course_id, Enrolment.role == Role.INSTRUCTOR)
+    )
+    if session.scalar(instructs.limit(1)) is None:
+        return None
+    unknown.deployment = deployment
+    return unknown
+
+
+def _lock(session: Session, platform: Platform) -> None:
+    """One launch of a platform at a time: two of the same subject or context would both be the first."""
+    session.get_one(LtiPlatform, platform.id, with_for_update={"key_share": True})
+
+
+def _check_id(kind: str, value: str) -> None:
+    if len(value) > LONGEST_ID:
+        raise UsageError("the platform's %(kind)s id is longer than %(most)s characters", kind=kind, most=LONGEST_ID)
 
 
 def course_link(session: Session, course_id: int) -> CourseLink | None:
@@ -229,9 +357,12 @@ def add_private_key(session: Session, pem: str) -> None:
 
 
 def _new_course(session: Session, title: str) -> int:
-    """A course of this name, or of one like it where another course has it."""
+    """A course of this name, or of one like it where another course has it.
+
+    The installation's own course is no platform's, even before it is made: its instructors may become operators.
+    """
     name, number = title, 1
-    while session.scalar(select(Course.id).where(Course.name == name)) is not None:
+    while name == DEFAULT_COURSE or session.scalar(select(Course.id).where(Course.name == name)) is not None:
         number += 1
         name = f"{title} ({number})"
     return course_of(session, name, now(session))
@@ -247,6 +378,7 @@ def _platform(row: LtiPlatform) -> Platform:
         row.authorization_url,
         row.token_url,
         row.keys_url,
+        tuple(row.service_origins),
     )
 
 

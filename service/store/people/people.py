@@ -1,19 +1,21 @@
-"""Who instructs a course and who runs the installation, made known beside the students.
+"""Members of a course and their roles; persons who are in several courses.
 
-Students are enrolled by ``students.py``; how any of them signs in is ``credentials.py``'s.
+Students are enrolled by ``students.py``; how people sign in is ``credentials.py``'s.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sqlalchemy import ColumnElement, exists, func, or_, select
+from sqlalchemy import ColumnElement, exists, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
 from service.store.engine import now
 from service.store.models import Course, Enrolment, Person
+from service.store.people import credentials
 from service.store.people.students import Students, course_of
 from service.store.states import Role
+from service.store.web_tables import Credential, LtiPerson
 from sim.errors import UsageError
 from submissions.names import shown_name
 from submissions.people import Student
@@ -25,6 +27,7 @@ class Member:
 
     person_id: int
     enrolment_id: int
+    course_id: int
     id: str  # what the course knows them by
     name: str
     email: str
@@ -45,22 +48,69 @@ class CourseLine:
 def make_instructor(session: Session, course: str, who: Student) -> Member:
     """Make somebody an instructor of the course, which is made where there is none of that name.
 
-    An instructor of this id in another course is the same person. Raises UsageError where a student of the course has
-    this id: whoever can sign in as that student would be an instructor.
+    An id belongs to its course: the same id in another course is another person, until an operator joins the two.
+    Raises UsageError where a student of the course has this id: whoever can sign in as that student would be an
+    instructor.
     """
-    at = now(session)
-    course_id, own = course_of(session, course, at), shown_name(who.id)
+    course_id, own = course_of(session, course, now(session)), shown_name(who.id)
     taken = select(Enrolment.role).where(Enrolment.course_id == course_id, Enrolment.student == own)
     if session.scalar(taken) is Role.STUDENT:
         raise UsageError(f"{own!r} is a student of this course, expected another id for an instructor")
-    elsewhere = select(Enrolment.person_id).where(Enrolment.student == own, Enrolment.role == Role.INSTRUCTOR).limit(1)
-    person_id = session.scalar(elsewhere)
-    if person_id is not None and session.scalar(taken) is None:
-        row = Enrolment(course_id=course_id, person_id=person_id, student=own, written=own, role=Role.INSTRUCTOR)
-        session.add(row)
-        session.flush()
-        return _member(session, row.id)
     return _make(session, course, who, Role.INSTRUCTOR)
+
+
+def set_role(session: Session, row: Enrolment, role: Role) -> None:
+    """Give a member of a course a role. Losing the instructor's role ends what they sign in with there."""
+    if row.role is Role.INSTRUCTOR and role is not Role.INSTRUCTOR:
+        credentials.revoke_reaching(session, row.person_id, row.course_id)
+    row.role = role
+
+
+def elsewhere(session: Session, enrolment_id: int) -> list[tuple[str, Member]]:
+    """Instructors with the id of this one in other courses who are other persons, each with the course's name."""
+    own = session.get_one(Enrolment, enrolment_id)
+    query = (
+        select(Course.name, Enrolment, Person)
+        .join(Course, Enrolment.course_id == Course.id)
+        .join(Person, Enrolment.person_id == Person.id)
+        .where(Enrolment.student == own.student, Enrolment.role == Role.INSTRUCTOR)
+        .where(Enrolment.person_id != own.person_id)
+        .order_by(Course.name)
+    )
+    return [(course, _line(enrolment, person)) for course, enrolment, person in session.execute(query)]
+
+
+def enrolments(session: Session, person_id: int) -> list[tuple[str, Member]]:
+    """What a person is in each of their courses, with the course's name."""
+    query = (
+        select(Course.name, Enrolment, Person)
+        .join(Course, Enrolment.course_id == Course.id)
+        .join(Person, Enrolment.person_id == Person.id)
+        .where(Enrolment.person_id == person_id)
+        .order_by(Course.name)
+    )
+    return [(course, _line(enrolment, person)) for course, enrolment, person in session.execute(query)]
+
+
+def is_from_platform(session: Session, person_id: int) -> bool:
+    """Whether a learning platform vouches for this person."""
+    return session.scalar(select(LtiPerson.id).where(LtiPerson.person_id == person_id).limit(1)) is not None
+
+
+def join(session: Session, person_id: int, other_id: int) -> None:
+    """Make two persons one, who keeps all enrolments. What either signs in with ends, for it would reach further.
+
+    The caller has locked both.
+    """
+    for each in (person_id, other_id):
+        credentials.revoke_all(session, each)
+    for column in (Enrolment.person_id, LtiPerson.person_id, Credential.person_id):
+        session.execute(update(column.class_).where(column == other_id).values(person_id=person_id))
+    person, other = session.get_one(Person, person_id), session.get_one(Person, other_id)
+    person.operator = person.operator or other.operator
+    person.signed_in_at = person.signed_in_at or other.signed_in_at
+    session.delete(other)
+    session.flush()
 
 
 def make_student(session: Session, course: str, who: Student) -> Member:
@@ -159,9 +209,8 @@ def _make(session: Session, course: str, who: Student, role: Role) -> Member:
     at = now(session)
     enrolment_id = Students(session, course_of(session, course, at)).enrol(who, at)
     row = session.get_one(Enrolment, enrolment_id)
-    person = session.get_one(Person, row.person_id)
-    row.role = role
-    person.name, person.email = who.name or person.name, who.email or person.email
+    set_role(session, row, role)
+    row.name, row.email = who.name or row.name, who.email or row.email
     session.flush()
     return _member(session, enrolment_id)
 
@@ -172,5 +221,12 @@ def _member(session: Session, enrolment_id: int) -> Member:
 
 def _line(enrolment: Enrolment, person: Person) -> Member:
     return Member(
-        person.id, enrolment.id, enrolment.student, person.name, person.email or "", enrolment.role, person.operator
+        person.id,
+        enrolment.id,
+        enrolment.course_id,
+        enrolment.student,
+        enrolment.name,
+        enrolment.email,
+        enrolment.role,
+        person.operator,
     )

@@ -27,7 +27,7 @@ DEFAULT_COURSE = "default"
 def course_of(session: Session, name: str, at: datetime) -> int:
     """The course, locked to the end of the transaction: numbering attempts needs one writer at a time."""
     insert_if_new(session, Course, name=name, created_at=at)
-    return session.scalars(select(Course.id).where(Course.name == name).with_for_update()).one()
+    return session.scalars(select(Course.id).where(Course.name == name).with_for_update(key_share=True)).one()
 
 
 class Students:
@@ -69,6 +69,13 @@ class Students:
             "expected that name as it is written there, or another."
         )
 
+    def is_enrolled(self, enrolment_id: int, student: Student) -> bool:
+        """Return whether an enrolment is still this student's; SQLite gives the ids of removed rows to new ones."""
+        row = self._session.get(Enrolment, enrolment_id)
+        if row is None or row.course_id != self._course_id:
+            return False
+        return shown_name(row.written) == shown_name(student.id)
+
     def known(self, student: Student) -> int | None:
         """The enrolment of who is written so in the normal form; None where nobody is, or it would have to be asked."""
         found = self._enrolled(shown_name(student.id))
@@ -92,16 +99,23 @@ class Students:
 
     def _tell(self, enrolment_id: int, student: Student) -> None:
         row = self._session.get_one(Enrolment, enrolment_id)
-        # An instructor's name is nothing that another instructor's table changes.
-        if (student.name or student.email) and row.role is Role.STUDENT:
-            person = self._session.get_one(Person, row.person_id)
-            person.name, person.email = student.name or person.name, student.email or person.email
+        # A table that one instructor uploads does not rename another instructor.
+        if row.role is Role.STUDENT:
+            row.name, row.email = student.name or row.name, student.email or row.email
 
     def _new(self, own: str, written: str, student: Student, at: datetime) -> int:
-        person = Person(name=student.name, email=student.email or None, created_at=at)
+        person = Person(created_at=at)
         self._session.add(person)
         self._session.flush()
-        row = Enrolment(course_id=self._course_id, person_id=person.id, student=own, written=written, role=Role.STUDENT)
+        row = Enrolment(
+            course_id=self._course_id,
+            person_id=person.id,
+            student=own,
+            written=written,
+            role=Role.STUDENT,
+            name=student.name,
+            email=student.email,
+        )
         self._session.add(row)
         self._session.flush()
         self._note(own, row.id)

@@ -14,7 +14,6 @@ from urllib.parse import urlsplit
 from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
-from service.store import audit
 from service.store.engine import now
 from service.store.outbox import WebhookEvent
 from service.store.web_tables import Delivery, Webhook
@@ -48,7 +47,7 @@ class DeliveryLine:
     error: str | None
 
 
-def create(session: Session, course_id: int, url: str, events: Collection[str], actor: str) -> tuple[WebhookLine, str]:
+def create(session: Session, course_id: int, url: str, events: Collection[str]) -> tuple[WebhookLine, str]:
     """A new webhook, and the secret that its deliveries are signed with, which is told this once.
 
     Raises UsageError for an address or an event that there is not, or where the course has many already.
@@ -65,7 +64,6 @@ def create(session: Session, course_id: int, url: str, events: Collection[str], 
     row = Webhook(course_id=course_id, url=url, secret=secret, events=chosen, created_at=now(session))
     session.add(row)
     session.flush()
-    audit.note(session, actor, "create webhook", "course", str(course_id), webhook=row.id, url=url)
     return _line(row), secret
 
 
@@ -75,7 +73,7 @@ def of_course(session: Session, course_id: int) -> list[WebhookLine]:
     return [_line(row) for row in session.scalars(select(Webhook).where(*mine).order_by(Webhook.created_at))]
 
 
-def revoke(session: Session, course_id: int, webhook_id: str, actor: str) -> bool:
+def revoke(session: Session, course_id: int, webhook_id: str) -> bool:
     """Tell it nothing any more, not even what waits; false where the course has none of this id."""
     row = session.get(Webhook, webhook_id)
     if row is None or row.course_id != course_id or row.revoked_at is not None:
@@ -83,7 +81,6 @@ def revoke(session: Session, course_id: int, webhook_id: str, actor: str) -> boo
     row.revoked_at = now(session)
     waiting = (Delivery.webhook_id == webhook_id, Delivery.delivered_at.is_(None))
     session.execute(update(Delivery).where(*waiting).values(due_at=None, error="the webhook was revoked"))
-    audit.note(session, actor, "revoke webhook", "course", str(course_id), webhook=webhook_id)
     return True
 
 

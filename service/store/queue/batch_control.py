@@ -1,7 +1,7 @@
 """What may be done to a whole batch: paused, resumed, cancelled, its dead jobs retried.
 
-A claim looks at the batch's state, and a worker at its job's, so nothing here talks to a worker. What students submit
-on the web is not held back: people wait for it.
+A claim looks at the batch's state, and a worker at its job's, so nothing here talks to a worker. Submissions on the web
+are not paused, because students wait for them. ``service.operations.batches`` owns the transactions.
 """
 
 from __future__ import annotations
@@ -11,16 +11,13 @@ from dataclasses import dataclass
 from sqlalchemy import exists, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
-from service.store import audit
-from service.store.engine import Store, now
+from service.store.engine import now
+from service.store.locks import locked_jobs
 from service.store.models import Batch, Job, SubmissionRow
 from service.store.queue import jobs
 from service.store.states import BatchState, JobState
 from service.store.web_tables import OpenAssignment
 from sim.errors import UsageError
-
-#: Who it is said to be where nobody was named.
-_NOBODY = "unknown"
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,77 +37,70 @@ class Retried:
     outdated: int
 
 
-def pause(store: Store, batch_id: str, *, actor: str = _NOBODY) -> Controlled:
+def pause(session: Session, batch_id: str) -> Controlled:
     """Begin no more of the batch; what runs goes on. Raises UsageError for one cancelled, or of the web."""
-    return _set(store, batch_id, BatchState.PAUSED, "pause", actor)
+    return _set(session, batch_id, BatchState.PAUSED)
 
 
-def resume(store: Store, batch_id: str, *, actor: str = _NOBODY) -> Controlled:
+def resume(session: Session, batch_id: str) -> Controlled:
     """Let a paused batch go on. Raises UsageError for a batch that was cancelled."""
-    return _set(store, batch_id, BatchState.OPEN, "resume", actor)
+    return _set(session, batch_id, BatchState.OPEN)
 
 
-def cancel(store: Store, batch_id: str, *, actor: str = _NOBODY) -> Controlled:
+def cancel(session: Session, batch_id: str) -> Controlled:
     """End all jobs of the batch that have not ended; a worker that runs one is told at its next heartbeat.
 
     A batch with nothing left to end stays as it is. Raises UsageError for what is submitted on the web.
     """
-    with store.transaction() as session:
-        _state(session, batch_id)
-        _refuse_of_the_web(session, batch_id)
-        waiting, running = _unfinished(session, batch_id)
-        if waiting + running == 0:
-            return Controlled(False, 0, 0)
-        jobs.cancel(session, batch_id, "the batch was cancelled", now(session))
-        session.execute(update(Batch).where(Batch.id == batch_id).values(state=BatchState.CANCELLED))
-        audit.note(session, actor, "cancel", "batch", batch_id, not_begun=waiting, stopped=running)
-        return Controlled(True, waiting, running)
+    _state(session, batch_id)
+    _refuse_of_the_web(session, batch_id)
+    waiting, running = _unfinished(session, batch_id)
+    if waiting + running == 0:
+        return Controlled(False, 0, 0)
+    jobs.cancel(session, batch_id, "the batch was cancelled", now(session))
+    session.execute(update(Batch).where(Batch.id == batch_id).values(state=BatchState.CANCELLED))
+    return Controlled(True, waiting, running)
 
 
-def retry(store: Store, batch_id: str | None, *, actor: str = _NOBODY) -> Retried:
+def retry(session: Session, batch_id: str | None) -> Retried:
     """Queue the dead jobs of a batch again, with all their attempts; None for every dead job there is.
 
     Raises UsageError for a batch that was cancelled; with None their jobs are passed over.
     """
-    with store.transaction() as session:
-        if batch_id is None:
-            cancelled = select(Batch.id).where(Batch.state == BatchState.CANCELLED)
-            of_batch = or_(Job.batch_id.is_(None), Job.batch_id.not_in(cancelled))
-        else:
-            _refuse_cancelled(_state(session, batch_id), batch_id)
-            of_batch = Job.batch_id == batch_id
-        newer = aliased(SubmissionRow)
-        outdated = exists().where(
-            newer.enrolment_id == SubmissionRow.enrolment_id,
-            newer.assignment == SubmissionRow.assignment,
-            newer.attempt > SubmissionRow.attempt,
-            newer.staff_only.is_(None),
-        )
-        of_newest = select(SubmissionRow.id).where(~outdated)
-        queued = jobs.retry(session, (of_batch, Job.submission_id.in_(of_newest)), now(session))
-        left = session.scalar(select(func.count()).select_from(Job).where(of_batch, Job.state == JobState.DEAD)) or 0
-        if queued:
-            audit.note(session, actor, "retry", "batch", batch_id or "all", queued=queued)
-        return Retried(queued, left)
+    if batch_id is None:
+        cancelled = select(Batch.id).where(Batch.state == BatchState.CANCELLED)
+        of_batch = or_(Job.batch_id.is_(None), Job.batch_id.not_in(cancelled))
+    else:
+        _refuse_cancelled(_state(session, batch_id), batch_id)
+        of_batch = Job.batch_id == batch_id
+    newer = aliased(SubmissionRow)
+    outdated = exists().where(
+        newer.enrolment_id == SubmissionRow.enrolment_id,
+        newer.assignment == SubmissionRow.assignment,
+        newer.attempt > SubmissionRow.attempt,
+        newer.staff_only.is_(None),
+    )
+    of_newest = select(SubmissionRow.id).where(~outdated)
+    queued = jobs.retry(session, (of_batch, Job.submission_id.in_(of_newest)), now(session))
+    left = session.scalar(select(func.count()).select_from(Job).where(of_batch, Job.state == JobState.DEAD)) or 0
+    return Retried(queued, left)
 
 
-def _set(store: Store, batch_id: str, state: BatchState, action: str, actor: str) -> Controlled:
-    with store.transaction() as session:
-        before = _state(session, batch_id)
-        _refuse_cancelled(before, batch_id)
-        _refuse_of_the_web(session, batch_id)
-        session.execute(update(Batch).where(Batch.id == batch_id).values(state=state))
-        # So that what goes on is notified for at once.
-        waiting = update(Job).where(Job.batch_id == batch_id, Job.state == JobState.QUEUED)
-        session.execute(waiting.values(notified_at=None), execution_options={"synchronize_session": False})
-        if before is not state:
-            audit.note(session, actor, action, "batch", batch_id)
-        return Controlled(before is not state, *_unfinished(session, batch_id))
+def _set(session: Session, batch_id: str, state: BatchState) -> Controlled:
+    before = _state(session, batch_id)
+    _refuse_cancelled(before, batch_id)
+    _refuse_of_the_web(session, batch_id)
+    session.execute(update(Batch).where(Batch.id == batch_id).values(state=state))
+    # So that what goes on is notified for at once.
+    waiting = (Job.batch_id == batch_id, Job.state == JobState.QUEUED)
+    unannounced = update(Job).where(locked_jobs(*waiting), *waiting).values(notified_at=None)
+    session.execute(unannounced, execution_options={"synchronize_session": False})
+    return Controlled(before is not state, *_unfinished(session, batch_id))
 
 
 def _state(session: Session, batch_id: str) -> BatchState:
     """The batch's state, locked to the end of the transaction."""
-    state = session.scalar(select(Batch.state).where(Batch.id == batch_id).with_for_update())
+    state = session.scalar(select(Batch.state).where(Batch.id == batch_id).with_for_update(key_share=True))
     if state is None:
         raise UsageError(f"there is no batch {batch_id}")
     return state

@@ -18,12 +18,14 @@ from sqlalchemy.orm import Session
 
 from service.store import outbox, phases
 from service.store.codec import encode
-from service.store.engine import Store, now
+from service.store.engine import Store, now, retry_conflicts
 from service.store.grades import overrides, plots, result_cache
 from service.store.installation import secret_of
+from service.store.locks import locked_jobs
 from service.store.models import Job
 from service.store.queue import workers
 from service.store.queue.scheduling import next_job
+from service.store.revision import needs_newer_code
 from service.store.states import JobState, PlotState
 from service.version import grader_sha256
 from sim.errors import Cancelled, HostError
@@ -32,6 +34,8 @@ if TYPE_CHECKING:
     from service.store.grades import results
 
 _SUPERSEDED = "superseded by "
+#: The error of a job that is put aside.
+OVER_A_LIMIT = "over a limit: it is graded when staff ask for it"
 _LONGEST_BACKOFF = timedelta(hours=1)
 #: Clocks are corrected all the time by less than this.
 _TOLERANCE = timedelta(seconds=2)
@@ -58,8 +62,11 @@ GIVE_UP = Transition("give up", (JobState.RUNNING,), JobState.DEAD, "the worker 
 GIVE_BACK = Transition("give back", (JobState.RUNNING,), JobState.QUEUED, "a worker's end, a quarantine")
 CANCEL = Transition("cancel", (JobState.QUEUED, JobState.RUNNING), JobState.CANCELLED, "staff")
 RETRY = Transition("retry", (JobState.DEAD,), JobState.QUEUED, "staff")
+PUT_ASIDE = Transition("put aside", (JobState.QUEUED,), JobState.CANCELLED, "intake")
+ASK_FOR = Transition("ask for", (JobState.CANCELLED,), JobState.QUEUED, "staff")
 TRANSITIONS = (
     ENQUEUE, COPY, SUPERSEDE, CLAIM, HEARTBEAT, FINISH, TRY_AGAIN, GIVE_UP, GIVE_BACK, CANCEL, RETRY,
+    PUT_ASIDE, ASK_FOR,
 )  # fmt: skip
 
 
@@ -115,6 +122,17 @@ def supersede(session: Session, submissions: Select[int], by: str, at: datetime)
         outbox.superseded(session, submissions, at)
 
 
+def put_aside(session: Session, job_id: str, at: datetime) -> None:
+    """Grade a job that waits only once staff ask for it."""
+    _make(session, PUT_ASIDE, (Job.id == job_id,), at, {"error": OVER_A_LIMIT})
+
+
+def ask_for(session: Session, job_id: str, at: datetime) -> bool:
+    """Let a job wait that was put aside. Returns whether it was."""
+    which = (Job.id == job_id, Job.error == OVER_A_LIMIT)
+    return _make(session, ASK_FOR, which, at, {"error": None}) > 0
+
+
 def superseded_by(error: str | None) -> str | None:
     """The id of the job that took the place of one with this error; None where none did, "" where it is not known."""
     if error is None or not error.startswith(_SUPERSEDED):
@@ -123,11 +141,13 @@ def superseded_by(error: str | None) -> str | None:
     return told if told.isalnum() else ""
 
 
+@retry_conflicts
 def claim(store: Store, worker: str, lease_seconds: float) -> Claim | None:
-    """Take the job whose turn it is; None when none is due."""
+    """Take the job whose turn it is; None when none is due, or the worker may take none."""
     with store.transaction() as session:
         at = now(session)
-        job_id = None if workers.is_in_quarantine(session, worker) else next_job(session, at, worker)
+        may_claim = not needs_newer_code(session) and not workers.is_in_quarantine(session, worker)
+        job_id = next_job(session, at, worker) if may_claim else None
         if job_id is None:
             return None
         begun, most = session.execute(select(Job.attempt, Job.max_attempts).where(Job.id == job_id)).one()
@@ -145,6 +165,7 @@ def claim(store: Store, worker: str, lease_seconds: float) -> Claim | None:
         return claimed if _make(session, CLAIM, (Job.id == job_id,), at, values) else None
 
 
+@retry_conflicts
 def heartbeat(store: Store, claim: Claim, lease_seconds: float, progress: float) -> None:
     """Keep the lease and tell the progress (0 to 1). Raises Fenced when the job is no longer this worker's."""
     with store.transaction() as session:
@@ -157,6 +178,7 @@ def heartbeat(store: Store, claim: Claim, lease_seconds: float, progress: float)
         _make_held(session, HEARTBEAT, claim, at, values)
 
 
+@retry_conflicts
 def finish(
     store: Store,
     claim: Claim,
@@ -206,6 +228,7 @@ def finish(
         outbox.grade_finished(session, claim.job_id)
 
 
+@retry_conflicts
 def finish_from_cache(store: Store, claim: Claim) -> bool:
     """End the job with the grade of an identical one, where there is one and nobody asked for it to be run anew.
 
@@ -228,6 +251,7 @@ def finish_from_cache(store: Store, claim: Claim) -> bool:
         return True
 
 
+@retry_conflicts
 def fail(store: Store, claim: Claim, reason: str, retry: Retry) -> JobState:
     """A fault of ours: the job waits for another attempt, or is dead when there were enough.
 
@@ -248,6 +272,7 @@ def fault(session: Session, claim: Claim, reason: str, retry: Retry, at: datetim
     return TRY_AGAIN.after
 
 
+@retry_conflicts
 def give_up(store: Store, claim: Claim, reason: str) -> None:
     """The job cannot be graded, however often it is tried. Raises Fenced when it is no longer this worker's."""
     with store.transaction() as session:
@@ -255,6 +280,7 @@ def give_up(store: Store, claim: Claim, reason: str) -> None:
         outbox.job_ended(session, claim.job_id)
 
 
+@retry_conflicts
 def release_worker(store: Store, worker: str) -> int:
     """Give back all that a worker held, one that is known to have ended. Returns how many jobs that were."""
     with store.transaction() as session:
@@ -289,7 +315,7 @@ def correct_clock(session: Session, at: datetime, longest_wait: Callable[[int], 
     ahead = at + _TOLERANCE
     held = select(Job.id, Job.lease, Job.lease_until, Job.heartbeat_at)
     for job_id, lease, lease_until, heartbeat_at in session.execute(
-        held.where(Job.state == JobState.RUNNING, Job.heartbeat_at > ahead)
+        held.where(Job.state == JobState.RUNNING, Job.heartbeat_at > ahead).order_by(Job.id)
     ).all():
         if lease_until is None or heartbeat_at is None:
             continue
@@ -297,13 +323,13 @@ def correct_clock(session: Session, at: datetime, longest_wait: Callable[[int], 
         leased = update(Job).where(Job.id == job_id, Job.lease == lease)
         session.execute(leased.values(heartbeat_at=at, lease_until=renewed))
     waiting = select(Job.id, Job.attempt, Job.due_at).where(Job.state == JobState.QUEUED, Job.due_at > ahead)
-    for job_id, attempt, due_at in session.execute(waiting).all():
+    for job_id, attempt, due_at in session.execute(waiting.order_by(Job.id)).all():
         latest = at + longest_wait(attempt) if attempt else at
         if due_at > latest + _TOLERANCE:
             held_back = (Job.id == job_id, Job.state == JobState.QUEUED)
             session.execute(update(Job).where(*held_back).values(due_at=latest, notified_at=None))
     notified = (Job.state == JobState.QUEUED, Job.notified_at > ahead)
-    session.execute(update(Job).where(*notified).values(notified_at=None))
+    session.execute(update(Job).where(locked_jobs(*notified), *notified).values(notified_at=None))
     plots.correct_clock(session, at, ahead)
 
 
@@ -330,7 +356,8 @@ def _make(
 ) -> int:
     """Make the transition for those of these jobs that are where it begins; the others stay. Returns how many."""
     columns = {"state": transition.after} | _arriving(transition.after, at) | values
-    statement = update(Job).where(*which, Job.state.in_(transition.before)).values(**columns)
+    which = (*which, Job.state.in_(transition.before))
+    statement = update(Job).where(locked_jobs(*which), *which).values(**columns)
     options = {"synchronize_session": False}
     return cast("CursorResult[Any]", session.execute(statement, execution_options=options)).rowcount
 

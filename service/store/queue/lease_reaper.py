@@ -12,7 +12,8 @@ from datetime import datetime, timedelta
 from sqlalchemy import func, or_, select, update
 from sqlalchemy.orm import Session
 
-from service.store.engine import Store, now
+from service.store.engine import Store, now, retry_conflicts
+from service.store.locks import locked_jobs
 from service.store.models import Job
 from service.store.queue import jobs
 from service.store.queue.jobs import Claim, Retry
@@ -31,6 +32,7 @@ class Wanting:
     stale: int
 
 
+@retry_conflicts
 def requeue_lost(store: Store, retry: Retry) -> int:
     """Jobs whose worker fell silent wait again, or are dead when that happened too often. Returns how many."""
     with store.transaction() as session:
@@ -38,7 +40,7 @@ def requeue_lost(store: Store, retry: Retry) -> int:
         jobs.correct_clock(session, at, retry.wait)
         lost = (Job.state == JobState.RUNNING, Job.lease_until < at)
         query = select(Job.id, Job.lease, Job.attempt, Job.max_attempts, Job.worker).where(*lost)
-        rows = session.execute(query.with_for_update(skip_locked=True)).all()
+        rows = session.execute(query.order_by(Job.id).with_for_update(skip_locked=True, key_share=True)).all()
         for job_id, lease, attempt, max_attempts, worker in rows:
             reason = f"the worker {worker} fell silent while it graded; its log may tell why"
             jobs.fault(session, Claim(job_id, lease or "", attempt, max_attempts, at), reason, retry, at)
@@ -56,6 +58,7 @@ def wanting_notices(store: Store, older_seconds: float) -> Mapping[Lane, Wanting
         return {lane: Wanting(count, all_stale.get(lane, 0)) for lane, count in all_due.items()}
 
 
+@retry_conflicts
 def note_notices(store: Store, lane: Lane, count: int) -> Sequence[str]:
     """Remember that the ``count`` longest unannounced jobs of a lane were notified now. Returns their ids."""
     with store.transaction() as session:
@@ -71,6 +74,7 @@ def note_notices(store: Store, lane: Lane, count: int) -> Sequence[str]:
         return ids
 
 
+@retry_conflicts
 def forget_notices(store: Store, ids: Sequence[str]) -> None:
     """These were not notified after all."""
     with store.transaction() as session:
@@ -78,7 +82,9 @@ def forget_notices(store: Store, ids: Sequence[str]) -> None:
 
 
 def _set_notified(session: Session, ids: Sequence[str], at: datetime | None) -> None:
+    ids = sorted(ids)
     for start in range(0, len(ids), _AT_ONCE):
         some = (Job.id.in_(ids[start : start + _AT_ONCE]), Job.state == JobState.QUEUED)
         options = {"synchronize_session": False}
-        session.execute(update(Job).where(*some).values(notified_at=at), execution_options=options)
+        statement = update(Job).where(locked_jobs(*some), *some).values(notified_at=at)
+        session.execute(statement, execution_options=options)

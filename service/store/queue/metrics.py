@@ -5,16 +5,18 @@ Only reads, so that every replica that is asked tells the same.
 
 from __future__ import annotations
 
+import math
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import timedelta
+from datetime import datetime, timedelta
 
-from sqlalchemy import case, func, select
+from sqlalchemy import case, func, or_, select
 from sqlalchemy.orm import Session
 
 from service.store import phases
 from service.store.engine import now
-from service.store.models import Batch, CriterionResultRow, Job, TrialRow, Worker
+from service.store.models import Batch, CriterionResultRow, Enrolment, Job, TrialRow, Worker
 from service.store.queue import workers
 from service.store.queue.scheduling import claimable
 from service.store.states import UNFINISHED, BatchState, JobState, Lane, PlotState
@@ -23,6 +25,8 @@ from service.store.states import UNFINISHED, BatchState, JobState, Lane, PlotSta
 TIMES_OVER = timedelta(hours=1)
 TIMES_MOST = 2000
 PACE_OVER = timedelta(minutes=5)
+#: A job that was begun longer ago says nothing of whether the queue stands still.
+_LATELY = timedelta(hours=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +36,7 @@ class ServiceMetrics:
     jobs: Mapping[tuple[Lane, JobState], int]
     claimable: Mapping[Lane, int]
     oldest_seconds: Mapping[Lane, float]  # how long the oldest job that could be claimed has waited
+    idle_seconds: float  # since a job was begun or ended; infinite where none was in the last hour
     verdicts: Mapping[str, int]
     host_faults: int  # attempts that ended through no fault of the student's
     unjudged: int  # criteria that could not be judged
@@ -64,6 +69,7 @@ def collect(session: Session) -> ServiceMetrics:
         jobs={(lane, state): count for lane, state, count in session.execute(by_state)},
         claimable={lane: count for lane, count, _ in rows},
         oldest_seconds={lane: max(0.0, (at - oldest).total_seconds()) for lane, _, oldest in rows},
+        idle_seconds=_idle_seconds(session, at),
         verdicts={verdict: count for verdict, count in session.execute(verdicts) if verdict is not None},
         host_faults=session.scalar(faults) or 0,
         unjudged=session.scalar(unjudged) or 0,
@@ -77,26 +83,57 @@ def collect(session: Session) -> ServiceMetrics:
     )
 
 
+def _idle_seconds(session: Session, at: datetime) -> float:
+    lately = Job.started_at > at - _LATELY
+    begun, ended = session.execute(select(func.max(Job.started_at), func.max(Job.finished_at)).where(lately)).one()
+    moments = [moment for moment in (begun, ended) if moment is not None]
+    return max(0.0, (at - max(moments)).total_seconds()) if moments else math.inf
+
+
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How fast a batch is being graded, and how long the rest of it takes at that pace."""
+    """How fast a batch is being graded, and how long the rest of it takes beside what else waits."""
 
     per_minute: float
     left: timedelta
 
 
 def pace(session: Session, batch_id: str) -> Pace | None:
-    """By what ended in the last minutes; None where nothing did, or nothing is left."""
+    """By what ended in the last minutes, of the batch and of all; None where nothing did, or nothing is left."""
     at = now(session)
-    of_batch = Job.batch_id == batch_id
-    unfinished = select(func.count()).select_from(Job).where(of_batch, Job.state.in_(UNFINISHED))
-    left = session.scalar(unfinished) or 0
-    ended = (of_batch, Job.state == JobState.DONE, Job.finished_at > at - PACE_OVER)
-    count, first = session.execute(select(func.count(), func.min(Job.started_at)).where(*ended)).one()
-    if not left or not count or first is None:
+    unfinished = (
+        select(Enrolment.course_id, Job.batch_id, func.count())
+        .join(Enrolment, Job.enrolment_id == Enrolment.id)
+        .outerjoin(Batch, Job.batch_id == Batch.id)
+        .where(
+            Job.state.in_(UNFINISHED),
+            or_(Job.batch_id.is_(None), Job.batch_id == batch_id, Batch.state == BatchState.OPEN),
+        )
+        .group_by(Enrolment.course_id, Job.batch_id)
+    )
+    waiting: dict[int, dict[str | None, int]] = defaultdict(dict)
+    for course, batch, count in session.execute(unfinished).all():
+        waiting[course][batch] = count
+    of_batch = func.sum(case((Job.batch_id == batch_id, 1), else_=0))
+    # The moment of the start has an index.
+    ended = (Job.state == JobState.DONE, Job.finished_at > at - PACE_OVER, Job.started_at > at - _LATELY)
+    own, everybody, first = session.execute(
+        select(of_batch, func.count(), func.min(Job.started_at)).where(*ended)
+    ).one()
+    before = _graded_before_its_end(waiting, batch_id)
+    if not before or not own or first is None:
         return None
     seconds = max(1.0, min((at - first).total_seconds(), PACE_OVER.total_seconds()))
-    return Pace(60 * count / seconds, timedelta(seconds=round(left * seconds / count)))
+    return Pace(60 * own / seconds, timedelta(seconds=round(before * seconds / everybody)))
+
+
+def _graded_before_its_end(waiting: Mapping[int, Mapping[str | None, int]], batch_id: str) -> int:
+    """How many jobs of all end until the batch has, as each course has the same share, and each batch in a course."""
+    course = next((course for course, batches in waiting.items() if batch_id in batches), None)
+    if course is None:
+        return 0
+    of_course = sum(min(count, waiting[course][batch_id]) for count in waiting[course].values())
+    return sum(min(sum(batches.values()), of_course) for batches in waiting.values())
 
 
 def quantile(values: Sequence[float], share: float) -> float:

@@ -14,8 +14,9 @@ from sqlalchemy import delete, or_, select
 from sqlalchemy.orm import Session
 
 from service.store import audit
-from service.store.engine import Store, now
-from service.store.models import Batch, Job, SelfTest, Worker
+from service.store.engine import Store, now, retry_conflicts
+from service.store.locks import lock_jobs, lock_submissions
+from service.store.models import Batch, Job, SelfTest, SubmissionRow, Worker
 from service.store.queue import jobs
 from service.store.states import BatchState, JobState, Lane, Standing
 from service.version import GRADER_VERSION, grader_sha256
@@ -32,6 +33,7 @@ class Quarantined:
     again: tuple[str, ...]
 
 
+@retry_conflicts
 def answered_rightly(store: Store, worker: str, process: int) -> None:
     """Write down that this process of the worker graded the known answer rightly now."""
     with store.transaction() as session:
@@ -45,6 +47,7 @@ def answered_rightly(store: Store, worker: str, process: int) -> None:
             row.right_at = at
 
 
+@retry_conflicts
 def quarantine(store: Store, worker: str, reason: str) -> Quarantined:
     """Let the worker claim and finish nothing more, take back what it holds, and run again what it may have spoilt.
 
@@ -63,10 +66,12 @@ def quarantine(store: Store, worker: str, reason: str) -> Quarantined:
         taken_back = jobs.give_back(session, worker, at)
         sentence = f"the worker {worker} was found to grade wrongly: {reason}"
         suspects = _suspects(session, worker)
-        again = tuple(_run_again(session, job, sentence, at) for job in suspects if job.standing is not Standing.KEPT)
+        reruns = [_rerun(session, job) for job in suspects if job.standing is not Standing.KEPT]
         for job in suspects:
             job.suspect, job.standing = sentence, Standing.KEPT
             job.published_at = job.published_by = None
+        session.flush()
+        again = tuple(jobs.enqueue(session, job, at) for job in reruns)
         ids = tuple(job.id for job in suspects)
         audit.note(session, worker, "quarantine", "worker", worker, reason=reason, suspect=list(ids), again=list(again))
         return Quarantined(taken_back, ids, again)
@@ -74,7 +79,7 @@ def quarantine(store: Store, worker: str, reason: str) -> Quarantined:
 
 def _worker(session: Session, name: str, at: datetime) -> Worker:
     """The worker's row, locked; made if there is none."""
-    row = session.scalar(select(Worker).where(Worker.name == name).with_for_update())
+    row = session.scalar(select(Worker).where(Worker.name == name).with_for_update(key_share=True))
     if row is None:
         _forget_old(session, at)
         row = Worker(
@@ -105,13 +110,17 @@ def _suspects(session: Session, worker: str) -> Sequence[Job]:
     graded = (Job.worker == worker, Job.state == JobState.DONE, Job.copied_from.is_(None), Job.suspect.is_(None))
     own = select(Job.id).where(*graded, or_(last.is_(None), Job.finished_at > last))
     ids = session.scalars(own).all()
-    query = select(Job).where(or_(Job.id.in_(ids), Job.copied_from.in_(ids))).order_by(Job.queued_at, Job.id)
-    return session.scalars(query.with_for_update()).all()
+    which = or_(Job.id.in_(ids), Job.copied_from.in_(ids))
+    lock_submissions(session, SubmissionRow.id.in_(select(Job.submission_id).where(which)))
+    lock_jobs(session, which)
+    query = select(Job).where(which).order_by(Job.queued_at, Job.id)
+    return session.scalars(query.execution_options(populate_existing=True)).all()
 
 
-def _run_again(session: Session, job: Job, sentence: str, at: datetime) -> str:
+def _rerun(session: Session, job: Job) -> Job:
+    """A new job in the place of one that is suspect; not queued yet."""
     cancelled = job.batch_id is not None and session.get_one(Batch, job.batch_id).state is BatchState.CANCELLED
-    again = Job(
+    return Job(
         submission_id=job.submission_id,
         assignment_version_id=job.assignment_version_id,
         enrolment_id=job.enrolment_id,
@@ -122,4 +131,3 @@ def _run_again(session: Session, job: Job, sentence: str, at: datetime) -> str:
         regrade_of=job.id,
         standing=job.standing,
     )
-    return jobs.enqueue(session, again, at)

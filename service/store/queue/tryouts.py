@@ -12,8 +12,9 @@ from typing import Any, cast
 from sqlalchemy import ColumnElement, CursorResult, and_, delete, func, or_, select, update
 from sqlalchemy.orm import Session
 
-from service.store.engine import Store, now
-from service.store.models import AssignmentVersion
+from service.store.engine import Store, now, retry_conflicts
+from service.store.models import AssignmentVersion, Enrolment
+from service.store.revision import needs_newer_code
 from service.store.states import TryoutState
 from service.store.web_tables import Tryout
 from sim.errors import UsageError
@@ -68,6 +69,8 @@ def ask(session: Session, enrolment_id: int, version_id: int, packed: bytes) -> 
 
     Raises UsageError where the student has one waiting, or has tried too many within an hour.
     """
+    # One at a time: of two that ask at once, the second finds the first.
+    session.execute(select(Enrolment.id).where(Enrolment.id == enrolment_id).with_for_update(key_share=True)).all()
     at = now(session)
     of_student = Tryout.enrolment_id == enrolment_id
     session.execute(delete(Tryout).where(Tryout.queued_at < at - _KEPT, Tryout.state.not_in(_UNFINISHED)))
@@ -77,6 +80,7 @@ def ask(session: Session, enrolment_id: int, version_id: int, packed: bytes) -> 
         MOST_AN_HOUR
     ):
         raise UsageError("you have tried %(count)s within an hour; wait a while, or submit it.", count=MOST_AN_HOUR)
+    _forget_programs(session, enrolment_id, version_id)
     row = Tryout(
         enrolment_id=enrolment_id,
         assignment_version_id=version_id,
@@ -89,14 +93,25 @@ def ask(session: Session, enrolment_id: int, version_id: int, packed: bytes) -> 
     return row.id
 
 
+def _forget_programs(session: Session, enrolment_id: int, version_id: int) -> None:
+    """Remove what a student tried before for the same assignment; what came of it is kept for a day."""
+    assignment = select(AssignmentVersion.assignment).where(AssignmentVersion.id == version_id).scalar_subquery()
+    versions = select(AssignmentVersion.id).where(AssignmentVersion.assignment == assignment)
+    tried = (Tryout.enrolment_id == enrolment_id, Tryout.assignment_version_id.in_(versions))
+    session.execute(update(Tryout).where(*tried, Tryout.state.not_in(_UNFINISHED)).values(packed=b""))
+
+
+@retry_conflicts
 def claim(store: Store, lease_seconds: float) -> TryoutClaim | None:
     """Take the one that has waited longest; None when none is due. What has killed two workers is given up."""
     with store.transaction() as session:
+        if needs_newer_code(session):
+            return None
         at = now(session)
         given_up = update(Tryout).where(_due(at), Tryout.attempt >= MOST_ATTEMPTS)
         session.execute(given_up.values(state=TryoutState.FAILED.value, error=_SILENT, finished_at=at))
         query = select(Tryout.id, Tryout.attempt).where(_due(at)).order_by(Tryout.queued_at, Tryout.id).limit(1)
-        found = session.execute(query.with_for_update(skip_locked=True)).one_or_none()
+        found = session.execute(query.with_for_update(skip_locked=True, key_share=True)).one_or_none()
         if found is None:
             return None
         claimed = TryoutClaim(found.id, found.attempt + 1)
@@ -106,12 +121,14 @@ def claim(store: Store, lease_seconds: float) -> TryoutClaim | None:
         return claimed
 
 
+@retry_conflicts
 def keep(store: Store, claimed: TryoutClaim, lease_seconds: float) -> bool:
     """Keep the lease; false when it is another's by now."""
     with store.transaction() as session:
         return _held(session, claimed, lease_until=now(session) + timedelta(seconds=lease_seconds))
 
 
+@retry_conflicts
 def finish(store: Store, claimed: TryoutClaim, words: dict[str, Any], replay: bytes | None) -> bool:
     """Keep what came of it; false when it is another's by now."""
     with store.transaction() as session:
@@ -119,6 +136,7 @@ def finish(store: Store, claimed: TryoutClaim, words: dict[str, Any], replay: by
         return _held(session, claimed, words=words, replay=replay, error=None, **done)
 
 
+@retry_conflicts
 def fail(store: Store, claimed: TryoutClaim, sentence: str) -> bool:
     """A fault of ours: it waits for its other attempt, or has failed."""
     with store.transaction() as session:

@@ -11,7 +11,7 @@ from datetime import datetime, timedelta
 from sqlalchemy import ColumnElement, delete, select
 from sqlalchemy.orm import Session
 
-from service.store.engine import Store, now
+from service.store.engine import Store, now, retry_conflicts
 from service.store.models import Heartbeat, Worker
 
 #: A worker that wrote within this time is taken to live.
@@ -28,6 +28,7 @@ class WorkerDescription:
     concurrency: int  # gradings at a time
     grader_version: str
     sandbox: str  # what stands round student code there
+    problem: str = ""  # why it must be restarted
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +50,7 @@ class InQuarantine:
     reason: str
 
 
+@retry_conflicts
 def beat(store: Store, worker: WorkerDescription) -> None:
     """Write down that the worker lives now. Those that fell silent a day ago are forgotten."""
     with store.transaction() as session:
@@ -60,9 +62,11 @@ def beat(store: Store, worker: WorkerDescription) -> None:
             session.add(row)
         row.host, row.concurrency = worker.host, worker.concurrency
         row.grader_version, row.sandbox = worker.grader_version, worker.sandbox
+        row.problem = worker.problem or None
         row.seen_at = at
 
 
+@retry_conflicts
 def forget(store: Store, name: str) -> None:
     """Take away the row of a worker that has ended."""
     with store.transaction() as session:
@@ -75,7 +79,9 @@ def known_workers(session: Session) -> list[Seen]:
     rows = session.scalars(select(Heartbeat).order_by(Heartbeat.worker))
     return [
         Seen(
-            WorkerDescription(row.worker, row.host, row.concurrency, row.grader_version, row.sandbox),
+            WorkerDescription(
+                row.worker, row.host, row.concurrency, row.grader_version, row.sandbox, row.problem or ""
+            ),
             row.started_at,
             row.seen_at,
             row.seen_at > at - LATELY,

@@ -8,15 +8,15 @@ from typing import Annotated, Any
 from fastapi import Depends, Path, Query, Response
 from pydantic import BaseModel, Field
 
-from service.store import audit
-from service.store.courses import open_assignments
-from service.store.states import Role
-from service.web import preparing
+from service.operations import assignment_uploads, assignment_views, assignments
+from service.operations.assignment_uploads import UploadRequest
+from service.operations.types import Role
 from service.web.api.shapes import Shape, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
-from service.web.api_uploads import ZIP_BODY, Uploaded
+from service.web.api_uploads import LARGEST_ASSIGNMENT, ZIP_BODY, Uploaded
 from service.web.context import Context
+from service.web.request_bodies import takes_upload
 from submissions.assignment.definition import Assignment
 from submissions.assignment.folder import assignment_folder, catalogue
 from submissions.assignment.overview import overview
@@ -185,8 +185,7 @@ def one_of_catalogue(_here: Reads, assignment: AssignmentId) -> AskedShape:
 def list_assignments(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[AssignmentShape]:
     """What the course has prepared and opened, by id."""
     place = place_after(after, str)
-    with context.store.reading() as session:
-        found = open_assignments.of_course(session, here.course_id)
+    found = assignment_views.list_prepared(context.service, here.acting, here.course_id)
     left = [AssignmentShape.model_validate(each) for each in found if place is None or each.assignment > place[0]]
     return page_of(left[: limit + 1], limit, lambda each: [each.id])
 
@@ -194,26 +193,30 @@ def list_assignments(here: Reads, context: Context, limit: Limit = 50, after: Af
 @router.post("/courses/{course_id}/assignments", status_code=201)
 def prepare(here: Manages, context: Context, asked: AssignmentAsked) -> AssignmentShape:
     """Take an assignment from the catalogue, not yet open; again, to mark by its newest version from now on."""
-    found = find_in_catalogue(asked.assignment)
-    return AssignmentShape.model_validate(preparing.prepare(context, here.caller.identity, here.course_id, found))
+    made = assignment_uploads.prepare_from_catalogue(context.service, here.acting, here.course_id, asked.assignment)
+    return AssignmentShape.model_validate(made)
 
 
 @router.post("/courses/{course_id}/assignments/uploads", status_code=201, openapi_extra=ZIP_BODY)
-def upload(here: Manages, context: Context, sent: Uploaded) -> AssignmentShape:
+@takes_upload(LARGEST_ASSIGNMENT, Role.INSTRUCTOR)
+def upload(
+    here: Manages,
+    context: Context,
+    sent: Uploaded,
+    replace: Annotated[bool, Query(description="Also in place of another that students have been shown.")] = True,
+) -> AssignmentShape:
     """Take an assignment of one's own from a zip of its folder; its reference solution is graded as a preview.
 
-    It takes the place of one of the same id.
+    It takes the place of one of the same id. Without `replace`, 409 where students have been shown that one.
     """
-    made = preparing.prepare_own(context, here.caller.identity, here.course_id, sent, replace=True)
+    made = assignment_uploads.upload(context.service, here.acting, here.course_id, UploadRequest(sent, replace))
     return AssignmentShape.model_validate(made)
 
 
 @router.get("/courses/{course_id}/assignments/{assignment}")
 def one_assignment(here: Reads, context: Context, assignment: AssignmentId) -> WholeAssignmentShape:
     """What an assignment of the course asks for, and whether it is open."""
-    with context.store.reading() as session:
-        line = open_assignments.find(session, here.course_id, assignment)
-        found = open_assignments.load(session, here.course_id, assignment)
+    line, found = assignment_views.load(context.service, here.acting, here.course_id, assignment)
     return WholeAssignmentShape(
         **_asked(found),
         open=line.open,
@@ -226,43 +229,35 @@ def one_assignment(here: Reads, context: Context, assignment: AssignmentId) -> W
 @router.post("/courses/{course_id}/assignments/{assignment}/preview", status_code=201)
 def preview(here: Manages, context: Context, assignment: AssignmentId) -> PreviewShape:
     """Grade the catalogue's reference solution as a submission of the token's owner, which is in no batch."""
-    return PreviewShape(job=preparing.preview(context, here.caller.identity, here.course_id, assignment))
+    return PreviewShape(job=assignment_uploads.preview(context.service, here.acting, here.course_id, assignment))
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/open")
 def open_one(here: Manages, context: Context, assignment: AssignmentId) -> AssignmentShape:
     """Let students see it and submit to it."""
-    with context.store.transaction() as session:
-        open_assignments.open_for_students(session, here.course_id, assignment)
-        audit.note(session, here.actor, "open", "course", str(here.course_id), assignment=assignment)
-        return AssignmentShape.model_validate(open_assignments.find(session, here.course_id, assignment))
+    changed = assignments.open_for_students(context.service, here.acting, here.course_id, assignment)
+    return AssignmentShape.model_validate(changed)
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/close")
 def close_one(here: Manages, context: Context, assignment: AssignmentId) -> AssignmentShape:
     """Let nobody submit to it any more; what was submitted stays."""
-    with context.store.transaction() as session:
-        open_assignments.close(session, here.course_id, assignment)
-        audit.note(session, here.actor, "close", "course", str(here.course_id), assignment=assignment)
-        return AssignmentShape.model_validate(open_assignments.find(session, here.course_id, assignment))
+    changed = assignments.close(context.service, here.acting, here.course_id, assignment)
+    return AssignmentShape.model_validate(changed)
 
 
 @router.delete("/courses/{course_id}/assignments/{assignment}", status_code=204, response_class=Response)
 def remove(here: Manages, context: Context, assignment: AssignmentId) -> None:
     """Let the course have it no more, as long as no student has been shown it."""
-    with context.store.transaction() as session:
-        open_assignments.remove(session, here.course_id, assignment)
-        audit.note(session, here.actor, "remove", "course", str(here.course_id), assignment=assignment)
+    assignments.remove(context.service, here.acting, here.course_id, assignment)
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/names")
 def hide_names(here: Manages, context: Context, assignment: AssignmentId, asked: NamesAsked) -> AssignmentShape:
     """Hide or show whose work it is."""
-    with context.store.transaction() as session:
-        open_assignments.hide_names(session, here.course_id, assignment, asked.names_hidden)
-        hidden = {"assignment": assignment, "hidden": asked.names_hidden}
-        audit.note(session, here.actor, "names", "course", str(here.course_id), **hidden)
-        return AssignmentShape.model_validate(open_assignments.find(session, here.course_id, assignment))
+    hidden = asked.names_hidden
+    changed = assignments.hide_names(context.service, here.acting, here.course_id, assignment, hidden=hidden)
+    return AssignmentShape.model_validate(changed)
 
 
 def _asked(found: Assignment) -> dict[str, Any]:
@@ -288,5 +283,5 @@ def _asked(found: Assignment) -> dict[str, Any]:
             )
             for each in found.scenarios
         ],
-        "has_reference": preparing.reference_of(found) is not None,
+        "has_reference": assignment_uploads.reference_of(found) is not None,
     }

@@ -8,19 +8,18 @@ from typing import Annotated
 from fastapi import Depends, Query
 from pydantic import Field
 
-from service.grading.statistics import statistics_of
-from service.store.batches import batches, publishing
-from service.store.courses.hidden_names import hidden_names_of
-from service.store.grades.marked import marked
-from service.store.queue import batch_control, metrics
-from service.store.states import Lane, Role
-from service.web.access import RowName, batch_in
+from service.operations import batch_views as views
+from service.operations import batches as operations
+from service.operations.batches import Accepted, AlreadySubmitted, SubmitRequest
+from service.operations.types import Role
+from service.web.access import RowName
 from service.web.api.shapes import BATCH_EXAMPLE, BatchShape, JobShape, RefusalShape, Shape, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
-from service.web.api_uploads import ZIP_BODY, Uploaded
-from service.web.batch_uploads import upload_batch
-from service.web.context import Context, WebContext
+from service.web.api_uploads import LARGEST_BATCH, ZIP_BODY, Uploaded
+from service.web.batch_uploads import read_upload
+from service.web.context import Context
+from service.web.request_bodies import takes_upload
 
 router = api_router("batches")
 Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
@@ -150,13 +149,14 @@ class RetriedShape(Shape):
 def list_batches(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[BatchShape]:
     """The batches of the course, the newest first."""
     place = place_after(after, datetime, str)
-    with context.store.reading() as session:
-        found = batches.batches_of(session, here.course_id, limit + 1, (place[0], place[1]) if place else None)
+    last = (place[0], place[1]) if place else None
+    found = views.list_batches(context.service, here.acting, here.course_id, limit + 1, last)
     shown = [BatchShape.model_validate(line) for line in found]
     return page_of(shown, limit, lambda each: [each.created_at, each.id])
 
 
 @router.post("/courses/{course_id}/batches", status_code=201, openapi_extra=ZIP_BODY)
+@takes_upload(LARGEST_BATCH, Role.INSTRUCTOR)
 def submit_batch(
     here: Submits,
     context: Context,
@@ -168,37 +168,31 @@ def submit_batch(
     again: Annotated[bool, Query(description="Grade again what was submitted already.")] = False,
 ) -> TakenShape:
     """Hand over a zip with a submission for each student, as `robomark batch submit` takes it."""
-    taken = upload_batch(context, here.course_id, upload, name, assignment, again=again)
-    jobs = () if taken.accepted.batch is None else taken.accepted.batch.jobs
+    contents = read_upload(context, here.acting, here.course_id, upload, assignment)
+    done = operations.submit(context.service, here.acting, here.course_id, SubmitRequest(name, contents, again))
+    over = [job for job in done.jobs if job.staff_only]
     return TakenShape(
-        batch=None if taken.accepted.batch is None else taken.accepted.batch.id,
-        queued=sum(job.copied_from is None for job in jobs),
-        copied=sum(job.copied_from is not None for job in jobs),
-        known=[KnownShape.model_validate(known) for known in taken.accepted.known],
-        for_staff=[ForStaffShape.model_validate(job) for job in jobs if job.staff_only],
-        refusals=[RefusalShape.model_validate(refusal) for refusal in taken.refusals],
+        batch=None if done.batch is None else done.batch.id,
+        queued=done.queued,
+        copied=done.copied,
+        known=[KnownShape.model_validate(each) for each in sorted(done.known, key=_by_student)],
+        for_staff=[ForStaffShape.model_validate(job) for job in sorted(over, key=_by_student)],
+        refusals=[RefusalShape.model_validate(refusal) for refusal in done.refusals],
     )
 
 
 @router.get("/courses/{course_id}/batches/{batch_id}")
 def one_batch(here: Reads, context: Context, batch_id: RowName) -> WholeBatchShape:
     """How far a batch is, and what a class got."""
-    hidden = hidden_names_of(context.store, here.course_id)
-    with context.store.reading() as session:
-        batch_in(session, here.course_id, batch_id)
-        line = batches.batch(session, batch_id)
-        pace = metrics.pace(session, batch_id)
-        lines = [each.hidden_by(hidden) for each in batches.job_lines(session, batch_id)]
-        statistics = statistics_of(marked(session, lines))
-        return WholeBatchShape(
-            **BatchShape.model_validate(line).model_dump(),
-            progress=ProgressShape.model_validate(batches.progress(session, batch_id)),
-            pace=None
-            if pace is None
-            else PaceShape(per_minute=pace.per_minute, left_seconds=pace.left.total_seconds()),
-            statistics=[StatisticsShape.model_validate(each) for each in statistics],
-            unpublished_regrades=0 if line.regrade_of else publishing.unpublished_regrades(session, batch_id),
-        )
+    found = views.show_graded(context.service, here.acting, here.course_id, batch_id)
+    pace = found.view.pace
+    return WholeBatchShape(
+        **BatchShape.model_validate(found.view.batch).model_dump(),
+        progress=ProgressShape.model_validate(found.view.progress),
+        pace=None if pace is None else PaceShape(per_minute=pace.per_minute, left_seconds=pace.left.total_seconds()),
+        statistics=[StatisticsShape.model_validate(each) for each in found.statistics],
+        unpublished_regrades=found.waiting_regrades,
+    )
 
 
 @router.get("/courses/{course_id}/batches/{batch_id}/grades")
@@ -210,10 +204,8 @@ def batch_grades(
     Their order tells nothing where names are hidden.
     """
     place = place_after(after, str)
-    hidden = hidden_names_of(context.store, here.course_id)
-    with context.store.reading() as session:
-        batch_in(session, here.course_id, batch_id)
-        found = batches.some_job_lines(session, batch_id, hidden, limit + 1, place[0] if place else None)
+    last = place[0] if place else None
+    found = views.list_grades(context.service, here.acting, here.course_id, batch_id, limit + 1, last)
     page = page_of(found, limit, lambda each: [each.id])
     return Listed(items=[JobShape.model_validate(each) for each in page.items], next=page.next)
 
@@ -221,33 +213,29 @@ def batch_grades(
 @router.post("/courses/{course_id}/batches/{batch_id}/pause")
 def pause(here: Submits, context: Context, batch_id: RowName) -> ControlledShape:
     """Begin no more of a batch; what runs goes on."""
-    _look_for(context, here, batch_id)
-    return ControlledShape.model_validate(batch_control.pause(context.store, batch_id, actor=here.actor))
+    done = operations.pause(context.service, here.acting, here.course_id, batch_id)
+    return ControlledShape.model_validate(done)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/resume")
 def resume(here: Submits, context: Context, batch_id: RowName) -> ControlledShape:
     """Let a paused batch go on."""
-    _look_for(context, here, batch_id)
-    return ControlledShape.model_validate(batch_control.resume(context.store, batch_id, actor=here.actor))
+    done = operations.resume(context.service, here.acting, here.course_id, batch_id)
+    return ControlledShape.model_validate(done)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/cancel")
 def cancel(here: Submits, context: Context, batch_id: RowName) -> ControlledShape:
     """End what of a batch is not graded yet; marks that are there stay."""
-    _look_for(context, here, batch_id)
-    return ControlledShape.model_validate(batch_control.cancel(context.store, batch_id, actor=here.actor))
+    done = operations.cancel(context.service, here.acting, here.course_id, batch_id)
+    return ControlledShape.model_validate(done)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/retry")
 def retry(here: Submits, context: Context, batch_id: RowName) -> RetriedShape:
     """Queue again what of a batch could not be graded."""
-    _look_for(context, here, batch_id)
-    retried = batch_control.retry(context.store, batch_id, actor=here.actor)
-    context.notifier.grade(Lane.BATCH, retried.queued)
-    return RetriedShape.model_validate(retried)
+    return RetriedShape.model_validate(operations.retry(context.service, here.acting, here.course_id, batch_id))
 
 
-def _look_for(context: WebContext, here: CallerInCourse, batch_id: str) -> None:
-    with context.store.reading() as session:
-        batch_in(session, here.course_id, batch_id)
+def _by_student(each: Accepted | AlreadySubmitted) -> str:
+    return each.student

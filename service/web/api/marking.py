@@ -8,19 +8,15 @@ from typing import Annotated
 
 from fastapi import Depends, Path, Query
 from pydantic import BaseModel, Field
-from sqlalchemy.orm import Session
 
-from service.store.courses.hidden_names import hidden_names_of
-from service.store.grades import appeals, comments, marking_history, overrides
-from service.store.grades.appeals import LONGEST_TEXT
-from service.store.grades.comments import LONGEST_COMMENT
-from service.store.grades.overrides import LONGEST_REASON
-from service.store.models import Job
-from service.store.states import JobState, Role
-from service.web.access import RowName, RowNumber, job_in, nothing_here, own_submission
+from service.operations import appeals, grades
+from service.operations.appeals import LONGEST_TEXT
+from service.operations.grades import LONGEST_COMMENT, LONGEST_REASON, CommentRequest, MarksRequest
+from service.operations.types import Role
+from service.web.access import HIGHEST_NUMBER, RowName, RowNumber
 from service.web.api.shapes import Shape, like
 from service.web.api_access import CallerInCourse, in_course
-from service.web.api_routes import Listed, api_router
+from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
 from service.web.context import Context, WebContext
 
 router = api_router("marking")
@@ -29,11 +25,11 @@ Marks = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "mark"))]
 StudentReads = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "read"))]
 StudentSubmits = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "submit"))]
 CriterionId = Annotated[str, Path(min_length=1, max_length=200)]
+_SEEN = "The id of the override that you have seen, 0 for none; 409 where it is another by now."
 
 
 def _owning(here: StudentSubmits, context: Context, submission_id: RowNumber) -> CallerInCourse:
-    with context.store.reading() as session:
-        own_submission(session, here.caller.identity, here.course_id, submission_id)
+    appeals.show_own(context.service, here.acting, here.course_id, submission_id)
     return here
 
 
@@ -45,6 +41,7 @@ GRADE = "/courses/{course_id}/grades/{job_id}"
 class OverrideShape(Shape):
     """What holds in place of the grader's marks; null for marks excuses the criterion."""
 
+    id: int = Field(description="To be sent as `seen` with the next change, so that a change in between is noticed.")
     marks: float | None
     reason: str
     actor: str
@@ -102,6 +99,7 @@ class MarkingShape(Shape):
                 "marks": 5,
                 "max_marks": 6,
                 "override": {
+                    "id": 1,
                     "marks": 5,
                     "reason": "The last one is named, with a slip of the pen.",
                     "actor": "Grace Hopper (person 2)",
@@ -119,6 +117,7 @@ class MarksAsked(BaseModel):
 
     marks: Decimal | None = Field(ge=0, le=10_000, examples=[5])
     reason: str = Field(min_length=1, max_length=LONGEST_REASON, examples=["The last one is named."])
+    seen: int | None = Field(None, ge=0, le=HIGHEST_NUMBER, description=_SEEN)
 
 
 class CommentAsked(BaseModel):
@@ -167,9 +166,7 @@ class TextAsked(BaseModel):
 @router.get(GRADE + "/marking")
 def marking(here: Reads, context: Context, job_id: RowName) -> MarkingShape:
     """The criteria of a grade as graded and as they count, and the comments on it."""
-    with context.store.reading() as session:
-        job_in(session, here.course_id, job_id)
-        return _marking(session, job_id)
+    return MarkingShape.model_validate(grades.show_marking(context.service, here.acting, here.course_id, job_id))
 
 
 @router.put(GRADE + "/marking/{criterion}")
@@ -177,40 +174,35 @@ def set_marks(
     here: Marks, context: Context, job_id: RowName, criterion: CriterionId, asked: MarksAsked
 ) -> MarkingShape:
     """Let a criterion of this submission have these marks from now on, or excuse it; a regrade changes neither."""
-    with context.store.transaction() as session:
-        _graded(session, here, job_id)
-        if asked.marks is None:
-            overrides.excuse(session, job_id, criterion, asked.reason, here.actor)
-        else:
-            overrides.set_marks(session, job_id, criterion, asked.marks, asked.reason, here.actor)
-        return _marking(session, job_id)
+    wanted = MarksRequest(criterion, asked.marks, asked.reason, asked.seen)
+    return MarkingShape.model_validate(grades.set_marks(context.service, here.acting, here.course_id, job_id, wanted))
 
 
 @router.delete(GRADE + "/marking/{criterion}")
-def withdraw(here: Marks, context: Context, job_id: RowName, criterion: CriterionId) -> MarkingShape:
+def withdraw(
+    here: Marks,
+    context: Context,
+    job_id: RowName,
+    criterion: CriterionId,
+    seen: Annotated[int | None, Query(ge=0, le=HIGHEST_NUMBER, description=_SEEN)] = None,
+) -> MarkingShape:
     """Let the grader's marks of a criterion count again."""
-    with context.store.transaction() as session:
-        _graded(session, here, job_id)
-        overrides.withdraw(session, job_id, criterion, here.actor)
-        return _marking(session, job_id)
+    changed = grades.withdraw(context.service, here.acting, here.course_id, job_id, criterion, seen)
+    return MarkingShape.model_validate(changed)
 
 
 @router.post(GRADE + "/comments", status_code=201)
 def comment(here: Marks, context: Context, job_id: RowName, asked: CommentAsked) -> MarkingShape:
     """Write a comment to the student."""
-    with context.store.transaction() as session:
-        _graded(session, here, job_id)
-        comments.comment(session, job_id, asked.criterion, asked.text, here.actor)
-        return _marking(session, job_id)
+    wanted = CommentRequest(asked.text, asked.criterion)
+    return MarkingShape.model_validate(grades.comment(context.service, here.acting, here.course_id, job_id, wanted))
 
 
 @router.delete(GRADE + "/comments/{comment_id}")
 def uncomment(here: Marks, context: Context, job_id: RowName, comment_id: RowNumber) -> MarkingShape:
     """Show a comment to nobody any more."""
-    with context.store.transaction() as session:
-        _graded(session, here, job_id)
-        comments.withdraw(session, job_id, comment_id, here.actor)
-        return _marking(session, job_id)
+    changed = grades.withdraw_comment(context.service, here.acting, here.course_id, job_id, comment_id)
+    return MarkingShape.model_validate(changed)
 
 
 @router.get("/courses/{course_id}/appeals")
@@ -218,19 +210,26 @@ def list_appeals(
     here: Reads,
     context: Context,
     answered: Annotated[bool, Query(description="Those with an answer, the newest first; else the open ones.")] = False,
+    limit: Limit = 100,
+    after: After = "",
 ) -> Listed[AppealShape]:
     """What students ask again: the open ones, the longest waiting first, or the newest answered ones."""
-    hidden = hidden_names_of(context.store, here.course_id)
-    with context.store.reading() as session:
-        found = appeals.in_course(session, here.course_id, hidden, answered=answered)
-    return Listed(items=[AppealShape.model_validate(each) for each in found])
+    where = (context.service, here.acting, here.course_id)
+    if answered:
+        last = place_after(after, datetime, int)
+        found = appeals.list_answered(*where, limit=limit + 1, after=last)
+        listed = page_of(found, limit, lambda each: [each.answered_at or each.asked_at, each.id])
+    else:
+        place = place_after(after, int)
+        found = appeals.list_open(*where, limit=limit + 1, after=None if place is None else place[0])
+        listed = page_of(found, limit, lambda each: [each.id])
+    return Listed(items=[AppealShape.model_validate(each) for each in listed.items], next=listed.next)
 
 
 @router.post("/courses/{course_id}/appeals/{appeal_id}/answer", status_code=204)
 def answer(here: Marks, context: Context, appeal_id: RowNumber, asked: TextAsked) -> None:
     """Answer an open one, which closes it."""
-    with context.store.transaction() as session:
-        appeals.answer(session, here.course_id, appeal_id, asked.text, here.actor)
+    appeals.answer(context.service, here.acting, here.course_id, appeal_id, asked.text)
 
 
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}/appeals")
@@ -242,26 +241,10 @@ def own_appeals(here: StudentReads, context: Context, submission_id: RowNumber) 
 @router.post("/courses/{course_id}/mine/submissions/{submission_id}/appeals", status_code=201)
 def ask(here: Owns, context: Context, submission_id: RowNumber, asked: TextAsked) -> Listed[AppealShape]:
     """Ask for a second look at a grade."""
-    with context.store.transaction() as session:
-        appeals.ask(session, submission_id, asked.text)
+    appeals.ask(context.service, here.acting, here.course_id, submission_id, asked.text)
     return _own(context, here, submission_id)
 
 
 def _own(context: WebContext, here: CallerInCourse, submission_id: int) -> Listed[AppealShape]:
-    with context.store.reading() as session:
-        row = own_submission(session, here.caller.identity, here.course_id, submission_id)
-        return Listed(items=[AppealShape.model_validate(each) for each in appeals.of_submission(session, row.id)])
-
-
-def _graded(session: Session, here: CallerInCourse, job_id: str) -> None:
-    if job_in(session, here.course_id, job_id).state is not JobState.DONE:
-        raise nothing_here()
-
-
-def _marking(session: Session, job_id: str) -> MarkingShape:
-    steps = marking_history.history(session, session.get_one(Job, job_id).submission_id)
-    return MarkingShape(
-        criteria=[CriterionMarksShape.model_validate(each) for each in overrides.criterion_marks(session, job_id)],
-        comments=[CommentShape.model_validate(each) for each in comments.of_job(session, job_id)],
-        history=[MarkingStepShape.model_validate(each) for each in steps],
-    )
+    found = appeals.show_own(context.service, here.acting, here.course_id, submission_id)
+    return Listed(items=[AppealShape.model_validate(each) for each in found.appeals])

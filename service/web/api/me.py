@@ -6,9 +6,8 @@ from typing import Annotated
 
 from fastapi import Depends
 from pydantic import Field
-from sqlalchemy import select
 
-from service.store.models import Course
+from service.operations import courses as own_courses
 from service.web.api.shapes import CourseShape, Shape, like
 from service.web.api_access import Called, Caller, with_scope
 from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
@@ -57,7 +56,4 @@ def courses(
 
 
 def _courses(context: WebContext, caller: Caller) -> list[CourseShape]:
-    roles = caller.identity.roles
-    with context.store.reading() as session:
-        rows = session.scalars(select(Course).where(Course.id.in_(roles)).order_by(Course.id)).all()
-    return [CourseShape(id=row.id, name=row.name, role=roles[row.id]) for row in rows]
+    return [CourseShape.model_validate(each) for each in own_courses.list_own(context.service, caller.acting)]

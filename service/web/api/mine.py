@@ -9,29 +9,23 @@ from typing import Annotated
 from fastapi import Depends, Path, Query, Request
 from fastapi.responses import Response
 from pydantic import Field
-from sqlalchemy.orm import Session
 
-from service import own_work
-from service.own_work import OwnSubmission
-from service.report_files import report_alone
-from service.reports.view import View, student_view
-from service.store.batches import batches
-from service.store.batches.batches import JobLine
-from service.store.courses import open_assignments, policies
-from service.store.grades import results
-from service.store.queue.queue_places import queue_place
-from service.store.states import JobState, Role
-from service.web.access import RowNumber, enrolment_in, nothing_here, own_submission
-from service.web.api.grades import HTML, REPLAY, ZIP, grade_answer, packed_answer, replay_answer
+from service.operations import own_views
+from service.operations.own_views import SubmissionView
+from service.operations.submissions import SubmitRequest
+from service.operations.types import JobState, Role
+from service.web.access import RowNumber
+from service.web.api.grades import HTML, REPLAY, ZIP, grade_answer, replay_answer, report_answer
 from service.web.api.people import LimitsShape
 from service.web.api.shapes import GradeShape, Shape, example_of, like
 from service.web.api_access import CallerInCourse, in_course
-from service.web.api_routes import After, Described, Limit, Listed, api_router, page_of, place_after, tagged
-from service.web.api_uploads import SENT_BODY, Sent
+from service.web.api_routes import After, Described, Limit, Listed, api_router, page_of, place_after
+from service.web.api_uploads import LARGEST_SUBMISSION, SENT_BODY, Sent
 from service.web.attachments import attachment
-from service.web.context import Context, WebContext
-from service.web.submitting import seen_assignment, submit
-from submissions.assignment.task_sheet import TaskSheet, task_sheet
+from service.web.context import Context
+from service.web.language import language_of
+from service.web.request_bodies import takes_upload
+from service.web.submitting import submit
 
 router = api_router("mine")
 Reads = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "read"))]
@@ -91,7 +85,7 @@ class SubmissionShape(Shape):
     )
     job: str = Field(validation_alias="job_id")
     state: JobState
-    progress: float = Field(description="Of the grading, from 0 to 1.")
+    progress: float = Field(description="Of the grading, from 0 to 1, by the time that it usually takes.", default=1.0)
     place: PlaceShape | None = Field(description="In the queue; null once nothing is to come.", default=None)
     marks: float | None = Field(description="As far as they may be seen now; null while there are none.")
     max_marks: float | None
@@ -158,30 +152,28 @@ class TaskSheetShape(Shape):
 def list_open(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[OpenShape]:
     """What the course shows its students, by id."""
     place = place_after(after, str)
-    with context.store.reading() as session:
-        enrolment = enrolment_in(session, here.caller.identity, here.course_id)
-        shown = []
-        for each in open_assignments.of_course(session, here.course_id):
-            if each.opened_at is not None and (place is None or each.assignment > place[0]):
-                left = own_work.allowance(session, enrolment.id, each.assignment)
-                shown.append(
-                    OpenShape(
-                        id=each.assignment,
-                        title=each.title,
-                        max_marks=float(each.max_marks),
-                        open=each.open,
-                        limits=LimitsShape.model_validate(left.limits),
-                        attempts_left=left.attempts_left,
-                        days_left=left.days_left,
-                    )
-                )
-    return page_of(shown[: limit + 1], limit, lambda each: [each.id])
+    found = own_views.list_opened(
+        context.service, here.acting, here.course_id, limit=limit + 1, after=place[0] if place else ""
+    )
+    shown = [
+        OpenShape(
+            id=each.assignment,
+            title=each.title,
+            max_marks=float(each.max_marks),
+            open=each.open,
+            limits=LimitsShape.model_validate(left.limits),
+            attempts_left=left.attempts_left,
+            days_left=left.days_left,
+        )
+        for each, left in found
+    ]
+    return page_of(shown, limit, lambda each: [each.id])
 
 
 @router.get(PREFIX + "/assignments/{assignment}")
 def one_assignment(here: Reads, context: Context, assignment: AssignmentId) -> TaskSheetShape:
     """What an assignment asks for, of those that were opened or that the token's owner has submitted to."""
-    sheet = _sheet(context, here, assignment)
+    sheet = own_views.show_sheet(context.service, here.acting, here.course_id, assignment)
     criteria = [CriterionAskedShape(title=title, marks=float(marks)) for title, marks in sheet.criteria]
     told = {field.name: getattr(sheet, field.name) for field in fields(sheet)}
     return TaskSheetShape.model_validate(told | {"criteria": criteria, "given": sorted(sheet.given)})
@@ -190,13 +182,11 @@ def one_assignment(here: Reads, context: Context, assignment: AssignmentId) -> T
 @router.get(PREFIX + "/assignments/{assignment}/given/{file}", responses=GIVEN, response_class=Response)
 def given_file(here: Reads, context: Context, assignment: AssignmentId, file: str) -> Response:
     """A file that the assignment gives its students."""
-    sheet = _sheet(context, here, assignment)
-    if file not in sheet.given:
-        raise nothing_here()
-    return attachment(sheet.given[file], file)
+    return attachment(own_views.show_given_file(context.service, here.acting, here.course_id, assignment, file), file)
 
 
 @router.post(PREFIX + "/submissions", status_code=201, openapi_extra=SENT_BODY)
+@takes_upload(LARGEST_SUBMISSION, Role.STUDENT)
 def submit_one(
     here: Submits,
     context: Context,
@@ -204,80 +194,55 @@ def submit_one(
     assignment: Annotated[str, Query(min_length=1, max_length=100, examples=["shape-recognition"])],
 ) -> SubmissionShape:
     """Submit: a robot program, a responder, a notebook, or a zip with them; each a part `files` of the form."""
-    identity = here.caller.identity
-    accepted = submit(context, identity, here.course_id, assignment, sent, even_in_part=True)
-    with context.store.reading() as session:
-        return _shown(session, _own(session, here, accepted.submission_id))
+    accepted = submit(context, here.acting, here.course_id, SubmitRequest(assignment, sent, even_in_part=True))
+    return _shown(own_views.show_submission(context.service, here.acting, here.course_id, accepted.submission_id))
 
 
 @router.get(PREFIX + "/submissions")
 def list_submissions(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[SubmissionShape]:
     """What the token's owner submitted in the course, the newest first."""
     place = place_after(after, int)
-    with context.store.reading() as session:
-        enrolment = enrolment_in(session, here.caller.identity, here.course_id)
-        found = own_work.own_submissions_before(session, enrolment.id, place[0] if place else None, limit + 1)
-        return page_of([_shown(session, each) for each in found], limit, lambda each: [each.id])
+    found = own_views.list_submissions(
+        context.service, here.acting, here.course_id, limit=limit + 1, before=place[0] if place else None
+    )
+    return page_of([_shown(each) for each in found], limit, lambda each: [each.id])
 
 
 @router.get(PREFIX + "/submissions/{submission_id}")
 def one_submission(here: Reads, context: Context, submission_id: RowNumber) -> SubmissionShape:
     """One submission, and how far it is."""
-    with context.store.reading() as session:
-        return _shown(session, _own(session, here, submission_id))
+    return _shown(own_views.show_submission(context.service, here.acting, here.course_id, submission_id))
 
 
 @router.get(PREFIX + "/submissions/{submission_id}/grade", response_model=GradeShape)
 def grade(request: Request, here: Reads, context: Context, submission_id: RowNumber) -> Response:
     """The grade, as far as its student may see it now; 404 until there is one."""
-    line, view = _view(context, here, submission_id)
-    return grade_answer(request, line.id, view)
+    job_id, view = own_views.show_result(context.service, here.acting, here.course_id, submission_id)
+    return grade_answer(request, job_id, view)
 
 
 @router.get(PREFIX + "/submissions/{submission_id}/report", responses=HTML, response_class=Response)
 def report(request: Request, here: Reads, context: Context, submission_id: RowNumber) -> Response:
-    """The report, as far as its student may see it now."""
-    line, view = _view(context, here, submission_id)
-    return tagged(request, report_alone(context.store, line, view).encode(), "text/html; charset=utf-8")
+    """The report, as far as its student may see it now, in the language that `Accept-Language` asks for."""
+    asked = (context.service, here.acting, here.course_id, submission_id)
+    return report_answer(request, own_views.show_report(*asked, language_of(request)))
 
 
 @router.get(PREFIX + "/submissions/{submission_id}/replay", responses=REPLAY, response_class=Response)
 def replay(request: Request, here: Reads, context: Context, submission_id: RowNumber) -> Response:
     """What a replay plays of the trials that the student may see now."""
-    line, view = _view(context, here, submission_id)
-    return replay_answer(request, context, line.id, view)
+    return replay_answer(request, own_views.show_replay(context.service, here.acting, here.course_id, submission_id))
 
 
 @router.get(PREFIX + "/submissions/{submission_id}/files", responses=ZIP, response_class=Response)
 def files(here: Reads, context: Context, submission_id: RowNumber) -> Response:
     """What was submitted, as a zip that can be submitted again."""
-    with context.store.reading() as session:
-        return packed_answer(session, own_submission(session, here.caller.identity, here.course_id, submission_id))
+    found = own_views.show_files(context.service, here.acting, here.course_id, submission_id)
+    return attachment(found.data, found.name, "application/zip")
 
 
-def _own(session: Session, here: CallerInCourse, submission_id: int) -> OwnSubmission:
-    enrolment = enrolment_in(session, here.caller.identity, here.course_id)
-    found = own_work.own_submission(session, enrolment.id, submission_id)
-    if found is None:
-        raise nothing_here()
-    return found
-
-
-def _shown(session: Session, found: OwnSubmission) -> SubmissionShape:
-    shape = SubmissionShape.model_validate(found)
-    place = PlaceShape.model_validate(queue_place(session, found.job_id)) if found.waits else None
-    return shape.model_copy(update={"over": found.staff_only or None, "place": place})
-
-
-def _sheet(context: WebContext, here: CallerInCourse, assignment: str) -> TaskSheet:
-    with context.store.reading() as session:
-        return task_sheet(seen_assignment(session, here.caller.identity, here.course_id, assignment))
-
-
-def _view(context: WebContext, here: CallerInCourse, submission_id: int) -> tuple[JobLine, View]:
-    with context.store.reading() as session:
-        found = _own(session, here, submission_id)
-        if not found.shown:
-            raise nothing_here()
-        view = student_view(results.load(session, found.job_id), policies.released(session, found.job_id))
-        return batches.job_line(session, found.job_id), view
+def _shown(found: SubmissionView) -> SubmissionShape:
+    shape = SubmissionShape.model_validate(found.submission)
+    place = None if found.place is None else PlaceShape.model_validate(found.place)
+    progress = 1.0 if found.place is None else found.place.progress
+    return shape.model_copy(update={"over": found.submission.staff_only or None, "place": place, "progress": progress})

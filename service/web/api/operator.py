@@ -8,22 +8,15 @@ from typing import Annotated
 from fastapi import Depends
 from pydantic import BaseModel, Field
 
-from service.doctor import examine_service
-from service.store import audit
-from service.store.models import Batch
-from service.store.people import people, sign_in_links
-from service.store.queue import batch_control, dead_letters, tryouts, workers
-from service.store.queue.metrics import collect
-from service.store.states import JobState, Lane
-from service.version import GRADER_VERSION
-from service.web.access import nothing_here
+from service.operations import batches, courses, system
+from service.operations.courses import MemberRequest
+from service.operations.types import JobState, Lane
 from service.web.api.batches import RetriedShape
 from service.web.api.shapes import Shape, example_of, like
 from service.web.api.sign_in_links import LinkShape, link_shape
 from service.web.api_access import Caller, operating
 from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, page_of, place_after
 from service.web.context import Context
-from submissions.people import Student
 
 router = api_router("operator")
 Reads = Annotated[Caller, Depends(operating("read"))]
@@ -91,6 +84,7 @@ class WorkerShape(Shape):
     seen_at: datetime
     lately: bool = Field(description="Whether it was heard of just now.")
     quarantine: str | None = Field(description="What it got wrong, where it may grade no more.")
+    problem: str = Field(description="Why it must be restarted; empty where nothing is wrong.")
 
     model_config = like(
         name="worker@host",
@@ -102,6 +96,7 @@ class WorkerShape(Shape):
         seen_at="2026-11-02T10:00:00Z",
         lately=True,
         quarantine=None,
+        problem="",
     )
 
 
@@ -154,27 +149,36 @@ class InstructorAsked(BaseModel):
     name: str = Field("", max_length=200, examples=["Grace Hopper"])
 
 
+class SameIdShape(Shape):
+    """An instructor of another course with the same id."""
+
+    course: str
+    enrolment: int
+    name: str
+
+    model_config = like(course="TM111", enrolment=4, name="Grace Hopper")
+
+
 class NewInstructorShape(Shape):
     """An instructor, and the link that signs them in; it is told this once."""
 
     id: str
     course: int
+    enrolment: int
     link: LinkShape
+    elsewhere: list[SameIdShape] = Field(description="Other persons, until an operator joins them with this one.")
 
-    model_config = like(id="grace", course=1, link=example_of(LinkShape))
+    model_config = like(id="grace", course=1, enrolment=9, link=example_of(LinkShape), elsewhere=[])
 
 
 @router.get("/operator")
-def service(_operator: Reads, context: Context) -> ServiceShape:
+def service(operator: Reads, context: Context) -> ServiceShape:
     """How the service is: what waits, and whether all that grading needs is well."""
-    findings = examine_service(context.settings, context.store)
-    with context.store.reading() as session:
-        found = collect(session)
-        dead = dead_letters.count(session)
-        tried = tryouts.lane(session)
+    view = system.show(context.service, operator.acting)
+    found = view.metrics
     return ServiceShape(
-        version=GRADER_VERSION,
-        ready=all(finding.well for finding in findings),
+        version=view.version,
+        ready=all(finding.well for finding in view.findings),
         lanes=[
             LaneShape(
                 lane=lane,
@@ -184,21 +188,18 @@ def service(_operator: Reads, context: Context) -> ServiceShape:
             )
             for lane in Lane
         ],
-        findings=[FindingShape.model_validate(finding) for finding in findings],
-        tryouts=TryoutLaneShape.model_validate(tried),
-        dead=dead,
+        findings=[FindingShape.model_validate(finding) for finding in view.findings],
+        tryouts=TryoutLaneShape.model_validate(view.test_runs),
+        dead=view.failed_count,
         host_faults=found.host_faults,
         paused_batches=found.paused_batches,
     )
 
 
 @router.get("/operator/workers")
-def list_workers(_operator: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[WorkerShape]:
+def list_workers(operator: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[WorkerShape]:
     """The workers that are known, by name."""
     place = place_after(after, str)
-    with context.store.reading() as session:
-        quarantined = {each.worker: each.reason for each in workers.in_quarantine(session)}
-        seen = workers.known_workers(session)
     shown = [
         WorkerShape(
             name=each.worker.name,
@@ -209,38 +210,42 @@ def list_workers(_operator: Reads, context: Context, limit: Limit = 50, after: A
             started_at=each.started_at,
             seen_at=each.seen_at,
             lately=each.lately,
-            quarantine=quarantined.get(each.worker.name),
+            quarantine=None if quarantine is None else quarantine.reason,
+            problem=each.worker.problem,
         )
-        for each in seen
+        for each, quarantine in system.list_workers(context.service, operator.acting)
         if place is None or each.worker.name > place[0]
     ]
     return page_of(shown[: limit + 1], limit, lambda each: [each.name])
 
 
 @router.get("/operator/courses")
-def list_courses(_operator: Reads, context: Context) -> Listed[NamedCourseShape]:
+def list_courses(operator: Reads, context: Context) -> Listed[NamedCourseShape]:
     """All courses, by name."""
-    with context.store.reading() as session:
-        return Listed(items=[NamedCourseShape.model_validate(each) for each in people.courses(session)])
+    found = courses.list_courses(context.service, operator.acting)
+    return Listed(items=[NamedCourseShape.model_validate(each) for each in found])
 
 
 @router.post("/operator/courses", status_code=201, openapi_extra=dict(NO_KEY))
 def add_instructor(operator: Manages, context: Context, asked: InstructorAsked) -> NewInstructorShape:
     """Make an instructor, and the course where there is none of that name, with a link that signs them in once."""
-    who = Student(asked.id.strip(), asked.name.strip())
-    with context.store.transaction() as session:
-        member = people.make_instructor(session, asked.course.strip(), who)
-        audit.note(session, operator.actor, "add", "person", str(member.person_id), role=member.role.value)
-        secret = sign_in_links.make_link(session, member.person_id, operator.actor)
-        course = people.find_course(session, asked.course.strip())
-    return NewInstructorShape(id=member.id, course=course, link=link_shape(context, secret))
+    request = MemberRequest(asked.course, asked.id, asked.name)
+    added = courses.add_member(context.service, operator.acting, request)
+    return NewInstructorShape(
+        id=added.member.id,
+        course=added.member.course_id,
+        enrolment=added.member.enrolment_id,
+        link=link_shape(context, added.secret),
+        elsewhere=[
+            SameIdShape(course=name, enrolment=each.enrolment_id, name=each.name) for name, each in added.elsewhere
+        ],
+    )
 
 
 @router.get("/operator/dead")
-def list_dead(_operator: Reads, context: Context) -> Listed[DeadShape]:
+def list_dead(operator: Reads, context: Context) -> Listed[DeadShape]:
     """The newest jobs that could not be graded."""
-    with context.store.reading() as session:
-        found = dead_letters.dead_letters(session)
+    found = system.list_failed(context.service, operator.acting)
     return Listed(items=[DeadShape.model_validate(each) for each in found])
 
 
@@ -248,11 +253,4 @@ def list_dead(_operator: Reads, context: Context) -> Listed[DeadShape]:
 def retry(operator: Manages, context: Context, asked: RetryAsked | None = None) -> RetriedShape:
     """Queue again what could not be graded, of one batch or of all."""
     batch_id = None if asked is None else asked.batch_id
-    if batch_id is not None:
-        with context.store.reading() as session:
-            if session.get(Batch, batch_id) is None:
-                raise nothing_here()
-    retried = batch_control.retry(context.store, batch_id, actor=operator.actor)
-    for lane in Lane:
-        context.notifier.grade(lane, retried.queued)
-    return RetriedShape.model_validate(retried)
+    return RetriedShape.model_validate(batches.retry_dead(context.service, operator.acting, batch_id))

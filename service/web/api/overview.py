@@ -9,20 +9,20 @@ from typing import Annotated, Literal
 from fastapi import Depends, Query
 from pydantic import Field
 
-from service.store.batches import batch_table, batches, preflight, publishing
-from service.store.batches.overview import PASS_SHARE, overview
-from service.store.courses.hidden_names import hidden_names_of
-from service.store.installation import secret_of
-from service.store.states import Role
-from service.web.access import RowName, batch_in
+from service.grading.statistics import PASS_SHARE
+from service.operations import batch_views, regrades
+from service.operations.batches import foresee
+from service.operations.types import Role
+from service.web.access import RowName
 from service.web.api.batches import StatisticsShape
 from service.web.api.regrades import PublishedShape
 from service.web.api.shapes import BATCH_EXAMPLE, RefusalShape, Shape, example_of, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import NO_KEY, api_router
-from service.web.api_uploads import ZIP_BODY, Uploaded
+from service.web.api_uploads import LARGEST_BATCH, ZIP_BODY, Uploaded
 from service.web.batch_uploads import read_upload
 from service.web.context import Context
+from service.web.request_bodies import takes_upload
 
 router = api_router("batches")
 Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
@@ -114,6 +114,7 @@ class PublicationShape(Shape):
 
 
 @router.post("/courses/{course_id}/batches/preflight", openapi_extra=ZIP_BODY | dict(NO_KEY))
+@takes_upload(LARGEST_BATCH, Role.INSTRUCTOR)
 def look_first(
     here: Submits,
     context: Context,
@@ -123,20 +124,17 @@ def look_first(
     ] = "",
 ) -> PreflightShape:
     """What would be taken in of a zip with a submission for each student; nothing is."""
-    checked = read_upload(context, here.course_id, upload, assignment)
-    secret = secret_of(context.store).sha256
-    with context.store.reading() as session:
-        foreseen = preflight.foresee(session, here.course_id, checked.grading_requests, secret)
+    checked = read_upload(context, here.acting, here.course_id, upload, assignment)
     return PreflightShape(
         submissions=[
             ExpectedShape(
-                student=asked.submission.student,
-                name=asked.student.name,
-                source=asked.source,
-                assignment=asked.assignment.id,
-                **asdict(ahead),
+                student=each.asked.submission.student,
+                name=each.asked.student.name,
+                source=each.asked.source,
+                assignment=each.asked.assignment.id,
+                **asdict(each.ahead),
             )
-            for asked, ahead in zip(checked.grading_requests, foreseen, strict=True)
+            for each in foresee(context.service, here.acting, here.course_id, checked)
         ],
         refusals=[RefusalShape.model_validate(refusal) for refusal in checked.refusals],
     )
@@ -152,23 +150,18 @@ def show_overview(
     ] = int(PASS_SHARE * 100),
 ) -> OverviewShape:
     """Marks and their distribution, criteria, causes, whom to look at, and who has not submitted."""
-    hidden = hidden_names_of(context.store, here.course_id)
-    with context.store.reading() as session:
-        batch_in(session, here.course_id, batch_id)
-        refusals = batches.batch(session, batch_id).refusals
-        lines = batch_table.table_lines(session, batch_id, refusals, hidden)
-        classes = overview(session, here.course_id, lines, Decimal(at_least) / 100)
+    found = batch_views.show_overview(context.service, here.acting, here.course_id, batch_id, Decimal(at_least) / 100)
     return OverviewShape(
         classes=[
             ClassShape(
                 statistics=StatisticsShape.model_validate(each.statistics),
-                distribution=[BinShape.model_validate(found) for found in each.distribution],
+                distribution=[BinShape.model_validate(bin_) for bin_ in each.distribution],
                 passed=each.passed,
-                outliers=[OutlierShape.model_validate(found) for found in each.outliers],
+                outliers=[OutlierShape.model_validate(outlier) for outlier in each.outliers],
                 identical=[[line.student for line in same] for same in each.identical],
                 missing=[MissingShape.model_validate(student) for student in each.missing],
             )
-            for each in classes
+            for each in found.classes
         ]
     )
 
@@ -176,6 +169,5 @@ def show_overview(
 @router.get("/courses/{course_id}/batches/{batch_id}/publish")
 def would_publish(here: Reads, context: Context, batch_id: RowName) -> PublicationShape:
     """What publishing the batch would do now; it does nothing."""
-    with context.store.reading() as session:
-        batch_in(session, here.course_id, batch_id)
-        return PublicationShape.model_validate(publishing.would_publish(session, batch_id))
+    found = regrades.preview(context.service, here.acting, here.course_id, batch_id)
+    return PublicationShape.model_validate(found)

@@ -10,17 +10,10 @@ from fastapi import Depends, Path, Query
 from fastapi.responses import Response
 from pydantic import AfterValidator, AwareDatetime, BaseModel, Field
 
-from service.store import audit
-from service.store.courses import open_assignments, policies
-from service.store.courses.policies import PolicyLimits
-from service.store.courses.versions import check_assignment
-from service.store.engine import now
-from service.store.grades import own_gradings
-from service.store.models import Course
-from service.store.people import people
-from service.store.people.students import Students
-from service.store.states import JobState, Role
-from service.web.access import RowNumber, member_in
+from service.operations import people, people_views, policies
+from service.operations.policies import ExtensionRequest, PolicyLimits
+from service.operations.types import JobState, Role
+from service.web.access import RowNumber
 from service.web.api.shapes import Shape, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
@@ -161,37 +154,27 @@ class LimitsShape(Shape):
 def list_people(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[MemberShape]:
     """Everybody in the course, in the order in which they came in."""
     place = place_after(after, int)
-    with context.store.reading() as session:
-        found = people.members_after(session, here.course_id, 0 if place is None else place[0], limit + 1)
+    actor, start = here.acting, 0 if place is None else place[0]
+    found = people_views.list_members_after(context.service, actor, here.course_id, start, limit + 1)
     return page_of([MemberShape.model_validate(each) for each in found], limit, lambda each: [each.enrolment])
 
 
 @router.post("/courses/{course_id}/people", status_code=201)
 def enrol(here: Manages, context: Context, asked: EnrolAsked) -> EnrolledShape:
     """Enrol students before they submit, or give those who have an id alone their names and addresses."""
-    with context.store.transaction() as session:
-        at = now(session)
-        students = Students(session, session.get_one(Course, here.course_id, with_for_update=True).id)
-        for each in asked.students:
-            students.enrol(Student(each.id, each.name, each.email), at)
-        audit.note(session, here.actor, "enrol", "course", str(here.course_id), students=len(asked.students))
+    students = [Student(each.id, each.name, each.email) for each in asked.students]
+    people.enrol(context.service, here.acting, here.course_id, students)
     return EnrolledShape(students=len(asked.students))
 
 
 @router.get("/courses/{course_id}/people/{enrolment_id}")
 def one_student(here: Reads, context: Context, enrolment_id: RowNumber) -> StudentShape:
     """A student, what they submitted as far as names are not hidden, and what they are allowed beyond the policy."""
-    with context.store.reading() as session:
-        row = member_in(session, here.course_id, enrolment_id, Role.STUDENT)
-        hidden = open_assignments.with_names_hidden(session, here.course_id)
-        gradings = own_gradings.newest(session, enrolment_id)
-        allowed = policies.extensions(session, here.course_id)
-        told = {
-            "gradings": [each for each in gradings if each.assignment not in hidden],
-            "some_hidden": bool(hidden),
-            "extensions": [each for each in allowed if each.enrolment_id == row.id],
-        }
-        return StudentShape.model_validate(asdict(people.member_of(session, row)) | told)
+    view = people_views.show_student(context.service, here.acting, here.course_id, enrolment_id)
+    return StudentShape.model_validate(
+        asdict(view.member)
+        | {"gradings": view.gradings, "some_hidden": view.some_hidden, "extensions": view.extensions}
+    )
 
 
 @router.get("/courses/{course_id}/people/{enrolment_id}/limits/{assignment}")
@@ -202,29 +185,23 @@ def limits(
     assignment: Annotated[str, Path(min_length=1, max_length=100)],
 ) -> LimitsShape:
     """What one student may do for an assignment: the policy, and what they are allowed beyond it."""
-    with context.store.reading() as session:
-        member_in(session, here.course_id, enrolment_id, Role.STUDENT)
-        return LimitsShape.model_validate(policies.limits(session, enrolment_id, assignment))
+    found = policies.show_limits(context.service, here.acting, here.course_id, enrolment_id, assignment)
+    return LimitsShape.model_validate(found)
 
 
 @router.post("/courses/{course_id}/people/{enrolment_id}/extensions", status_code=201)
 def extend(here: Manages, context: Context, enrolment_id: RowNumber, asked: ExtensionAsked) -> LimitsShape:
     """Allow one student more time or attempts."""
-    with context.store.transaction() as session:
-        row = member_in(session, here.course_id, enrolment_id, Role.STUDENT)
-        check_assignment(session, asked.assignment)
-        policies.extend(session, enrolment_id, asked.assignment, asked.due_at, asked.more_attempts)
-        detail = {"student": row.student, **asked.model_dump(mode="json")}
-        audit.note(session, here.actor, "extend", "course", str(here.course_id), **detail)
-        return LimitsShape.model_validate(policies.limits(session, enrolment_id, asked.assignment))
+    request = ExtensionRequest(asked.assignment, asked.due_at, asked.more_attempts)
+    found = policies.extend(context.service, here.acting, here.course_id, enrolment_id, request)
+    return LimitsShape.model_validate(found)
 
 
 @router.get("/courses/{course_id}/policies")
 def list_policies(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[PolicyShape]:
     """When and how often students may submit, by assignment."""
     place = place_after(after, str)
-    with context.store.reading() as session:
-        found = policies.policies(session, here.course_id)
+    found = policies.list_policies(context.service, here.acting, here.course_id)
     left = [_policy(name, allowed) for name, allowed in sorted(found.items()) if place is None or name > place[0]]
     return page_of(left[: limit + 1], limit, lambda each: [each.assignment])
 
@@ -233,11 +210,7 @@ def list_policies(here: Reads, context: Context, limit: Limit = 50, after: After
 def set_policy(here: Manages, context: Context, asked: PolicyAsked) -> PolicyShape:
     """Set what holds from now on for an assignment, or for all that have no policy of their own."""
     allowed = PolicyLimits(asked.due_at, asked.late_days, asked.attempts, asked.cool_down_seconds)
-    with context.store.transaction() as session:
-        check_assignment(session, asked.assignment)
-        policies.set_policy(session, here.course_id, asked.assignment, allowed)
-        detail = asked.model_dump(mode="json")
-        audit.note(session, here.actor, "policy", "course", str(here.course_id), **detail)
+    policies.set_policy(context.service, here.acting, here.course_id, asked.assignment, allowed)
     return _policy(asked.assignment, allowed)
 
 
@@ -246,10 +219,7 @@ def drop_policy(
     here: Manages, context: Context, assignment: Annotated[str, Query(min_length=1, max_length=100)]
 ) -> None:
     """Let an assignment have what holds for all, in place of a policy of its own."""
-    with context.store.transaction() as session:
-        policies.drop_policy(session, here.course_id, assignment)
-        detail = {"assignment": assignment, "dropped": True}
-        audit.note(session, here.actor, "policy", "course", str(here.course_id), **detail)
+    policies.drop_policy(context.service, here.acting, here.course_id, assignment)
 
 
 def _policy(assignment: str, allowed: PolicyLimits) -> PolicyShape:

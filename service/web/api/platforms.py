@@ -7,10 +7,9 @@ from typing import Annotated
 from fastapi import Depends
 from pydantic import BaseModel, Field
 
-from service.lti import course_services
-from service.store import audit
-from service.store.people import lti
-from service.store.states import Role
+from service.operations import platforms
+from service.operations.platforms import PlatformRequest
+from service.operations.types import Role
 from service.web.api.shapes import Shape, like
 from service.web.api_access import Caller, CallerInCourse, in_course, operating
 from service.web.api_routes import Described, Listed, api_router
@@ -22,6 +21,7 @@ OperatorManages = Annotated[Caller, Depends(operating("manage"))]
 Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
 Manages = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "manage"))]
 Address = Annotated[str, Field(min_length=1, max_length=1000)]
+Registered = Annotated[str, Field(min_length=1, max_length=platforms.LONGEST_REGISTERED)]
 _SILENT: Described = {
     502: {
         "content": {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}},
@@ -50,20 +50,27 @@ class PlatformShape(Shape):
     authorization_url: str
     token_url: str
     keys_url: str
+    service_origins: list[str] = Field(description="Where else its services are asked for members and marks.")
 
-    model_config = like(id=1, **_MOODLE)
+    model_config = like(id=1, **_MOODLE, service_origins=[])
 
 
 class PlatformAsked(BaseModel):
     """A platform to be registered, or to be changed where issuer and client are those of one."""
 
     name: str = Field(min_length=1, max_length=200, examples=[_MOODLE["name"]])
-    issuer: Address = Field(examples=[_MOODLE["issuer"]])
-    client_id: Address = Field(examples=[_MOODLE["client_id"]])
+    issuer: Registered = Field(examples=[_MOODLE["issuer"]])
+    client_id: Registered = Field(examples=[_MOODLE["client_id"]])
     deployments: list[Address] = Field(min_length=1, max_length=100, examples=[_MOODLE["deployments"]])
     authorization_url: Address = Field(examples=[_MOODLE["authorization_url"]])
     token_url: Address = Field(examples=[_MOODLE["token_url"]])
     keys_url: Address = Field(examples=[_MOODLE["keys_url"]])
+    service_origins: list[Address] = Field(
+        [],
+        max_length=20,
+        description="Where else its services may be asked than at the three addresses.",
+        examples=[["https://school.instructure.com"]],
+    )
 
 
 class CoursePlatformShape(Shape):
@@ -100,26 +107,25 @@ class SentShape(Shape):
 
 
 @router.get("/operator/platforms")
-def list_platforms(_operator: OperatorReads, context: Context) -> Listed[PlatformShape]:
+def list_platforms(operator: OperatorReads, context: Context) -> Listed[PlatformShape]:
     """All that are registered, by name."""
-    with context.store.reading() as session:
-        return Listed(items=[PlatformShape.model_validate(each) for each in lti.platforms(session)])
+    found = platforms.list_platforms(context.service, operator.acting)
+    return Listed(items=[PlatformShape.model_validate(each) for each in found])
 
 
 @router.post("/operator/platforms", status_code=201)
 def register(operator: OperatorManages, context: Context, asked: PlatformAsked) -> Listed[PlatformShape]:
     """Register a platform, or change one of the same issuer and client; all that are registered then."""
-    with context.store.transaction() as session:
-        platform_id = lti.register(session, **asked.model_dump())
-        audit.note(session, operator.actor, "register", "lti_platform", str(platform_id), issuer=asked.issuer)
-        return Listed(items=[PlatformShape.model_validate(each) for each in lti.platforms(session)])
+    lists = {"deployments": tuple(asked.deployments), "service_origins": tuple(asked.service_origins)}
+    request = PlatformRequest(**(asked.model_dump() | lists))
+    found = platforms.register(context.service, operator.acting, request)
+    return Listed(items=[PlatformShape.model_validate(each) for each in found])
 
 
 @router.get("/courses/{course_id}/platform")
 def course_platform(here: Reads, context: Context) -> CoursePlatformShape:
     """The platform that the course is launched from, if one does."""
-    with context.store.reading() as session:
-        link = lti.course_link(session, here.course_id)
+    link = platforms.show_course_platform(context.service, here.acting, here.course_id).link
     if link is None:
         return CoursePlatformShape(name=None, members=False, marks=False)
     marks = link.lineitems_url is not None
@@ -129,10 +135,11 @@ def course_platform(here: Reads, context: Context) -> CoursePlatformShape:
 @router.post("/courses/{course_id}/platform/members", responses=_SILENT)
 def enrol_members(here: Manages, context: Context) -> EnrolledMembersShape:
     """Enrol everybody whom the platform has in the course."""
-    return EnrolledMembersShape.model_validate(course_services.enrol_members(context.store, here.course_id, here.actor))
+    enrolled = platforms.enrol_members(context.service, here.acting, here.course_id)
+    return EnrolledMembersShape.model_validate(enrolled)
 
 
 @router.post("/courses/{course_id}/platform/marks", responses=_SILENT)
 def pass_back(here: Manages, context: Context, asked: MarksOfAsked) -> SentShape:
     """Send the published marks of an assignment to the platform's gradebook."""
-    return SentShape(sent=course_services.pass_back(context.store, here.course_id, asked.assignment, here.actor))
+    return SentShape(sent=platforms.pass_back(context.service, here.acting, here.course_id, asked.assignment))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Annotated, Any
 
 from fastapi import Depends, Query, Request
@@ -11,23 +10,22 @@ from fastapi.responses import Response
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
-from service.batch_export import ExportedFile, export_file
+from service.operations import regrades as operations
+from service.operations.exports import ExportRequest, download
+from service.operations.types import JobState, Role, Standing
 from service.reports.formats import FORMATS
-from service.store.batches import batches, publishing, regrades
-from service.store.courses.hidden_names import hidden_names_of
-from service.store.states import JobState, Lane, Role, Standing
-from service.web.access import RowName, batch_in, job_in
+from service.web.access import RowName
 from service.web.api.shapes import Shape, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, page_of, place_after
-from service.web.batch_uploads import assignment_of
+from service.web.api_uploads import LARGEST_TABLE
+from service.web.attachments import attachment
 from service.web.context import Context, WebContext
+from service.web.request_bodies import takes_upload
 
 router = api_router("batches")
 Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
 Marks = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "mark"))]
-#: A form of another system, filled in.
-_LONGEST_WORKSHEET = 10 * 2**20
 _FILE: dict[int | str, dict[str, Any]] = {
     200: {"description": "The file.", "content": {"*/*": {"schema": {"type": "string", "format": "binary"}}}}
 }
@@ -131,12 +129,8 @@ class PublishedShape(Shape):
 @router.post("/courses/{course_id}/batches/{batch_id}/regrades", status_code=201)
 def regrade(here: Marks, context: Context, batch_id: RowName, asked: RegradeAsked | None = None) -> RegradedShape:
     """Grade a batch again; the old grades stand until somebody publishes."""
-    with context.store.reading() as session:
-        batch_in(session, here.course_id, batch_id)
-        changed = assignment_of(session, here.course_id, asked.assignment) if asked and asked.assignment else None
-    most = context.settings.max_attempts
-    made = regrades.regrade(context.store, batch_id, changed, max_attempts=most, actor=here.actor)
-    context.notifier.grade(Lane.BATCH, made.jobs)
+    name = "" if asked is None else asked.assignment
+    made = operations.regrade_batch(context.service, here.acting, here.course_id, batch_id, name)
     return RegradedShape.model_validate(made)
 
 
@@ -146,46 +140,40 @@ def changes(
 ) -> Listed[ChangeShape]:
     """What a batch of regrades changes, by student; nothing for a batch that is none."""
     place = place_after(after, str)
-    hidden = hidden_names_of(context.store, here.course_id)
-    with context.store.reading() as session:
-        batch_in(session, here.course_id, batch_id)
-        found = regrades.changes(session, batch_id)
-        shown = {line.id: line.hidden_by(hidden).student for line in batches.job_lines(session, batch_id)}
+    found = operations.list_changes(context.service, here.acting, here.course_id, batch_id)
     ids = [each.job_id for each in found]
     start = 0 if place is None else ids.index(place[0]) + 1 if place[0] in ids else len(ids)
     page = page_of(found[start : start + limit + 1], limit, lambda each: [each.job_id])
-    told = [replace(each, student=shown.get(each.job_id, each.student)) for each in page.items]
-    return Listed(items=[ChangeShape.model_validate(each) for each in told], next=page.next)
+    return Listed(items=[ChangeShape.model_validate(each) for each in page.items], next=page.next)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/publish")
 def publish(here: Marks, context: Context, batch_id: RowName, asked: PublishAsked | None = None) -> PublishedShape:
     """Let the newest grades of a batch stand, and release them to the students."""
-    with context.store.reading() as session:
-        batch_in(session, here.course_id, batch_id)
     anyway = asked is not None and asked.anyway
-    return PublishedShape.model_validate(publishing.publish(context.store, batch_id, actor=here.actor, anyway=anyway))
+    done = operations.publish(context.service, here.acting, here.course_id, batch_id, anyway=anyway)
+    return PublishedShape.model_validate(done)
 
 
 @router.post("/courses/{course_id}/grades/{job_id}/publish")
 def publish_one(here: Marks, context: Context, job_id: RowName, asked: PublishAsked | None = None) -> PublishedShape:
     """Let the newest grade of this submission stand, and release it to its student."""
-    with context.store.reading() as session:
-        job_in(session, here.course_id, job_id)
     anyway = asked is not None and asked.anyway
-    return PublishedShape.model_validate(publishing.publish_one(context.store, job_id, actor=here.actor, anyway=anyway))
+    done = operations.publish_one(context.service, here.acting, here.course_id, job_id, anyway=anyway)
+    return PublishedShape.model_validate(done)
 
 
 @router.post("/courses/{course_id}/grades/{job_id}/regrades", status_code=201)
 def regrade_one(here: Marks, context: Context, job_id: RowName, asked: RegradeAsked | None = None) -> RegradedOneShape:
     """Grade this submission again; the old grade stands until somebody publishes."""
-    with context.store.reading() as session:
-        job_in(session, here.course_id, job_id)
-        changed = assignment_of(session, here.course_id, asked.assignment) if asked and asked.assignment else None
-    most = context.settings.max_attempts
-    made = regrades.regrade_one(context.store, job_id, changed, max_attempts=most, actor=here.actor)
-    context.notifier.grade(Lane.INTERACTIVE)
-    return RegradedOneShape(job=made)
+    name = "" if asked is None else asked.assignment
+    return RegradedOneShape(job=operations.regrade_one(context.service, here.acting, here.course_id, job_id, name))
+
+
+@router.post("/courses/{course_id}/grades/{job_id}/over-limit", status_code=204)
+def grade_over_limit(here: Marks, context: Context, job_id: RowName) -> None:
+    """Grade a submission that was put aside because it is over a limit."""
+    operations.grade_over_limit(context.service, here.acting, here.course_id, job_id)
 
 
 @router.get("/courses/{course_id}/batches/{batch_id}/export", responses=_FILE, response_class=Response)
@@ -193,36 +181,26 @@ def export(
     here: Reads, context: Context, batch_id: RowName, form: Form = "csv", published: Published = False
 ) -> Response:
     """The grades of a batch in a format of `robomark batch export`; one without a table is a zip with a file each."""
-    with context.store.reading() as session:
-        batch_in(session, here.course_id, batch_id)
-    return _file(export_file(context.store, batch_id, form, published=published))
+    return _file(context, here, batch_id, ExportRequest(form, published))
 
 
 @router.post(
     "/courses/{course_id}/batches/{batch_id}/worksheet", responses=_FILE, response_class=Response, openapi_extra=_CSV
 )
+@takes_upload(LARGEST_TABLE, Role.INSTRUCTOR)
 async def worksheet(
     request: Request, here: Reads, context: Context, batch_id: RowName, published: Published = False
 ) -> Response:
     """Moodle's grading worksheet, which is sent, with the grades in it; changes nothing here."""
-    given = b""
-    async for chunk in request.stream():
-        given += chunk
-        if len(given) > _LONGEST_WORKSHEET:
-            raise HTTPException(413, f"Expected at most {_LONGEST_WORKSHEET // 2**20} MB.")
+    given = await request.body()
     try:
         text = given.decode("utf-8")
     except UnicodeDecodeError:
         raise HTTPException(422, "The worksheet is not UTF-8; expected it as Moodle wrote it.") from None
-    return await run_in_threadpool(_filled_in, context, here, batch_id, text, published=published)
+    asked = ExportRequest("moodle-worksheet", published, text)
+    return await run_in_threadpool(_file, context, here, batch_id, asked)
 
 
-def _filled_in(context: WebContext, here: CallerInCourse, batch_id: str, given: str, *, published: bool) -> Response:
-    with context.store.reading() as session:
-        batch_in(session, here.course_id, batch_id)
-    return _file(export_file(context.store, batch_id, "moodle-worksheet", published=published, given=given))
-
-
-def _file(exported: ExportedFile) -> Response:
-    headers = {"content-disposition": f'attachment; filename="{exported.name}"'}
-    return Response(exported.data, media_type=exported.media_type, headers=headers)
+def _file(context: WebContext, here: CallerInCourse, batch_id: str, asked: ExportRequest) -> Response:
+    made = download(context.service, here.acting, here.course_id, batch_id, asked)
+    return attachment(made.data, made.name, made.media_type)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from datetime import datetime, timedelta
+from datetime import datetime
 from typing import Annotated
 
 from fastapi import Depends
 from pydantic import BaseModel, Field
 
-from service.store.people import sign_in_links
-from service.store.people.sign_in_links import StudentLink
-from service.store.states import Role
-from service.web.access import RowNumber, member_in
+from service.operations import sign_in_links
+from service.operations.sign_in_links import StudentLink
+from service.operations.types import Role
+from service.web.access import RowNumber
 from service.web.api.shapes import Shape, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import NO_KEY, api_router
@@ -74,18 +74,15 @@ class StudentLinksShape(Shape):
 @router.post("/courses/{course_id}/people/links", status_code=201, openapi_extra=dict(NO_KEY))
 def links(here: Manages, context: Context, asked: LinksAsked | None = None) -> StudentLinksShape:
     """A new link for each student of the course, by id; those that were made before count no more."""
-    lifetime = timedelta(days=sign_in_links.DAYS if asked is None else asked.days)
-    with context.store.transaction() as session:
-        made = sign_in_links.make_links(session, here.course_id, lifetime, here.actor)
+    days = sign_in_links.DAYS if asked is None else asked.days
+    made = sign_in_links.make_links(context.service, here.acting, here.course_id, days)
     return StudentLinksShape(links=[_told(context, each) for each in made])
 
 
 @router.post("/courses/{course_id}/people/{enrolment_id}/link", status_code=201, openapi_extra=dict(NO_KEY))
 def link(here: Manages, context: Context, enrolment_id: RowNumber) -> LinkShape:
     """A new link that signs a student of the course in; instructors have theirs from whoever runs it all."""
-    with context.store.transaction() as session:
-        row = member_in(session, here.course_id, enrolment_id, Role.STUDENT)
-        secret = sign_in_links.make_students_link(session, row, here.actor)
+    secret = sign_in_links.make_students_link(context.service, here.acting, here.course_id, enrolment_id)
     return link_shape(context, secret)
 
 

@@ -10,16 +10,14 @@ from typing import Annotated
 from fastapi import Depends
 from pydantic import Field
 
+from service.operations.similarity import list_similar
+from service.operations.types import Role
 from service.similarity.behaviour import Aspect
-from service.store.batches.similarities import MOST_AT_ONCE, newest_of_course, similarities
-from service.store.installation import secret_of
-from service.store.states import Role
-from service.web.access import RowName, batch_in
+from service.web.access import RowName
 from service.web.api.shapes import Shape, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import api_router
 from service.web.context import Context
-from sim.errors import UsageError
 
 router = api_router("batches")
 Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
@@ -72,8 +70,9 @@ class SimilarityShape(Shape):
     assignment: str
     students: int
     pairs: list[SimilarPairShape]
-    too_short: list[str] = Field(description="Who has too little of their own for anything to be said of it.")
+    too_short: list[str] = Field(description="Who has too little of their own code to compare.")
     same: list[list[str]] = Field(description="Groups who have a whole file in common, however many they are.")
+    same_recordings: list[list[str]] = Field(description="Groups whose recordings of all trials are the same.")
     not_compared: int = Field(description="Pairs of sources that were too many to compare.")
 
 
@@ -88,15 +87,5 @@ class SimilaritiesShape(Shape):
 @router.get("/courses/{course_id}/batches/{batch_id}/similar")
 def show_similar(here: Reads, context: Context, batch_id: RowName) -> SimilaritiesShape:
     """Pairs of students of the course whose newest submissions are alike: a reason to look and to ask, and no proof."""
-    secret = secret_of(context.store)
-    with context.store.reading() as session:
-        batch_in(session, here.course_id, batch_id)
-        lines = newest_of_course(session, here.course_id, batch_id, secret)
-    if len(lines) > MOST_AT_ONCE:
-        raise UsageError(
-            f"{len(lines)} submissions are too many to compare while you wait, expected {MOST_AT_ONCE} at most; "
-            f"robomark batch similar {batch_id} compares those of this batch"
-        )
-    return SimilaritiesShape(
-        assignments=[SimilarityShape.model_validate(found) for found in similarities(context.store, lines)]
-    )
+    found = list_similar(context.service, here.acting, here.course_id, batch_id)
+    return SimilaritiesShape(assignments=[SimilarityShape.model_validate(each) for each in found])

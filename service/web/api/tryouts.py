@@ -9,19 +9,19 @@ from typing import Annotated, Any
 from fastapi import Depends, Query, Request
 from fastapi.responses import Response
 from pydantic import Field
-from sqlalchemy.orm import Session
 
-from service.store.queue import tryouts
-from service.store.queue.tryouts import TryoutLine
-from service.store.states import Role, TryoutState
-from service.web.access import RowName, enrolment_in, nothing_here
+from service.operations import test_runs
+from service.operations.test_runs import TryoutLine
+from service.operations.types import Role, TryoutState
+from service.web.access import RowName
 from service.web.api.grades import REPLAY
 from service.web.api.shapes import Shape, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import api_router, tagged
-from service.web.api_uploads import SENT_BODY, Sent
+from service.web.api_uploads import LARGEST_SUBMISSION, SENT_BODY, Sent
 from service.web.context import Context
-from service.web.submitting import try_out
+from service.web.request_bodies import takes_upload
+from service.web.submitting import start_test_run
 
 router = api_router("mine")
 Reads = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "read"))]
@@ -55,6 +55,7 @@ class TryoutShape(Shape):
 
 
 @router.post(PREFIX, status_code=201, openapi_extra=SENT_BODY)
+@takes_upload(LARGEST_SUBMISSION, Role.STUDENT)
 def ask(
     here: Submits,
     context: Context,
@@ -62,34 +63,21 @@ def ask(
     assignment: Annotated[str, Query(min_length=1, max_length=100, examples=["shape-recognition"])],
 ) -> TryoutShape:
     """Let a program be run once, as the assignment starts it first; nothing is marked, and it counts as no attempt."""
-    made = try_out(context, here.caller.identity, here.course_id, assignment, sent)
-    with context.store.reading() as session:
-        return _shown(_own(session, here, made))
+    made = start_test_run(context, here.acting, here.course_id, assignment, sent)
+    return _shown(test_runs.show(context.service, here.acting, here.course_id, made))
 
 
 @router.get(PREFIX + "/{tryout_id}")
 def one_tryout(here: Reads, context: Context, tryout_id: RowName) -> TryoutShape:
     """How far it is, and what came of it; it is kept for a day."""
-    with context.store.reading() as session:
-        return _shown(_own(session, here, tryout_id))
+    return _shown(test_runs.show(context.service, here.acting, here.course_id, tryout_id))
 
 
 @router.get(PREFIX + "/{tryout_id}/replay", responses=REPLAY, response_class=Response)
 def replay(request: Request, here: Reads, context: Context, tryout_id: RowName) -> Response:
     """What a replay of it plays; 404 until there is something."""
-    with context.store.reading() as session:
-        kept = tryouts.replay_of(session, _own(session, here, tryout_id).id)
-    if kept is None:
-        raise nothing_here()
+    kept = test_runs.show_replay(context.service, here.acting, here.course_id, tryout_id)
     return tagged(request, zlib.decompress(kept), "application/json")
-
-
-def _own(session: Session, here: CallerInCourse, tryout_id: str) -> TryoutLine:
-    enrolment = enrolment_in(session, here.caller.identity, here.course_id)
-    line = tryouts.line(session, enrolment.id, tryout_id)
-    if line is None:
-        raise nothing_here()
-    return line
 
 
 def _shown(line: TryoutLine) -> TryoutShape:

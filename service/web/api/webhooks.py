@@ -9,10 +9,10 @@ from fastapi import Depends
 from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
-from service.store.outbox import WebhookEvent
-from service.store.people import webhooks
-from service.store.states import Role
-from service.web.access import RowName, nothing_here
+from service.operations import webhooks
+from service.operations.types import Role
+from service.operations.webhooks import WebhookEvent
+from service.web.access import RowName
 from service.web.api.shapes import Shape, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, page_of, place_after
@@ -86,32 +86,27 @@ class DeliveryShape(Shape):
 @router.get("/courses/{course_id}/webhooks")
 def list_webhooks(here: Manages, context: Context) -> Listed[WebhookShape]:
     """The webhooks of the course."""
-    with context.store.reading() as session:
-        found = webhooks.of_course(session, here.course_id)
+    found = webhooks.list_webhooks(context.service, here.acting, here.course_id)
     return Listed(items=[WebhookShape.model_validate(each) for each in found])
 
 
 @router.post("/courses/{course_id}/webhooks", status_code=201, openapi_extra=dict(NO_KEY))
 def create(here: Manages, context: Context, asked: WebhookAsked) -> NewWebhookShape:
     """Be told at this address. Its secret is told this once, so the request is not answered again by its key."""
-    events = [event.value for event in asked.events]
-    with context.store.transaction() as session:
-        line, secret = webhooks.create(session, here.course_id, asked.url, events, here.actor)
+    line, secret = webhooks.create(context.service, here.acting, here.course_id, asked.url, asked.events)
     return NewWebhookShape(**WebhookShape.model_validate(line).model_dump(), secret=secret)
 
 
 @router.delete("/courses/{course_id}/webhooks/{webhook_id}", status_code=204, response_class=Response)
 def revoke(here: Manages, context: Context, webhook_id: RowName) -> None:
     """Tell it nothing any more."""
-    with context.store.transaction() as session:
-        if not webhooks.revoke(session, here.course_id, webhook_id, here.actor):
-            raise nothing_here()
+    webhooks.revoke(context.service, here.acting, here.course_id, webhook_id)
 
 
 @router.get("/courses/{course_id}/deliveries")
 def list_deliveries(here: Manages, context: Context, limit: Limit = 50, after: After = "") -> Listed[DeliveryShape]:
     """What was told to the course's webhooks lately, or is to be, the newest first."""
     place = place_after(after, datetime, str)
-    with context.store.reading() as session:
-        found = webhooks.deliveries(session, here.course_id, limit + 1, (place[0], place[1]) if place else None)
+    after_that = (place[0], place[1]) if place else None
+    found = webhooks.list_deliveries(context.service, here.acting, here.course_id, limit + 1, after_that)
     return page_of([DeliveryShape.model_validate(each) for each in found], limit, lambda each: [each.made_at, each.id])

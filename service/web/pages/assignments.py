@@ -1,13 +1,9 @@
-"""The assignments of a course for its instructors: taken from the catalogue or uploaded, previewed, opened and closed.
-
-How one is taken in is ``web/preparing.py``'s.
-"""
+"""The assignments of a course for its instructors: added from the catalogue or uploaded, previewed, opened, closed."""
 
 from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
@@ -15,26 +11,24 @@ from typing import Annotated
 from fastapi import APIRouter, File, Form, Query, Request, UploadFile
 from fastapi import Path as InPath
 from fastapi.responses import RedirectResponse, Response
-from sqlalchemy.orm import Session
 
-from service.store import audit
-from service.store.courses import open_assignments, policies
-from service.store.courses.open_assignments import CourseAssignment
-from service.store.courses.policies import PolicyLimits
-from service.store.courses.versions import check_assignment
-from service.store.grades import own_gradings
-from service.web import preparing
-from service.web.access import InCourse, Instructing, enrolment_in
+from service.operations import assignment_uploads, assignment_views, assignments, policies
+from service.operations.assignment_uploads import StudentsKnowAnother, UploadRequest
+from service.operations.assignments import CourseAssignment
+from service.operations.policies import PolicyLimits
+from service.operations.types import Role
+from service.web.access import InCourse, Instructing
+from service.web.api_uploads import LARGEST_ASSIGNMENT
 from service.web.attachments import attachment
 from service.web.context import Context, WebContext
 from service.web.kept_uploads import file_name
+from service.web.language import language_of
 from service.web.moments import written_moment
-from service.web.preparing import StudentsKnowAnother
 from service.web.rendering import page
+from service.web.request_bodies import takes_upload
 from sim.errors import UsageError
 from submissions.assignment.export import write_new
 from submissions.assignment.folder import FILE_NAME, catalogue
-from submissions.assignment.reader import find_in_catalogue
 from submissions.raw_files import SentFile
 
 router = APIRouter(prefix="/courses/{course_id}")
@@ -51,10 +45,13 @@ def list_assignments(request: Request, here: Instructing, context: Context, done
 @router.post("/assignments")
 def prepare(here: Instructing, context: Context, assignment: Annotated[str, Form(max_length=100)]) -> Response:
     """Take an assignment from the catalogue, as it is now."""
-    return _to(here, preparing.prepare(context, here.reader.identity, here.course_id, find_in_catalogue(assignment)))
+    return _to(
+        here, assignment_uploads.prepare_from_catalogue(context.service, here.acting, here.course_id, assignment)
+    )
 
 
 @router.post("/assignments/uploads")
+@takes_upload(LARGEST_ASSIGNMENT, Role.INSTRUCTOR)
 def upload(
     request: Request,
     here: Instructing,
@@ -71,11 +68,11 @@ def upload(
             path = Path(folder) / file_name(sent)
             with path.open("xb") as sink:
                 shutil.copyfileobj(sent.stream, sink)
-            made = preparing.prepare_own(context, here.reader.identity, here.course_id, path, replace=replace)
-            return _to(here, made)
+            asked = UploadRequest(path, replace)
+            return _to(here, assignment_uploads.upload(context.service, here.acting, here.course_id, asked))
     except UsageError as error:
-        asks = isinstance(error, StudentsKnowAnother)
-        return _list(request, here, context, refused=str(error).splitlines(), asks_to_replace=asks, status_code=422)
+        asks, told = isinstance(error, StudentsKnowAnother), language_of(request).tell(error.said).splitlines()
+        return _list(request, here, context, refused=told, asks_to_replace=asks, status_code=422)
 
 
 @router.get("/assignments/uploads")
@@ -96,25 +93,19 @@ def commented_example(here: Instructing) -> Response:
 @router.get("/assignments/{assignment}")
 def show(request: Request, here: Instructing, context: Context, assignment: AssignmentId, done: Done = "") -> Response:
     """What an assignment asks for, whether it is open, and what holds for it."""
-    with context.store.reading() as session:
-        line = open_assignments.find(session, here.course_id, assignment)
-        found = open_assignments.load(session, here.course_id, assignment)
-        allowed = policies.policies(session, here.course_id)
-        own = enrolment_in(session, here.reader.identity, here.course_id)
-        previews = own_gradings.newest(session, own.id, assignment)
-    newest = find_in_catalogue(assignment).version if assignment in catalogue() else line.version
+    view = assignment_views.show(context.service, here.acting, here.course_id, assignment)
     return page(
         request,
         here.reader,
         "assignment.html",
         here=here,
-        line=line,
-        found=found,
-        own_policy=allowed.get(assignment),
-        policy=allowed.get(assignment) or allowed.get("") or PolicyLimits(),
-        previews=previews,
-        has_reference=preparing.reference_of(found) is not None,
-        changed=newest != line.version,
+        line=view.line,
+        found=view.found,
+        own_policy=view.own_policy,
+        policy=view.policy,
+        previews=view.previews,
+        has_reference=view.has_reference,
+        changed=view.changed,
         done=done,
         at=datetime.now(UTC),
     )
@@ -123,19 +114,19 @@ def show(request: Request, here: Instructing, context: Context, assignment: Assi
 @router.post("/assignments/{assignment}/open")
 def open_one(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
     """Let students see it and submit to it."""
-    return _changed(here, context, assignment, "open", open_assignments.open_for_students)
+    return _to(here, assignments.open_for_students(context.service, here.acting, here.course_id, assignment))
 
 
 @router.post("/assignments/{assignment}/close")
 def close_one(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
     """Let nobody submit to it any more."""
-    return _changed(here, context, assignment, "close", open_assignments.close)
+    return _to(here, assignments.close(context.service, here.acting, here.course_id, assignment))
 
 
 @router.post("/assignments/{assignment}/remove")
 def remove(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
     """Let the course have it no more, as long as no student has been shown it."""
-    _changed(here, context, assignment, "remove", open_assignments.remove)
+    assignments.remove(context.service, here.acting, here.course_id, assignment)
     return RedirectResponse(_path(here, ""), 303)
 
 
@@ -144,17 +135,13 @@ def hide_names(
     here: Instructing, context: Context, assignment: AssignmentId, hidden: Annotated[bool, Form()] = False
 ) -> Response:
     """Hide or show whose work it is, for all who instruct the course."""
-    with context.store.transaction() as session:
-        open_assignments.hide_names(session, here.course_id, assignment, hidden)
-        told = {"assignment": assignment, "hidden": hidden}
-        audit.note(session, here.actor, "names", "course", str(here.course_id), **told)
-    return RedirectResponse(_path(here, assignment), 303)
+    return _to(here, assignments.hide_names(context.service, here.acting, here.course_id, assignment, hidden=hidden))
 
 
 @router.post("/assignments/{assignment}/preview")
 def preview(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
     """Grade the catalogue's reference solution as a submission of one's own."""
-    job_id = preparing.preview(context, here.reader.identity, here.course_id, assignment)
+    job_id = assignment_uploads.preview(context.service, here.acting, here.course_id, assignment)
     return RedirectResponse(f"/courses/{here.course_id}/grades/{job_id}", 303)
 
 
@@ -169,23 +156,15 @@ def set_policy(
     cool_down: Annotated[float, Form(ge=0, le=10_000)] = 0.0,
 ) -> Response:
     """Say when and how often students may submit, to one assignment or to all that have no policy of their own."""
-    if attempts and not 1 <= int(attempts) <= 1000:
-        raise UsageError("attempts have to be from 1 to 1000, or empty for any number")
     allowed = PolicyLimits(written_moment(due), late_days, int(attempts) if attempts else None, cool_down * 60)
-    with context.store.transaction() as session:
-        check_assignment(session, assignment)
-        policies.set_policy(session, here.course_id, assignment, allowed)
-        told = {"assignment": assignment, "due": due or None, "late_days": late_days, "attempts": allowed.attempts}
-        audit.note(session, here.actor, "policy", "course", str(here.course_id), **told)
+    policies.set_policy(context.service, here.acting, here.course_id, assignment, allowed)
     return RedirectResponse(f"{_path(here, assignment)}?done=policy", 303)
 
 
 @router.post("/assignments/{assignment}/no-policy")
 def drop_policy(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
     """Let the assignment have what holds for all, in place of a policy of its own."""
-    with context.store.transaction() as session:
-        policies.drop_policy(session, here.course_id, assignment)
-        audit.note(session, here.actor, "policy", "course", str(here.course_id), assignment=assignment, dropped=True)
+    policies.drop_policy(context.service, here.acting, here.course_id, assignment)
     return RedirectResponse(f"{_path(here, assignment)}?done=policy", 303)
 
 
@@ -199,19 +178,17 @@ def _list(
     asks_to_replace: bool = False,
     status_code: int = 200,
 ) -> Response:
-    with context.store.reading() as session:
-        prepared = open_assignments.of_course(session, here.course_id)
-        allowed = policies.policies(session, here.course_id)
+    view = assignment_views.show_all(context.service, here.acting, here.course_id)
     return page(
         request,
         here.reader,
         "assignments.html",
         status_code=status_code,
         here=here,
-        prepared=prepared,
+        prepared=view.prepared,
         catalogue=len(catalogue()),
-        policies=allowed,
-        policy=allowed.get("") or PolicyLimits(),
+        policies=view.policies,
+        policy=view.policy,
         refused=refused or [],
         asks_to_replace=asks_to_replace,
         done=done,
@@ -225,12 +202,3 @@ def _to(here: InCourse, made: CourseAssignment) -> Response:
 
 def _path(here: InCourse, assignment: str) -> str:
     return f"/courses/{here.course_id}/assignments{f'/{assignment}' if assignment else ''}"
-
-
-def _changed(
-    here: InCourse, context: WebContext, assignment: str, action: str, change: Callable[[Session, int, str], None]
-) -> Response:
-    with context.store.transaction() as session:
-        change(session, here.course_id, assignment)
-        audit.note(session, here.actor, action, "course", str(here.course_id), assignment=assignment)
-    return RedirectResponse(_path(here, assignment), 303)

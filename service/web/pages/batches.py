@@ -5,53 +5,49 @@ What is done with one batch is ``batch.py``'s; what an upload may hold is ``subm
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, File, Form, Query, Request, UploadFile
+from fastapi import APIRouter, File, Form, Request, UploadFile
 from fastapi.responses import RedirectResponse, Response
 from starlette.exceptions import HTTPException
 
 from service.language import translatable
-from service.store import audit
-from service.store.batches import batches, preflight
-from service.store.courses import open_assignments
-from service.store.installation import secret_of
-from service.store.models import Batch
-from service.store.people import people
-from service.web.access import InCourse, Instructing
-from service.web.batch_uploads import read_upload, take_in
+from service.operations import batch_views as views
+from service.operations import batches as operations
+from service.operations.batches import ForeseenSubmission, SubmitRequest
+from service.operations.types import Role
+from service.web.access import InCourse, Instructing, RowName, RowNameAfter
+from service.web.api_uploads import LARGEST_BATCH
+from service.web.batch_uploads import read_upload
 from service.web.context import Context, WebContext
 from service.web.kept_uploads import ExpectedSubmission, KeptUpload, KeptUploads
 from service.web.rendering import page
+from service.web.request_bodies import takes_upload
 from sim.errors import UsageError
 from submissions.assignment.folder import catalogue
 from submissions.batch_folder import BatchContents
 from submissions.bundle import empty_parts, missing_part
-from submissions.grading_request import GradingRequest
 from submissions.people import read_people
 from submissions.raw_files import SentFile, shown
 from submissions.submission import PART_FILES
 
 router = APIRouter(prefix="/courses/{course_id}/batches")
-_A_PAGE = 30
 _ARCHIVES = (".zip",)
 #: What a student's submission may be where each is a file of its own; what is in it is looked at later.
 _SINGLE = (".zip", ".py", ".ipynb")
-UploadId = str
 
 
 @router.get("")
-def list_batches(
-    request: Request, here: Instructing, context: Context, after: Annotated[str, Query(max_length=32)] = ""
-) -> Response:
+def list_batches(request: Request, here: Instructing, context: Context, after: RowNameAfter = "") -> Response:
     """The batches of the course, the newest first, and a form for another."""
     return _list(request, here, context, after=after)
 
 
 @router.post("/uploads")
+@takes_upload(LARGEST_BATCH, Role.INSTRUCTOR)
 def upload(
     request: Request,
     here: Instructing,
@@ -65,17 +61,17 @@ def upload(
     begun = kept_uploads.begin(here.reader.identity.person_id, here.course_id, assignment)
     try:
         laid = _laid(kept_uploads, begun, _sent(files), _sent([people] if people is not None else []))
-        checked = _read(context, laid)
+        checked = _read(context, here, laid)
     except UsageError as error:
         kept_uploads.remove(begun)
         return _list(request, here, context, refused=str(error), status_code=422)
-    expected = _expected(context, here, checked.grading_requests)
+    expected = _expected(operations.foresee(context.service, here.acting, here.course_id, checked))
     kept_uploads.write(replace(laid, expected=expected, refusals=checked.refusals))
     return RedirectResponse(f"/courses/{here.course_id}/batches/uploads/{laid.id}", 303)
 
 
 @router.get("/uploads/{upload_id}")
-def look_first(request: Request, here: Instructing, context: Context, upload_id: UploadId) -> Response:
+def look_first(request: Request, here: Instructing, context: Context, upload_id: RowName) -> Response:
     """What of an upload would be taken in, and what not and why."""
     found = _find(context, here, upload_id)
     missing: dict[str, list[str]] = {}
@@ -101,24 +97,22 @@ def confirm(
     request: Request,
     here: Instructing,
     context: Context,
-    upload_id: UploadId,
+    upload_id: RowName,
     again: Annotated[bool, Form()] = False,
 ) -> Response:
     """Make a batch of an upload."""
     found = _find(context, here, upload_id)
-    taken = take_in(context, here.course_id, found.name, _read(context, found), again=again)
+    asked = SubmitRequest(found.name, _read(context, here, found), again)
+    done = operations.submit(context.service, here.acting, here.course_id, asked)
     KeptUploads(context.settings.home).remove(found)
-    batch = taken.accepted.batch
-    if batch is None:
-        return page(request, here.reader, "upload.html", here=here, upload=found, known=taken.accepted.known)
-    with context.store.transaction() as session:
-        done = {"submissions": len(batch.jobs), "refused": len(taken.refusals), "known": len(taken.accepted.known)}
-        audit.note(session, here.actor, "submit", "batch", batch.id, **done)
-    return RedirectResponse(f"/courses/{here.course_id}/batches/{batch.id}?done=submit", 303)
+    if done.batch is None:
+        known = sorted((each.student, each.job_id) for each in done.known)
+        return page(request, here.reader, "upload.html", here=here, upload=found, known=known)
+    return RedirectResponse(f"/courses/{here.course_id}/batches/{done.batch.id}?done=submit", 303)
 
 
 @router.post("/uploads/{upload_id}/discard")
-def discard(here: Instructing, context: Context, upload_id: UploadId) -> Response:
+def discard(here: Instructing, context: Context, upload_id: RowName) -> Response:
     """Take nothing in of an upload."""
     KeptUploads(context.settings.home).remove(_find(context, here, upload_id))
     return RedirectResponse(f"/courses/{here.course_id}/batches", 303)
@@ -127,58 +121,43 @@ def discard(here: Instructing, context: Context, upload_id: UploadId) -> Respons
 def _list(
     request: Request, here: InCourse, context: WebContext, *, after: str = "", refused: str = "", status_code: int = 200
 ) -> Response:
-    with context.store.reading() as session:
-        last = session.get(Batch, after) if after else None
-        place = None if last is None or last.course_id != here.course_id else (last.created_at, last.id)
-        listed = batches.batches_of(session, here.course_id, _A_PAGE + 1, place)
-        prepared = open_assignments.of_course(session, here.course_id)
-    own = {each.assignment for each in prepared}
+    shown = views.list_batches_page(context.service, here.acting, here.course_id, after)
+    own = {each.assignment for each in shown.prepared}
     return page(
         request,
         here.reader,
         "batches.html",
         status_code=status_code,
         here=here,
-        batches=listed[:_A_PAGE],
-        older=listed[_A_PAGE - 1].id if len(listed) > _A_PAGE else "",
-        unfinished=any(line.unfinished for line in listed[:_A_PAGE]),
-        prepared=prepared,
+        batches=shown.batches,
+        older=shown.older,
+        unfinished=any(line.unfinished for line in shown.batches),
+        prepared=shown.prepared,
         catalogue=[each for each in catalogue() if each not in own],
         refused=refused,
         waiting=KeptUploads(context.settings.home).waiting(here.reader.identity.person_id, here.course_id),
     )
 
 
-def _expected(
-    context: WebContext, here: InCourse, grading_requests: Sequence[GradingRequest]
-) -> tuple[ExpectedSubmission, ...]:
-    secret = secret_of(context.store).sha256
-    with context.store.reading() as session:
-        foreseen = preflight.foresee(session, here.course_id, grading_requests, secret)
-        names = {each.id: each.name for each in people.members(session, here.course_id)}
+def _expected(foreseen: Sequence[ForeseenSubmission]) -> tuple[ExpectedSubmission, ...]:
     found = []
-    for each, ahead in zip(grading_requests, foreseen, strict=True):
-        part = missing_part(each.submission, each.assignment.parts)
+    for each in foreseen:
+        asked, ahead = each.asked, each.ahead
+        part = missing_part(asked.submission, asked.assignment.parts)
         found.append(
             ExpectedSubmission(
-                each.submission.student,
-                _name(each, names),
-                each.assignment.title,
-                each.source,
+                asked.submission.student,
+                each.name,
+                asked.assignment.title,
+                asked.source,
                 PART_FILES[part] if part is not None else "",
                 ahead.enrolled,
                 ahead.known,
                 ahead.copied,
-                next(iter(empty_parts(each.submission)), ""),
+                next(iter(empty_parts(asked.submission)), ""),
             )
         )
     return tuple(found)
-
-
-def _name(asked: GradingRequest, names: Mapping[str, str]) -> str:
-    """Who submitted, where that is more than the id: as the batch has it, else as the course knows them."""
-    name = asked.student.name if asked.student.name != asked.student.id else ""
-    return name or names.get(asked.submission.student, "")
 
 
 def _sent(files: list[UploadFile]) -> list[SentFile]:
@@ -204,11 +183,12 @@ def _laid(kept_uploads: KeptUploads, begun: KeptUpload, files: list[SentFile], p
     return replace(begun, name=shown(called), file=names[0] if one_archive else "", people=table[0])
 
 
-def _read(context: WebContext, upload: KeptUpload) -> BatchContents:
+def _read(context: WebContext, here: InCourse, upload: KeptUpload) -> BatchContents:
     kept_uploads = KeptUploads(context.settings.home)
     table = kept_uploads.people(upload)
     people = None if table is None else read_people(table)
-    return read_upload(context, upload.course_id, kept_uploads.submissions(upload), upload.assignment, people)
+    submissions = kept_uploads.submissions(upload)
+    return read_upload(context, here.acting, upload.course_id, submissions, upload.assignment, people)
 
 
 def _find(context: WebContext, here: InCourse, upload_id: str) -> KeptUpload:

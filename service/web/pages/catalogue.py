@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi import Path as InPath
 from fastapi.responses import Response
 
-from service.store.courses import open_assignments
+from service.operations import assignment_views
 from service.web.access import Instructing
 from service.web.context import Context
 from service.web.rendering import page
@@ -28,8 +28,7 @@ def look_through(
     topic: Annotated[str, Query(max_length=10)] = "",
 ) -> Response:
     """What comes with Robomark, as far as it is of the topic and has all words that are looked for."""
-    with context.store.reading() as session:
-        prepared = {each.assignment for each in open_assignments.of_course(session, here.course_id)}
+    taken = assignment_views.list_prepared(context.service, here.acting, here.course_id)
     everything = [overview(assignment_folder(each)) for each in catalogue()]
     found = [each for each in everything if each.says(q) and topic in ("", each.topic or "none")]
     return page(
@@ -40,7 +39,7 @@ def look_through(
         found=sorted(found, key=lambda each: (each.topic == "", each.section, each.title)),
         everything=len(everything),
         topics={number: TOPICS[number] for number in sorted({each.topic for each in everything if each.topic})},
-        prepared=prepared,
+        prepared={each.assignment for each in taken},
         text=q,
         topic=topic,
     )
@@ -52,6 +51,6 @@ def read(
 ) -> Response:
     """What an assignment of the catalogue asks for, before it is taken into the course."""
     found = find_in_catalogue(assignment)
-    with context.store.reading() as session:
-        taken = found.id in {each.assignment for each in open_assignments.of_course(session, here.course_id)}
+    prepared = assignment_views.list_prepared(context.service, here.acting, here.course_id)
+    taken = found.id in {each.assignment for each in prepared}
     return page(request, here.reader, "catalogue_entry.html", here=here, found=found, in_course=taken)

@@ -1,25 +1,22 @@
-"""The first page: the courses that somebody has a role in; and one's own account with its tokens."""
+"""The first page with a person's courses, and their account: sessions and tokens."""
 
 from __future__ import annotations
 
-from datetime import timedelta
 from typing import Annotated
 from urllib.parse import quote
 
 from fastapi import APIRouter, Form, Query, Request
 from fastapi.responses import RedirectResponse, Response
-from sqlalchemy import select
 
-from service.store.models import Course
-from service.store.people import credentials
-from service.store.states import Role
-from service.web.access import SignedIn, nothing_here
-from service.web.api_scopes import SCOPES
+from service.operations import courses
+from service.operations import credentials as own_credentials
+from service.operations.credentials import TokenRequest
+from service.operations.scopes import offered_scopes
+from service.operations.types import CredentialKind, Role
+from service.web.access import RowName, SignedIn
 from service.web.context import Context
 from service.web.made_links import new_word, secret_word
-from service.web.refusing import Declined
 from service.web.rendering import page
-from sim.sentences import Sentence
 
 router = APIRouter()
 
@@ -30,23 +27,30 @@ MadeWord = Annotated[str, Query(max_length=64)]
 @router.get("/")
 def home(request: Request, reader: SignedIn, context: Context) -> Response:
     """One's courses; where there is but one thing to see, that."""
-    roles = reader.identity.roles
-    with context.store.reading() as session:
-        rows = session.scalars(select(Course).where(Course.id.in_(roles)).order_by(Course.name)).all()
-    if len(rows) == 1 and not reader.identity.operator:
-        return RedirectResponse(course_path(rows[0].id, roles[rows[0].id]), 303)
-    listed = [(row.name, roles[row.id], course_path(row.id, roles[row.id])) for row in rows]
+    own = sorted(courses.list_own(context.service, reader.acting), key=lambda each: each.name)
+    if len(own) == 1 and not reader.identity.operator:
+        return RedirectResponse(course_path(own[0].id, own[0].role), 303)
+    listed = [(each.name, each.role, course_path(each.id, each.role)) for each in own]
     return page(request, reader, "home.html", courses=listed)
 
 
 @router.get("/account")
 def account(request: Request, reader: SignedIn, context: Context, made: MadeWord = "") -> Response:
-    """One's name and tokens; the one just made can be copied until it is used."""
-    person_id = reader.identity.person_id
-    with context.store.reading() as session:
-        tokens = credentials.tokens(session, person_id)
-        secret = credentials.unused_token(session, person_id, secret_word(reader, made)) if made else ""
-    return page(request, reader, "account.html", tokens=tokens, scopes=SCOPES, made=secret, word=new_word())
+    """One's name, sessions and tokens; a new token can be copied until it is used."""
+    identity = reader.identity
+    listed = own_credentials.list_credentials(context.service, reader.acting)
+    word = secret_word(reader, made)
+    secret = own_credentials.show_unused_token(context.service, reader.acting, word) if made else ""
+    return page(
+        request,
+        reader,
+        "account.html",
+        tokens=[each for each in listed if each.kind is CredentialKind.TOKEN],
+        sessions=[each for each in listed if each.kind is CredentialKind.SESSION],
+        scopes=offered_scopes(identity.roles.values(), operator=identity.operator, limit=identity.scopes),
+        made=secret,
+        word=new_word(),
+    )
 
 
 @router.post("/account/tokens")
@@ -59,20 +63,29 @@ def make_token(
     scopes: Annotated[tuple[str, ...], Form()] = (),
 ) -> Response:
     """A new token; the form sent twice makes one."""
-    if not scopes or not set(scopes) <= set(SCOPES):
-        raise Declined(422, Sentence("Say what the token may do: %(scopes)s.", {"scopes": ", ".join(SCOPES)}))
-    person_id, lifetime, secret = reader.identity.person_id, timedelta(days=days), secret_word(reader, word)
-    with context.store.transaction() as session:
-        credentials.make_token(session, person_id, lifetime, secret, name=name, scopes=scopes)
+    asked = TokenRequest(name, frozenset(scopes), days, secret_word(reader, word))
+    own_credentials.make_token(context.service, reader.acting, asked)
     return RedirectResponse(f"/account?made={quote(word)}", 303)
 
 
 @router.post("/account/tokens/{token_id}/revoke")
-def revoke_token(reader: SignedIn, context: Context, token_id: str) -> Response:
-    """Let a token count no more."""
-    with context.store.transaction() as session:
-        if not credentials.revoke(session, token_id, reader.identity.person_id):
-            raise nothing_here()
+def revoke_token(reader: SignedIn, context: Context, token_id: RowName) -> Response:
+    """End one of one's tokens."""
+    own_credentials.end_credential(context.service, reader.acting, token_id)
+    return RedirectResponse("/account", 303)
+
+
+@router.post("/account/sessions/{session_id}/end")
+def end_session(reader: SignedIn, context: Context, session_id: RowName) -> Response:
+    """End one of one's sessions."""
+    own_credentials.end_credential(context.service, reader.acting, session_id)
+    return RedirectResponse("/account", 303)
+
+
+@router.post("/account/end-others")
+def end_others(reader: SignedIn, context: Context) -> Response:
+    """End all one's links, sessions and tokens except this session."""
+    own_credentials.end_other_credentials(context.service, reader.acting)
     return RedirectResponse("/account", 303)
 
 

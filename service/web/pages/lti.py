@@ -16,7 +16,7 @@ from service.lti import launch
 from service.lti.keys import public_keys, signing_key
 from service.store import audit
 from service.store.people import credentials, lti
-from service.store.people.credentials import SESSION_LIFETIME
+from service.store.people.credentials import SESSION_LIFETIME, Reach
 from service.store.states import CredentialKind
 from service.web.context import Context, WebContext
 from service.web.pages.home import course_path
@@ -91,6 +91,7 @@ def end_launch(
         launched = lti.meet(
             session,
             pending.platform,
+            told.deployment,
             told.context,
             told.course_title,
             told.subject,
@@ -101,7 +102,9 @@ def end_launch(
         )
         if launched is None:
             raise UsageError("no instructor has opened Robomark from this course yet; ask yours to do it first")
-        secret = credentials.issue(session, launched.person_id, CredentialKind.SESSION, SESSION_LIFETIME)
+        # A platform vouches for people in its own courses only.
+        reach = Reach(platform_id=pending.platform.id)
+        secret = credentials.issue(session, launched.person_id, CredentialKind.SESSION, SESSION_LIFETIME, reach=reach)
         audit.note(session, f"platform {pending.platform.name}", "launch", "person", str(launched.person_id))
     target = pending.target if pending.target != "/" else course_path(launched.course_id, launched.role)
     answer = RedirectResponse(target, 303)
@@ -119,14 +122,15 @@ def _begin(
     message_hint: str,
     client_id: str,
 ) -> Response:
-    context.limits.launches.spend("" if request.client is None else request.client.host)
     start = context.settings.public_url or str(request.base_url).rstrip("/")
-    with context.store.transaction() as session:
+    with context.store.reading() as session:
         platform = lti.find_platform(session, issuer, client_id or None)
-        if platform is None:
-            raise UsageError(f"no platform {issuer[:100]!r} with this client is registered here")
-        # Only a path of ours: whoever makes the link does not choose another site.
-        path = inside(target.removeprefix(start)) if target.startswith(f"{start}/") else "/"
+    if platform is None:
+        context.limits.unknown_platforms.spend("" if request.client is None else request.client.host)
+        raise UsageError(f"no platform {issuer[:100]!r} with this client is registered here")
+    # Only a path of ours: whoever makes the link does not choose another site.
+    path = inside(target.removeprefix(start)) if target.startswith(f"{start}/") else "/"
+    with context.store.transaction() as session:
         state, nonce = lti.begin_launch(session, platform, path)
     where = launch.authorization_address(platform, f"{start}/lti/launch", login_hint, message_hint, state, nonce)
     answer = RedirectResponse(where, 303)

@@ -14,22 +14,24 @@ from fastapi import APIRouter, File, Form, Request, UploadFile
 from fastapi.responses import RedirectResponse, Response
 from starlette.exceptions import HTTPException
 
-from service import own_work
-from service.own_work import OwnSubmission
+from service.operations import own_views
+from service.operations.errors import NotFound
+from service.operations.own_work import OwnSubmission
+from service.operations.submissions import LacksPart, SubmitRequest
+from service.operations.types import Role
 from service.reports.readable import flowing
-from service.store.courses import open_assignments
-from service.store.queue import tryouts
-from service.trying import tryout_assignment
-from service.web.access import InCourse, Studying, enrolment_in, nothing_here
+from service.web.access import InCourse, Studying
+from service.web.api_uploads import LARGEST_SUBMISSION
 from service.web.attachments import attachment
 from service.web.context import Context, WebContext
 from service.web.errors import sentence_of
 from service.web.language import language_of
 from service.web.refusing import said_in
 from service.web.rendering import page
-from service.web.submitting import LacksPart, seen_assignment, submit
+from service.web.request_bodies import takes_upload
+from service.web.submitting import submit
 from sim.errors import UsageError
-from submissions.assignment.task_sheet import TaskSheet, task_sheet
+from submissions.assignment.task_sheet import TaskSheet
 from submissions.raw_files import SentFile
 
 router = APIRouter()
@@ -53,9 +55,7 @@ class _Refused:
 @router.get("/courses/{course_id}/mine")
 def mine(request: Request, here: Studying, context: Context) -> Response:
     """What is open, and what was submitted."""
-    with context.store.reading() as session:
-        enrolment_id = enrolment_in(session, here.reader.identity, here.course_id).id
-        lines = own_work.own_assignments(session, here.course_id, enrolment_id)
+    lines = own_views.list_assignments(context.service, here.acting, here.course_id)
     return page(request, here.reader, "mine.html", here=here, lines=lines)
 
 
@@ -66,6 +66,7 @@ def own_assignment(request: Request, here: Studying, context: Context, assignmen
 
 
 @router.post("/courses/{course_id}/mine/{assignment}")
+@takes_upload(LARGEST_SUBMISSION, Role.STUDENT)
 def submit_own(
     request: Request,
     here: Studying,
@@ -76,11 +77,12 @@ def submit_own(
     even_in_part: Annotated[bool, Form()] = False,
 ) -> Response:
     """Take in what was chosen and typed, and go where it is waited for."""
-    with context.store.reading() as session:
-        sheet = task_sheet(seen_assignment(session, here.reader.identity, here.course_id, assignment))
+    sheet = own_views.show_sheet(context.service, here.acting, here.course_id, assignment)
     try:
-        sent = sent_files(sheet, files, texts)
-        accepted = submit(context, here.reader.identity, here.course_id, assignment, sent, even_in_part=even_in_part)
+        asked = SubmitRequest(assignment, sent_files(sheet, files, texts), even_in_part)
+        accepted = submit(context, here.acting, here.course_id, asked)
+    except NotFound:
+        raise
     except UsageError as error:
         sentence = sentence_of(error, language_of(request))
         refused = _Refused(sentence, 422, texts, lacks_part=isinstance(error, LacksPart))
@@ -97,11 +99,7 @@ def submit_own(
 @router.get("/courses/{course_id}/mine/{assignment}/given/{file}")
 def given_file(here: Studying, context: Context, assignment: str, file: str) -> Response:
     """A file that the assignment gives its students."""
-    with context.store.reading() as session:
-        sheet = task_sheet(seen_assignment(session, here.reader.identity, here.course_id, assignment))
-    if file not in sheet.given:
-        raise nothing_here()
-    return attachment(sheet.given[file], file)
+    return attachment(own_views.show_given_file(context.service, here.acting, here.course_id, assignment, file), file)
 
 
 def sent_files(sheet: TaskSheet, files: Sequence[UploadFile], texts: Sequence[str]) -> list[SentFile]:
@@ -134,31 +132,22 @@ def curve(attempts: Sequence[OwnSubmission]) -> list[tuple[float, float]]:
 def _shown(
     request: Request, here: InCourse, context: WebContext, assignment: str, refused: _Refused | None
 ) -> Response:
-    with context.store.reading() as session:
-        seen = seen_assignment(session, here.reader.identity, here.course_id, assignment)
-        sheet = task_sheet(seen)
-        enrolment_id = enrolment_in(session, here.reader.identity, here.course_id).id
-        attempts = own_work.own_submissions(session, enrolment_id, assignment)
-        counting = own_work.counting_submission(session, enrolment_id, assignment)
-        allowance = own_work.allowance(session, enrolment_id, assignment)
-        has_tried = tryouts.newest(session, enrolment_id, assignment) is not None
-        prepared = open_assignments.of_course(session, here.course_id)
-    is_open = any(each.assignment == assignment and each.open for each in prepared)
+    found = own_views.show_task(context.service, here.acting, here.course_id, assignment)
     shown = page(
         request,
         here.reader,
         "own_assignment.html",
         status_code=refused.status if refused else 200,
         here=here,
-        sheet=sheet,
-        description=flowing(sheet.description),
-        attempts=attempts,
-        counting=counting,
-        curve=curve(attempts),
-        allowance=allowance,
-        is_open=is_open,
-        can_try=is_open and tryout_assignment(seen) is not None,
-        has_tried=has_tried,
+        sheet=found.sheet,
+        description=flowing(found.sheet.description),
+        attempts=found.attempts,
+        counting=found.counting,
+        curve=curve(found.attempts),
+        allowance=found.allowance,
+        is_open=found.is_open,
+        can_try=found.can_try,
+        has_tried=found.has_tried,
         refused=refused,
     )
     shown.headers.update(refused.headers if refused else {})

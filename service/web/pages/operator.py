@@ -5,25 +5,20 @@ Nothing of a grade is shown here.
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Form, Request
 from fastapi.responses import RedirectResponse, Response
 
-from service.doctor import examine_service
 from service.language import translatable
-from service.store import audit
-from service.store.people import people, sign_in_links
-from service.store.queue import batch_control, dead_letters, tryouts, workers
-from service.store.queue.metrics import collect
-from service.store.states import JobState, Lane
-from service.version import GRADER_VERSION
-from service.web.access import Operating
-from service.web.context import Context, WebContext
+from service.operations import batches, people, system
+from service.operations import courses as course_operations
+from service.operations.courses import MemberRequest
+from service.operations.types import JobState, Lane
+from service.web.access import Operating, RowNumberAfter, SentRowName
+from service.web.context import Context
 from service.web.made_links import LinkWord, made_link, new_word, secret_word
 from service.web.rendering import page, wants_part
-from sim.errors import UsageError
-from submissions.people import Student
 
 router = APIRouter()
 _LANES = {
@@ -36,26 +31,53 @@ _TRYOUTS = translatable("tryouts: programs that are run and not marked")
 @router.get("/operator")
 def operation(request: Request, reader: Operating, context: Context) -> Response:
     """How the service is: what waits, who works, what could not be graded."""
+    view = system.show(context.service, reader.acting)
+    lanes = [
+        (
+            _LANES[lane],
+            view.metrics.jobs.get((lane, JobState.QUEUED), 0),
+            view.metrics.jobs.get((lane, JobState.RUNNING), 0),
+            round(view.metrics.oldest_seconds.get(lane, 0.0)),
+        )
+        for lane in Lane
+    ]
+    lanes.append((_TRYOUTS, view.test_runs.queued, view.test_runs.running, round(view.test_runs.oldest_seconds)))
     template = "operator_state.html" if wants_part(request) else "operator.html"
-    return page(request, reader, template, **_state(context))
+    return page(
+        request,
+        reader,
+        template,
+        findings=view.findings,
+        lanes=lanes,
+        metrics=view.metrics,
+        quarantined=view.quarantined,
+        dead=view.failed,
+        dead_count=view.failed_count,
+        version=view.version,
+    )
 
 
 @router.post("/operator/retry")
-def retry(reader: Operating, context: Context, batch_id: Annotated[str, Form(max_length=20)] = "") -> Response:
+def retry(reader: Operating, context: Context, batch_id: SentRowName = "") -> Response:
     """Queue again what could not be graded, of one batch or of all."""
-    retried = batch_control.retry(context.store, batch_id or None, actor=reader.actor)
-    # The lane of each is its own; a notice too many does no harm.
-    for lane in Lane:
-        context.notifier.grade(lane, retried.queued)
+    batches.retry_dead(context.service, reader.acting, batch_id or None)
     return RedirectResponse("/operator", 303)
 
 
 @router.get("/operator/courses")
-def courses(request: Request, reader: Operating, context: Context, link: LinkWord = "") -> Response:
+def courses(
+    request: Request,
+    reader: Operating,
+    context: Context,
+    link: LinkWord = "",
+    added: RowNumberAfter = 0,
+) -> Response:
     """The courses, a form for an instructor of one, and the link that was made for the newest."""
-    with context.store.reading() as session:
-        made = made_link(session, request, context, reader, link)
-        return page(request, reader, "operator_courses.html", courses=people.courses(session), made=made)
+    actor, made = reader.acting, made_link(request, context, reader, link)
+    listed = course_operations.list_courses(context.service, actor)
+    elsewhere = people.show(context.service, actor, added).elsewhere if added else ()
+    template = "operator_courses.html"
+    return page(request, reader, template, courses=listed, made=made, added=added, elsewhere=elsewhere)
 
 
 @router.post("/operator/courses")
@@ -67,40 +89,7 @@ def add_instructor(
     name: Annotated[str, Form(max_length=200)] = "",
 ) -> Response:
     """Make an instructor, and the course where there is none of that name; their link is shown to whoever made it."""
-    if not course.strip() or not who.strip():
-        raise UsageError("a course and its instructor need a name that can be seen")
     word = new_word()
-    with context.store.transaction() as session:
-        member = people.make_instructor(session, course.strip(), Student(who.strip(), name.strip()))
-        audit.note(session, reader.actor, "add", "person", str(member.person_id), role=member.role.value)
-        sign_in_links.make_link(session, member.person_id, reader.actor, word=secret_word(reader, word))
-    return RedirectResponse(f"/operator/courses?link={word}", 303)
-
-
-def _state(context: WebContext) -> dict[str, Any]:
-    findings = examine_service(context.settings, context.store)
-    with context.store.reading() as session:
-        metrics = collect(session)
-        quarantined = {each.worker: each for each in workers.in_quarantine(session)}
-        dead = dead_letters.dead_letters(session)
-        count = dead_letters.count(session)
-        tried = tryouts.lane(session)
-    lanes = [
-        (
-            _LANES[lane],
-            metrics.jobs.get((lane, JobState.QUEUED), 0),
-            metrics.jobs.get((lane, JobState.RUNNING), 0),
-            round(metrics.oldest_seconds.get(lane, 0.0)),
-        )
-        for lane in Lane
-    ]
-    lanes.append((_TRYOUTS, tried.queued, tried.running, round(tried.oldest_seconds)))
-    return {
-        "findings": findings,
-        "lanes": lanes,
-        "metrics": metrics,
-        "quarantined": quarantined,
-        "dead": dead,
-        "dead_count": count,
-        "version": GRADER_VERSION,
-    }
+    asked = MemberRequest(course, who, name, word=secret_word(reader, word))
+    member = course_operations.add_member(context.service, reader.acting, asked).member
+    return RedirectResponse(f"/operator/courses?link={word}&added={member.enrolment_id}", 303)

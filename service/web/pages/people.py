@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from datetime import timedelta
 from pathlib import Path
 from typing import Annotated
 from urllib.parse import urlencode
@@ -15,30 +14,26 @@ from urllib.parse import urlencode
 from fastapi import APIRouter, File, Form, Query, Request, UploadFile
 from fastapi.responses import RedirectResponse, Response
 
+from service.operations import people, people_views, policies, sign_in_links
+from service.operations.errors import Conflict
+from service.operations.policies import ExtensionRequest
+from service.operations.types import Role
 from service.reports.formats.csv_output import csv_text
-from service.store import audit
-from service.store.courses import open_assignments, policies
-from service.store.courses.versions import check_assignment
-from service.store.engine import now
-from service.store.grades import own_gradings
-from service.store.people import lti, people, sign_in_links
-from service.store.people.people import Member
-from service.store.people.students import Students, course_of
-from service.store.purge import has_submitted, remove_student
-from service.store.states import Role
-from service.web.access import InCourse, Instructing, RowNumber, member_in
+from service.web.access import InCourse, Instructing, RowNumber
+from service.web.api_uploads import LARGEST_TABLE
 from service.web.attachments import attachment
 from service.web.context import Context, WebContext
 from service.web.kept_uploads import file_name
+from service.web.language import language_of
 from service.web.made_links import LinkWord, made_link, new_word, secret_word, sign_in_address
 from service.web.moments import written_moment
 from service.web.rendering import page
+from service.web.request_bodies import takes_upload
 from sim.errors import UsageError
 from submissions.people import Student, read_people, students_of
 from submissions.raw_files import SentFile
 
 router = APIRouter(prefix="/courses/{course_id}/people")
-_A_PAGE = 100
 _LONGEST = 200
 
 
@@ -66,15 +61,15 @@ def add(
     email: Annotated[str, Form(max_length=_LONGEST)] = "",
 ) -> Response:
     """Enrol one student; whoever is there stays as they are."""
-    with context.store.reading() as session:
-        known = people.known(session, here.course_id, Student(who))
-    if known is not None:
-        return _list(request, here, context, refused=_is_there(known), status_code=422)
-    enrolment_id = _enrol(here, context, [Student(who, name, email)])[0]
+    try:
+        enrolment_id = people.enrol_new(context.service, here.acting, here.course_id, Student(who, name, email))
+    except Conflict as error:
+        return _list(request, here, context, refused=error, status_code=422)
     return RedirectResponse(f"/courses/{here.course_id}/people/{enrolment_id}", 303)
 
 
 @router.post("/table")
+@takes_upload(LARGEST_TABLE, Role.INSTRUCTOR)
 def add_table(request: Request, here: Instructing, context: Context, file: Annotated[UploadFile, File()]) -> Response:
     """Enrol all students of a table."""
     with tempfile.TemporaryDirectory(prefix="robomark-people-") as folder:
@@ -84,9 +79,9 @@ def add_table(request: Request, here: Instructing, context: Context, file: Annot
         try:
             listed = students_of(read_people(path))
         except UsageError as error:
-            return _list(request, here, context, refused=str(error), status_code=422)
-    enrolled = len(set(_enrol(here, context, listed)))
-    return RedirectResponse(f"/courses/{here.course_id}/people?enrolled={enrolled}", 303)
+            return _list(request, here, context, refused=error, status_code=422)
+    enrolled = people.enrol(context.service, here.acting, here.course_id, listed)
+    return RedirectResponse(f"/courses/{here.course_id}/people?enrolled={len(set(enrolled))}", 303)
 
 
 @router.get("/table")
@@ -103,8 +98,7 @@ def links(
     days: Annotated[int, Form(ge=1, le=sign_in_links.MOST_DAYS)] = sign_in_links.DAYS,
 ) -> Response:
     """A table with a new link for each student, for whoever sends them on."""
-    with context.store.transaction() as session:
-        made = sign_in_links.make_links(session, here.course_id, timedelta(days=days), here.actor)
+    made = sign_in_links.make_links(context.service, here.acting, here.course_id, days)
     rows = [["id", "name", "email", "link", "expires", "reason"]]
     for each in made:
         link = sign_in_address(request, context, each.secret) if each.secret else ""
@@ -118,57 +112,44 @@ def show(
     request: Request, here: Instructing, context: Context, enrolment_id: RowNumber, link: LinkWord = ""
 ) -> Response:
     """One student: what they submitted, what they are allowed, and a link that was made for them."""
-    with context.store.reading() as session:
-        row = member_in(session, here.course_id, enrolment_id, Role.STUDENT)
-        made = made_link(session, request, context, here.reader, link)
-        member = people.member_of(session, row)
-        prepared = open_assignments.of_course(session, here.course_id)
-        hidden = open_assignments.with_names_hidden(session, here.course_id)
-        submitted = own_gradings.newest(session, enrolment_id)
-        allowed = [each for each in policies.extensions(session, here.course_id) if each.enrolment_id == row.id]
-        has_any = has_submitted(session, row.id)
+    view = people_views.show_student(context.service, here.acting, here.course_id, enrolment_id)
+    made = made_link(request, context, here.reader, link)
     return page(
         request,
         here.reader,
         "person.html",
         here=here,
-        member=member,
-        prepared=prepared,
-        titles={each.assignment: each.title for each in prepared},
-        submitted=[each for each in submitted if each.assignment not in hidden],
-        some_hidden=bool(hidden),
-        extensions=allowed,
-        made=made if made and made.person_id == row.person_id else None,
+        member=view.member,
+        prepared=view.assignments,
+        titles={each.assignment: each.title for each in view.assignments},
+        submitted=view.gradings,
+        some_hidden=view.some_hidden,
+        extensions=view.extensions,
+        made=made if made and made.person_id == view.member.person_id else None,
         gone=bool(link),
-        has_submitted=has_any,
+        has_submitted=view.has_submitted,
     )
 
 
 @router.get("/{enrolment_id}/link")
-def to_student(here: Instructing, context: Context, enrolment_id: RowNumber) -> Response:
+def to_student(here: Instructing, enrolment_id: RowNumber) -> Response:
     """Nothing but the way back, for whoever comes to the address that makes links."""
-    with context.store.reading() as session:
-        member_in(session, here.course_id, enrolment_id, Role.STUDENT)
     return RedirectResponse(f"/courses/{here.course_id}/people/{enrolment_id}", 303)
 
 
 @router.post("/{enrolment_id}/link")
 def link(here: Instructing, context: Context, enrolment_id: RowNumber) -> Response:
     """A new link that signs the student in once, which the student's page shows to whoever made it."""
-    word = new_word()
-    with context.store.transaction() as session:
-        row = member_in(session, here.course_id, enrolment_id, Role.STUDENT)
-        sign_in_links.make_students_link(session, row, here.actor, word=secret_word(here.reader, word))
+    word, actor = new_word(), here.acting
+    made_of = secret_word(here.reader, word)
+    sign_in_links.make_students_link(context.service, actor, here.course_id, enrolment_id, word=made_of)
     return RedirectResponse(f"/courses/{here.course_id}/people/{enrolment_id}?link={word}", 303)
 
 
 @router.post("/{enrolment_id}/remove")
 def remove(here: Instructing, context: Context, enrolment_id: RowNumber) -> Response:
     """Take a student out of the course who has submitted nothing."""
-    with context.store.reading() as session:
-        row = member_in(session, here.course_id, enrolment_id, Role.STUDENT)
-        who = row.student
-    remove_student(context.store, enrolment_id, here.actor)
+    who = people.remove(context.service, here.acting, here.course_id, enrolment_id)
     return RedirectResponse(f"/courses/{here.course_id}/people?{urlencode({'removed': who[:_LONGEST]})}", 303)
 
 
@@ -182,33 +163,9 @@ def extend(
     more_attempts: Annotated[int, Form(ge=0, le=1000)] = 0,
 ) -> Response:
     """Allow one student more time or attempts, in place of what they were allowed before for the same."""
-    due_at = written_moment(due)
-    if due_at is None and not more_attempts:
-        raise UsageError("say what to allow: a later date, more attempts, or both")
-    with context.store.transaction() as session:
-        row = member_in(session, here.course_id, enrolment_id, Role.STUDENT)
-        check_assignment(session, assignment)
-        policies.extend(session, enrolment_id, assignment, due_at, more_attempts)
-        told = {"student": row.student, "assignment": assignment, "due": due or None, "more_attempts": more_attempts}
-        audit.note(session, here.actor, "extend", "course", str(here.course_id), **told)
+    asked = ExtensionRequest(assignment, written_moment(due), more_attempts)
+    policies.extend(context.service, here.acting, here.course_id, enrolment_id, asked)
     return RedirectResponse(f"/courses/{here.course_id}/people/{enrolment_id}", 303)
-
-
-def _is_there(known: Member) -> str:
-    called = f", as {known.name}" if known.name and known.name != known.id else ""
-    if known.role is Role.INSTRUCTOR:
-        return f"{known.id} is an instructor of this course{called}; expected the id of a student."
-    return f"{known.id} is in this course already{called}; a table gives other names and addresses."
-
-
-def _enrol(here: InCourse, context: WebContext, listed: list[Student]) -> list[int]:
-    """All of them, or none."""
-    with context.store.transaction() as session:
-        at = now(session)
-        students = Students(session, course_of(session, here.course, at))
-        enrolled = [students.enrol(student, at) for student in listed]
-        audit.note(session, here.actor, "enrol", "course", str(here.course_id), students=len(listed))
-    return enrolled
 
 
 def _list(
@@ -220,34 +177,21 @@ def _list(
     number: int = 1,
     enrolled: int = 0,
     removed: str = "",
-    refused: str = "",
+    refused: UsageError | None = None,
     status_code: int = 200,
 ) -> Response:
-    with context.store.reading() as session:
-        members = people.members(session, here.course_id)
-        allowed = policies.extensions(session, here.course_id)
-        platform = lti.course_link(session, here.course_id)
-    wanted = text.strip().casefold()
-    found = [each for each in members if wanted in f"{each.id} {each.name} {each.email}".casefold()]
-    pages = max(1, -(-len(found) // _A_PAGE))
-    number = min(number, pages)
+    view = people_views.search_members(context.service, here.acting, here.course_id, text, number)
     return page(
         request,
         here.reader,
         "people.html",
         status_code=status_code,
         here=here,
-        members=found[(number - 1) * _A_PAGE : number * _A_PAGE],
-        found=len(found),
-        number=number,
-        pages=pages,
+        view=view,
         text=text,
-        extended={each.enrolment_id for each in allowed},
-        refused=refused,
+        refused="" if refused is None else language_of(request).tell(refused.said),
         enrolled=enrolled,
         removed=removed,
-        students=sum(each.role is Role.STUDENT for each in members),
-        platform=platform,
         days=sign_in_links.DAYS,
         most_days=sign_in_links.MOST_DAYS,
     )

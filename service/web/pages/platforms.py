@@ -7,23 +7,21 @@ from typing import Annotated
 from fastapi import APIRouter, Form, Request
 from fastapi.responses import RedirectResponse, Response
 
-from service.lti import course_services
-from service.store import audit
-from service.store.courses import open_assignments
-from service.store.people import lti
+from service.operations import platforms as operations
+from service.operations.platforms import PlatformRequest
 from service.web.access import Instructing, Operating
 from service.web.context import Context
 from service.web.rendering import page
 
 router = APIRouter()
 Address = Annotated[str, Form(min_length=1, max_length=1000)]
+Registered = Annotated[str, Form(min_length=1, max_length=operations.LONGEST_REGISTERED)]
 
 
 @router.get("/operator/platforms")
 def platforms(request: Request, reader: Operating, context: Context) -> Response:
     """What is registered, what a platform's administrator has to be told, and a form for another."""
-    with context.store.reading() as session:
-        registered = lti.platforms(session)
+    registered = operations.list_platforms(context.service, reader.acting)
     start = context.settings.public_url or str(request.base_url).rstrip("/")
     return page(request, reader, "platforms.html", platforms=registered, start=start)
 
@@ -33,18 +31,19 @@ def register(
     reader: Operating,
     context: Context,
     name: Annotated[str, Form(min_length=1, max_length=200)],
-    issuer: Address,
-    client_id: Address,
+    issuer: Registered,
+    client_id: Registered,
     deployments: Address,
     authorization_url: Address,
     token_url: Address,
     keys_url: Address,
+    service_origins: Annotated[str, Form(max_length=1000)] = "",
 ) -> Response:
     """Register a platform, or change one of the same issuer and client."""
-    listed = [each for each in deployments.replace(",", " ").split() if each]
-    with context.store.transaction() as session:
-        platform_id = lti.register(session, name, issuer, client_id, listed, authorization_url, token_url, keys_url)
-        audit.note(session, reader.actor, "register", "lti_platform", str(platform_id), issuer=issuer)
+    listed, origins = (each.replace(",", " ").split() for each in (deployments, service_origins))
+    addresses = (authorization_url, token_url, keys_url)
+    asked = PlatformRequest(name, issuer, client_id, tuple(listed), *addresses, tuple(origins))
+    operations.register(context.service, reader.acting, asked)
     return RedirectResponse("/operator/platforms", 303)
 
 
@@ -57,7 +56,7 @@ def course_platform(request: Request, here: Instructing, context: Context) -> Re
 @router.post("/courses/{course_id}/platform/members")
 def fetch_members(request: Request, here: Instructing, context: Context) -> Response:
     """Enrol everybody whom the platform has in the course."""
-    enrolled = course_services.enrol_members(context.store, here.course_id, here.actor)
+    enrolled = operations.enrol_members(context.service, here.acting, here.course_id)
     told = f"{enrolled.members} of the platform's members are in the course."
     refused = enrolled.refused
     return _course_page(request, here, context, f"{told} {len(refused)} not: {refused[0]}." if refused else told)
@@ -68,12 +67,11 @@ def pass_back(
     request: Request, here: Instructing, context: Context, assignment: Annotated[str, Form(max_length=200)]
 ) -> Response:
     """Send the published marks of an assignment to the platform's gradebook."""
-    sent = course_services.pass_back(context.store, here.course_id, assignment, here.actor)
+    sent = operations.pass_back(context.service, here.acting, here.course_id, assignment)
     return _course_page(request, here, context, f"{sent} published marks were sent.")
 
 
 def _course_page(request: Request, here: Instructing, context: Context, told: str) -> Response:
-    with context.store.reading() as session:
-        link = lti.course_link(session, here.course_id)
-        assignments = open_assignments.of_course(session, here.course_id)
+    view = operations.show_course_platform(context.service, here.acting, here.course_id)
+    link, assignments = view.link, view.assignments
     return page(request, here.reader, "course_platform.html", here=here, link=link, assignments=assignments, told=told)

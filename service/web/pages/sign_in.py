@@ -32,10 +32,10 @@ def sign_in_page(request: Request, reader: MaybeReader, target: Annotated[str, Q
 @router.get("/sign-in/{link}")
 def link_page(request: Request, reader: MaybeReader, context: Context, link: str) -> Response:
     """Where a personal link leads; it counts only when the button is pressed, for mail programs look into links."""
-    context.limits.failed_sign_ins.check(_address(request))
     with context.store.reading() as session:
         owner = credentials.owner(session, link)
     if owner is None:
+        # Only what fails is counted: a right link counts, however many wrong ones came from the same address.
         context.limits.failed_sign_ins.spend(_address(request))
         refused = _REFUSED if reader is None else _SIGNED_IN
         return page(request, reader, "sign_in.html", status_code=410, target="/", refused=refused)
@@ -51,16 +51,16 @@ def sign_in(
     target: Annotated[str, Form(alias="next")] = "/",
 ) -> Response:
     """Exchange a link's secret, or a token, for a session of this browser."""
-    context.limits.failed_sign_ins.check(_address(request))
     # A whole link may have been pasted.
     secret = secret.strip().rstrip("/").rpartition("/")[2]
     with context.store.transaction() as session:
         opened = credentials.redeem(session, secret)
         if opened is None:
             identity = credentials.identify(session, secret, CredentialKind.TOKEN)
-            # A token that may not do everything does not become a browser that may.
-            if identity is not None and identity.scopes is not None and "sign-in" in identity.scopes:
-                opened = credentials.issue(session, identity.person_id, CredentialKind.SESSION, SESSION_LIFETIME)
+            # The browser may do no more than the token.
+            if identity is not None and "sign-in" in identity.reach.scopes:
+                kind, reach = CredentialKind.SESSION, identity.reach
+                opened = credentials.issue(session, identity.person_id, kind, SESSION_LIFETIME, reach=reach)
         if opened is not None and reader is not None:
             credentials.revoke(session, reader.identity.credential_id, reader.identity.person_id)
     if opened is None:

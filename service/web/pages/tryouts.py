@@ -8,20 +8,22 @@ from fastapi import APIRouter, Request
 from fastapi.responses import RedirectResponse, Response
 from starlette.exceptions import HTTPException
 
+from service.operations import own_views, test_runs
+from service.operations.errors import NotFound
+from service.operations.types import Role
 from service.reports.html import replay_section
-from service.store.queue import tryouts
-from service.trying import tryout_assignment
-from service.web.access import InCourse, Studying, enrolment_in
+from service.web.access import InCourse, Studying
+from service.web.api_uploads import LARGEST_SUBMISSION
 from service.web.context import Context, WebContext
 from service.web.errors import sentence_of
 from service.web.language import language_of
 from service.web.pages.mine import Files, Texts, sent_files
 from service.web.refusing import said_in
 from service.web.rendering import page, wants_part
-from service.web.submitting import seen_assignment, try_out
+from service.web.request_bodies import takes_upload
+from service.web.submitting import start_test_run
 from sim.errors import UsageError
-from submissions.assignment.task_sheet import TaskSheet, task_sheet
-from submissions.packed import unpack_submission
+from submissions.assignment.task_sheet import TaskSheet
 from submissions.submission import PART_FILES, Submission
 
 router = APIRouter()
@@ -32,24 +34,23 @@ def newest_tryout(request: Request, here: Studying, context: Context, assignment
     """What was tried last, with the program in the form to be changed; htmx is told to load it when it is through."""
     if not wants_part(request):
         return _shown(request, here, context, assignment)
-    with context.store.reading() as session:
-        enrolment_id = enrolment_in(session, here.reader.identity, here.course_id).id
-        newest = tryouts.newest(session, enrolment_id, assignment)
-        line = tryouts.line(session, enrolment_id, newest) if newest else None
+    line = test_runs.find_newest(context.service, here.acting, here.course_id, assignment)
     if line is None or not line.waits:
         return Response(headers={"hx-refresh": "true"})
     return page(request, here.reader, "tryout_progress.html", here=here, line=line)
 
 
 @router.post("/courses/{course_id}/mine/{assignment}/try")
+@takes_upload(LARGEST_SUBMISSION, Role.STUDENT)
 def try_own(
     request: Request, here: Studying, context: Context, assignment: str, files: Files = (), texts: Texts = ()
 ) -> Response:
     """Let what was chosen and typed be run."""
-    with context.store.reading() as session:
-        sheet = task_sheet(seen_assignment(session, here.reader.identity, here.course_id, assignment))
+    sheet = own_views.show_sheet(context.service, here.acting, here.course_id, assignment)
     try:
-        try_out(context, here.reader.identity, here.course_id, assignment, sent_files(sheet, files, texts))
+        start_test_run(context, here.acting, here.course_id, assignment, sent_files(sheet, files, texts))
+    except NotFound:
+        raise
     except UsageError as error:
         return _shown(request, here, context, assignment, 422, sentence_of(error, language_of(request)), texts)
     except HTTPException as error:
@@ -70,26 +71,19 @@ def _shown(
     typed: Sequence[str] = (),
     headers: Mapping[str, str] | None = None,
 ) -> Response:
-    with context.store.reading() as session:
-        enrolment_id = enrolment_in(session, here.reader.identity, here.course_id).id
-        seen = seen_assignment(session, here.reader.identity, here.course_id, assignment)
-        newest = tryouts.newest(session, enrolment_id, assignment)
-        line = tryouts.line(session, enrolment_id, newest) if newest else None
-        replay = tryouts.replay_of(session, newest) if newest else None
-        tried = unpack_submission(tryouts.kept(session, newest)[0]) if newest else None
-    sheet, once = task_sheet(seen), tryout_assignment(seen)
+    found = test_runs.show_newest(context.service, here.acting, here.course_id, assignment)
     shown = page(
         request,
         here.reader,
         "tryout.html",
         status_code=status,
         here=here,
-        sheet=sheet,
-        seconds=once.scenarios[0].seconds if once else None,
-        line=line,
-        replay=replay_section(replay, language_of(request)) if replay else None,
+        sheet=found.sheet,
+        seconds=found.seconds,
+        line=found.line,
+        replay=replay_section(found.replay, language_of(request)) if found.replay else None,
         refused=refused,
-        texts=list(typed) or (_texts(sheet, tried) if tried else []),
+        texts=list(typed) or (_texts(found.sheet, found.submission) if found.submission else []),
     )
     shown.headers.update(headers or {})
     return shown

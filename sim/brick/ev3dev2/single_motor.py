@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from brick_link import link, number
+from brick_link import MOST_UNITS, link, number
 from ev3dev2.speeds import Speed, SpeedValue, whole
 
 OUTPUT_A = "outA"
@@ -231,7 +231,8 @@ class Motor:
                     "do": "until",
                     "port": self.address,
                     "state": state,
-                    "timeout": None if timeout is None else round(timeout * 3000),
+                    # One below zero has passed at the first look, as one of zero has.
+                    "timeout": None if timeout is None else round(min(max(timeout * 3000, 0), MOST_UNITS)),
                 }
             )
         )

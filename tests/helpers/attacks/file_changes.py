@@ -114,7 +114,7 @@ def create_a_file_among_the_secrets():
     return os.open(os.path.join(targets.folder, "mine"), os.O_WRONLY | os.O_CREAT) > 0
 
 
-@attack(LANDLOCK)
+@attack(EITHER)
 def create_a_nameless_file_among_the_secrets():
     return os.open(targets.folder, os.O_WRONLY | os.O_TMPFILE) > 0
 

@@ -132,7 +132,7 @@ def read_the_key_while_unpickling_with_joblib():
     return joblib.load("model.joblib")
 
 
-@attack(LANDLOCK)
+@attack(EITHER)
 def send_the_key_file_into_a_pipe():
     fd = os.open(targets.key, os.O_RDONLY)
     return os.copy_file_range(fd, os.open("copy", os.O_RDWR | os.O_CREAT), 16)

@@ -39,7 +39,7 @@ sys.argv = ["robomark", "run", sys.argv[3]]
 main()
 """
 
-_CREATE, _ADD, _RESTRICT, _SECCOMP, _PIDFD_OPEN, _PIDFD_SIGNAL, _CAPSET, _UNUSED = (
+_CREATE, _ADD, _RESTRICT, _SECCOMP, _PIDFD_OPEN, _PIDFD_SIGNAL, _CAPSET, _UNUSED, _PERSONALITY = (
     444,
     445,
     446,
@@ -48,6 +48,7 @@ _CREATE, _ADD, _RESTRICT, _SECCOMP, _PIDFD_OPEN, _PIDFD_SIGNAL, _CAPSET, _UNUSED
     424,
     126,
     176,
+    135,
 )
 
 
@@ -80,6 +81,13 @@ def test_behind_a_filter_that_denies_nothing_they_stand() -> None:
     ran = _run(_CHECK, _UNUSED, errno.EPERM)
     assert ran.returncode == 0
     assert "seccomp" in ran.stdout
+
+
+def test_where_addresses_cannot_be_fixed_they_stand_without() -> None:
+    ran = _run(_CHECK, _PERSONALITY, errno.EPERM)
+    assert ran.returncode == 0
+    assert "seccomp" in ran.stdout
+    assert "fixed addresses" not in ran.stdout
 
 
 @pytest.mark.parametrize(

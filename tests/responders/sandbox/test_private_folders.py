@@ -123,7 +123,36 @@ def test_folders_that_nobody_asked_for_are_closed_without_a_trace(tmp_path: Path
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_number_of_a_trials_first_file_is_anybodys_guess(tmp_path: Path) -> None:
+_GAPS = """
+import itertools, tempfile
+from responders.sandbox.private_folders import PrivateFolders
+tempfile.tempdir = {folder!r}
+folders, numbers = PrivateFolders(), []
+for made in {made!r}:
+    with folders.one() as trial:
+        (trial / "own").touch()
+        numbers.append((trial / "own").stat().st_ino)
+        for place in range(made):
+            (trial / str(place)).touch()
+folders.close()
+print(*{{later - earlier for earlier, later in itertools.pairwise(numbers)}})
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount")
+def test_where_files_are_numbered_on_and_on_every_trial_takes_up_as_many_numbers(tmp_path: Path) -> None:
+    """In a file system of its own: nobody else takes numbers there."""
+    made = [0, 299, 0, 1, 150, 299, 299, 0, 0]
+    code = _GAPS.format(folder=str(tmp_path), made=made)
+    script = f'mount -t tmpfs none {tmp_path} && exec {sys.executable} -c "$0"'
+    ran = subprocess.run(["unshare", "--mount", "sh", "-c", script, code], capture_output=True, text=True, check=False)
+    if any(name in ran.stderr for name in ("unshare:", "mount:")):
+        pytest.skip(f"this machine lets root mount nothing: {ran.stderr}")
+    assert ran.returncode == 0, ran.stderr
+    assert len(ran.stdout.split()) == 1
+
+
+def test_where_low_numbers_are_taken_the_number_of_a_trials_first_file_is_anybodys_guess(tmp_path: Path) -> None:
     folders = PrivateFolders()
     numbers = set()
     for _ in range(20):

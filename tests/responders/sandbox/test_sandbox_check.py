@@ -23,7 +23,7 @@ def test_every_attempt_is_refused_here(role: str) -> None:
     with Sandboxes() as sandboxes:
         said = sandboxes.check(role)  # type: ignore[arg-type]
     assert re.fullmatch(
-        r"Landlock \d+, seccomp, doorkeeper, (own user, )?(bubblewrap, )?process limits, "
+        r"Landlock \d+, seccomp, doorkeeper, (own user, )?(bubblewrap, )?(fixed addresses, )?process limits, "
         r"policy [0-9a-f]{8} \(battery .*\)",
         said,
     )
@@ -53,6 +53,14 @@ def test_bubblewrap_is_used_where_it_works_and_done_without_where_not(monkeypatc
             assert reason in str(sandboxes.why_no_bubblewrap())
             assert "bubblewrap" not in sandboxes.check()
             assert _number_of_the_zygote(sandboxes) != 2
+
+
+def test_addresses_are_as_fixed_in_bubblewrap_as_without_it() -> None:
+    def has_fixed_addresses(isolation: Isolation) -> bool:
+        with Sandboxes(isolation) as sandboxes:
+            return "fixed addresses" in sandboxes.check()
+
+    assert has_fixed_addresses(Isolation()) == has_fixed_addresses(Isolation(bubblewrap=False))
 
 
 def _number_of_the_zygote(sandboxes: Sandboxes) -> int:

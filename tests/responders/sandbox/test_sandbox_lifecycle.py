@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from benchmarks.harness.process_tree import command_line
 from paths import HELPERS
 from processes import alive, until
 from responders.sandbox import zygote
+from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from running import run_program
 from service.grading.trial_runner import TrialRunner
@@ -36,6 +38,26 @@ with TrialRunner() as runner:
 _ENDLESS = "while True: pass"
 _ECHO = "def responder(text): return text"
 _WAITING = 'import select\nprint("PY::x")\nselect.select([], [], [])'
+
+
+@pytest.mark.parametrize("is_ready", [False, True], ids=["it-starts", "it-waits"])
+def test_a_zygote_that_is_closed_before_its_first_child_ends_silently(
+    is_ready: bool, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with Sandboxes() as sandboxes:
+        unused = sandboxes._zygote("robot")
+        unused.begin()
+        assert unused._process is not None
+        process = unused._process
+        if is_ready:
+            assert select.select(unused._sockets, [], [], 60)[0]
+        else:
+            for each in unused._sockets:
+                each.close()
+            unused._sockets = ()
+            process.wait(60)
+    assert process.poll() == 0
+    assert capfd.readouterr().err == ""
 
 
 @pytest.mark.parametrize(

@@ -132,6 +132,8 @@ def test_what_was_compiled_of_a_closed_file_is_closed_too(
 ) -> None:
     source = ROOT / "responders" / "kit" / "nn_tools" / "weights.py"
     compiled = Path(py_compile.compile(str(source), doraise=True) or "")
+    # Whoever made the folder may have kept it from other users.
+    compiled.parent.chmod(0o755)
     (tmp_path / "responder.py").write_text(COMPILED.format(name=compiled.name))
     asked = assignment("responder", {"avoids": [f"import {module}"]})
     assert grade(read_submission(tmp_path, asked=asked.parts), asked, runner=runner).criteria[1].marks == marks

@@ -61,8 +61,9 @@ def _own(pid: int) -> bool:
 
 def _opens(flags: int, mode: int) -> bool:
     access = flags & 3
-    special = flags & (0o100 | 0o20000000) and mode & 0o7000
-    return not special and (access in (1, 2) or (access == 0 and not flags & 0o1000))
+    special = flags & 0o100 and mode & 0o7000
+    without_a_name = flags & 0o20000000
+    return not special and not without_a_name and (access in (1, 2) or (access == 0 and not flags & 0o1000))
 
 
 def _arguments(everything: bool) -> list[list[int]]:

@@ -46,12 +46,15 @@ def test_a_batch_is_of_the_course_that_is_named_and_listed_there(tmp_path: Path)
     folder = tmp_path / "class"
     shutil.copytree(examples("echo-responder") / "flawed", folder / "ada")
     home = tmp_path / "home"
+    mistyped = robomark(home, "batch", "submit", folder, "-a", "echo-responder", "--course", "night")
+    assert (mistyped.status, "there is no course called 'night'" in mistyped.err) == (2, True)
+    robomark(home, "user", "add", "grace", "--course", "night")
     ended = robomark(home, "batch", "submit", folder, "-a", "echo-responder", "--course", "night", "--json")
     batch = json.loads(ended.out)["batch"]
     assert batch in robomark(home, "batch", "list", "--course", "night").out
     assert batch in robomark(home, "batch", "list").out
     other = robomark(home, "batch", "list", "--course", "day")
-    assert (other.status, "there is no course 'day'" in other.err) == (2, True)
+    assert (other.status, "there is no course called 'day'" in other.err) == (2, True)
 
 
 def _batch_id(ended: Ended) -> str:

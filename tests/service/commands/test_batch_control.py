@@ -14,9 +14,11 @@ import pytest
 from rich.console import Console
 from sqlalchemy import select, update
 
+import acting
 from batch_command import Ended, robomark
 from builders import asked_already, grading_request, settings_in
 from service.commands.batch.waiting import Waiting
+from service.operations.batches import Controlled
 from service.queue.celery_app import make_celery
 from service.queue.embedded import EmbeddedServices
 from service.queue.notifier import Notifier
@@ -25,7 +27,6 @@ from service.reports.written import file_stem
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
 from service.store.models import CriterionResultRow, Job, TrialRow
-from service.store.queue import batch_control
 from service.store.states import JobState, Lane
 from submissions.assignment.examples import examples
 
@@ -125,14 +126,16 @@ def test_a_worker_honours_pause_and_cancel(tmp_path: Path) -> None:
 
         def grade(batch: str, count: int) -> None:
             notifier.grade(Lane.BATCH, count)
-            Waiting(store, notifier, batch, Console(quiet=True), services.ensure).for_marks()
+            Waiting(
+                acting.service_on(store), acting.machine(), notifier, batch, Console(quiet=True), services.ensure
+            ).for_marks()
 
         paused = accept_batch(store, "paused", [grading_request("ada")], [], max_attempts=2).id
-        batch_control.pause(store, paused)
+        acting.pause(store, paused)
         other = accept_batch(store, "other", [grading_request("bob")], [], max_attempts=2).id
         grade(other, 2)
         assert _states(store, paused) == [JobState.QUEUED]
-        batch_control.resume(store, paused)
+        acting.resume(store, paused)
         grade(paused, 0)
         assert _states(store, paused) == [JobState.DONE]
 
@@ -144,7 +147,7 @@ def test_a_worker_honours_pause_and_cancel(tmp_path: Path) -> None:
         while JobState.RUNNING not in _states(store, spinning):
             assert time.monotonic() < until
             time.sleep(0.05)
-        assert batch_control.cancel(store, spinning) == batch_control.Controlled(True, 2, 1)
+        assert acting.cancel(store, spinning) == Controlled(True, 2, 1)
         after = accept_batch(store, "after", [grading_request("eve")], [], max_attempts=2).id
         grade(after, 1)
         assert _states(store, spinning) == [JobState.CANCELLED] * 3

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from command import robomark
 from replays import data_of
 from responders.channel import Channel
-from service.commands.channel_flags import changed, given_flags
+from service.commands.channel_flags import ChannelFlags, changed
 from submissions.assignment.examples import examples
 
 ECHO = examples("json-queue") / "reference"
@@ -18,7 +19,7 @@ BEACON = Channel(loss=0.2, link="infrared", beacon=(500.0, 500.0), range=300)
 
 
 def test_without_flags_nothing_changes() -> None:
-    assert changed(BEACON, given_flags(loss=None, link=None)) is BEACON
+    assert changed(BEACON, ChannelFlags().given()) is BEACON
 
 
 @pytest.mark.parametrize(
@@ -34,10 +35,8 @@ def test_without_flags_nothing_changes() -> None:
         ),
     ],
 )
-def test_flags_change_what_they_name_and_nothing_else(
-    before: Channel, flags: dict[str, object], after: Channel
-) -> None:
-    assert changed(before, given_flags(**flags)) == after
+def test_flags_change_what_they_name_and_nothing_else(before: Channel, flags: dict[str, Any], after: Channel) -> None:
+    assert changed(before, ChannelFlags(**flags).given()) == after
 
 
 def test_a_run_shows_what_was_lost(tmp_path: Path) -> None:

@@ -199,7 +199,7 @@ def test_run_takes_an_image_as_its_floor_and_modules_beside(tmp_path: Path) -> N
         assert ((green > red + 20) & (green > blue + 20)).mean() > 0.25
     small = tmp_path / "small.png"
     Image.new("RGB", (10, 10)).save(small)
-    assert "it must be 2362 x 1143" in robomark("run", program, "-b", small).stderr
+    assert "it must be a PNG or JPEG of 2362 x 1143 pixels" in robomark("run", program, "-b", small).stderr
 
 
 def test_run_says_how_long_a_responder_may_compute(tmp_path: Path) -> None:

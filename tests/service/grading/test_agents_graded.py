@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from notebook_builder import notebook
 from responders.code import Code
 from service.grading.grade import Grade
 from service.grading.grader import grade
@@ -29,7 +30,7 @@ from submissions.assignment.examples import examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 from submissions.criteria import SCHEMAS
-from submissions.submission import Cell, Notebook, Submission
+from submissions.submission import Submission
 
 ASSIGNMENT = find_assignment("parser-agent-and-logger")
 REFERENCE = read_submission(examples(ASSIGNMENT.id) / "reference", asked=ASSIGNMENT.parts)
@@ -81,10 +82,39 @@ def test_a_given_agent_sees_given_files_alone_and_no_process_sees_anothers_text(
     assert sorted(plan.answers.files) == ["own.csv", "table.csv"]
 
 
-def test_a_notebook_is_refused_where_agents_are_asked_for() -> None:
-    notebook = Submission("ada", notebook=Notebook("n.ipynb", (Cell(1, "x = 1"),)))
-    with pytest.raises(UsageError, match=r"n\.ipynb: is a notebook, expected robot\.py and responder\.py beside agent"):
-        plan_run(notebook, ASSIGNMENT)
+def as_notebook(folder: Path, *first: str, leave_out: str = "") -> Submission:
+    """The reference as a notebook: each agent in a cell that writes its file, the responder in the last one."""
+    sources = {path.name: path.read_text() for path in sorted((examples(ASSIGNMENT.id) / "reference").glob("*.py"))}
+    responder = sources.pop("responder.py")
+    sources.pop(leave_out, None)
+    agents = [f"%%writefile {name}\n{text}" for name, text in sources.items()]
+    return read_submission(notebook(folder / "ada.ipynb", [*first, *agents, responder]), asked=ASSIGNMENT.parts)
+
+
+def test_a_notebook_brings_agents_in_cells_and_gets_the_marks_of_the_files(
+    tmp_path: Path, full: Grade, runner: TrialRunner
+) -> None:
+    result = grade(as_notebook(tmp_path), ASSIGNMENT, runner=runner)
+    assert result.marks == full.marks == ASSIGNMENT.max_marks
+    expected, recording = full.trials[0].recording, result.trials[0].recording
+    assert recording.agent_messages == expected.agent_messages
+    assert [each.log for each in recording.agent_outputs] == [each.log for each in expected.agent_outputs]
+
+
+def test_what_cells_ask_agents_before_the_marked_run_is_no_part_of_it(
+    tmp_path: Path, full: Grade, runner: TrialRunner
+) -> None:
+    submission = as_notebook(tmp_path, "print(agent('PY::7'), parser('PY::8'))")
+    result = grade(submission, ASSIGNMENT, runner=runner)
+    recording = result.trials[0].recording
+    assert "Py saw: 7 8" in recording.responder_output
+    assert result.marks == ASSIGNMENT.max_marks
+    assert recording.agent_messages == full.trials[0].recording.agent_messages
+
+
+def test_a_notebook_without_one_of_the_agents_is_told_where_to_put_it(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"has no parser\.py; put each agent .* begins with %%writefile parser\.py"):
+        as_notebook(tmp_path, leave_out="parser.py")
 
 
 def judged(full: Grade, check: str, **keys: Any) -> tuple[bool, str]:

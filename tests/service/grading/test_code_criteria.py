@@ -9,6 +9,7 @@ import pytest
 from judging import criterion
 from responders.code import Code
 from responders.sandbox.meter import JobMeter
+from service.grading.grade import CriterionResult
 from service.grading.grader import grade
 from service.grading.judging.code import judge_source
 from service.grading.judging.outcome import Outcome
@@ -16,7 +17,8 @@ from service.grading.judging.source_answers import SourceAnswers
 from service.grading.run_plan import plan_run
 from service.grading.static_analysis import analyse
 from service.grading.trial_runner import TrialRunner
-from submissions.assignment.definition import Assignment, Parts, WorldSpec
+from sim.recording import Pose
+from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.criteria import Criterion
 from submissions.magics import split_program
 from submissions.plain_cells import python_of
@@ -68,7 +70,8 @@ while True:
         ({"uses": ["import ev3"]}, False),
         ({"uses": ["colorLeft", "colorLeft.rgb", "rgb"]}, True),
         ({"uses": ["color"]}, False),
-        ({"in_loop": ["square()", "on_for_rotations()"]}, True),
+        ({"in_loop": ["square()", "on_for_rotations()"], "defines": ["square"]}, True),
+        ({"in_loop": ["square()"]}, False),
         ({"in_loop": ["Sound()"]}, False),
         ({"defines": ["square"]}, True),
         ({"defines": ["triangle"]}, False),
@@ -161,6 +164,63 @@ def test_what_a_text_cannot_show_is_told_to_staff(runner: TrialRunner) -> None:
 
 
 @pytest.mark.parametrize(
+    "text",
+    [
+        "import cProfile\ncProfile.run('tank_' + 'drive.on_' + 'for_degrees(1, 1, 9)')",
+        "import timeit\ntimeit.Timer('tank_drive.on_' + go).timeit(1)",
+        "import string\nstring.Formatter().get_field('0.on_' + go, [tank_drive], {})",
+        "import logging.config\nlogging.config.BaseConfigurator({}).resolve('ev3dev2_glue.' + go)",
+        "import xmlrpc.server\nxmlrpc.server.resolve_dotted_attribute(tank_drive, 'on_' + go)",
+        # Other modules, and other ways to the same ones.
+        *(
+            f"import {name}\n{name}.run(go)"
+            for name in ("profile", "bdb", "pdb", "trace", "doctest", "sched", "turtle")
+        ),
+        *(
+            f"import {name}"
+            for name in ("unittest.mock", "multiprocessing", "threading", "asyncio", "types", "os", "sys")
+        ),
+        "from string import Formatter as F\nF().get_field(go, [tank_drive], {})",
+        "from string import *\nFormatter().vformat(go, [tank_drive], {})",
+        "from sys import _getframe as frame\nframe()",
+        "import collections\ncollections._sys.modules[go]",
+        "from random import _os\n_os.sys",
+        "import enum\nenum.bltns.eval(go)",
+        "import statistics as s\ns.sys.modules[go]",
+        "import typing\ntyping.get_type_hints(go)",
+        "from functools import singledispatch as on_type\non_type(go)",
+        "import pandas as pd\npd.eval(go)",
+        "import pandas as pd\npd.DataFrame({}).query(go)",
+        "from numpy.testing import measure\nmeasure(go)",
+        "import numpy as np\nnp.testing.measure(go)",
+        "import numpy.f2py",
+        "import no_such_module",
+    ],
+)
+def test_what_runs_or_looks_up_a_text_is_doubtful(text: str, runner: TrialRunner) -> None:
+    outcome = judged(text, runner, avoids=["on_for_*()"])
+    assert outcome.passed
+    assert "Can do more than its text shows: line " in outcome.for_staff
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(f"import {name}" for name in ("math", "time", "json", "random", "statistics", "re", "datetime", "csv")),
+        "from collections import Counter, deque\nfrom dataclasses import dataclass\nfrom enum import Enum",
+        "import collections.abc, itertools, functools, string\nstring.digits, functools.partial(print)",
+        "import datetime\ndatetime.datetime.now().time()",
+        "from ev3dev2.motor import MoveTank\nfrom ev3dev2_glue import say\nsay('x')",
+        "import numpy as np\nimport pandas as pd\nnp.random.rand(3), np.trace(x), pd.read_csv('a')",
+        "from sklearn.neural_network import MLPClassifier\nfrom nn_tools.sensor_data import x",
+        "from matplotlib import pyplot as plt\nplt.plot([1])",
+    ],
+)
+def test_harmless_modules_are_no_doubt(text: str, runner: TrialRunner) -> None:
+    assert judged(text, runner, avoids=["on_for_*()"]).for_staff == ""
+
+
+@pytest.mark.parametrize(
     ("helper", "words"),
     [
         ("import math\nfrom sklearn import svm", "line 2 of helper.py has it"),
@@ -221,3 +281,105 @@ def test_text_of_a_notebook_is_its_plain_cells() -> None:
     assert "say" not in text
     assert "import re" in text
     assert "import math\nimport json" in text
+
+
+DRIVES = "import time\ntank_drive.on_for_seconds(20, 20, 0.1)\n"
+
+
+def driven_by(text: str, runner: TrialRunner, *, visibility: str = "visible", **rules: Any) -> CriterionResult:
+    scenario = Scenario("s", (Pose(200, 600, 0),), seconds=5, visibility=visibility)  # type: ignore[arg-type]
+    asked = criterion("source", **rules)
+    drives = Assignment("a", "A", WorldSpec(), Parts("student", "none"), (scenario,), (asked,))
+    program = Code("robot.py", f"%%sim_magic_preloaded\n{text}")
+    files = {"helper.py": b"def twice(go):\n    for _ in range(2):\n        go()\n"}
+    return grade(Submission("ada", program=program, files=files), drives, runner=runner).criteria[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "rules", "holds"),
+    [
+        ("while time.time() < 0: say('x')", {"uses": ["while"]}, False),
+        ("while time.time() < 0:\n    say('x')", {"in_loop": ["say()"]}, False),
+        ("while time.time() > 0: say('x'); break", {"uses": ["while"], "in_loop": ["say()"]}, True),
+        ("for x in list(): say('x')", {"uses": ["for"]}, False),
+        ("for x in list('ab'): say(x)", {"uses": ["for"], "in_loop": ["say()"]}, True),
+        ("for x in list(): pass\nfor x in 'ab': say(x)", {"uses": ["for"]}, True),
+        ("say('x')\nwhile time.time() < 0: say('y')", {"in_loop": ["say()"]}, False),
+        ("def f(): say('x')\nf()\nwhile time.time() < 0: f()", {"in_loop": ["say()"]}, False),
+        ("def f(): say('x')\nfor _ in 'ab': f()", {"in_loop": ["say()"]}, True),
+        ("if time.time() < 0: pass\nelse: pass", {"uses": ["if", "else"]}, True),
+        ("if time.time() > 0: pass\nelse: pass", {"uses": ["else"]}, False),
+        ("if time.time() < 0: colorLeft.rgb", {"uses": ["colorLeft"]}, False),
+        ("for x in 'ab':\n    if x == 'a': continue\n    break", {"uses": ["for", "continue", "break"]}, True),
+        ("for x in 'ab':\n    if x == 'c': continue\n    if x == 'd': break", {"uses": ["continue", "break"]}, False),
+        ("def f():\n    '''Says.'''\n    global n\n    n = 1\n    say('x')\nf()", {"uses": ["say()", "global"]}, True),
+        ("from helper import twice\ntwice(lambda: say('x'))", {"uses": ["say()", "for"]}, True),
+        ("import helper\nif time.time() < 0: helper.twice(print)", {"uses": ["for"]}, False),
+        ("x = [n for n in 'ab']", {"uses": ["comprehension"]}, True),
+        ("exec('for n in [1]: say(str(n))')", {"uses": ["for"]}, True),
+        ("while True:\n    time.sleep(0.1)", {"uses": ["while"]}, True),
+        ("x = 1" + " + 1" * 1500 + "\nwhile time.time() < 0: pass", {"uses": ["while"]}, False),
+        ("x = 1" + " + 1" * 1500 + "\nwhile x > 0: break", {"uses": ["while"]}, True),
+        ("while True:\n    pass", {"uses": ["while"]}, True),
+        ("say('x')\nraise ValueError\nsay('y')", {"uses": ["say()"]}, True),
+        ("def say(text): print(text)\nsay('x')", {"uses": ["say()"]}, False),
+        ("def say(text): print(text)\nsay('x')", {"uses": ["say()"], "defines": ["say"]}, True),
+        ("say = print\nsay('x')", {"uses": ["say()"]}, False),
+        ("class Robot:\n    def on(self): pass\nRobot().on()", {"uses": ["on()"]}, False),
+        ("class colorLeft: rgb = 1\ncolorLeft.rgb", {"uses": ["colorLeft.rgb"]}, False),
+        ("colorLeft = ColorSensor(INPUT_2)\ncolorLeft.rgb", {"uses": ["colorLeft.rgb"]}, True),
+        ("from math import floor as MLPClassifier\nMLPClassifier(1)", {"uses": ["MLPClassifier"]}, False),
+        ("from helper import twice as say\nsay(print)", {"uses": ["say()"]}, False),
+        ("import time as g\nnap = g.sleep\nnap(0.1)", {"uses": ["time.sleep()"]}, True),
+    ],
+)
+def test_only_what_was_run_and_is_not_the_submissions_own_is_used(
+    text: str, rules: dict[str, Any], holds: bool, runner: TrialRunner
+) -> None:
+    result = driven_by(DRIVES + text, runner, **rules)
+    assert (result.marks == result.max_marks) is holds, result.message
+
+
+@pytest.mark.parametrize(
+    ("text", "holds"),
+    [
+        ("from sklearn.neural_network import MLPClassifier\nMLPClassifier()\ndef f(): return 1", True),
+        ("def MLPClassifier(): pass\nMLPClassifier()\ndef f(): return 1", False),
+        ("from sklearn.neural_network import MLPClassifier as Net\ndef f(): return Net().alpha * 10000", True),
+        ("from sklearn import neural_network\ndef f(): return neural_network.MLPClassifier().alpha * 10000", True),
+        (
+            "from sklearn.neural_network import MLPClassifier\ndef f(a=0):\n    if a: MLPClassifier()\n    return 1",
+            False,
+        ),
+    ],
+)
+def test_what_a_called_function_uses_is_what_it_ran(text: str, holds: bool, runner: TrialRunner) -> None:
+    rule = criterion("source", part="responder", uses=["MLPClassifier"])
+    called = criterion("functions", function="f", calls=[{"returns": 1}]).model_copy(update={"id": "f"})
+    submission = Submission("ada", responder=Code("responder.py", text))
+    result = grade(submission, without_robot(rule, called), runner=runner)
+    assert [each.marks == 4 for each in result.criteria] == [holds, True], result.criteria[0].message
+
+
+def test_what_is_run_in_hidden_trials_is_not_looked_at(runner: TrialRunner) -> None:
+    dead = f"{DRIVES}while time.time() < 0: say('x')"
+    assert driven_by(dead, runner, visibility="hidden", uses=["while"]).marks == 4
+
+
+def test_looking_at_statements_changes_no_recording(runner: TrialRunner) -> None:
+    loop = "for n in range(3):\n    print('PY::', n)\n    say(str(colorLeft.rgb))\n1 / 0"
+    text = f"%%sim_magic_preloaded\n{DRIVES}{loop}"
+    scenario = Scenario("s", (Pose(200, 600, 0),), seconds=5)
+    rules = criterion("source", uses=["for"]), criterion("finishes")
+    found = [
+        grade(
+            Submission("ada", program=Code("robot.py", text)),
+            Assignment("a", "A", WorldSpec(), Parts("student", "none"), (scenario,), (rule,)),
+            runner=runner,
+        )
+        .trials[0]
+        .recording
+        for rule in rules
+    ]
+    assert found[0].sha256 == found[1].sha256
+    assert found[0].faults == found[1].faults

@@ -166,7 +166,7 @@ _DRIVEN = [
     ("one-shape-from-six-sides", "always the same", "shapes-on-the-move", "shapes", "0.00", "3.00"),
     ("one-shape-from-six-sides", "the network", "shapes-on-the-move", "shapes", "0.00", "6.00"),
     ("one-shape-from-six-sides", "always the same", "shapes-on-a-track", "track", "1.33", "4.00"),
-    ("one-place-four-times", "nobody", "collect-shapes", "enough", "2.64", "4.93"),
+    ("one-place-four-times", "nobody", "collect-shapes", "enough", "2.75", "4.75"),
 ]
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
 from judging import criterion
 from responders.code import Code
@@ -14,8 +17,13 @@ from responders.sandbox.running_child import ChildLimits
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
+from service.reports.formats.json_output import json_text
+from service.reports.html import report
+from service.reports.view import student_view
 from sim.recording import Verdict
 from submissions.assignment.definition import Assignment, Limits, Parts, WorldSpec
+from submissions.assignment.problems import AssignmentProblems
+from submissions.assignment.reader import read_assignment
 from submissions.criteria import Criterion
 from submissions.submission import Submission
 
@@ -103,3 +111,125 @@ def test_what_the_module_prints_counts_against_its_output(runner: TrialRunner) -
     fault = called.returned[0].fault
     assert fault is not None
     assert fault.verdict is Verdict.OUTPUT_LIMIT
+
+
+SQUARES = [
+    {"arguments": [2], "returns": 4},
+    {"arguments": [3], "returns": 9, "hidden": True},
+    {"arguments": [-5], "returns": 25, "hidden": True},
+]
+
+
+@pytest.mark.parametrize(
+    ("text", "marks", "words"),
+    [
+        ("def f(x): return x * x", "4.00", "3 of 3 calls right"),
+        (
+            "def f(x): return 4",
+            "1.33",
+            "Expected the right values in all 2 hidden calls as well, but 0 of them were right (1 of 3 calls right).",
+        ),
+        ("def f(x): return 2 * x", "1.33", "Expected the right values in all 2 hidden calls"),
+        ("def f(x): return abs(x) ** 3", "0.00", "Expected f(2) to return 4, but it returned 8 (0 of 3 calls right)."),
+        ("def g(x): return 0", "0.00", "there is no function called f"),
+    ],
+)
+def test_of_hidden_calls_the_count_is_told(text: str, marks: str, words: str, runner: TrialRunner) -> None:
+    result = graded(text, runner, criterion("functions", function="f", calls=SQUARES)).criteria[0]
+    assert str(result.marks) == marks
+    assert words in result.message
+
+
+#: What a function does with an argument that it has not seen, and right answers to what is shown.
+_LEAKS = {
+    "returns it": "return 4 if x == 2 else [x, 'look']",
+    "raises it": "if x != 2: raise ValueError(x)\n    return 4",
+    "raises on a line of its own": "if x == 2: return 4\n    if x == 3: raise ValueError\n    return 1 / 0",
+    "prints it": "print(x)\n    return 4 if x == 2 else 0",
+    "ends the process": "import os\n    if x == 3: os._exit(0)\n    return 4",
+    "names the lack of a function": "if x == 3: raise ValueError('there is no function called f')\n    return 4",
+    "is refused something": "if x == 3:\n        try: open('/etc/passwd')\n        except OSError: pass\n    return 4",
+}
+
+
+@pytest.mark.parametrize("leak", _LEAKS)
+def test_what_is_done_with_a_hidden_argument_is_not_told(leak: str, runner: TrialRunner) -> None:
+    text = f"def f(x):\n    {_LEAKS[leak]}\n"
+
+    def read(hidden: int) -> str:
+        calls = [SQUARES[0], {"arguments": [hidden], "returns": "never", "hidden": True}]
+        found = student_view(graded(text, runner, criterion("functions", function="f", calls=calls)))
+        return json_text(found) + report(found, {}, Submission("ada", responder=Code("responder.py", text)))
+
+    assert read(3) == read(7)
+
+
+def test_staff_read_which_hidden_call_went_wrong(runner: TrialRunner) -> None:
+    asked = criterion("functions", function="f", calls=SQUARES)
+    result = graded("def f(x): return x + x", runner, asked).criteria[0]
+    assert result.for_staff == "The first hidden call that went wrong: Expected f(3) to return 9, but it returned 6."
+
+
+def test_a_hidden_call_cannot_be_told_by_a_later_one() -> None:
+    with pytest.raises(ValidationError, match="expected the hidden ones last"):
+        criterion("functions", calls=SQUARES[::-1])
+
+
+_TABLE = """
+id = "a"
+title = "A"
+[parts]
+program = "none"
+[[criterion]]
+title = "Names the letters"
+marks = 4
+check = "functions"
+function = "kind"
+table = "letters.csv"
+at_least = 0.9
+"""
+_LETTERS = "kind,letter\n" + "".join(
+    f"{'vowel' if letter in 'aeiou' else 'other'},{letter}\n" for letter in "abcdefghijklmnopqrst"
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "marks", "words"),
+    [
+        ("def kind(x): return 'vowel' if x in 'aeiou' else 'other'", "4.00", "at least 90% of 20 calls right"),
+        ("def kind(x): return 'vowel' if x in 'aei' else 'other'", "4.00", "at least 90% of 20 calls right"),
+        (
+            "def kind(x): return 'other'",
+            "3.20",
+            "Expected kind to be right in 90% of 20 calls, but it was in about 80%.",
+        ),
+        ("def kind(x): return 1.0", "0.00", "but it was in about 0%"),
+        ("def accuracy(): return 1.0", "0.00", "there is no function called kind"),
+    ],
+)
+def test_accuracy_is_measured_on_what_we_pass(
+    text: str, marks: str, words: str, runner: TrialRunner, tmp_path: Path
+) -> None:
+    (tmp_path / "assignment.toml").write_text(_TABLE)
+    (tmp_path / "letters.csv").write_text(_LETTERS)
+    asked = read_assignment(tmp_path)
+    result = grade(Submission("ada", responder=Code("responder.py", text)), asked, runner=runner).criteria[0]
+    assert str(result.marks) == marks
+    assert words in result.message
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        (None, 'table is "letters.csv", expected a CSV file'),
+        ("kind,letter\n", "has 0 rows"),
+        ("kind,letter\nvowel,a\nother\n", "letters.csv:3 has 1 cells, expected 2"),
+        ("kind,letter\n" + "vowel,a\n" * 1001, "has 1001 rows"),
+    ],
+)
+def test_a_table_that_cannot_be_used_is_refused(rows: str | None, words: str, tmp_path: Path) -> None:
+    (tmp_path / "assignment.toml").write_text(_TABLE)
+    if rows is not None:
+        (tmp_path / "letters.csv").write_text(rows)
+    with pytest.raises(AssignmentProblems, match=re.escape(words)):
+        read_assignment(tmp_path)

@@ -13,8 +13,11 @@ from typing import Any
 
 import pytest
 
+from builders import echo, grading_request
 from report_builders import row_of
 from responders.code import Code
+from responders.sandbox.meter import JobMeter
+from service.grading import grader
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
@@ -245,9 +248,51 @@ def training() -> Assignment:
     return replace(found, scenarios=scenarios, criteria=(*criteria, pooled), limits=limits)
 
 
-@pytest.mark.parametrize("channel", MODELS)
+@pytest.mark.parametrize(
+    "channel", [pytest.param(name, marks=[pytest.mark.long] * (number > 0)) for number, name in enumerate(MODELS)]
+)
 def test_what_a_model_does_with_hidden_images_is_not_told(
     runner: TrialRunner, training: Assignment, channel: str
 ) -> None:
     model = Code("responder.py", MODEL.replace("{}", MODELS[channel]))
     told_apart(runner, Submission("s", None, model), training)
+
+
+def _with_hidden(count: int, *, first: bool) -> Assignment:
+    """The echo assignment with four visible trials, and so many hidden ones before or after them."""
+    (own,) = echo().scenarios
+    shown = replace(own, poses=tuple(Pose(x, 800, 0) for x in (100, 150, 200, 250)))
+    hidden = tuple(replace(own, id=f"secret-{number}", visibility="hidden") for number in range(count))
+    return replace(echo(), scenarios=(*hidden, shown) if first else (shown, *hidden))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_visible_trials_are_run_in_an_order_of_their_own(seed: int) -> None:
+    def order(assignment: Assignment) -> list[int]:
+        trials = tuple(assignment.trials())
+        run = [trials[number] for number in grader._run_order(trials, seed)]
+        assert [trial.scenario.visibility for trial in run[4:]] == ["hidden"] * (len(run) - 4)
+        return [trial.index for trial in run[:4]]
+
+    assert order(_with_hidden(1, first=False)) == order(_with_hidden(3, first=True))
+
+
+def test_visible_trials_may_compute_as_long_however_many_are_hidden(
+    runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits: list[float] = []
+
+    class Watched(JobMeter):
+        def child_ended(self, cpu_seconds: float, sleep_seconds: float) -> None:
+            limits.append(self.limits.cpu_seconds)
+            super().child_ended(cpu_seconds, sleep_seconds)
+
+    monkeypatch.setattr(grader, "JobMeter", Watched)
+    found = {}
+    for count in (1, 3):
+        limits.clear()
+        graded = grade(grading_request().submission, _with_hidden(count, first=True), runner=runner)
+        assert graded.cost is not None
+        found[count] = (limits[0], graded.cost.limits.cpu_seconds - limits[0])
+    assert found[1][0] == found[3][0]
+    assert (found[1][1], found[3][1]) == (1, 3)

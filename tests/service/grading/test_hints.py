@@ -21,7 +21,7 @@ from report_builders import line_follower_recording
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.hint_clues import clues_of
-from service.grading.hint_rules import PRELOADED
+from service.grading.hint_names import PRELOADED
 from service.grading.hints import near_misses
 from service.grading.judging import bounded
 from service.grading.run_plan import plan_run
@@ -182,7 +182,7 @@ def test_in_a_notebook_the_cell_is_named(name: str, runner: TrialRunner, tmp_pat
         ("%%sim_magic_preload\nprint(1)", "line 1 of cell 1 has %%sim_magic_preload, another word."),
         (
             "import time\n%%sim_magic_preloaded\nprint(1)",
-            "; line 2 of cell 1 has %%sim_magic_preloaded, below other code.",
+            "; line 2 of cell 1 has %%sim_magic_preloaded, below other code: make it the first line.",
         ),
         ("print(1)", "begins with %%sim_magic_preloaded."),
     ],
@@ -233,8 +233,8 @@ def test_searching_for_hints_takes_time_that_grows_with_the_length(tmp_path: Pat
         near_misses(replace(clues, recordings=(recording,), lost=lost))
         return time.process_time() - began
 
-    short = max(cost(250), 0.002)
-    assert cost(4 * 250) < 20 * 4 * short
+    short = max(cost(100), 0.002)
+    assert cost(4 * 100) < 20 * 4 * short
 
 
 def _raises(_: object) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -104,6 +105,26 @@ def test_forwards_and_backwards_left_and_right_are_moves_of_their_own(made: Any,
     assert passes(criterion("moves", moves=moves, only=True), driven(*made))
 
 
+@pytest.mark.parametrize(
+    ("keys", "made", "marks"),
+    [
+        # The first move suits both, the second only the first that is asked for.
+        ({"in_order": False}, (80, 200), 4),
+        ({"in_order": False}, (200, 80), 4),
+        ({"in_order": False}, (200, 220), 2),
+        # The last two that are asked for came, in order.
+        ({"then": 300}, (80, 300, 200), 2.67),
+    ],
+)
+def test_moves_are_paired_so_that_most_are_found(keys: dict[str, Any], made: Sequence[float], marks: float) -> None:
+    wide, narrow = {"forward": [50, 300]}, {"forward": [50, 100]}
+    asked = [{"forward": [190, 210]}, {"forward": [70, 90]}, {"forward": [keys["then"]] * 2}] if "then" in keys else []
+    keys = {key: value for key, value in keys.items() if key != "then"}
+    run = driven(*(part for mm in made for part in (straight(mm), rest())))
+    result = judged(criterion("moves", moves=asked or [wide, narrow], over="mean", **keys), run)
+    assert float(result.marks) == marks, result.message
+
+
 def test_a_missing_move_tells_what_came_instead_and_when() -> None:
     result = judged(criterion("moves", moves=RIGHT_ANGLE, over="mean"), driven(straight(100), rest(), spin(111)))
     assert result.marks == 2
@@ -150,6 +171,30 @@ def test_an_excursion_without_a_return_is_told() -> None:
     assert "Expected the robot to go out " in result.message
     still = judged(criterion("excursions", heights=[1, 1]), driven())
     assert "it never did" in still.message
+
+
+@pytest.mark.parametrize(
+    ("heights", "moves", "score", "told"),
+    [
+        ([1], (straight(100),), 0.5, "it ended 100 mm from it"),
+        ([1, 1], (straight(100), straight(-100), straight(100)), 0.75, "it ended 100 mm from it"),
+        ([1], (straight(100), straight(-60)), 0.5, "it ended 40 mm from it"),
+        # Back along the way out, and then off to the side.
+        ([1], (straight(100), straight(-100), spin(90), straight(300)), 0.5, "it ended 300 mm from it"),
+        # Level with the start, and to the side of it.
+        (
+            [1, 1],
+            (straight(100), spin(90), straight(100), spin(90), straight(100), straight(-100), straight(100)),
+            0.5,
+            "the first time it came back to 100 mm",
+        ),
+    ],
+)
+def test_each_excursion_comes_back_to_the_start(heights: list[int], moves: Any, score: float, told: str) -> None:
+    asked = criterion("excursions", heights=heights, over="mean")
+    result = judged(asked, driven(*moves))
+    assert float(result.marks) == 4 * score, result.message
+    assert told in result.message
 
 
 @given(st.lists(st.sampled_from((1, 2, 3)), min_size=1, max_size=5), st.sampled_from((60, 100)))
@@ -235,6 +280,51 @@ def test_only_what_the_pen_draws_are_legs() -> None:
     lifted = driven(*moves, pen=((0, True), (45, False)))
     assert [round(leg.length) for leg in legs_of(lifted, pen=True)] == [200]
     assert [round(leg.length) for leg in legs_of(lifted, pen=False)] == [200, 200]
+
+
+def lifted_between(first: Sequence[Any], between_them: Sequence[Any], second: Sequence[Any]) -> Any:
+    """A run of these moves with the pen up for those in the middle."""
+    up = sum(ticks for _, _, ticks in first)
+    down = up + sum(ticks for _, _, ticks in between_them)
+    return driven(*first, *between_them, *second, pen=((0, True), (up, False), (down, True)))
+
+
+ASIDE = (spin(90), straight(100), spin(-90))
+#: To the left by about 100 mm, and on in the same direction.
+BEND = ((5.0, 2.0, 35), (5.0, -2.0, 35))
+
+
+@pytest.mark.parametrize(
+    ("run", "lengths"),
+    [
+        # Parallel strokes, a dashed line, one stroke over the other.
+        (lifted_between([straight(200)], ASIDE, [straight(200)]), [200, 200]),
+        (lifted_between([straight(200)], [straight(50)], [straight(200)]), [200, 200]),
+        (lifted_between([straight(200)], [straight(-200)], [straight(200)]), [200, 200]),
+        # With the pen down a bend is a corner as well, whatever the direction after it.
+        (driven(straight(200), *BEND, straight(200)), [200, 200]),
+        # A rest, a slip and a short bend to the side are none.
+        (driven(straight(200), rest(30), straight(200)), [400]),
+        (driven(straight(200), (5.0, 1.0, 4), (5.0, -1.0, 4), straight(200)), [440]),
+    ],
+)
+def test_only_what_goes_on_in_one_line_is_one_leg(run: Any, lengths: list[int]) -> None:
+    assert [leg.length for leg in legs_of(run, pen=True)] == pytest.approx(lengths, abs=1)
+
+
+@given(st.lists(st.tuples(st.integers(40, 200), st.sampled_from((0, 30, 100))), min_size=1, max_size=5))
+@settings(max_examples=30, deadline=None)
+def test_each_stroke_of_a_hatching_is_a_leg(strokes: list[tuple[int, int]]) -> None:
+    """All strokes have one direction; between them the pen is up, and the robot goes on or to the side."""
+    moves: list[Any] = []
+    pen: list[tuple[int, bool]] = []
+    for length, aside in strokes:
+        pen.append((sum(ticks for _, _, ticks in moves), True))
+        moves.append(straight(5 * round(length / 5)))
+        pen.append((sum(ticks for _, _, ticks in moves), False))
+        moves += [spin(90), straight(aside), spin(-90), straight(40)]
+    run = driven(*moves, pen=tuple(pen))
+    assert [leg.length for leg in legs_of(run, pen=True)] == pytest.approx([5 * round(mm / 5) for mm, _ in strokes])
 
 
 @given(st.integers(3, 8), st.integers(60, 400), st.sampled_from((-1, 1)), st.integers(0, 359))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -13,11 +14,13 @@ from pydantic import ValidationError
 
 from driving import along, driven, measured, passes, rest, spin, straight
 from judging import criterion, judged
+from service.grading.judging.geometry import Along, covered, distance_to, positions
 from service.grading.judging.geometry import along as along_line
-from service.grading.judging.geometry import covered, distance_to, positions
+from service.grading.judging.line import Crossing, whole_laps
 from service.grading.judging.point import rounds
 from sim.floors.centrelines import centrelines
 from sim.recording import Pose, Touch
+from submissions.criteria.line import Laps
 from submissions.criteria.places import Area, LineToFollow
 
 coordinates = st.floats(-500, 500, allow_nan=False).map(lambda value: round(value, 3))
@@ -83,6 +86,10 @@ NEAR, FAR = {"name": "the near place", "circle": [300, 800, 30]}, {"name": "the 
         ({"places": [FAR, NEAR], "in_order": False}, 4),
         ({"places": [NEAR, {"circle": [300, 900, 30]}], "at_least": 1}, 4),
         ({"places": [NEAR, {"circle": [300, 900, 30]}], "at_least": 2}, 2),
+        # The last two come in order, and are enough; the first comes too late for them.
+        ({"places": [FAR, {"circle": [150, 800, 10]}, NEAR], "at_least": 2}, 4),
+        ({"places": [FAR, {"circle": [150, 800, 10]}, NEAR]}, 2.67),
+        ({"places": [NEAR, {"circle": [310, 800, 30]}]}, 4),
         ({"places": [NEAR], "without_stopping": True}, 4),
         ({"places": [{"circle": [500, 800, 30]}], "without_stopping": True}, 0),
         ({"places": [{"circle": [630, 830, 5]}], "of": "left_light"}, 0),
@@ -94,6 +101,24 @@ def test_visits(keys: dict[str, Any], marks: float) -> None:
     asked = criterion("visits", over="mean", **keys)
     result = judged(asked, run)
     assert float(result.marks) == pytest.approx(marks, abs=0.05), result.message
+
+
+@given(st.lists(st.sampled_from("ABC"), min_size=1, max_size=4), st.lists(st.sampled_from("ABC"), max_size=6))
+@settings(max_examples=60, deadline=None)
+def test_as_many_places_in_order_as_an_exhaustive_search_finds(wished: list[str], visited: list[str]) -> None:
+    where = {"A": (300.0, 100.0), "B": (600.0, 100.0), "C": (300.0, 500.0)}
+    stops = np.array([(1000.0, 1000.0), *(where[name] for name in visited)])
+    places = [{"name": name, "circle": [*where[name], 20]} for name in wished]
+    run = along(stops, np.zeros(len(stops)))
+    chains = [
+        size
+        for size in range(len(wished) + 1)
+        for chosen in itertools.combinations(wished, size)
+        for way in itertools.combinations_with_replacement(range(len(visited)), size)
+        if all(visited[place] == name for place, name in zip(way, chosen, strict=True))
+    ]
+    result = judged(criterion("visits", places=places), run)
+    assert measured(result, "places visited") == max(chains, default=0)
 
 
 def test_stopping_at_the_end_is_stopping() -> None:
@@ -222,6 +247,48 @@ def test_following_a_line(run: Any, keys: dict[str, Any], good: bool) -> None:
     assert passes(criterion("follows", line=LINE, **keys), run) is good
 
 
+STRETCH = {"points": [[300, 300], [1300, 300]]}
+
+
+@pytest.mark.parametrize(
+    ("run", "keys", "share"),
+    [
+        # It stands on the line's end, drives over it at right angles, or turns round there.
+        (driven(rest(30), start=Pose(1300, 300, 0)), {}, 0),
+        (driven(spin(90), rest(30), start=Pose(1310, 300, 0)), {}, 0),
+        (driven(straight(400), start=Pose(1290, 100, 90)), {}, 0),
+        (driven(straight(200), spin(180), straight(200), start=Pose(1200, 300, 0)), {}, 1 / 9),
+        # What lies before the tenth by which it must be met need not be driven.
+        (driven(straight(1000), start=Pose(300, 300, 0)), {}, 1),
+        (driven(straight(900), start=Pose(400, 300, 0)), {}, 1),
+        (driven(straight(850), start=Pose(450, 300, 0)), {}, 850 / 900),
+        (driven(straight(500), start=Pose(800, 300, 0)), {}, 5 / 9),
+        (driven(straight(500), start=Pose(800, 300, 0)), {"joins_by": 0.5}, 1),
+        (driven(straight(900), start=Pose(400, 300, 0)), {"joins_by": 0}, 0.9),
+    ],
+)
+def test_an_open_line_is_followed_from_its_beginning(run: Any, keys: dict[str, Any], share: float) -> None:
+    asked = criterion("follows", line=STRETCH, covers=0.999, over="mean", **keys)
+    result = judged(asked, run)
+    assert measured(result, "share covered") == pytest.approx(share, abs=0.001)
+    assert result.evidence[0].passed is (share == 1)
+
+
+@given(st.floats(0, 1), st.floats(0, 0.9), st.floats(0, 1))
+@settings(max_examples=50, deadline=None)
+def test_no_more_is_followed_than_was_driven_along(met: float, joins_by: float, left: float) -> None:
+    end = max(met, left)
+    places = np.linspace(300 + 1000 * met, 300 + 1000 * end, 100)
+    run = along(np.column_stack([places, np.full(100, 300.0)]), np.zeros(100))
+    result = judged(criterion("follows", line=STRETCH, joins_by=joins_by, within=5), run)
+    assert measured(result, "share covered") <= (end - met) / (1 - joins_by) + 1e-6
+
+
+def test_coming_upon_the_line_too_late_is_told() -> None:
+    result = judged(criterion("follows", line=STRETCH), driven(straight(500), start=Pose(800, 300, 0)))
+    assert "but it came upon it only 50% of the way along, and followed 56% of it" in result.message
+
+
 def test_going_back_and_forth_over_the_line_is_not_one_side() -> None:
     line = {"points": [[0, 0], [1000, 0]]}
     places = np.arange(0, 1000, 5.0)
@@ -268,6 +335,54 @@ def circling(laps: float, seconds_a_lap: float, off: float = 0.0) -> Any:
     radius = 300 + off * np.sin(angles / 2) ** 2
     path = np.column_stack([500 + radius * np.cos(angles), 500 + radius * np.sin(angles)])
     return along(path, np.degrees(angles) + 90)
+
+
+def round_by(*degrees: float) -> Any:
+    """Round the circle to each of these places in turn, degrees from its easternmost point."""
+    angles = np.radians(np.concatenate([np.linspace(a, b, 120) for a, b in itertools.pairwise(degrees)]))
+    return np.column_stack([500 + 300 * np.cos(angles), 500 + 300 * np.sin(angles)])
+
+
+def test_a_lap_is_whole_though_the_robot_began_twice() -> None:
+    """It crosses the start line, leaves the track, is put right before the line, and drives a clean lap."""
+    aside = np.linspace([793, 558], [950, 600], 30)
+    run = np.concatenate([round_by(-10, 11), aside, aside[::-1], round_by(11, -10), round_by(-10, 360 + 10)])
+    result = judged(criterion("laps", **CIRCUIT), along(run, np.zeros(len(run))))
+    assert result.marks == 4, result.message
+
+
+@given(st.lists(st.tuples(st.sampled_from((-400, 0, 300, 700, 1000)), st.booleans()), min_size=2, max_size=7))
+@settings(max_examples=100, deadline=None)
+def test_laps_are_those_that_an_exhaustive_search_finds(ways: list[tuple[int, bool]]) -> None:
+    """Between two crossings the robot comes so far along a line of 1000 mm, and leaves it or not."""
+    progress = np.concatenate([[0], np.cumsum([way for way, _ in ways])]).astype(float)
+    crossings = [Crossing(float(row), row, float(at)) for row, at in enumerate(progress)]
+    offsets = np.zeros((len(progress) - 1) * 2 + 1)
+    offsets[1::2] = [100 if leaves else 0 for _, leaves in ways]
+    found = Along(0, np.repeat(progress, 2)[:-1], offsets, 1000)
+    crossings = [Crossing(each.t, 2 * each.row, each.progress) for each in crossings]
+    clean = [
+        (first.t, last.t)
+        for first, last in itertools.combinations(crossings, 2)
+        if last.progress - first.progress >= 995 and not any(leaves for _, leaves in ways[int(first.t) : int(last.t)])
+    ]
+    most = max(
+        size
+        for size in range(len(ways) + 1)
+        for chosen in itertools.combinations(clean, size)
+        if all(one[1] <= other[0] for one, other in itertools.pairwise(sorted(chosen)))
+    )
+    asked = criterion("laps", **CIRCUIT)
+    assert isinstance(asked, Laps)
+    laps, _ = whole_laps(asked, found, crossings)
+    assert len(laps) == most
+    assert min((seconds for seconds, _ in laps), default=0) == min((b - a for a, b in clean), default=0)
+
+
+def test_the_best_lap_is_timed_from_the_crossing_nearest_before_it() -> None:
+    run = round_by(-10, 10, -10, 370)
+    result = judged(criterion("laps", **CIRCUIT), along(run, np.zeros(len(run))))
+    assert measured(result, "lap time") == pytest.approx(3.76, abs=0.01)
 
 
 CIRCUIT = {"line": {"ellipse": [500, 500, 300, 300], "name": "the track"}, "start_line": [750, 500, 850, 500]}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from decimal import Decimal
@@ -9,8 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from driving import driven, rest, spin, straight
 from judging import START, criterion, judged
 from service.grading.grade import TrialResult
 from service.grading.judging.judge import judge
@@ -154,6 +158,49 @@ def test_a_word_may_be_any_of_a_list() -> None:
     assert judged(asked, recorded(spoken=lines("TM"))).marks == 0
 
 
+@pytest.mark.parametrize(
+    ("words", "keys", "said", "passes"),
+    [
+        # The first alternative that fits is the beginning of the one that is meant.
+        ([["OK", "OK go"], "now"], {}, "OK go now", True),
+        ([["OK", "OK go"], "now"], {}, "OK now", True),
+        ([["OK", "OK go"], ["go now", "now"], "now"], {}, "OK go now", False),
+        ([["OK", "OK go"], ["go now", "now"], "now"], {}, "OK go go now now", True),
+        # An earlier run is as long, but only the later one is the end.
+        (["1", "2"], {"lead_in": True}, "1 2 and 1 2", True),
+        (["1", ["2", "2 3"]], {}, "1 2 3", True),
+        (["1", ["2 3", "2"]], {"more": True}, "1 2 3", True),
+    ],
+)
+def test_every_alternative_is_tried(words: list[Any], keys: dict[str, Any], said: str, passes: bool) -> None:
+    result = judged(criterion("sequence", words=words, **keys), recorded(spoken=lines(said)))
+    assert result.evidence[0].passed is passes, result.message
+
+
+short = st.lists(st.sampled_from("ab"), min_size=1, max_size=2).map(" ".join)
+
+
+@given(
+    st.lists(st.lists(short, min_size=1, max_size=2, unique=True), min_size=1, max_size=3),
+    st.lists(st.sampled_from("ab"), min_size=1, max_size=6),
+    st.booleans(),
+    st.booleans(),
+)
+def test_a_sequence_is_found_wherever_an_exhaustive_search_finds_it(
+    wanted: list[list[str]], said: list[str], lead_in: bool, more: bool
+) -> None:
+    asked = criterion("sequence", words=wanted, lead_in=lead_in, more=more, strays=100)
+    starts = range(len(said)) if lead_in else range(1)
+    begins = [said[start:] for start in starts]
+
+    def fits(chosen: Sequence[str]) -> bool:
+        words = " ".join(chosen).split()
+        return any(begin[: len(words)] == words and (more or begin == words) for begin in begins)
+
+    result = judged(asked, recorded(spoken=lines(" ".join(said))))
+    assert result.evidence[0].passed is any(fits(chosen) for chosen in itertools.product(*wanted)), result.message
+
+
 def test_nothing_is_said_before_the_word_before_has_been_spoken() -> None:
     asked = criterion("sequence", words=["1", "2"], waits=True)
     assert judged(asked, recorded(spoken=lines("1", "2", every=0.47))).marks == 4
@@ -201,6 +248,23 @@ def test_margin_widens_every_zone() -> None:
 def test_what_the_sensor_stops_on(keys: dict[str, Any], passes: bool) -> None:
     result = judged(criterion("stop_on", **keys), recorded(rgb=(0, 0, 0)))
     assert result.marks == (4 if passes else 0), result.message
+
+
+@pytest.mark.parametrize(
+    ("moves", "still", "passes"),
+    [
+        ((straight(100), rest(30)), 1, True),
+        ((straight(100), rest(29)), 1, False),
+        ((rest(30),), 1, True),
+        ((rest(29),), 1, False),
+        ((straight(100), rest(4), spin(360)), 0.1, False),
+        ((straight(100), rest(4), spin(-360, 0.5)), 0.1, False),
+        ((straight(100), spin(90), rest(3)), 0.1, True),
+    ],
+)
+def test_a_robot_that_stands_neither_drives_nor_turns(moves: Any, still: float, passes: bool) -> None:
+    result = judged(criterion("stop_on", reflected=[99, 100], off_floor=True, still=still), driven(*moves))
+    assert result.evidence[0].passed is passes, result.message
 
 
 @pytest.mark.parametrize(("verdict", "marks"), [(Verdict.TIME_LIMIT, 0), (Verdict.PROGRAM_ERROR, 4)])
@@ -352,10 +416,12 @@ def test_time_of_program_movement_and_speech() -> None:
         ([[1, 1], [2, 0.5]], False, 0),
         ([[3, 1], [1, 0.5]], True, 4),
         ([[5, 1], [1, 0.25]], True, 1),
+        ([[1, 1], [10, 0.995]], False, Decimal("3.98")),
+        ([[1, 1], [10, 0.999]], False, Decimal("4.00")),
     ],
 )
 def test_figure_of_another_criterion_is_worth_marks_by_steps(
-    steps: list[list[float]], highest: bool, marks: int
+    steps: list[list[float]], highest: bool, marks: Decimal
 ) -> None:
     ranked = criterion("ranking", of="ends", measure="time", steps=steps, highest=highest)
     ends = criterion("finishes").model_copy(update={"id": "ends"})
@@ -368,6 +434,14 @@ def test_figure_of_another_criterion_is_worth_marks_by_steps(
 
     assert marks_of(recorded()) == marks
     assert marks_of(recorded(verdict=Verdict.TIME_LIMIT)) == 0
+
+
+def test_the_share_of_a_step_is_told_as_it_is() -> None:
+    ranked = criterion("ranking", of="ends", measure="time", steps=[[1, 1], [10, 0.995]])
+    ends = criterion("finishes").model_copy(update={"id": "ends"})
+    assignment = Assignment("a", "A", WorldSpec(), Parts(), (Scenario("s", (START,)),), (ranked, ends))
+    results = judge(assignment, (TrialResult("s", 0, 1, 0.0, 0.0, "visible", recorded()),))
+    assert "is worth 99.5% of the marks" in results[0].message
 
 
 @pytest.mark.parametrize(

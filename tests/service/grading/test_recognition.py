@@ -21,6 +21,7 @@ from paths import ROOT
 from responders.code import Code
 from service.grading.grade import Accuracy, CriterionResult, Shown, TrialResult
 from service.grading.grader import grade
+from service.grading.judging.geometry import part_at
 from service.grading.judging.judge import judge
 from service.grading.judging.label_patches import CODES, decoded
 from service.grading.judging.per_class import class_scores
@@ -121,6 +122,28 @@ def test_every_image_has_one_reply_status(
     expected = {"answered": 0, "late": 0, "malformed": 0, "unanswered": 1} | {"sent": 2, "duplicates": duplicates}
     expected[status] += 1
     assert {name: getattr(counts, name) for name in expected} == expected
+
+
+@pytest.mark.parametrize(
+    ("answers", "marks"),
+    [
+        ([("circle", 0.4, ""), ("square", 0.2, "")], 4),
+        ([("square", 0.4, ""), ("circle", 0.2, "")], 0),
+        ([("circle", 1.4, ""), ("square", 0.2, "")], 4),
+        ([("circle", 1.4, ""), ("square", 1.2, "")], 4),
+        ([("circle", None, "undelivered"), ("square", 1.2, "")], 4),
+        ([("circle", 0.2, ""), ("square", 0.2, "")], 0),
+    ],
+)
+def test_of_several_answers_the_first_that_arrived_counts(
+    answers: list[tuple[str, float | None, str]], marks: int
+) -> None:
+    recording = talk(("square", None), (None, None))
+    sent, following = recording.messages
+    replies = tuple(Message(0.0, "responder", text, t, 0, note) for text, t, note in answers)
+    moved = replace(recording.images[1], message=len(replies) + 1)
+    recording = replace(recording, messages=(sent, *replies, following), images=(recording.images[0], moved))
+    assert judged(asked(), recording).marks == marks
 
 
 def test_an_answer_that_is_no_text_is_malformed() -> None:
@@ -440,3 +463,13 @@ def test_a_student_sees_no_curve_of_hidden_trials() -> None:
     assert student_view(grade).grade.criteria[0].curves
     hidden = replace(grade, trials=(*grade.trials[:-1], replace(grade.trials[-1], visibility="hidden")))
     assert not student_view(hidden).grade.criteria[0].curves
+
+
+def test_images_taken_far_from_what_they_show_do_not_count() -> None:
+    recording = talk(("square", "square"), ("square", "circle"))
+    first, second = recording.images
+    x, y = part_at(recording, "left", first.pose)
+    recording = replace(recording, images=(first, replace(second, pose=replace(first.pose, x=first.pose.x + 8))))
+    keys: dict[str, Any] = {"truth": "places", "places": [[x, y, "square"]]}
+    assert judged(asked(**keys), recording).marks < 4
+    assert judged(asked(near_spot=5, **keys), recording).marks == 4

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -41,6 +42,17 @@ check = "finishes"
 ECHO = "def responder(text):\n    return text\n"
 ASKS = 'import time\nprint("PY::hi")\ntime.sleep(1)\nspeed = colorLeft.reflected_light_intensity\n'
 BUSY = "def responder(text):\n    while True:\n        pass\n"
+#: Statements that come to what follows from the seed by a name that the text does not hold.
+UNSEEN_NAMES = (
+    r'"{0._\x5finit_\x5f._\x5fg\x6cobals_\x5f[re].enum.s\x79s.mod\x75les[uuid]._node}".format(json.JSONDecoder)',
+    "'{0.enum.s' 'ys.mod' 'ules[uuid]._node}'.format(json.scanner.re)",
+    "('{r.enum.s' 'ys.mod' 'ules[uuid]._node}').format_map({'r': json.scanner.re})",
+    "string.Formatter().vformat('{0.enum.s' 'ys.mod' 'ules[uuid]._node}', [json.scanner.re], {})",
+    "string.Formatter().get_field('0.enum.s' 'ys', [json.scanner.re], {})",
+    "functools.update_wrapper(lambda: 0, json.scanner.re.enum, ['s' 'ys'], [])",
+    "functools.wraps(json.scanner.re.enum, ['s' 'ys'], [])(lambda: 0)",
+    "print('a\\\nb')",
+)
 _NO_TICKS = Ticks(*cast(Any, [np.empty(0)] * 9))  # the same object in both
 
 
@@ -76,6 +88,7 @@ def spared(graded: Grade, role: str) -> list[int]:
         ({"robot.py": "import helper\n1/0\n", "helper.py": "from random import random\n"}, "robot", 0),
         ({"robot.py": "__import__('ran' + 'dom').random()\n1/0\n"}, "robot", 0),
         ({"robot.py": "import \\\n random\n1/0\n"}, "robot", 0),
+        *(({"robot.py": f"import functools, json, string\n{unseen}\n1/0\n"}, "robot", 0) for unseen in UNSEEN_NAMES),
         ({"robot.py": ASKS, "responder.py": BUSY}, "responder", 2),
         ({"robot.py": ASKS, "responder.py": "import numpy\n" + BUSY}, "responder", 0),
         ({"robot.py": ASKS, "responder.py": "open('logger.txt', 'w').write('x')\n" + BUSY}, "responder", 0),
@@ -100,6 +113,35 @@ def test_a_spared_trial_is_what_running_it_gives(
     assert [each.marks for each in found.criteria] == [each.marks for each in wanted.criteria]
     told = [note for note in found.notes if "it would have done the same" in note]
     assert [f"in {count} of 4 trials" in note for note in told] == ([True] if count else [])
+
+
+def _turns_of(seconds: float) -> int:
+    """How many turns of an empty loop take so long here, outside of any function."""
+    loop = compile("for _ in range(10_000): pass", "loop", "exec")
+    turns, began = 0, time.process_time()
+    while time.process_time() - began < seconds:
+        exec(loop, {})
+        turns += 10_000
+    return turns
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        # It ends a little after its limit: on a faster machine, or in another trial, it would end before.
+        "for _ in range(TURNS): pass\nsay('done')\n",
+        # What it says comes a little before its limit: in another trial it would not come any more.
+        "for _ in range(FEWER_TURNS): pass\nsay('done')\nwhile True: pass\n",
+    ],
+)
+def test_near_its_limit_every_trial_is_run(program: str, tmp_path: Path, runner: TrialRunner) -> None:
+    (tmp_path / "assignment.toml").write_text(TOML)
+    asked = read_assignment(tmp_path)
+    (tmp_path / "ada").mkdir()
+    text = program.replace("FEWER_TURNS", str(_turns_of(0.16))).replace("TURNS", str(_turns_of(0.24)))
+    (tmp_path / "ada" / "robot.py").write_text(text)
+    (tmp_path / "ada" / "responder.py").write_text(ECHO)
+    assert spared(grade(read_submission(tmp_path / "ada", asked=asked.parts), asked, runner=runner), "robot") == []
 
 
 def test_how_many_hidden_trials_were_spared_is_not_told(tmp_path: Path, runner: TrialRunner) -> None:

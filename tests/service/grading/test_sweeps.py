@@ -202,6 +202,7 @@ def test_delay_loss_and_offset_are_felt(runner: TrialRunner) -> None:
     assert [t.recording.sha256 for t in again.trials] == [t.recording.sha256 for t in result.trials]
 
 
+@pytest.mark.long
 def test_cheats_gain_where_nothing_forbids_them_and_nothing_where_it_does(runner: TrialRunner) -> None:
     """What the catalogue's cheats get on the course's own floor, with its patches, against the shuffled one."""
     forbidding = find_assignment("shapes-on-the-move")

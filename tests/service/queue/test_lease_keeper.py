@@ -7,21 +7,26 @@ import threading
 import time
 from dataclasses import replace
 from datetime import datetime
+from pathlib import Path
 from threading import Event, Thread, Timer
 
 import pytest
+from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
-from builders import accept_one, echo
+import report_builders
+from builders import accept_one, echo, opened, settings_in
 from floods import ECHO, FLOODS
 from processes import until
 from responders.code import Code
+from service.grading.grade import Grade
 from service.grading.trial_runner import TrialRunner
+from service.queue import grading_job
 from service.queue.grading_job import JobOutcome, grade_next
 from service.queue.lease_keeper import LeaseKeeper
 from service.settings import Settings
 from service.store.batches.intake import accept
-from service.store.engine import Store
+from service.store.engine import IMPATIENT_SECONDS, SQLITE_BUSY_SECONDS, Store
 from service.store.models import Job
 from service.store.queue import jobs
 from service.store.queue.lease_reaper import requeue_lost
@@ -105,6 +110,24 @@ def test_what_hangs_is_not_held_for_ever() -> None:
             keeper.check()
 
 
+def test_marks_that_took_too_long_are_not_stored(
+    store: Store, service_settings: Settings, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The exception at the end of a job's time can be taken for that of a criterion, which then has no marks."""
+    job_id = accept_one(store).job_id
+    graded = report_builders.faulty_grade()
+
+    def grade(*_: object, **__: object) -> Grade:
+        time.sleep(1.5)
+        return graded
+
+    monkeypatch.setattr(grading_job, "grade", grade)
+    settings = replace(service_settings, job_seconds=1.0)
+    assert grade_next(store, settings, runner, "worker") is JobOutcome.HOST_FAULT
+    with store.reading() as session:
+        assert "longer than" in (session.get_one(Job, job_id).error or "")
+
+
 def test_a_renewal_that_fails_is_tried_again() -> None:
     faults = [OperationalError("UPDATE", {}, Exception("the server is away")), ValueError("surprise")]
     renewed = Event()
@@ -117,6 +140,60 @@ def test_a_renewal_that_fails_is_tried_again() -> None:
     with LeaseKeeper(renew, 0.1, 60) as keeper:
         assert renewed.wait(30)
         keeper.check()
+
+
+def test_a_locked_database_holds_up_no_fork(tmp_path: Path) -> None:
+    """A renewal waits for SQLite's write lock, and all forks of the process for the renewal."""
+    with opened(settings_in(tmp_path)) as store:
+        accept_one(store)
+        claim = jobs.claim(store, "worker", 60)
+        assert claim is not None
+        impatient, renewing = store.impatient(), Event()
+
+        def renew() -> None:
+            renewing.set()
+            jobs.heartbeat(impatient, claim, 60, 0.0)
+
+        with store.transaction() as session, LeaseKeeper(renew, 0.3, 60) as keeper:
+            # From here on the database is locked.
+            session.connection()
+            for _ in range(3):
+                renewing.clear()
+                assert renewing.wait(30)
+                pid = os.fork()
+                if pid == 0:
+                    os._exit(0)
+                assert os.waitpid(pid, 0)[1] == 0
+            keeper.check()
+
+
+def test_the_lease_of_a_job_is_renewed_by_a_store_in_a_hurry(
+    tmp_path: Path, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    renewed: list[int] = []
+
+    def heartbeat(store: Store, *_: object) -> None:
+        with store.transaction() as session:
+            renewed.append(int(session.scalar(text("PRAGMA busy_timeout")) or 0))
+
+    def grade(*_: object, **__: object) -> Grade:
+        until(lambda: renewed)
+        return report_builders.faulty_grade()
+
+    monkeypatch.setattr(jobs, "heartbeat", heartbeat)
+    monkeypatch.setattr(grading_job, "grade", grade)
+    settings = settings_in(tmp_path, lease_seconds=1.0)
+    with opened(settings) as store:
+        accept_one(store)
+        assert grade_next(store, settings, runner, "worker") is JobOutcome.GRADED
+    assert set(renewed) == {IMPATIENT_SECONDS * 1000}
+
+
+def test_a_store_in_a_hurry_waits_only_so_long_for_sqlite(tmp_path: Path) -> None:
+    with opened(settings_in(tmp_path)) as store:
+        for each, seconds in ((store, SQLITE_BUSY_SECONDS), (store.impatient(), IMPATIENT_SECONDS), (store, 30)):
+            with each.transaction() as session:
+                assert session.scalar(text("PRAGMA busy_timeout")) == seconds * 1000
 
 
 def test_no_process_is_forked_in_the_middle_of_a_renewal() -> None:

@@ -14,6 +14,7 @@ import pytest
 from rich.console import Console
 from sqlalchemy import func, select
 
+import acting
 from benchmarks.harness.postgresql_server import fresh_database
 from benchmarks.harness.process_tree import children, command_line, descendants
 from builders import comparable, grading_request, settings_in
@@ -34,7 +35,6 @@ from service.store.engine import Store, open_store
 from service.store.grades import results
 from service.store.installation import secret_of
 from service.store.models import CriterionResultRow, Job, TrialRow
-from service.store.queue import batch_control
 from service.store.states import JobState, Lane, PlotState
 from submissions.assignment.examples import examples
 from submissions.batch_folder import read_batch
@@ -64,7 +64,9 @@ class Service:
             assert time.monotonic() - begun < PATIENCE, "the batch does not end"
             self.services.ensure()
 
-        waiting = Waiting(self.store, self.notifier, batch, Console(quiet=True), keep_up)
+        waiting = Waiting(
+            acting.service_on(self.store), acting.machine(), self.notifier, batch, Console(quiet=True), keep_up
+        )
         waiting.for_marks()
         waiting.for_plots()
         return self.jobs(batch)
@@ -219,7 +221,7 @@ def _has_student(pool_child: int) -> bool:
 def test_a_cancelled_job_stops(service: Service) -> None:
     batch = service.submit(_spinning(1))
     job = service.until_running(batch)
-    assert batch_control.cancel(service.store, batch).running == 1
+    assert acting.cancel(service.store, batch).running == 1
     after = service.submit([grading_request("after")])
     service.wait(after)
     assert [found.state for found in service.jobs(batch)] == [JobState.CANCELLED]

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import signal
+import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -53,9 +54,13 @@ def _first_words(up: subprocess.Popen[str]) -> tuple[str, str]:
 
 def _ready(up: subprocess.Popen[str]) -> str:
     address, first = _first_words(up)
-    link = re.search(r"sign in by (http://[\w.:]+/sign-in/rml_[\w-]+)", first)
-    assert link is not None, first
-    until(lambda: "This link signs you in as" in _get(link[1])[1])
+    # What goes to no terminal may go to a journal that others read.
+    assert "rml_" not in first
+    told = Path(json.loads(first)["message"].partition("sign in by the link in ")[2])
+    assert stat.S_IMODE(told.stat().st_mode) == 0o600
+    link = told.read_text().strip()
+    assert re.fullmatch(re.escape(address) + r"/sign-in/rml_[\w-]+", link)
+    until(lambda: "This link signs you in as" in _get(link)[1])
     assert up.stdout is not None
     ready = json.loads(up.stdout.readline())
     assert ready["event"] == "up.ready"
@@ -189,6 +194,7 @@ def test_serve_says_what_is_not_well(tmp_path: Path) -> None:
             "workers": False,
             "queue": True,
             "sandbox": False,
+            "release": True,
         }
         assert _metrics(address)["robomark_workers",] == 0
         host, _, port = address.removeprefix("http://").partition(":")

@@ -15,12 +15,17 @@ import pytest
 from junitparser import Error, Failure, JUnitXml, Skipped
 
 import report_builders as build
+from builders import accept_one
 from moodle_rules import feedback_taken_by_moodle, imported_by_moodle
 from paths import DATA
+from service.batch_rows import row_of, why_not_shown
 from service.grading.grade import Grade
 from service.reports.formats import FORMATS
 from service.reports.html import refusal_page
-from service.reports.rows import ReportPage, TableRow, missing_words
+from service.reports.rows import ReportPage, TableRow, missing_words, rows_for_students
+from service.store.batches import batches
+from service.store.engine import Store
+from service.store.states import JobState
 from sim.errors import UsageError
 from submissions.people import Student
 
@@ -228,3 +233,54 @@ def test_who_was_refused_reads_what_was_found_and_what_to_do() -> None:
     hostile = refusal_page(replace(ZOE, student=Student(build.HOSTILE), source=build.HOSTILE, reason=build.HOSTILE))
     assert "<script" not in hostile
     assert "What was expected" in hostile
+
+
+@pytest.mark.parametrize("name", sorted(FORMATS))
+def test_no_gradebook_has_a_word_that_is_for_staff(name: str) -> None:
+    """A format that students look into has no row over a limit, and tells no fault of ours."""
+    over: TableRow[Grade] = TableRow(
+        Student("eve"), "eve.zip", "echo", reason="for staff only: attempt 2, allowed: 1", for_staff=True
+    )
+    dead: TableRow[Grade] = TableRow(
+        Student("zoe"), "zoe.zip", "echo", reason="dead: /srv is full", told="could not be graded yet"
+    )
+    chosen = FORMATS[name]
+    given = "Identifier,ID number,Grade,Feedback comments\nParticipant 1,eve,,\nParticipant 2,zoe,,\n"
+    if chosen.table is not None:
+        text = chosen.table([over, dead])
+    elif chosen.filled_in is not None:
+        text = chosen.filled_in([over, dead], given).text
+    else:
+        return
+    staffs = {"csv", "csv-long", "json", "junit"}
+    assert ("attempt 2" in text) is (name in staffs)
+    assert ("/srv is full" in text) is (name in staffs)
+    assert ("could not be graded yet" in text) is (name not in staffs)
+    if chosen.filled_in is not None:
+        assert "Participant 1,eve,,\n" in text
+
+
+@pytest.mark.parametrize(
+    ("state", "changes", "told", "for_staff"),
+    [
+        (JobState.DEAD, {"error": "Tried 3 times, the last time: /srv is full"}, "could not be graded yet", False),
+        (JobState.CANCELLED, {"error": "the batch was cancelled"}, "was cancelled", False),
+        (JobState.DONE, {"suspect": "the worker w1 was found to grade wrongly"}, "is graded again", False),
+        (JobState.DONE, {"staff_only": "attempt 2, allowed: 1"}, "", True),
+        (JobState.QUEUED, {}, "", False),
+    ],
+)
+def test_what_a_student_is_told_of_a_job_without_a_grade(
+    store: Store, state: JobState, changes: dict[str, str], told: str, for_staff: bool
+) -> None:
+    accepted = accept_one(store)
+    with store.reading() as session:
+        line = replace(batches.job_line(session, accepted.job_id), state=state, **changes)  # type: ignore[arg-type]
+    row = row_of(line, None, why_not_shown(line))
+    (shown,) = rows_for_students([row]) or [row]
+    assert row.for_staff is for_staff
+    if told:
+        assert shown.reason.startswith(told)
+        assert all(text not in shown.reason for text in changes.values())
+    else:
+        assert shown.reason == row.reason

@@ -46,7 +46,7 @@ def hinted(*hints: str, criteria: tuple[CriterionResult, ...] = ()) -> Grade:
 def test_a_hint_is_the_cause_and_its_line_the_excerpt_and_the_next_step() -> None:
     told = diagnose(hinted(HINT, "another thing"), build.faulty_submission())
     assert told.cause == f"Line 2 of responder.py: {ERROR}. Did you mean parser?"
-    assert told.next_step.startswith("Mend what line 2 of responder.py needs")
+    assert told.next_step.startswith("Fix line 2 of responder.py")
     assert told.further == ("Another thing.",)
     assert told.excerpt is not None
     assert told.excerpt.name == "responder.py"

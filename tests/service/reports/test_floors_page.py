@@ -5,10 +5,13 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
+
 from command import robomark
 from sim.floors import names
 
 
+@pytest.mark.long
 def test_the_page_shows_every_floor_by_name_and_loads_nothing(tmp_path: Path) -> None:
     ended = robomark("floors", "--output", tmp_path / "floors")
     assert (ended.returncode, ended.stderr) == (0, "")

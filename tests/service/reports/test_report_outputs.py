@@ -13,7 +13,7 @@ from rich.console import Console
 
 import report_builders as build
 from responders.sandbox.meter import JobLimits, Spent
-from service.grading.grade import Cost
+from service.grading.grade import Cost, unjudged_notes
 from service.reports.formats import FORMATS
 from service.reports.formats.csv_output import marks_csv
 from service.reports.formats.gradescope import gradescope_document, gradescope_text
@@ -75,7 +75,8 @@ def test_full_marks_say_so_and_ask_for_nothing_more(form: str) -> None:
     assert "missing" not in words
     assert "to be gained" not in words
     if form in ("text", "gradescope", "page", "terminal"):
-        assert "Full marks: everything that was asked for is there." in words
+        assert "Full marks." in words
+        assert "No changes needed." in words
     else:
         assert re.search(r'"marks": 8,|name="marks" value="8"', words)
 
@@ -220,28 +221,38 @@ def _on_a_terminal(view: View) -> str:
 
 COSTLY = replace(build.shape_grade(), cost=Cost(JobLimits(64 << 20, 240.0, 20.0), Spent(150_000, 3.21, 0.04)))
 FIGURES = "Used 3.2 of 240 s of CPU, 0 of 20 s of sleep, 0.1 of 64 MB of output."
-LIMITS = "All trials together may use 240 s of CPU, 20 s of sleep and 64 MB of output."
 
 
-def test_staff_read_what_was_used_and_students_what_may_be() -> None:
-    viewed = student_view(COSTLY)
+def test_staff_read_what_was_used_and_students_nothing_that_grows_with_hidden_trials() -> None:
     for_staff = (plain_text(staff_view(COSTLY)), _on_a_terminal(staff_view(COSTLY)), report(staff_view(COSTLY), {}))
-    assert all(FIGURES in page and LIMITS not in page for page in for_staff)
-    for_students = (plain_text(viewed), _on_a_terminal(viewed), report(student_view(COSTLY), {}))
-    assert all(LIMITS in page and "of 240 s" not in page for page in for_students)
-    assert all(
-        "of 240 s" not in text
-        for text in (gradescope_text(gradebook_view(COSTLY)), moodle_csv([build.row_of(COSTLY).shown(gradebook_view)]))
-    )
+    assert all(FIGURES in page for page in for_staff)
+    viewed = student_view(COSTLY)
+    for_students = (plain_text(viewed), _on_a_terminal(viewed), report(viewed, {}))
+    in_files = (gradescope_text(gradebook_view(COSTLY)), moodle_csv([build.row_of(COSTLY).shown(gradebook_view)]))
+    assert all("240" not in text for text in (*for_students, *in_files))
     assert json_document(staff_view(COSTLY))["cost"]["spent"] == {
         "kept_bytes": 150_000,
         "cpu_seconds": 3.21,
         "sleep_seconds": 0.04,
     }
-    assert json_document(viewed)["cost"] == {
-        "limits": json_document(staff_view(COSTLY))["cost"]["limits"],
-        "spent": None,
-    }
+    assert "cost" not in json_document(viewed)
+
+
+def test_students_read_how_many_of_the_criteria_that_they_see_could_not_be_judged() -> None:
+    first, second, *_ = build.shape_grade().criteria
+    criteria = (
+        replace(first, unjudged="too long", visibility="hidden"),
+        replace(second, unjudged="too long", visibility="visible"),
+        replace(second, id="third", visibility="visible"),
+    )
+    grade = replace(build.shape_grade(), criteria=criteria, notes=("a note", *unjudged_notes(criteria)))
+    assert "2 of 3 criteria could not be judged; staff will look at it" in staff_view(grade).grade.notes
+    assert student_view(grade).grade.notes == (
+        "a note",
+        "1 of 2 criteria could not be judged; staff will look at it",
+    )
+    all_hidden = replace(grade, criteria=tuple(replace(each, visibility="hidden") for each in criteria))
+    assert student_view(all_hidden).grade.notes == ("a note",)
 
 
 def test_of_a_grade_that_was_given_before_this_was_measured_nothing_is_said() -> None:

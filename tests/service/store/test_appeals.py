@@ -53,17 +53,17 @@ def test_one_asks_is_answered_and_may_ask_again(store: Store) -> None:
     with pytest.raises(UsageError, match="you have asked already"):
         _ask(store, "And why?")
     with store.reading() as session:
-        (line,) = appeals.in_course(session, 1, NONE_HIDDEN, answered=False)
+        (line,) = appeals.open_in_course(session, 1, NONE_HIDDEN)
     assert (line.who, line.text, line.answer) == ("ada", "Why?\nLine 3 prints it.", None)
     _answer(store, first)
     with pytest.raises(UsageError, match="is answered already"):
         _answer(store, first, "Really.")
     second = _ask(store, "And why?")
     with store.reading() as session:
-        assert [each.id for each in appeals.in_course(session, 1, NONE_HIDDEN, answered=False)] == [second]
-        (answered,) = appeals.in_course(session, 1, NONE_HIDDEN, answered=True)
+        assert [each.id for each in appeals.open_in_course(session, 1, NONE_HIDDEN)] == [second]
+        (answered,) = appeals.answered_in_course(session, 1, NONE_HIDDEN)
         assert [each.id for each in appeals.of_submission(session, 1)] == [second, first]
-        assert appeals.in_course(session, 2, NONE_HIDDEN, answered=False) == []
+        assert appeals.open_in_course(session, 2, NONE_HIDDEN) == []
         (entry,) = audit.entries(session, "submission", "1")
     assert (answered.answer, answered.answered_by) == ("Because.", "grace")
     assert (entry.actor, entry.action, entry.detail) == ("grace", "answer appeal", {"appeal": first})
@@ -101,6 +101,6 @@ def test_who_asks_is_not_named_while_names_are_hidden(store: Store) -> None:
         open_assignments.hide_names(session, 1, "echo-responder", True)
     hidden = hidden_names_of(store, 1)
     with store.reading() as session:
-        (line,) = appeals.in_course(session, 1, hidden, answered=False)
+        (line,) = appeals.open_in_course(session, 1, hidden)
     assert line.who == hidden.called("echo-responder", "ada")
     assert line.who.startswith("Participant ")

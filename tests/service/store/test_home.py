@@ -233,7 +233,7 @@ def test_a_link_in_the_place_of_a_file_of_ours_is_not_followed(tmp_path: Path, l
     log = tmp_path / "home" / linked / "service.log"
     log.parent.mkdir(parents=True)
     log.symlink_to(victim)
-    process = start_process([sys.executable, "-c", "print('written')"], dict(os.environ), log, signal.SIGKILL)
+    process = start_process([sys.executable, "-c", "print('written')"], {}, log, signal.SIGKILL)
     process.wait()
     end_processes([process], 1)
     assert victim.read_text() == "mine\n"
@@ -245,7 +245,7 @@ def test_what_a_service_starts_makes_files_for_us_alone(tmp_path: Path) -> None:
     try:
         code = "import pathlib; pathlib.Path('made').touch()"
         command = [sys.executable, "-c", f"import os; os.chdir({str(tmp_path)!r}); {code}"]
-        process = start_process(command, dict(os.environ), tmp_path / "log" / "a.log", signal.SIGKILL)
+        process = start_process(command, {}, tmp_path / "log" / "a.log", signal.SIGKILL)
     finally:
         os.umask(before)
     process.wait(timeout=30)

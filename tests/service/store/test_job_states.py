@@ -10,8 +10,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from sqlalchemy import Select, select
+from sqlalchemy import Select, select, update
+from sqlalchemy.orm import Session
 
+import acting
 import report_builders
 import service
 from builders import grading_request
@@ -19,7 +21,7 @@ from service.store.batches.intake import accept_batch
 from service.store.engine import Store, now
 from service.store.grades import results
 from service.store.models import Job, SubmissionRow
-from service.store.queue import batch_control, jobs
+from service.store.queue import jobs
 from service.store.queue.jobs import TRANSITIONS, Claim, Fenced, Retry, Transition
 from service.store.states import JobState
 from sim.errors import HostError
@@ -70,6 +72,12 @@ def _submissions(subject: Subject) -> Select[int]:
     return select(SubmissionRow.id).where(SubmissionRow.batch_id == subject.batch_id)
 
 
+def _ask_for(session: Session, subject: Subject, at: datetime) -> None:
+    """As if the job had been cancelled because it is over a limit."""
+    session.execute(update(Job).where(Job.id == subject.job_id).values(error=jobs.OVER_A_LIMIT))
+    jobs.ask_for(session, subject.job_id, at)
+
+
 #: One thing to do for each transition, as those do it who may.
 MOVES: dict[Transition, Callable[[Store, Subject], object]] = {
     jobs.COPY: _in_session(lambda session, subject, at: jobs.copy(session, subject.job_id, subject.source_id, at)),
@@ -84,6 +92,8 @@ MOVES: dict[Transition, Callable[[Store, Subject], object]] = {
     jobs.GIVE_BACK: lambda store, subject: jobs.release_worker(store, WORKER),
     jobs.CANCEL: _in_session(lambda session, subject, at: jobs.cancel(session, subject.batch_id, "enough", at)),
     jobs.RETRY: _in_session(lambda session, subject, at: jobs.retry(session, (Job.id == subject.job_id,), at)),
+    jobs.PUT_ASIDE: _in_session(lambda session, subject, at: jobs.put_aside(session, subject.job_id, at)),
+    jobs.ASK_FOR: _in_session(_ask_for),
 }
 
 
@@ -100,7 +110,7 @@ def _subject(store: Store, state: JobState, student: str, source_id: str) -> Sub
     elif state is JobState.DEAD:
         jobs.give_up(store, claim, "no program")
     elif state is JobState.CANCELLED:
-        batch_control.cancel(store, batch_id)
+        acting.cancel(store, batch_id)
     return Subject(job_id, batch_id, source_id, claim)
 
 
@@ -124,13 +134,20 @@ def test_a_transition_is_made_where_it_begins_and_nowhere_else(store: Store, sta
         assert (job.lease is not None) == (job.state is JobState.RUNNING), transition.name
         assert (job.finished_at is None) == (job.state in (JobState.QUEUED, JobState.RUNNING)), transition.name
         # So that the next one claimed is the next one's.
-        batch_control.cancel(store, subject.batch_id)
+        acting.cancel(store, subject.batch_id)
 
 
 def test_every_state_can_be_reached_and_left_or_is_an_end() -> None:
     assert {transition.after for transition in TRANSITIONS} == set(JobState)
     left = {state for transition in TRANSITIONS for state in transition.before}
-    assert set(JobState) - left == {JobState.DONE, JobState.CANCELLED}
+    assert set(JobState) - left == {JobState.DONE}
+
+
+def test_staff_ask_for_nothing_but_what_was_put_aside(store: Store) -> None:
+    subject = _subject(store, JobState.CANCELLED, "ada", "")
+    with store.transaction() as session:
+        assert not jobs.ask_for(session, subject.job_id, datetime.now(UTC))
+    assert _job(store, subject.job_id).state is JobState.CANCELLED
 
 
 def test_the_drawing_names_every_transition() -> None:

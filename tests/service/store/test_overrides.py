@@ -16,18 +16,20 @@ from xml.etree import ElementTree
 import pytest
 from sqlalchemy.orm import Session
 
+import acting
 import report_builders
 from builders import accept_one, grading_request
 from service.batch_rows import rows_of
 from service.grading.grade import Grade, SetByHand
-from service.grading.statistics import marked_of, statistics_of
+from service.grading.statistics import marked_of
 from service.report_files import report_body
 from service.reports.formats import FORMATS
 from service.reports.formats.json_output import json_document
-from service.reports.view import staff_view, student_view
+from service.reports.view import gradebook_view, staff_view, student_view
 from service.store import audit
-from service.store.batches import batches, publishing, regrades
+from service.store.batches import batch_table, batches, overview, regrades
 from service.store.batches.intake import accept, accept_batch
+from service.store.courses.hidden_names import NAMED, HiddenNames
 from service.store.engine import Store
 from service.store.grades import comments, marking_history, overrides, results
 from service.store.grades.marked import marked
@@ -78,8 +80,13 @@ def _totals(store: Store, batch: str) -> dict[str, tuple[float, float]]:
         (line,) = batches.job_lines(session, batch)
         job = session.get_one(Job, line.id)
         grade = results.load(session, line.id)
-        (statistics,) = statistics_of(marked(session, [line]))
-        assert statistics == statistics_of([marked_of(replace(grade, assignment=line.assignment, student="ada"))])[0]
+        counted = marked(session, [line])
+    # In statistics the other criteria count for an excused one, as in a gradebook; whoever is excused is out of them.
+    assert [(each.marks, each.max_marks) for each in counted] == [
+        (marks, grade.worth) for marks in [gradebook_view(grade).marks] if marks is not None
+    ]
+    if counted:
+        assert counted == [marked_of(replace(grade, assignment=line.assignment, student="ada"))]
     rows = rows_of(store, [line])
     wide, *_ = _csv(FORMATS["csv"].table, rows)
     long = _csv(FORMATS["csv-long"].table, rows)
@@ -96,9 +103,8 @@ def _totals(store: Store, batch: str) -> dict[str, tuple[float, float]]:
         "list": (float(line.marks), float(line.max_marks)),
         "row": (float(job.marks or 0), float(job.max_marks or 0)),
         "grade": (float(grade.marks), float(grade.max_marks)),
-        "statistics": (statistics.mean, float(statistics.max_marks)),
         "csv": (float(wide["marks"]), float(wide["max_marks"])),
-        "csv-long": (sum(float(row["marks"]) for row in long), sum(float(row["max_marks"]) for row in long)),
+        "csv-long": (sum(float(row["marks"] or 0) for row in long), sum(float(row["max_marks"] or 0) for row in long)),
         "json": (told["marks"], told["max_marks"]),
         "junit": (float(properties["marks"]), float(properties["max_marks"])),
         "report": (float(score[1]), float(score[2])),
@@ -152,16 +158,16 @@ def test_every_place_that_tells_marks_tells_the_same(
 def test_a_regrade_counts_what_was_set_and_changes_the_rest(store: Store) -> None:
     batch, job_id = _graded(store)
     _change(store, job_id, _set(SHAPE, "6"))
-    regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
+    acting.regrade(store, batch, None, max_attempts=3, actor="staff")
     shape, aloud = GRADE.criteria
     worse = (replace(shape, marks=Decimal(1)), replace(aloud, marks=Decimal("1.5")))
     _grade_all(store, replace(GRADE, criteria=worse))
     with store.reading() as session:
         again = session.query(Job).filter(Job.regrade_of == job_id).one()
-        (change,) = regrades.changes(session, again.batch_id or "")
+        (change,) = regrades.changes(session, again.batch_id or "", NAMED)
     assert (change.before, change.after) == (8, Decimal("7.5"))
     assert [(each.title, each.by_hand) for each in change.criteria] == [(aloud.title, False)]
-    publishing.publish(store, batch, actor="staff")
+    acting.publish(store, batch, actor="staff")
     assert set(_totals(store, batch).values()) == {(7.5, 8)}
     # What is set goes for the earlier grade and the later one, whichever it was set in.
     _change(store, job_id, _withdraw(SHAPE))
@@ -171,16 +177,16 @@ def test_a_regrade_counts_what_was_set_and_changes_the_rest(store: Store) -> Non
 def test_marks_set_for_more_than_a_changed_criterion_gives_are_all_that_it_gives(store: Store) -> None:
     batch, job_id = _graded(store)
     _change(store, job_id, _set(SHAPE, "6"))
-    regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
+    acting.regrade(store, batch, None, max_attempts=3, actor="staff")
     shape, aloud = GRADE.criteria
     _grade_all(store, replace(GRADE, criteria=(replace(shape, marks=Decimal(1), max_marks=Decimal(4)), aloud)))
     with store.reading() as session:
         again = session.query(Job).filter(Job.regrade_of == job_id).one()
-        (change,) = regrades.changes(session, again.batch_id or "")
+        (change,) = regrades.changes(session, again.batch_id or "", NAMED)
     assert change.criteria == (
         regrades.CriterionChange(shape.title, (Decimal(6), Decimal(6)), (Decimal(4), Decimal(4)), by_hand=True),
     )
-    publishing.publish(store, batch, actor="staff")
+    acting.publish(store, batch, actor="staff")
     assert set(_totals(store, batch).values()) == {(6, 6)}
 
 
@@ -213,7 +219,7 @@ def test_what_could_not_be_judged_gets_its_marks_and_is_published(store: Store) 
     shape, aloud = GRADE.criteria
     unjudged = replace(shape, marks=Decimal(0), unjudged="too long", message="This could not be judged; staff look.")
     batch, job_id = _graded(store, replace(GRADE, criteria=(unjudged, aloud)))
-    assert publishing.publish(store, batch, actor="staff").unjudged == 1
+    assert acting.publish(store, batch, actor="staff").unjudged == 1
     _change(store, job_id, _set(SHAPE, "5"))
     assert set(_totals(store, batch).values()) == {(7, 8)}
     with store.reading() as session:
@@ -221,7 +227,7 @@ def test_what_could_not_be_judged_gets_its_marks_and_is_published(store: Store) 
         told = staff_view(results.load(session, job_id)).grade.criteria[0]
     assert (line.unjudged, line.set_by_hand) == (0, 1)
     assert told.message == "Set by hand to 5: seen again."
-    assert publishing.publish(store, batch, actor="staff").published == 1
+    assert acting.publish(store, batch, actor="staff").published == 1
     _change(store, job_id, _withdraw(SHAPE))
     with store.reading() as session:
         assert batches.job_line(session, job_id).unjudged == 1
@@ -322,3 +328,30 @@ def test_what_was_set_is_told_where_the_message_is_of_visible_trials_alone() -> 
     told = student_view(replace(GRADE, criteria=(said,), trials=trials)).grade.criteria[0].message
     assert told.startswith("Set by hand from 5 to 6: seen again.")
     assert "5 of 6 images" not in told
+
+
+def test_who_is_excused_is_out_of_every_statistic(store: Store) -> None:
+    """Ada is excused from the second criterion, Bob from both: the others' mean, bars and shares are of what counts."""
+    students = ("ada", "bob", "cid")
+    batch = accept_batch(store, "class", [grading_request(name) for name in students], [], max_attempts=3)
+    _grade_all(store)
+    ada, bob, _ = (job.job_id for job in batch.jobs)
+    _change(store, ada, _set(SHAPE, "3"), _excuse(ALOUD))
+    _change(store, bob, _excuse(SHAPE), _excuse(ALOUD))
+    with store.reading() as session:
+        lines = batch_table.table_lines(session, batch.id, (), HiddenNames(frozenset(), b""))
+        (found,) = overview.overview(session, 1, lines, Decimal("0.6"), NAMED)
+        accuracies = {line.student: line.accuracy for line in batches.job_lines(session, batch.id)}
+    # Ada has 3 of 6, so 4 of 8; Cid 7 of 8.
+    statistics = found.statistics
+    assert (statistics.n, statistics.mean, statistics.max_marks) == (2, 5.5, 8)
+    assert (statistics.lowest, statistics.highest) == (4, 7)
+    assert {bin_.low: bin_.count for bin_ in found.distribution if bin_.count} == {4: 1, 7: 1}
+    assert found.passed == 1
+    assert {each.id: each.n for each in statistics.criteria} == {SHAPE: 2, ALOUD: 1}
+    assert bob not in {each.id for each in found.outliers}
+    assert {student: accuracy is None for student, accuracy in accuracies.items()} == {
+        "ada": False,
+        "bob": True,
+        "cid": False,
+    }

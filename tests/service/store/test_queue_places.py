@@ -7,13 +7,14 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from sqlalchemy import update
 
+import acting
 import report_builders
 from builders import accept_one, grading_request
 from service.store.batches.intake import accept, accept_batch
-from service.store.engine import Store
+from service.store.engine import Store, now
 from service.store.grades import results
 from service.store.models import Job
-from service.store.queue import batch_control, jobs, workers
+from service.store.queue import jobs, workers
 from service.store.queue.queue_places import QueuePlace, queue_place
 from service.store.queue.workers import WorkerDescription
 from service.store.states import Lane
@@ -50,7 +51,7 @@ def test_what_is_held_back_is_before_nobody(store: Store) -> None:
     batch = accept_batch(store, "class", [grading_request("dan")], (), max_attempts=3)
     late = accept_one(store, "ada", lane=Lane.BATCH).job_id
     before = _place(store, late).before
-    batch_control.pause(store, batch.id)
+    acting.pause(store, batch.id)
     assert (before, _place(store, late).before) == (1, 0)
 
 
@@ -72,4 +73,13 @@ def test_the_time_left_follows_from_what_gradings_took_and_how_many_run_at_once(
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None
     jobs.heartbeat(store, claim, 60, 0.75)
-    assert _place(store, claim.job_id) == QueuePlace(0, 2.0, 1)
+    with store.transaction() as session:
+        started = now(session) - timedelta(seconds=6)
+        session.execute(update(Job).where(Job.id == claim.job_id).values(started_at=started))
+    place = _place(store, claim.job_id)
+    # By the time that passes, not by the trials that have run.
+    assert (place.progress, place.seconds) == (pytest.approx(0.75, abs=0.1), pytest.approx(2.0, abs=1))
+    with store.transaction() as session:
+        started = now(session) - timedelta(seconds=60)
+        session.execute(update(Job).where(Job.id == claim.job_id).values(started_at=started))
+    assert _place(store, claim.job_id).progress == 0.95

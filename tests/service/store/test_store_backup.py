@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 from sqlalchemy import func, select, update
 
+import acting
 import report_builders
 from benchmarks.harness.postgresql_server import fresh_database
 from builders import grading_request, settings_in
 from service.settings import Settings
 from service.store.backup import back_up, restore
-from service.store.batches import regrades
 from service.store.batches.intake import accept_batch, accept_new
 from service.store.engine import Store, open_engine, open_store
 from service.store.grades import appeals, comments, overrides, results
@@ -62,7 +62,7 @@ def _filled(store: Store) -> str:
     copied = accept_new(store, "same again", [grading_request("eve")], [], max_attempts=3).batch
     assert copied is not None
     _look_again(store, copied.jobs[0].job_id)
-    regrades.regrade(store, first, None, max_attempts=3, actor="staff")
+    acting.regrade(store, first, None, max_attempts=3, actor="staff")
     _grade_all(store)
     accept_batch(store, "waits", [grading_request("mia")], [], max_attempts=3)
     return first

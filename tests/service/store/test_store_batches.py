@@ -7,7 +7,9 @@ from dataclasses import replace
 import pytest
 from sqlalchemy import func, select
 
+import acting
 from builders import echo, grading_request
+from service.operations.batches import Controlled, Retried
 from service.store.batches import batches
 from service.store.batches.batches import JobLine
 from service.store.batches.intake import accept, accept_batch, accept_new
@@ -16,7 +18,7 @@ from service.store.courses.hidden_names import hidden_names_of
 from service.store.courses.versions import freeze
 from service.store.engine import Store
 from service.store.models import Batch, Job, SubmissionRow
-from service.store.queue import batch_control, jobs
+from service.store.queue import jobs
 from service.store.queue.lease_reaper import wanting_notices
 from service.store.states import BatchState, JobState, Lane
 from sim.errors import UsageError
@@ -124,7 +126,7 @@ def test_what_was_cancelled_comes_in_again(store: Store) -> None:
     first = accept_new(store, "class", [grading_request("ada"), grading_request("bob")], [], max_attempts=2)
     assert first.batch is not None
     _die(store)
-    batch_control.cancel(store, first.batch.id)
+    acting.cancel(store, first.batch.id)
     again = accept_new(store, "class", [grading_request("ada"), grading_request("bob")], [], max_attempts=2)
     assert again.batch is not None
     assert [job.attempt for job in again.batch.jobs] == [2, 2]
@@ -134,12 +136,12 @@ def test_a_paused_batch_is_neither_claimed_nor_notified_for(store: Store) -> Non
     batch = _take(store, grading_request("ada"), grading_request("bob"))
     running = jobs.claim(store, "worker", 60)
     assert running is not None
-    assert batch_control.pause(store, batch) == batch_control.Controlled(True, 1, 1)
-    assert batch_control.pause(store, batch).changed is False
+    assert acting.pause(store, batch) == Controlled(True, 1, 1)
+    assert acting.pause(store, batch).changed is False
     assert jobs.claim(store, "worker", 60) is None
     assert Lane.BATCH not in wanting_notices(store, 60)
     jobs.heartbeat(store, running, 60, 0.5)
-    assert batch_control.resume(store, batch) == batch_control.Controlled(True, 1, 1)
+    assert acting.resume(store, batch) == Controlled(True, 1, 1)
     assert wanting_notices(store, 60)[Lane.BATCH].stale == 1
     assert jobs.claim(store, "worker", 60) is not None
 
@@ -149,14 +151,14 @@ def test_a_cancelled_batch_ends_and_stays_so(store: Store) -> None:
     dead = _die(store)
     running = jobs.claim(store, "worker", 60)
     assert running is not None
-    assert batch_control.cancel(store, batch) == batch_control.Controlled(True, 1, 1)
-    assert batch_control.cancel(store, batch).changed is False
+    assert acting.cancel(store, batch) == Controlled(True, 1, 1)
+    assert acting.cancel(store, batch).changed is False
     with pytest.raises(jobs.Fenced, match="cancelled"):
         jobs.heartbeat(store, running, 60, 0.5)
-    for change in (batch_control.pause, batch_control.resume, batch_control.retry):
+    for change in (acting.pause, acting.resume, acting.retry):
         with pytest.raises(UsageError, match="was cancelled; submit it again"):
             change(store, batch)
-    assert batch_control.retry(store, None) == batch_control.Retried(0, 0)
+    assert acting.retry(store, None) == Retried(0, 0)
     with store.reading() as session:
         line = batches.batch(session, batch)
         assert session.get_one(Job, dead).state is JobState.DEAD
@@ -166,8 +168,8 @@ def test_a_cancelled_batch_ends_and_stays_so(store: Store) -> None:
 def test_cancelling_what_has_ended_changes_nothing(store: Store) -> None:
     batch = _take(store, grading_request("ada"))
     _die(store)
-    assert batch_control.cancel(store, batch).changed is False
-    assert batch_control.retry(store, batch) == batch_control.Retried(1, 0)
+    assert acting.cancel(store, batch).changed is False
+    assert acting.retry(store, batch) == Retried(1, 0)
 
 
 def test_the_dead_are_tried_again_with_all_their_attempts_but_not_the_outdated(store: Store) -> None:
@@ -175,8 +177,8 @@ def test_the_dead_are_tried_again_with_all_their_attempts_but_not_the_outdated(s
     dead = {_die(store), _die(store)}
     other = _take(store, grading_request("bob", OTHER))
     _die(store)
-    assert batch_control.retry(store, batch) == batch_control.Retried(1, 1)
-    assert batch_control.retry(store, None) == batch_control.Retried(1, 1)
+    assert acting.retry(store, batch) == Retried(1, 1)
+    assert acting.retry(store, None) == Retried(1, 1)
     assert _states(store) == [(1, JobState.QUEUED), (1, JobState.DEAD), (2, JobState.QUEUED)]
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None

@@ -10,16 +10,18 @@ from typing import Any
 import pytest
 from sqlalchemy import func, select, update
 
+import acting
 import report_builders
 from builders import accept_one, grading_request, settings_in
 from command import FORKING
+from service.operations.batches import Controlled
 from service.settings import Settings
 from service.store.batches import batches
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
 from service.store.grades import plots, results
-from service.store.models import Batch, CriterionResultRow, Job, SubmissionRow, TrialRow
-from service.store.queue import batch_control, jobs
+from service.store.models import Batch, Course, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
+from service.store.queue import jobs
 from service.store.queue.jobs import Claim, Fenced, Retry
 from service.store.queue.lease_reaper import note_notices, requeue_lost, wanting_notices
 from service.store.queue.scheduling import BATCH_EVERY
@@ -177,11 +179,11 @@ def test_what_is_given_back_costs_no_attempt(store: Store) -> None:
 def test_a_cancelled_job_stops_its_worker(store: Store) -> None:
     batch = _batch(store, "batch", 2)
     claim = _claim(store)
-    assert batch_control.cancel(store, batch) == batch_control.Controlled(True, 1, 1)
+    assert acting.cancel(store, batch) == Controlled(True, 1, 1)
     with pytest.raises(Fenced, match="cancelled"):
         jobs.heartbeat(store, claim, 60, 0.5)
     assert jobs.claim(store, "worker", 60) is None
-    assert not batch_control.cancel(store, batch).changed
+    assert not acting.cancel(store, batch).changed
 
 
 def test_the_newest_submission_supersedes_one_that_waits_not_one_that_runs(store: Store) -> None:
@@ -331,3 +333,23 @@ def _submit_again(settings: Settings) -> None:
     with open_store(settings) as store:
         for _ in range(5):
             accept_one(store)
+
+
+def test_courses_share_alike_however_many_batches_they_have(store: Store) -> None:
+    """A submits eight batches of 30, B and C one each: B and C have all of theirs after about 90 grades."""
+    for course, count in (("A", 8), ("B", 1), ("C", 1)):
+        for number in range(count):
+            requests = [grading_request(f"{course}{number}-{place}") for place in range(30)]
+            accept_batch(store, f"{course}{number}", requests, (), course=course, max_attempts=3)
+    begun: Counter[str] = Counter()
+    ended_at: dict[str, int] = {}
+    for turn in range(1, 121):
+        claim = jobs.claim(store, "worker", 600)
+        assert claim is not None
+        with store.reading() as session:
+            enrolment = session.get_one(Enrolment, session.get_one(Job, claim.job_id).enrolment_id)
+            begun[session.get_one(Course, enrolment.course_id).name] += 1
+        for course in ("B", "C"):
+            if begun[course] == 30:
+                ended_at.setdefault(course, turn)
+    assert all(ended_at[course] <= 92 for course in ("B", "C")), ended_at

@@ -15,21 +15,22 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import func, insert, inspect, select, text
 
 import report_builders
-from builders import accept_one
+from builders import accept_one, upgraded_by_newer_release
 from command import FORKING
 from first_release import lay_first_release
 from service.settings import Settings
 from service.store import artifacts, recorded_schema
+from service.store.backup import back_up, restore
 from service.store.batches import batches, intake
 from service.store.courses import open_assignments
-from service.store.engine import open_engine, open_store
+from service.store.engine import Store, open_engine, open_store
 from service.store.grades import results
 from service.store.migrate import configuration, migrate
 from service.store.models import Artifact, Batch, CriterionResultRow, Enrolment, Job, Person, TrialRow
 from service.store.queue import jobs
-from service.store.revision import current_revision, newest_revision, revision_of
-from service.store.states import JobState, Standing
-from service.store.web_tables import METADATA, OpenAssignment
+from service.store.revision import current_revision, newest_revision, revision_of, schema_state
+from service.store.states import JobState, Role, Standing
+from service.store.web_tables import METADATA, Credential, LtiCourse, LtiPlatform, OpenAssignment
 from sim.errors import HostError
 from submissions.people import Refusal
 
@@ -87,10 +88,49 @@ def test_many_may_come_first(service_settings: Settings) -> None:
 
 
 def test_a_newer_database_is_refused(service_settings: Settings) -> None:
-    with open_store(service_settings) as store, store.engine.begin() as connection:
-        connection.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+    with open_store(service_settings) as store:
+        upgraded_by_newer_release(store, "9998")
     with pytest.raises(HostError, match=r"newer Robomark .*no way down"):
         open_store(service_settings)
+
+
+def _back_up_and_restore(store: Store, file: Path) -> None:
+    back_up(store.engine, file)
+    restore(file, store.engine)
+
+
+def test_a_newer_database_that_this_release_can_use_is_used(service_settings: Settings, tmp_path: Path) -> None:
+    with open_store(service_settings) as store:
+        job_id = accept_one(store).job_id
+        upgraded_by_newer_release(store, newest_revision())
+    with open_store(service_settings) as store:
+        claim = jobs.claim(store, "worker", 60)
+        assert claim is not None
+        assert claim.job_id == job_id
+        # What the newer release added would be missing from a copy that is made row by row.
+        with pytest.raises(HostError, match=r"no way down|release that they are of"):
+            _back_up_and_restore(store, tmp_path / "backup.db")
+
+
+def test_migrations_name_the_oldest_revision_that_can_use_the_tables(service_settings: Settings) -> None:
+    engine = open_engine(service_settings.database)
+    with engine.begin() as connection:
+        scripts = {
+            each.revision: each for each in ScriptDirectory.from_config(configuration(connection)).walk_revisions()
+        }
+        migrate(connection)
+    named = {
+        revision: getattr(scripts[revision].module, "OLDEST_COMPATIBLE", None)
+        for revision in sorted(scripts)
+        if revision >= "0017"
+    }
+    assert None not in named.values(), (
+        "each migration names OLDEST_COMPATIBLE (CONTRIBUTING.md, How to change the tables)"
+    )
+    assert list(named.values()) == sorted(map(str, named.values()))
+    assert all(oldest in scripts and oldest <= revision for revision, oldest in named.items())
+    assert schema_state(engine).oldest_compatible == named[newest_revision()]
+    engine.dispose()
 
 
 def test_a_database_of_the_first_release_is_upgraded_with_its_data(service_settings: Settings, tmp_path: Path) -> None:
@@ -112,7 +152,7 @@ def test_a_database_of_the_first_release_is_upgraded_with_its_data(service_setti
             assert bob.student == "Bob 🤖"
             assert (bob.name, bob.email, bob.missing) == ("", "", "")
             assert batches.batch(session, batch).refusals == (Refusal("odd.txt", "is odd."),)
-            people = session.execute(select(Enrolment.student, Enrolment.written, Person.name).join(Person)).all()
+            people = session.execute(select(Enrolment.student, Enrolment.written, Enrolment.name)).all()
             assert {(student, written) for student, written, _ in people} >= {("ada", "ada"), ("Bob 🤖", "Bob 🤖")}
             assert {name for _, _, name in people} == {""}
             assert artifacts.get(session, ada.id, prefix="plot-")["plot-path.png"].data.startswith(b"\x89PNG")
@@ -160,6 +200,82 @@ def test_what_was_submitted_on_the_web_before_it_had_a_batch_is_in_one(
         assert session.scalar(select(func.count()).where(Job.batch_id.is_(None))) == 0
 
 
+def test_of_two_jobs_that_stand_the_published_one_stays(service_settings: Settings, tmp_path: Path) -> None:
+    """Quarantine and publication could let two jobs of one submission stand, until the index forbade it."""
+    engine = lay_first_release(service_settings.database, tmp_path)
+    with engine.begin() as connection:
+        command.upgrade(configuration(connection), "0013")
+        done, dead = (
+            connection.scalars(text(f"SELECT min(id) FROM job WHERE state = '{state}'")).one()
+            for state in ("done", "dead")
+        )
+        columns = [column["name"] for column in inspect(connection).get_columns("job")]
+        copied = ", ".join(
+            {"id": ":id", "state": ":state", "published_at": ":at", "queued_at": ":queued"}.get(name, name)
+            for name in columns
+        )
+        copy = text(f"INSERT INTO job ({', '.join(columns)}) SELECT {copied} FROM job WHERE id = :of")
+        soon, late = "2030-01-01 00:00:00.000000+00:00", "2031-01-01 00:00:00.000000+00:00"
+        for id_, state, at, queued, of in (
+            ("published", "done", soon, soon, done),  # the regrade that was published
+            ("rerun", "done", None, late, done),  # the job that ran a suspect grade again
+            ("waiting", "queued", None, late, dead),
+        ):
+            values = {"id": id_, "state": state, "at": at, "queued": queued, "of": of}
+            connection.execute(copy, values)
+    engine.dispose()
+    with open_store(service_settings) as store, store.reading() as session:
+        standing = session.execute(select(Job.submission_id, Job.id).where(Job.standing == Standing.STANDS)).all()
+        assert len(standing) == len({submission for submission, _ in standing}) == 5
+        ids = {job_id for _, job_id in standing}
+        assert "published" in ids
+        assert {done, "rerun"} & ids == set()
+        assert len({dead, "waiting"} & ids) == 1
+
+
+def test_names_go_to_enrolments_and_credentials_get_their_reach(service_settings: Settings, tmp_path: Path) -> None:
+    """A student of one course keeps what they sign in with, for this course; somebody in two keeps it as it was."""
+    at = "2026-01-02 03:04:05.000000+00:00"
+    engine = lay_first_release(service_settings.database, tmp_path)
+    with engine.begin() as connection:
+        command.upgrade(configuration(connection), "0015")
+
+        def add(table: str, **values: object) -> None:
+            names = ", ".join(values)
+            bound = ", ".join(f":{name}" for name in values)
+            connection.execute(text(f"INSERT INTO {table} ({names}) VALUES ({bound})"), values)
+
+        add("course", id=50, name="two", created_at=at)
+        for person, role in ((50, "student"), (51, "student"), (52, "instructor"), (53, "student"), (54, "student")):
+            add("person", id=person, name=f"Name {person}", email=None, operator=person == 53, created_at=at)
+            courses = (1, 50) if person == 51 else (1,)
+            for course in courses:
+                names = {"student": f"s{person}", "written": f"s{person}", "role": role}
+                add("enrolment", id=person * 10 + course % 10, course_id=course, person_id=person, **names)
+            for kind in ("link",) if person == 54 else ("link", "session", "token"):
+                row = {"person_id": person, "kind": kind, "sha256": f"{kind} {person}", "name": "", "scopes": "[]"}
+                add("credential", id=f"{kind}{person}"[:12], created_at=at, expires_at="2036" + at[4:], **row)
+        for platform, deployments in ((50, '["1"]'), (51, '["1", "2"]')):
+            urls = {"authorization_url": "", "token_url": "", "keys_url": "", "created_at": at}
+            named = {"name": "p", "issuer": f"i{platform}", "client_id": "c", "deployments": deployments}
+            add("lti_platform", id=platform, **named, **urls)
+            add("lti_course", id=platform, platform_id=platform, context="c", course_id=1)
+    engine.dispose()
+    with open_store(service_settings) as store, store.reading() as session:
+        rows = session.execute(select(Enrolment.person_id, Enrolment.name, Enrolment.email)).all()
+        assert {(who, name, email) for who, name, email in rows if who >= 50} == {
+            (person, f"Name {person}", "") for person in range(50, 55)
+        }
+        found = session.execute(select(Credential.person_id, Credential.course_id, Credential.role)).all()
+        limited = {50: (1, Role.STUDENT), 54: (1, Role.STUDENT)}
+        assert {tuple(row) for row in found} == {(who, *limited.get(who, (None, None))) for who in range(50, 55)}
+        signed_in = session.scalars(select(Person.id).where(Person.signed_in_at.is_not(None))).all()
+        assert sorted(signed_in) == [50, 51, 52, 53]
+        launched = session.execute(select(LtiCourse.platform_id, LtiCourse.deployment)).all()
+        assert {tuple(row) for row in launched} == {(50, "1"), (51, "")}
+        assert session.scalars(select(LtiPlatform.service_origins)).all() == [[], []]
+
+
 @pytest.mark.parametrize("revision", ["0002", "0001", "base"])
 def test_there_is_no_way_down(service_settings: Settings, revision: str) -> None:
     with open_store(service_settings) as store:
@@ -174,8 +290,8 @@ def test_there_is_no_way_down(service_settings: Settings, revision: str) -> None
 
 
 def test_a_database_that_is_away_is_named_without_its_password(service_settings: Settings) -> None:
-    url = "postgresql+psycopg://someone:hush@127.0.0.1:1/nowhere"
+    url = "postgresql+psycopg://someone:hush-hush@127.0.0.1:1/nowhere"
     with pytest.raises(HostError) as caught:
         open_store(replace(service_settings, database_url=url))
     assert "127.0.0.1" in str(caught.value)
-    assert "hush" not in str(caught.value)
+    assert "hush-hush" not in str(caught.value)

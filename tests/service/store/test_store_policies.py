@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from zoneinfo import ZoneInfo
 
 import pytest
 from sqlalchemy import select
 
+import acting
 import report_builders
 from builders import grading_request
-from service.store.batches import batches, publishing
+from service.operations.regrades import Published
+from service.store.batches import batches
 from service.store.batches.intake import Accepted, accept, accept_batch, accept_new
 from service.store.courses import policies
 from service.store.courses.policies import PolicyLimits
@@ -100,10 +103,12 @@ def test_what_is_over_is_marked_but_neither_supersedes_nor_is_published(store: S
     assert batch is not None
     _grade_all(store)
     with store.reading() as session:
+        (own,) = batches.attempt_lines(session, batch)
+        assert (own.marks, own.staff_only) == (GRADE.marks, "attempt 2, allowed: 1")
         (line,) = batches.job_lines(session, batch)
-        assert (line.marks, line.staff_only) == (GRADE.marks, "attempt 2, allowed: 1")
+        assert (line.id, line.newer_attempt) == (first.job_id, 3)
         assert session.get_one(Job, first.job_id).state is JobState.DONE
-    assert publishing.publish(store, batch, actor="staff") == publishing.Published(0, 0, 0, 0, 1, 0)
+    assert acting.publish(store, batch, actor="staff") == Published(0, 0, 0, 0, 1, 0)
 
 
 @pytest.mark.parametrize(
@@ -152,7 +157,7 @@ def test_what_a_person_submits_is_submitted_now(store: Store) -> None:
         assert session.scalars(select(SubmissionRow.days_late)).all() == [2, 2]
 
 
-def test_extensions_are_one_students_own_and_the_more_special_wins(store: Store) -> None:
+def test_extensions_are_one_students_own_and_hold_together(store: Store) -> None:
     _set(store, PolicyLimits(DUE, attempts=1))
     _set(store, PolicyLimits(DUE + DAY, attempts=1), "echo-responder")
     _extend(store, "ada", DUE + 3 * DAY, more=1)
@@ -166,7 +171,7 @@ def test_extensions_are_one_students_own_and_the_more_special_wins(store: Store)
     _extend(store, "cid", DUE - DAY, assignment="echo-responder")
     # An extension never takes away what all have.
     assert _request(store, 1, DUE + DAY, "cid").staff_only == ""
-    assert "late" in _request(store, 2, DUE + 4 * DAY, "cid").staff_only
+    assert "late" in _request(store, 2, DUE + 6 * DAY, "cid").staff_only
 
 
 def test_what_is_hidden_opens_when_nobody_can_submission_any_more_or_when_published(store: Store) -> None:
@@ -187,5 +192,78 @@ def test_what_is_hidden_opens_when_nobody_can_submission_any_more_or_when_publis
     with store.reading() as session:
         batch = session.scalars(select(Job.batch_id)).one()
     assert batch is not None
-    publishing.publish(store, batch, actor="staff")
+    acting.publish(store, batch, actor="staff")
     assert released() == {"visible", "after_due_date", "after_published"}
+
+
+def _moment(text: str) -> datetime:
+    """A moment of the wall clock in Berlin: from UTC+1 to UTC+2 on 29 March 2026, and back on 25 October."""
+    return datetime.fromisoformat(text).replace(tzinfo=ZoneInfo("Europe/Berlin"))
+
+
+@pytest.mark.parametrize(
+    ("due", "submitted", "days_late", "counts"),
+    [
+        ("2026-10-24T23:59", "2026-10-25T23:30", 1, True),  # a day of 25 hours
+        ("2026-10-24T23:59", "2026-10-26T00:00", 2, False),
+        ("2026-10-24T02:30", "2026-10-25T02:15", 1, True),
+        ("2026-03-28T23:59", "2026-03-29T23:30", 1, True),  # a day of 23 hours
+        ("2026-03-28T23:59", "2026-03-30T00:30", 2, False),
+        ("2026-03-28T02:30", "2026-03-29T03:15", 1, True),  # there is no 02:30 that day
+        ("2026-03-28T02:30", "2026-03-29T03:45", 2, False),
+        ("2026-11-30T17:00", "2026-11-30T17:00", 0, True),
+        ("2026-11-30T17:00", "2026-12-01T17:00", 1, True),
+    ],
+)
+def test_late_days_are_days_of_the_calendar(
+    store: Store, monkeypatch: pytest.MonkeyPatch, due: str, submitted: str, days_late: int, counts: bool
+) -> None:
+    monkeypatch.setenv("TZ", "Europe/Berlin")
+    _set(store, PolicyLimits(_moment(due), late_days=1))
+    # The days stay those of the zone that the policy was set in.
+    monkeypatch.setenv("TZ", "America/New_York")
+    with store.transaction() as session:
+        enrolment_id = Students(session, 1).enrol(Student("ada"), now(session))
+        ruling = policies.rule(session, enrolment_id, "echo-responder", "0", _moment(submitted))
+        closed_at = policies.limits(session, enrolment_id, "echo-responder").closed_at
+    assert (ruling.days_late, not ruling.over) == (days_late, counts)
+    assert closed_at is not None
+    assert (_moment(submitted) <= closed_at) is counts
+
+
+def test_a_day_has_passed_for_students_and_rulings_at_the_same_moment() -> None:
+    """Every hour around both changes of the clock: what is closed is what is too late."""
+    for due in ("2026-03-27T02:30", "2026-03-28T12:00", "2026-10-24T02:30", "2026-10-25T02:30"):
+        for late_days in range(3):
+            allowed = PolicyLimits(_moment(due), late_days, zone="Europe/Berlin")
+            assert allowed.closed_at is not None
+            for hour in range(100):
+                at = _moment(due).astimezone(UTC) + timedelta(minutes=30 * hour)
+                assert (allowed.days_late(at) > late_days) is (at > allowed.closed_at), (due, late_days, at)
+
+
+@pytest.mark.parametrize(
+    ("general", "particular", "due", "attempts"),
+    [
+        ((DUE + 7 * DAY, 0), (None, 1), DUE + 7 * DAY, 3),
+        ((DUE + 7 * DAY, 0), (DUE + DAY, 1), DUE + 7 * DAY, 3),
+        ((None, 3), (DUE + DAY, 1), DUE + DAY, 5),
+        ((DUE - DAY, 0), (None, 0), DUE, 2),
+    ],
+)
+def test_a_general_and_a_particular_extension_hold_together(
+    store: Store,
+    general: tuple[datetime | None, int],
+    particular: tuple[datetime | None, int],
+    due: datetime,
+    attempts: int,
+) -> None:
+    _set(store, PolicyLimits(DUE, attempts=2))
+    for assignment, (due_at, more) in (("", general), ("echo-responder", particular)):
+        _extend(store, "ada", due_at, more, assignment)
+    with store.transaction() as session:
+        enrolment_id = Students(session, 1).enrol(Student("ada"), now(session))
+        allowed = policies.limits(session, enrolment_id, "echo-responder")
+        elsewhere = policies.limits(session, enrolment_id, "another")
+    assert (allowed.due_at, allowed.attempts) == (due, attempts)
+    assert (elsewhere.due_at, elsewhere.attempts) == (max(DUE, general[0] or DUE), 2 + general[1])

@@ -12,7 +12,7 @@ from service.grading.grade import CriterionResult, Evidence, Measure
 from service.store.batches import batches, rankings
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store
-from service.store.grades import results
+from service.store.grades import overrides, results
 from service.store.queue import jobs
 from submissions.assignment.reader import find_assignment
 from submissions.grading_request import GradingRequest
@@ -61,3 +61,15 @@ def test_what_ranks_nothing_has_no_table(store: Store) -> None:
     batch = graded(store, [replace(grading_request("ada"), assignment=echo())], {"ada": (40.0,)})
     with store.reading() as session:
         assert rankings.rank_tables(session, batches.job_lines(session, batch)) == []
+
+
+def test_who_is_excused_from_a_ranking_has_no_place_in_it(store: Store) -> None:
+    circuit = find_assignment("fastest-lap-of-thruxton")
+    laps: dict[str, tuple[float | None, ...]] = {"ada": (40.0,), "bob": (41.0,)}
+    requests = [replace(grading_request(student), assignment=circuit) for student in laps]
+    batch = graded(store, requests, laps)
+    with store.transaction() as session:
+        ada, _ = batches.job_lines(session, batch)
+        overrides.excuse(session, ada.id, "fast", "was ill", "grace")
+        (table,) = rankings.rank_tables(session, batches.job_lines(session, batch))
+    assert [row[1] for row in table.texts] == ["bob"]

@@ -8,19 +8,22 @@ from datetime import UTC, datetime
 from decimal import Decimal
 
 import pytest
-from sqlalchemy import select, update
+from sqlalchemy import ColumnElement, select, update
 
+import acting
 import report_builders
 from builders import echo, grading_request
 from service.commands.batch.words import unjudged_words
 from service.grading.grade import Grade
+from service.operations.regrades import Published
 from service.store import audit
 from service.store.batches import batches, publishing, regrades
 from service.store.batches.intake import accept_batch, accept_new
+from service.store.courses.hidden_names import NAMED
 from service.store.engine import Store
 from service.store.grades import results
-from service.store.models import Batch, Job
-from service.store.queue import batch_control, jobs
+from service.store.models import Batch, Enrolment, Job
+from service.store.queue import jobs
 from service.store.states import JobState, Standing
 from sim.errors import UsageError
 
@@ -48,7 +51,7 @@ def _grade_all(store: Store, grade: Grade = GRADE) -> None:
 
 
 def _regrade(store: Store, batch: str, grade: Grade = GRADE, *, changed: bool = False) -> str:
-    made = regrades.regrade(store, batch, CHANGED if changed else None, max_attempts=3, actor="staff")
+    made = acting.regrade(store, batch, CHANGED if changed else None, max_attempts=3, actor="staff")
     _grade_all(store, grade)
     return made.batch_id
 
@@ -61,20 +64,20 @@ def _standing(store: Store, batch: str) -> dict[str, str]:
 
 def _changes(store: Store, batch: str) -> list[regrades.Change]:
     with store.reading() as session:
-        return regrades.changes(session, batch)
+        return regrades.changes(session, batch, NAMED)
 
 
 def test_old_grades_stand_until_the_new_ones_are_published(store: Store) -> None:
     batch = _batch(store, "ada", "bob")
     _grade_all(store)
     before = _standing(store, batch)
-    assert publishing.publish(store, batch, actor="staff") == publishing.Published(2, 0, 0, 0, 0, 0)
+    assert acting.publish(store, batch, actor="staff") == Published(2, 0, 0, 0, 0, 0)
     again = _regrade(store, batch, _better(GRADE), changed=True)
     assert _standing(store, batch) == before
     with store.reading() as session:
         assert publishing.unpublished_regrades(session, batch) == 2
         assert batches.batch(session, again).regrade_of == batch
-    assert publishing.publish(store, batch, actor="staff") == publishing.Published(2, 2, 0, 0, 0, 0)
+    assert acting.publish(store, batch, actor="staff") == Published(2, 2, 0, 0, 0, 0)
     after = _standing(store, batch)
     assert set(after.values()).isdisjoint(before.values())
     with store.reading() as session:
@@ -85,14 +88,14 @@ def test_old_grades_stand_until_the_new_ones_are_published(store: Store) -> None
             assert results.load(session, job_id).marks == GRADE.marks
         actions = [entry.action for entry in audit.entries(session, "batch", batch)]
     assert actions == ["publish", "regrade", "publish"]
-    assert publishing.publish(store, batch, actor="staff").published == 0
+    assert acting.publish(store, batch, actor="staff").published == 0
 
 
 def test_a_regrade_can_be_published_by_its_own_batch_too(store: Store) -> None:
     batch = _batch(store, "ada")
     _grade_all(store)
     again = _regrade(store, batch)
-    publishing.publish(store, again, actor="staff")
+    acting.publish(store, again, actor="staff")
     (line,) = _standing(store, batch).values()
     with store.reading() as session:
         assert session.get_one(Job, line).batch_id == again
@@ -115,13 +118,13 @@ def test_what_could_not_be_judged_is_named_and_stays_back(store: Store) -> None:
     (left,) = [line for line in lines if line.unjudged]
     assert unjudged_words(lines).startswith("1 submission has criteria that could not be judged")
     assert f": {left.student};" in unjudged_words(lines)
-    assert publishing.publish(store, batch, actor="staff") == publishing.Published(1, 0, 0, 0, 0, 1)
+    assert acting.publish(store, batch, actor="staff") == Published(1, 0, 0, 0, 0, 1)
     with store.reading() as session:
         assert session.get_one(Job, left.id).published_at is None
-    assert publishing.publish(store, batch, actor="staff", anyway=True) == publishing.Published(1, 0, 0, 0, 0, 0)
+    assert acting.publish(store, batch, actor="staff", anyway=True) == Published(1, 0, 0, 0, 0, 0)
     with store.reading() as session:
         assert session.get_one(Job, left.id).published_at is not None
-    assert publishing.publish(store, batch, actor="staff") == publishing.Published(0, 0, 0, 0, 0, 0)
+    assert acting.publish(store, batch, actor="staff") == Published(0, 0, 0, 0, 0, 0)
 
 
 def test_a_regrade_that_could_not_be_judged_takes_no_whole_grades_place(store: Store) -> None:
@@ -129,10 +132,10 @@ def test_a_regrade_that_could_not_be_judged_takes_no_whole_grades_place(store: S
     _grade_all(store)
     before = _standing(store, batch)
     _regrade(store, batch, _unjudged(GRADE))
-    assert publishing.publish(store, batch, actor="staff") == publishing.Published(1, 0, 0, 0, 0, 1)
+    assert acting.publish(store, batch, actor="staff") == Published(1, 0, 0, 0, 0, 1)
     assert _standing(store, batch) == before
     _regrade(store, batch, _better(GRADE))
-    assert publishing.publish(store, batch, actor="staff") == publishing.Published(1, 1, 0, 0, 0, 0)
+    assert acting.publish(store, batch, actor="staff") == Published(1, 1, 0, 0, 0, 0)
     assert len(_standing(store, batch)) == 1
     assert _standing(store, batch) != before
 
@@ -142,7 +145,7 @@ def test_a_whole_regrade_takes_the_place_of_what_could_not_be_judged(store: Stor
     _grade_all(store, _unjudged(GRADE))
     before = _standing(store, batch)
     _regrade(store, batch)
-    assert publishing.publish(store, batch, actor="staff") == publishing.Published(1, 1, 0, 0, 0, 0)
+    assert acting.publish(store, batch, actor="staff") == Published(1, 1, 0, 0, 0, 0)
     after = _standing(store, batch)
     assert len(after) == 1
     assert after != before
@@ -155,7 +158,7 @@ def test_of_several_regrades_the_newest_stands(store: Store) -> None:
     _grade_all(store)
     _regrade(store, batch)
     newest = _regrade(store, batch, _better(GRADE))
-    publishing.publish(store, batch, actor="staff")
+    acting.publish(store, batch, actor="staff")
     with store.reading() as session:
         standing = session.execute(select(Job.batch_id, Job.standing).order_by(Job.queued_at)).all()
     assert [state for _, state in standing] == [Standing.KEPT, Standing.KEPT, Standing.STANDS]
@@ -191,6 +194,46 @@ def test_what_changes_is_explained(
         assert change.differs
 
 
+def test_equal_marks_are_equal_however_many_decimals_they_have(store: Store) -> None:
+    """SQLite keeps marks as text, and "8" is not "8.0"."""
+    batch = _batch(store, "ada", "bob", "cyd")
+    _grade_all(store)
+    again = _regrade(store, batch)
+    with store.transaction() as session:
+        for student, before, after in (("ada", "8", "8.0"), ("bob", "9", "10"), ("cyd", "8.00", "8")):
+            job = session.scalars(select(Job).join(Enrolment).where(Enrolment.student == student)).all()
+            for row in job:
+                row.marks = Decimal(before if row.regrade_of is None else after)
+                row.max_marks = Decimal("10" if row.regrade_of is None else "10.00")
+    with store.reading() as session:
+        page = regrades.changes_page(session, again, 1, NAMED)
+    assert page.differing == 1
+    assert [(change.student, change.differs) for change in page.changes] == [
+        ("bob", True), ("ada", False), ("cyd", False),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("asked", "found"),
+    [
+        (Job.marks == Decimal("8"), {"8", "8.0"}),
+        (Job.marks != Decimal("8.00"), {"9", "10"}),
+        (Job.marks > Decimal("8.5"), {"9", "10"}),
+        (Job.marks <= Decimal("9.0"), {"8", "8.0", "9"}),
+        (Job.marks.is_(None), set()),
+        (Job.marks.in_([Decimal("8.0"), Decimal("10.0")]), {"8", "8.0", "10"}),
+    ],
+)
+def test_every_query_compares_marks_as_numbers(store: Store, asked: ColumnElement[bool], found: set[str]) -> None:
+    marks = ("8", "8.0", "9", "10")
+    _batch(store, *(f"student-{number}" for number, _ in enumerate(marks)))
+    with store.transaction() as session:
+        for job, own in zip(session.scalars(select(Job).order_by(Job.id)), marks, strict=True):
+            job.marks = Decimal(own)
+    with store.reading() as session:
+        assert {str(job.marks) for job in session.scalars(select(Job).where(asked))} == found
+
+
 def test_criteria_that_come_and_go_are_told(store: Store) -> None:
     batch = _batch(store, "ada")
     _grade_all(store)
@@ -206,18 +249,18 @@ def test_what_is_not_graded_and_other_assignments_are_left_out(store: Store) -> 
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None
     with pytest.raises(UsageError, match="nothing to grade again: 3 of its submissions are not graded yet"):
-        regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
+        acting.regrade(store, batch, None, max_attempts=3, actor="staff")
     jobs.give_up(store, claim, "no program")
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None
     jobs.finish(store, claim, results.prepare(GRADE), datetime.now(UTC))
     other = replace(echo(), id="other")
     with pytest.raises(UsageError, match="has no submission for other, only for echo-responder"):
-        regrades.regrade(store, batch, other, max_attempts=3, actor="staff")
-    made = regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
+        acting.regrade(store, batch, other, max_attempts=3, actor="staff")
+    made = acting.regrade(store, batch, None, max_attempts=3, actor="staff")
     assert (made.jobs, made.other_assignment, made.unfinished) == (2, 0, 1)
-    with pytest.raises(UsageError, match="there is no batch"):
-        publishing.publish(store, "nowhere", actor="staff")
+    with pytest.raises(UsageError, match="nothing here"):
+        acting.publish(store, "nowhere", actor="staff")
 
 
 def test_what_could_not_be_graded_may_get_its_first_grade(store: Store) -> None:
@@ -228,13 +271,13 @@ def test_what_could_not_be_graded_may_get_its_first_grade(store: Store) -> None:
     (change,) = _changes(store, _regrade(store, batch, changed=True))
     assert (change.before, change.after) == (None, GRADE.marks)
     assert "had no grade" in change.reason
-    assert publishing.publish(store, batch, actor="staff") == publishing.Published(1, 1, 0, 0, 0, 0)
+    assert acting.publish(store, batch, actor="staff") == Published(1, 1, 0, 0, 0, 0)
 
 
 def test_a_newer_submission_does_not_stop_a_regrade_of_the_one_before(store: Store) -> None:
     batch = _batch(store, "ada")
     _grade_all(store)
-    made = regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
+    made = acting.regrade(store, batch, None, max_attempts=3, actor="staff")
     accept_new(store, "late", [grading_request("ada", "print('other')\n")], [], max_attempts=3)
     with store.reading() as session:
         assert session.scalars(select(Job.state).where(Job.batch_id == made.batch_id)).all() == [JobState.QUEUED]
@@ -256,9 +299,9 @@ def test_a_batch_of_regrades_can_be_cancelled_and_leaves_the_old_grades(store: S
     batch = _batch(store, "ada")
     _grade_all(store)
     before = _standing(store, batch)
-    made = regrades.regrade(store, batch, None, max_attempts=3, actor="staff")
-    batch_control.cancel(store, made.batch_id, actor="staff")
-    assert publishing.publish(store, batch, actor="staff").replaced == 0
+    made = acting.regrade(store, batch, None, max_attempts=3, actor="staff")
+    acting.cancel(store, made.batch_id, actor="staff")
+    assert acting.publish(store, batch, actor="staff").replaced == 0
     assert _standing(store, batch) == before
     with store.reading() as session:
         names = session.scalars(select(Batch.name).order_by(Batch.created_at)).all()

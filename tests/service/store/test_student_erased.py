@@ -13,17 +13,19 @@ import pytest
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+import acting
 import report_builders
 from builders import grading_request
+from service.operations import privacy
 from service.store import audit
 from service.store.batches import intake
 from service.store.courses import policies
 from service.store.engine import Store
 from service.store.grades import results
-from service.store.models import Enrolment, Job, Person, SubmissionRow
+from service.store.models import Enrolment, Job, SubmissionRow
 from service.store.people import credentials
 from service.store.people.students import course_of
-from service.store.purge import erase_student, purge
+from service.store.purge import Purged, purge
 from service.store.queue import jobs
 from service.store.states import CredentialKind, Role
 from service.store.web_tables import (
@@ -72,9 +74,16 @@ def everything(store: Store) -> int:
         session.add(Tryout(enrolment_id=enrolment.id, assignment_version_id=version_id, packed=b"", state="done",
                            queued_at=NOW, words={"said": KNOWN[1]}))  # fmt: skip
         policies.extend(session, enrolment.id, "", NOW, 1)
-        credentials.issue(session, person_id, CredentialKind.TOKEN, timedelta(days=1), name=KNOWN[1], scopes=["read"])
+        credentials.issue(
+            session,
+            person_id,
+            CredentialKind.TOKEN,
+            timedelta(days=1),
+            name=KNOWN[1],
+            reach=credentials.Reach(scopes=frozenset({"read"})),
+        )
         session.flush()
-        token = credentials.tokens(session, person_id)[0].id
+        token = credentials.of_person(session, person_id)[0].id
         session.add(IdempotentReply(credential_id=token, key="k", request_sha256="", status=200, body=b"", made_at=NOW))
         platform = LtiPlatform(name="p", issuer="i", client_id="c", authorization_url="", token_url="", keys_url="",
                                created_at=NOW)  # fmt: skip
@@ -90,7 +99,7 @@ def test_nothing_is_left_of_who_is_erased_but_that_it_was_done(store: Store) -> 
     enrolment_id = everything(store)
     before = _dump(store)
     assert all(word in before for word in KNOWN)
-    gone = erase_student(store, enrolment_id, "grace")
+    gone = _erase(store, enrolment_id)
     assert (gone.submissions, gone.grades) == (1, 1)
     left = _dump(store)
     assert [word for word in KNOWN if word in left] == []
@@ -117,9 +126,9 @@ def test_who_is_in_another_course_stays_there(store: Store) -> None:
     enrolment_id = everything(store)
     with store.transaction() as session:
         _in_another_course(session, session.get_one(Enrolment, enrolment_id).person_id)
-    erase_student(store, enrolment_id, "grace")
+    _erase(store, enrolment_id)
     with store.reading() as session:
-        assert KNOWN[1] in session.scalars(select(Person.name)).all()
+        assert KNOWN[1] in session.scalars(select(Enrolment.name)).all()
         assert session.scalars(select(SubmissionRow.id)).all() == [2]
 
 
@@ -127,11 +136,11 @@ def test_who_is_being_graded_or_instructs_is_not_erased(store: Store) -> None:
     intake.accept(store, grading_request("ada"), max_attempts=1)
     assert jobs.claim(store, "worker", 60)
     with pytest.raises(UsageError, match="is being graded"):
-        erase_student(store, 1, "grace")
+        _erase(store, 1)
     with store.transaction() as session:
         session.get_one(Enrolment, 1).role = Role.INSTRUCTOR
     with pytest.raises(UsageError, match="is no student"):
-        erase_student(store, 1, "grace")
+        _erase(store, 1)
 
 
 def test_what_is_old_goes_with_all_that_was_said_of_it(store: Store) -> None:
@@ -164,10 +173,16 @@ def test_the_zip_has_what_the_student_may_see(store: Store) -> None:
 
 def _in_another_course(session: Session, person_id: int) -> None:
     course_id = course_of(session, "another", NOW)
-    session.add(Enrolment(course_id=course_id, person_id=person_id, student="x", written="x", role=Role.STUDENT))
+    row = Enrolment(course_id=course_id, person_id=person_id, student="x", written="x", role=Role.STUDENT)
+    row.name = KNOWN[1]
+    session.add(row)
 
 
 def _dump(store: Store) -> str:
     """All that the database holds, but what is compressed."""
     with store.reading() as session:
         return "\n".join(str(row) for table in METADATA.sorted_tables for row in session.execute(select(table)))
+
+
+def _erase(store: Store, enrolment_id: int) -> Purged:
+    return privacy.erase_student(acting.service_on(store), acting.machine("grace"), 1, enrolment_id)

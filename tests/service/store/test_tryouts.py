@@ -126,3 +126,15 @@ def test_what_was_tried_goes_a_day_after(store: Store) -> None:
     _ask(store, ada)
     with store.reading() as session:
         assert session.scalar(select(func.count()).select_from(Tryout)) == 1
+
+
+def test_of_what_a_student_tries_the_newest_program_is_kept(store: Store) -> None:
+    ada, bob = _enrolled(store), _enrolled(store, "bob")
+    tried = [_ask(store, bob)]
+    for _ in range(3):
+        tried.append(_ask(store, ada))
+        while (claimed := tryouts.claim(store, 60)) is not None:
+            assert tryouts.finish(store, claimed, {}, None)
+    with store.reading() as session:
+        sizes = {row.id: len(row.packed) for row in session.scalars(select(Tryout))}
+    assert [sizes[each] > 0 for each in tried] == [True, False, False, True]

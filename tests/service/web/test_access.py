@@ -62,7 +62,7 @@ def signed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, Sign
         }
         browsers = {"nobody": web.browser(), **{who: web.browser(member) for who, member in members.items()}}
         words = {who: csrf(browser.get("/account")) for who, browser in browsers.items() if who != "nobody"}
-        everything = ("read", "submit", "mark", "manage")
+        everything = ("read", "submit", "mark", "manage", "sign-in")
         tokens = {who: web.token(member, *everything) for who, member in members.items()}
         yield web, Signed(browsers, tokens, words, world.values)
 
@@ -140,8 +140,8 @@ def test_what_changes_something_asks_for_the_forms_word(signed: tuple[Web, Signe
 def _ask(asked: Signed, who: str, method: str, path: str) -> Response:
     if path.startswith(API):
         return asked.browsers["nobody"].request(method, path, headers=asked.tokens.get(who, {}))
-    # A session ends with the browser's leave; this one is needed again.
-    if path == "/sign-out" and who != "nobody":
+    # These end sessions and tokens that are needed again.
+    if path in ("/sign-out", "/account/end-others") and who != "nobody":
         return asked.browsers[who].get("/account")
     headers = {"x-csrf-token": asked.words[who]} if who in asked.words else {}
     return asked.browsers[who].request(method, path, headers=headers)

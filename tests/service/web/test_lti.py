@@ -13,7 +13,7 @@ from urllib.parse import parse_qs, urlsplit
 import pytest
 from cryptography.hazmat.primitives.asymmetric import rsa
 from httpx2 import Response
-from sqlalchemy import update
+from sqlalchemy import func, select, update
 from starlette.testclient import TestClient
 
 import report_builders
@@ -26,7 +26,7 @@ from service.store.models import Job
 from service.store.people import lti, people
 from service.store.queue import jobs
 from service.store.states import Role
-from service.store.web_tables import LtiCourse
+from service.store.web_tables import LtiCourse, LtiLaunch
 from service.web.access import CSRF_FIELD
 from web import Web, csrf, web_in
 
@@ -171,6 +171,29 @@ def test_a_platform_that_nobody_registered_begins_nothing(launched: tuple[Web, L
     answer = browser.get("/lti/login", params={"iss": "https://evil.example.org", "login_hint": "x"})
     assert answer.status_code == 422
     assert "registered" in answer.text
+
+
+def test_launches_from_unknown_platforms_keep_no_known_one_out(launched: tuple[Web, LearningPlatform]) -> None:
+    browser, unknown = _browser(launched[0]), {"iss": "https://evil.example.org", "login_hint": "x"}
+    statuses = [browser.get("/lti/login", params=unknown).status_code for _ in range(320)]
+    assert set(statuses) == {422, 429}
+    _begin(browser)
+
+
+def test_the_oldest_launches_make_room_for_new_ones(
+    launched: tuple[Web, LearningPlatform], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    web, platform = launched
+    monkeypatch.setattr(lti, "MOST_PENDING", 3)
+    browsers = [_browser(web) for _ in range(5)]
+    begun = [_begin(browser) for browser in browsers]
+    with web.store.reading() as session:
+        assert session.scalar(select(func.count()).select_from(LtiLaunch)) == 3
+    answers = [
+        _end(browser, each["state"], platform.sign(platform.claims(each, "grace", INSTRUCTOR)))
+        for browser, each in zip(browsers, begun, strict=True)
+    ]
+    assert [answer.status_code for answer in answers] == [422, 422, 303, 303, 303]
 
 
 def test_nobody_becomes_somebody_else_by_an_id_that_a_platform_tells(

@@ -90,7 +90,9 @@ def test_what_has_ended_counts_no_more(web: Web) -> None:
         past = timedelta(seconds=-1)
         link = credentials.issue(session, ada.person_id, CredentialKind.LINK, past)
         secret = credentials.issue(session, ada.person_id, CredentialKind.SESSION, past)
-        token = credentials.issue(session, ada.person_id, CredentialKind.TOKEN, past, scopes=["read"])
+        token = credentials.issue(
+            session, ada.person_id, CredentialKind.TOKEN, past, reach=credentials.Reach(scopes=frozenset({"read"}))
+        )
         assert credentials.redeem(session, link) is None
         assert credentials.identify(session, secret, CredentialKind.SESSION) is None
         assert credentials.identify(session, token, CredentialKind.TOKEN) is None
@@ -103,13 +105,27 @@ def test_tries_to_sign_in_are_counted(web: Web) -> None:
     assert int(refused.headers["retry-after"]) >= 1
 
 
-def test_an_instructor_of_two_courses_is_one_person(web: Web) -> None:
+def test_wrong_links_keep_nobody_out(web: Web) -> None:
+    ada = web.student()
+    browser = web.browser()
+    answers = [browser.post("/sign-in", data={"secret": "rml_wrong"}).status_code for _ in range(40)]
+    answers += [browser.get("/sign-in/rml_wrong").status_code for _ in range(3)]
+    assert answers[-4:] == [429] * 4
+    link = web.link(ada)
+    assert browser.get(f"/sign-in/{link}").status_code == 200
+    assert browser.post("/sign-in", data={"secret": link}).status_code == 303
+    token = web.token(ada, "sign-in")["authorization"].removeprefix("Bearer ")
+    assert web.browser().post("/sign-in", data={"secret": token}).status_code == 303
+
+
+def test_an_instructor_of_two_courses_is_one_person_once_an_operator_joins_them(web: Web) -> None:
     with web.store.transaction() as session:
         first = people.make_instructor(session, "one", Student("grace"))
         second = people.make_instructor(session, "two", Student("grace"))
         other = people.make_student(session, "two", Student("ada"))
-    assert first.person_id == second.person_id
+    assert first.person_id != second.person_id
     assert other.role is Role.STUDENT
+    web.join(first, second)
     shown = web.browser(first).get("/").text
     assert 'href="/courses/1/batches">one</a>' in shown
     assert 'href="/courses/2/batches">two</a>' in shown

@@ -3,28 +3,40 @@
 from __future__ import annotations
 
 import itertools
+import random
 import zipfile
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from io import BytesIO
+from pathlib import Path
 
 import pytest
 from sqlalchemy import select
 from starlette.exceptions import HTTPException
 
 from builders import PROGRAM, echo
+from report_builders import faulty_grade
+from service.operations.context import Actor
+from service.operations.errors import NotFound
+from service.operations.submissions import SubmitRequest
 from service.store.batches import intake
 from service.store.batches.intake import Accepted
-from service.store.courses import open_assignments
+from service.store.courses import open_assignments, policies
+from service.store.courses.policies import PolicyLimits
 from service.store.courses.versions import freeze
+from service.store.grades import comments
 from service.store.models import Job, SubmissionRow
 from service.store.people import credentials
-from service.store.people.credentials import Identity
 from service.store.people.people import Member
-from service.store.states import CredentialKind, Lane
+from service.store.people.students import course_of
+from service.store.queue import jobs
+from service.store.states import CredentialKind, JobState, Lane
+from service.web.access import actor_from
 from service.web.submitting import submit
 from sim.errors import UsageError
 from submissions.raw_files import MAX_FILE_BYTES, MAX_FILES, SentFile
-from web import Web, web_in
+from web import COURSE, Web, grade_all, web_in, words
+from web import submit as submit_form
 
 RESPONDER = "def responder(msg):\n    return msg\n"
 
@@ -48,18 +60,18 @@ def ada(web: Web) -> Member:
     return web.student(next(_NAMES))
 
 
-def _identity(web: Web, member: Member) -> Identity:
+def _actor(web: Web, member: Member) -> Actor:
     with web.store.transaction() as session:
         found = credentials.identify(
             session, credentials.redeem(session, web.link(member)) or "", CredentialKind.SESSION
         )
     assert found is not None
-    return found
+    return actor_from(found)
 
 
 def _submit(web: Web, member: Member, *files: tuple[str, bytes | str]) -> Accepted:
     sent = [SentFile(name, BytesIO(data.encode() if isinstance(data, str) else data)) for name, data in files]
-    return submit(web.app.state.context, _identity(web, member), 1, echo().id, sent, even_in_part=False)
+    return submit(web.app.state.context, _actor(web, member), 1, SubmitRequest(echo().id, sent))
 
 
 def _zip(*entries: tuple[str, str]) -> bytes:
@@ -135,9 +147,8 @@ def test_only_what_is_open_takes_submissions(web: Web, ada: Member) -> None:
         _submit(web, ada, *BOTH)
     with web.store.transaction() as session:
         open_assignments.open_for_students(session, 1, echo().id)
-    with pytest.raises(HTTPException) as refused:
-        submit(web.app.state.context, _identity(web, ada), 1, "no-such", [], even_in_part=False)
-    assert refused.value.status_code == 404
+    with pytest.raises(NotFound):
+        submit(web.app.state.context, _actor(web, ada), 1, SubmitRequest("no-such", []))
 
 
 def test_nobody_submits_without_end(web: Web, ada: Member) -> None:
@@ -147,3 +158,95 @@ def test_nobody_submits_without_end(web: Web, ada: Member) -> None:
     with pytest.raises(HTTPException) as refused:
         _submit(web, ada, *BOTH)
     assert refused.value.status_code == 429
+
+
+def _rows(web: Web, member: Member) -> list[tuple[int, bool, JobState]]:
+    """Attempt, whether it is over a limit, and state of all that a student has."""
+    query = (
+        select(SubmissionRow.attempt, SubmissionRow.staff_only, Job.state)
+        .join(Job, Job.submission_id == SubmissionRow.id)
+        .where(SubmissionRow.enrolment_id == member.enrolment_id)
+        .order_by(SubmissionRow.attempt)
+    )
+    with web.store.reading() as session:
+        return [(attempt, over is not None, state) for attempt, over, state in session.execute(query)]
+
+
+@pytest.fixture
+def once(tmp_path: Path) -> Iterator[Web]:
+    """A course that allows one attempt, and few bytes."""
+    with web_in(tmp_path, student_quota_mb=1) as opened:
+        with opened.store.transaction() as session:
+            course_of(session, COURSE, datetime.now(UTC))
+            open_assignments.prepare(session, 1, freeze(echo()))
+            open_assignments.open_for_students(session, 1, echo().id)
+            policies.set_policy(session, 1, "", PolicyLimits(attempts=1))
+        yield opened
+
+
+def _send(web: Web, member: Member, number: int) -> Accepted:
+    return _submit(web, member, ("robot.py", PROGRAM + f"# {number}\n"), ("responder.py", RESPONDER))
+
+
+def test_over_a_limit_the_newest_is_kept_and_graded_when_staff_ask(once: Web) -> None:
+    ada, grace = once.student(), once.instructor()
+    _send(once, ada, 0)
+    grade_all(once, faulty_grade())
+    made = [_send(once, ada, number) for number in range(1, 6)]
+    assert _rows(once, ada) == [(1, False, JobState.DONE), (6, True, JobState.CANCELLED)]
+    assert jobs.claim(once.store, "worker", 60) is None
+    path = f"/courses/1/grades/{made[-1].job_id}"
+    shown = words(once.browser(ada).get(f"/courses/1/mine/submissions/{made[-1].submission_id}").text)
+    assert "all attempts were used" in shown
+    browser = once.browser(grace)
+    assert "Grade this submission" in browser.get(path).text
+    assert submit_form(browser, f"{path}/grade-over-limit").status_code == 303
+    assert "Grade this submission" not in browser.get(path).text
+    assert submit_form(browser, f"{path}/grade-over-limit").status_code == 409
+    grade_all(once, faulty_grade())
+    assert _rows(once, ada)[-1] == (6, True, JobState.DONE)
+    # What staff asked for stays; what comes after it is put aside again.
+    last = _send(once, ada, 7)
+    assert [state for _, _, state in _rows(once, ada)] == [JobState.DONE, JobState.DONE, JobState.CANCELLED]
+    token = once.token(grace, "mark")
+    asked = once.browser().post(f"/api/v1/courses/1/grades/{last.job_id}/over-limit", headers=token)
+    assert asked.status_code == 204
+    assert (
+        once.browser()
+        .post(f"/api/v1/courses/1/grades/{last.job_id}/over-limit", headers=once.token(ada, "mark"))
+        .status_code
+        == 404
+    )
+
+
+def test_a_submission_over_a_limit_that_has_a_comment_is_kept(once: Web) -> None:
+    ada = once.student()
+    _send(once, ada, 0)
+    grade_all(once, faulty_grade())
+    made = _send(once, ada, 1)
+    with once.store.transaction() as session:
+        comments.comment(session, made.job_id, "", "This is over the limit.", "grace")
+    for number in (2, 3):
+        _send(once, ada, number)
+    assert [attempt for attempt, _, _ in _rows(once, ada)] == [1, 2, 4]
+
+
+def test_a_student_fills_no_more_than_the_quota(once: Web) -> None:
+    ada, bob = once.student(), once.student("bob")
+    noise = random.Random(1).randbytes(400_000)
+    for number in range(2):
+        files = (("robot.py", PROGRAM), ("responder.py", RESPONDER), ("model.bin", noise + bytes([number])))
+        _submit(once, ada, *files)
+        grade_all(once, faulty_grade())
+    # Of those over the limit one is kept: the next takes its place and needs no more room.
+    _submit(once, ada, ("robot.py", PROGRAM), ("responder.py", RESPONDER), ("model.bin", noise + b"x"))
+    with pytest.raises(UsageError, match="at most 1 MB in all"):
+        _submit(once, ada, ("robot.py", PROGRAM), ("responder.py", RESPONDER), ("model.bin", noise * 2))
+    assert sum(size for size in _sizes(once, ada)) <= 2**20
+    _submit(once, bob, ("robot.py", PROGRAM), ("responder.py", RESPONDER), ("model.bin", noise))
+
+
+def _sizes(web: Web, member: Member) -> list[int]:
+    with web.store.reading() as session:
+        own = SubmissionRow.enrolment_id == member.enrolment_id
+        return list(session.scalars(select(SubmissionRow.size).where(own)))

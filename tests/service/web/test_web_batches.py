@@ -10,11 +10,12 @@ from decimal import Decimal
 import pytest
 from starlette.testclient import TestClient
 
+import acting
 import report_builders
 from builders import PROGRAM, echo
 from service.store import outbox as told_outbox
 from service.store import purge
-from service.store.batches import batches, publishing, regrades
+from service.store.batches import batches, publishing
 from service.store.courses import open_assignments, policies
 from service.store.courses.policies import PolicyLimits
 from service.store.courses.versions import freeze
@@ -22,7 +23,6 @@ from service.store.engine import now
 from service.store.models import Batch, Job
 from service.store.people import webhooks
 from service.store.people.people import Member
-from service.store.queue import batch_control
 from service.store.states import JobState
 from sim.errors import UsageError
 from web import Web, grade_all, submit
@@ -117,7 +117,7 @@ def test_it_is_not_held_back_and_what_could_not_be_graded_is_retried(web: Web, g
     page = grace.get(f"/courses/1/batches/{batch}").text
     assert "/pause" not in page
     assert "/cancel" not in page
-    for done in (batch_control.pause, batch_control.cancel):
+    for done in (acting.pause, acting.cancel):
         with pytest.raises(UsageError, match="close echo-responder"):
             done(web.store, batch)
     with web.store.transaction() as session:
@@ -131,7 +131,7 @@ def test_it_is_not_held_back_and_what_could_not_be_graded_is_retried(web: Web, g
 
 def test_it_is_finished_when_the_assignment_is_closed(web: Web, grace: TestClient) -> None:
     with web.store.transaction() as session:
-        webhooks.create(session, 1, "https://hooks.example.org/x", ["batch.finished"], "grace")
+        webhooks.create(session, 1, "https://hooks.example.org/x", ["batch.finished"])
     send(web, web.student())
     grade_with(web)
     assert told_outbox.claim(web.store, 9) == []
@@ -148,7 +148,7 @@ def test_a_regrade_is_of_the_attempts_that_count_and_publishing_of_all(web: Web,
         send(web, ada, program)
         grade_with(web)
     batch = batch_of(web)
-    made = regrades.regrade(web.store, batch, None, max_attempts=1, actor="grace")
+    made = acting.regrade(web.store, batch, None, max_attempts=1, actor="grace")
     assert made.jobs == 1
     send(web, ada, "print(3)\n")
     grade_with(web, 2)
@@ -159,7 +159,7 @@ def test_a_regrade_is_of_the_attempts_that_count_and_publishing_of_all(web: Web,
         planned = publishing.would_publish(session, batch).counts
         assert all(job.published_at is None for job in session.query(Job))
     assert (planned.published, planned.replaced) == (3, 1)
-    assert publishing.publish(web.store, batch, actor="grace") == planned
+    assert acting.publish(web.store, batch, actor="grace") == planned
     assert "There is nothing to release" in grace.get(f"/courses/1/batches/{batch}/publish").text
 
 

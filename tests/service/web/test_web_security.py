@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import anyio
 import pytest
 from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
 
-from service.settings import Settings
+from service.settings import Settings, load_settings
+from service.web.api_uploads import LARGEST_BATCH
 from service.web.listening import check_reach
 from service.web.rate_limits import RateLimit
-from service.web.security import LARGEST_BODY
+from service.web.server import server_config
 from sim.errors import UsageError
 from web import Web, csrf, submit, web_in
 
@@ -35,14 +38,124 @@ def test_pages_run_and_load_nothing_but_our_files_and_are_kept_nowhere(web: Web)
     assert "immutable" in browser.get(css).headers["cache-control"]
 
 
+_PROBES = ("/health/live", "/health/ready", "/metrics")
+
+
 @pytest.mark.parametrize(
-    "host", ["evil.example.org", "localhost.evil.example.org", "", "robomark.example.org:443@evil"]
+    "host",
+    [
+        "evil.example.org",
+        "localhost.evil.example.org",
+        "robomark.example.org:443@evil",
+        "localhost:80@evil",
+        "localhost:80:80",
+        "localhost:evil",
+        "[::1]:80@evil",
+        "web",
+        "10.0.0.1.evil",
+    ],
 )
 def test_a_name_that_is_not_ours_is_refused(web: Web, host: str) -> None:
     answer = web.browser().get("/sign-in", headers={"host": host})
     assert answer.status_code == 400
     assert "<a" not in answer.text
-    assert web.browser().get("/health/live", headers={"host": host}).status_code == 200
+    for path in _PROBES:
+        answer = web.browser().get(path, headers={"host": host})
+        assert (answer.status_code, len(answer.text) < 200) == (400, True)
+
+
+@pytest.mark.parametrize("host", ["", "10.1.2.3", "10.1.2.3:8470", "[fd00::7]:8470", "localhost:8470", "127.0.0.1"])
+def test_probes_ask_by_an_address_or_by_no_name(web: Web, host: str) -> None:
+    for path in _PROBES:
+        assert web.browser().get(path, headers={"host": host}).status_code in (200, 503)
+
+
+def test_probes_ask_by_the_names_that_are_set(tmp_path: Path) -> None:
+    with web_in(tmp_path, probe_hosts="Web, robomark.internal", public_url="https://robomark.example.org") as web:
+        for host in ("web:8470", "robomark.internal", "robomark.example.org"):
+            assert web.browser().get("/metrics", headers={"host": host}).status_code == 200
+        assert web.browser().get("/sign-in", headers={"host": "web:8470"}).status_code == 400
+
+
+_FROM_HERE = {"origin": "http://localhost"}
+_FROM_ELSEWHERE = {"origin": "https://evil.example.org"}
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({}, 303),
+        (_FROM_HERE, 303),
+        ({"origin": "https://localhost"}, 303),
+        (_FROM_ELSEWHERE, 403),
+        ({"origin": "null"}, 403),
+        ({"origin": "http://localhost.evil.example.org"}, 403),
+        ({"origin": "http://localhost:1"}, 403),
+        ({"origin": ""}, 403),
+        ({**_FROM_HERE, "sec-fetch-site": "cross-site"}, 403),
+        ({**_FROM_HERE, "sec-fetch-site": "same-origin"}, 303),
+    ],
+)
+def test_nobody_is_signed_in_from_another_site(web: Web, headers: dict[str, str], status: int) -> None:
+    answer = web.browser().post("/sign-in", data={"secret": web.link(web.student())}, headers=headers)
+    assert answer.status_code == status
+
+
+def test_the_public_name_is_an_origin_of_ours(tmp_path: Path) -> None:
+    with web_in(tmp_path, public_url="https://robomark.example.org") as web:
+        for origin, status in (("https://robomark.example.org", 303), ("https://other.example.org", 403)):
+            data = {"secret": web.link(web.student())}
+            assert web.browser().post("/sign-in", data=data, headers={"origin": origin}).status_code == status
+
+
+def test_pages_are_counted_for_each_person(tmp_path: Path) -> None:
+    with web_in(tmp_path, api_calls_per_minute=5) as web:
+        browser = web.browser(web.instructor())
+        answers = [browser.get("/account").status_code for _ in range(8)]
+        assert answers == [200] * 5 + [429] * 3
+        assert web.browser(web.student()).get("/account").status_code == 200
+        assert browser.get("/sign-in").status_code == 200
+
+
+def _told_address(settings: Settings, forwarded: str) -> str:
+    """The address that the application is told of a request from this machine."""
+    seen: list[str] = []
+
+    async def application(scope: Any, _receive: object, _send: object) -> None:
+        seen.append(scope["client"][0])
+
+    config = server_config(settings, application)
+    config.load()
+    scope = {
+        "type": "http",
+        "scheme": "http",
+        "client": ("127.0.0.1", 5),
+        "headers": [(b"x-forwarded-for", forwarded.encode()), (b"host", b"localhost")],
+    }
+    anyio.run(config.loaded_app, scope, None, None)
+    return seen[0]
+
+
+@pytest.mark.parametrize(
+    ("trusted", "forwarded", "address"),
+    [
+        ("", "192.0.2.7", "127.0.0.1"),
+        ("10.0.0.0/8", "192.0.2.7", "127.0.0.1"),
+        ("127.0.0.1", "192.0.2.7", "192.0.2.7"),
+        ("127.0.0.0/8", "1.2.3.4, 192.0.2.7", "192.0.2.7"),
+        ("127.0.0.1, 10.0.0.0/8", "1.2.3.4, 192.0.2.7, 10.0.0.3", "192.0.2.7"),
+    ],
+)
+def test_only_a_trusted_proxy_says_who_asks(tmp_path: Path, trusted: str, forwarded: str, address: str) -> None:
+    assert _told_address(Settings(home=tmp_path, trusted_proxies=trusted), forwarded) == address
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("trusted_proxies", "proxy"), ("probe_hosts", "a b"), ("probe_hosts", "a:1")]
+)
+def test_lists_of_hosts_are_checked(tmp_path: Path, name: str, value: str) -> None:
+    with pytest.raises(UsageError, match=f"ROBOMARK_{name.upper()}"):
+        load_settings(home=tmp_path, **{name: value})
 
 
 def test_behind_tls_cookies_and_links_are_for_tls(tmp_path: Path) -> None:
@@ -55,9 +168,9 @@ def test_behind_tls_cookies_and_links_are_for_tls(tmp_path: Path) -> None:
         assert answer.headers["strict-transport-security"]
 
 
-@pytest.mark.parametrize(("path", "most"), [("/sign-in", 2**20), ("/courses/1/batches/uploads", LARGEST_BODY)])
+@pytest.mark.parametrize(("path", "most"), [("/sign-in", 2**20), ("/courses/1/batches/uploads", LARGEST_BATCH)])
 def test_a_body_is_not_read_for_ever(web: Web, path: str, most: int) -> None:
-    browser = web.browser()
+    browser = web.browser(web.instructor())
     for length in (str(most + 1), "-1"):
         assert browser.post(path, headers={"content-length": length}, content=b"x").status_code == 413
 
@@ -90,7 +203,7 @@ def test_our_own_faults_say_nothing_of_themselves(web: Web, monkeypatch: pytest.
             raise surprise
 
         with monkeypatch.context() as patched:
-            patched.setattr("service.store.people.credentials.tokens", fail)
+            patched.setattr("service.store.people.credentials.of_person", fail)
             answer = browser.get("/account")
         assert answer.status_code == status
         assert "secret" not in answer.text

@@ -4,10 +4,10 @@ import json
 from sklearn.neural_network import MLPClassifier
 
 
-def training_accuracy():
-    """How many of the images in collected_shapes.csv the network names rightly, from 0 to 1."""
-    # TODO: train a network on these images.
-    return 0.0
+def shape_of(pixels):
+    """The shape in an image of collected_shapes.csv, given as a text of 196 digits."""
+    # TODO: train a network on the images of the file, and ask it.
+    return "square"
 
 
 def responder(text):

@@ -1,0 +1,73 @@
+"""Notes which statements of a student's files are run, each when it is run for the first time.
+
+Before each statement stands a look at a table, which tells of what it does not have yet. Lines stay as they are.
+"""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Callable, Iterator
+from types import CodeType
+from typing import Any
+
+from .frames import Frame
+
+_TABLE = "__ran__"
+_LONGEST_LINE = 1_000_000
+_DEEPEST = 30_000
+_BLOCKS = ("body", "orelse", "finalbody")
+
+
+class StatementWatch:
+    """Compiles files, and sends a frame for each statement of them that is run; ``main`` is the file that is run."""
+
+    def __init__(self, send: Callable[[Frame], None], main: str) -> None:
+        self._send = send
+        self._main = main
+
+    def compile(self, text: str, name: str, namespace: dict[str, Any]) -> CodeType:
+        """Code of a whole file that is going to be run in ``namespace``. The file compiles as it is."""
+        namespace[_TABLE] = _Table(self._send, None if name == self._main else name)
+        limit = sys.getrecursionlimit()
+        # A tree takes deeper calls than the text that it is of.
+        sys.setrecursionlimit(_DEEPEST)
+        try:
+            tree = ast.parse(text, name)
+            for block in list(_blocks(tree)):
+                block[:] = [each for statement in block for each in (*_mark(statement), statement)]
+            return compile(tree, name, "exec", dont_inherit=True)
+        finally:
+            sys.setrecursionlimit(limit)
+
+
+class _Table(dict[int, None]):
+    """The statements of one file that have been run, by line and column in one number."""
+
+    def __init__(self, send: Callable[[Frame], None], file: str | None) -> None:
+        self._send, self._file = send, file
+
+    def __missing__(self, place: int) -> None:
+        self[place] = None
+        line, column = divmod(place, _LONGEST_LINE)
+        self._send({"do": "ran", "file": self._file, "line": line, "column": column})
+
+
+def _blocks(tree: ast.Module) -> Iterator[list[ast.stmt]]:
+    for node in ast.walk(tree):
+        for name in _BLOCKS:
+            block = getattr(node, name, None)
+            if isinstance(block, list):
+                yield block
+
+
+def _mark(statement: ast.stmt) -> Iterator[ast.stmt]:
+    """A look at the table, but where nothing may stand before the statement."""
+    match statement:
+        case ast.ImportFrom(module="__future__") | ast.Expr(value=ast.Constant(value=str())):
+            return
+    place = ast.Constant(statement.lineno * _LONGEST_LINE + statement.col_offset)
+    look = ast.Expr(ast.Subscript(ast.Name(_TABLE, ast.Load()), place, ast.Load()))
+    for node in ast.walk(look):
+        ast.copy_location(node, statement)
+    yield look

@@ -1,0 +1,80 @@
+"""Run a robot program without marking it, and read the replays of runs and grades."""
+
+from __future__ import annotations
+
+import base64
+import os
+import re
+import zlib
+from pathlib import Path
+from typing import Any
+
+from service.grading import standalone
+from service.grading.standalone import RunOptions
+from service.grading.trial_runner import TrialRunner
+from service.reports.replay.document import FORMAT
+from sim.errors import UsageError
+from sim.readers.json_text import read_json
+from sim.recording import Recording
+from submissions.magics import parse_flags
+
+_ISLAND = re.compile(rb'<script type="application/json">(.*?)</script>')
+_MOST_BYTES = 256 << 20
+_MOST_VALUES = 20_000_000
+
+
+def run_program(
+    path: str | os.PathLike[str],
+    flags: str = "",
+    *,
+    responder: str | None = None,
+    seconds: float = 60.0,
+    seed: int = 0,
+) -> Recording:
+    """Run a robot program in the sandbox and return everything that happened.
+
+    Args:
+        path: The robot program, a ``.py`` file.
+        flags: Flags of ``%sim_magic`` in the place of those in the program's first line: ``-b Lollipop -x 400``.
+        responder: ``FILE`` or ``FILE:NAME`` that answers the program's messages.
+        seconds: How much simulated time it may take.
+        seed: Of everything that is left to chance.
+
+    Raises:
+        UsageError: a file cannot be read, or a flag has a wrong value.
+        HostError: this machine cannot run student code safely, or fails.
+    """
+    options = RunOptions(flags=parse_flags("sim_magic", flags), seconds=seconds, seed=seed)
+    answering = None if responder is None else standalone.find_responder(responder, options.limits)
+    with TrialRunner() as runner:
+        program = standalone.read_program(Path(path))
+        return standalone.run_program(program, options, runner, responder=answering).recording
+
+
+def read_replay(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The data of a replay or a report, from its page or its ``.json``, as ``docs/replay.md`` describes it.
+
+    Raises:
+        UsageError: the file cannot be read, or is no replay.
+    """
+    file = Path(path)
+    content = standalone.read_file(file)
+    try:
+        data = read_json(content if file.suffix.lower() == ".json" else _unpacked(content), most_values=_MOST_VALUES)
+    except (ValueError, KeyError, TypeError, zlib.error) as error:
+        raise UsageError(f"{file} is not a replay; expected a file that --replay or --report has written") from error
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise UsageError(f"{file} is not a replay; expected a file that --replay or --report has written")
+    return data
+
+
+def _unpacked(page: bytes) -> bytes:
+    """The data of a page. Raises ValueError, KeyError, TypeError or zlib.error where the page is no replay."""
+    found = _ISLAND.search(page)
+    if found is None:
+        raise ValueError("the page has no data")
+    unpack = zlib.decompressobj()
+    data = unpack.decompress(base64.b64decode(read_json(found[1])["deflated"]), _MOST_BYTES)
+    if unpack.unconsumed_tail:
+        raise ValueError(f"the page has more than {_MOST_BYTES >> 20} MB of data")
+    return data

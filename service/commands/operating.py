@@ -1,0 +1,66 @@
+"""What a command acts with: the installation, and its user as the operator of the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from service.settings import Settings, load_settings
+
+if TYPE_CHECKING:
+    from service.operations.context import Actor, Service
+    from service.queue.notifier import Notifier
+    from service.store.engine import Store
+    from service.store.states import Lane
+
+
+@contextmanager
+def operating() -> Iterator[tuple[Service, Actor]]:
+    """The installation, open meanwhile, and the user of this command as its operator."""
+    from service.operations.context import Actor, Service
+    from service.store import audit
+    from service.store.engine import open_store
+
+    settings = load_settings()
+    with open_store(settings) as store:
+        yield Service(settings, store, _LateNotifier(settings, store)), Actor(audit.this_user(), operator=True)
+
+
+@dataclass(frozen=True, slots=True)
+class _LateNotifier:
+    """The notifier of the workers, which loads the queue when there is something to notify for.
+
+    Without a named broker and with no service running in the home nobody is notified: workers that start later look
+    for waiting jobs themselves.
+    """
+
+    settings: Settings
+    store: Store
+
+    def grade(self, lane: Lane, count: int = 1) -> None:
+        if count > 0 and (notifier := self._notifier()):
+            notifier.grade(lane, count)
+
+    def try_out(self, count: int = 1) -> None:
+        if count > 0 and (notifier := self._notifier()):
+            notifier.try_out(count)
+
+    def plot(self, count: int = 1) -> None:
+        if count > 0 and (notifier := self._notifier()):
+            notifier.plot(count)
+
+    def _notifier(self) -> Notifier | None:
+        from service.queue.broker import broker_answers, broker_url
+        from service.queue.celery_app import make_celery
+        from service.queue.logs import configure_logging
+        from service.queue.notifier import Notifier
+
+        settings = self.settings
+        if not settings.broker_url:
+            if not broker_answers(settings):
+                return None
+            settings = settings.with_broker(broker_url(settings))
+        configure_logging(settings.log_level)
+        return Notifier(make_celery(settings), self.store, settings)

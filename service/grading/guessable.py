@@ -1,0 +1,47 @@
+"""Finds criteria that a program passes at most poses without a look, because these poses share one answer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from service.grading.judging.entries import Row, are_alike
+from service.grading.judging.geometry import sensor_at
+from service.grading.judging.reporting import NO_LABEL, row_of_label
+from sim.floors import floor, seeded_names
+from sim.robot import ROBOTS
+from submissions.assignment.definition import Assignment
+from submissions.criteria.reporting import Reports
+
+
+def find_guessable_reports(assignment: Assignment) -> Iterator[str]:
+    """Yield a sentence for each ``reports`` criterion of which one row fits more than half of the poses.
+
+    A criterion with the same row for all poses, or with no rows of its own, does not count: it asks for no difference.
+    """
+    for criterion in assignment.criteria:
+        if not isinstance(criterion, Reports):
+            continue
+        rows = _labels(assignment, criterion) if criterion.expected == "label" else criterion.expected
+        what = "label of the floor" if criterion.expected == "label" else "entry of expected"
+        counts = (sum(are_alike(row, other, criterion.leeway) for other in rows) for row in set(rows))
+        most = max(counts, default=0)
+        if len(rows) < 2 * most < 2 * len(rows):
+            yield (
+                f'criterion "{criterion.id}": one {what} fits {most} of the {len(rows)} poses, '
+                "so a constant text passes there; choose poses of which at most half have the same answer"
+            )
+
+
+def _labels(assignment: Assignment, criterion: Reports) -> Sequence[Row]:
+    """Return the row of each pose; none where each trial has a floor of its own, or the floor has no labels."""
+    world = assignment.world
+    if world.image is not None or (world.sheet is None and world.background in seeded_names()):
+        return ()
+    ground = floor(world.background, labels=world.labels, seed=world.sheet or 0)
+    sensor = ROBOTS[world.robot].left_light
+    return [
+        row_of_label(ground.label_at(*sensor_at(sensor, pose)) or NO_LABEL)
+        for scenario in assignment.scenarios
+        if not criterion.scenarios or scenario.id in criterion.scenarios
+        for pose in (scenario.poses if criterion.robot == 1 else scenario.second_poses)
+    ]

@@ -1,0 +1,185 @@
+"""Hints on objects that the responder answers: another key, another value's number, None, a text for a number.
+
+They compare what was answered with what a criterion that lost marks asks for.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import re
+from collections.abc import Iterator
+
+from responders.message_format import JSON
+from service.grading.grade import CriterionResult
+from service.grading.hint_clues import Clues
+from service.grading.hint_code import joined
+from service.grading.hint_rules import RETURNS, where_returned
+from service.grading.judging.words import quoted
+from sim.readers.json_text import read_json
+from sim.readers.unreadable import Unreadable
+from submissions.criteria.coping import FreshAnswers, Resends
+from submissions.criteria.logged import ImageLog
+from submissions.criteria.replies import Replies
+from submissions.criteria.reporting import Reports
+
+_KEY = re.compile(r"""["'](\w{2,40})["']\s*:""")
+_NO_KEY = re.compile(r"KeyError: '([^']+)'")
+_AFTER = re.compile(r'"([^"]+)" did not come after "(\w+)"')
+_NOTHING = re.compile(r"\bNone\b|\bnull\b")
+_TEXT_NUMBER = re.compile(r'"(\w+)"\s*:\s*"(-?\d+(?:\.\d+)?)"')
+_IMAGE_LOG = re.compile(r"image_data (?:left|right|both)\Z")
+_NEAR = 0.6
+
+
+def of_other_keys(clues: Clues) -> Iterator[str]:
+    """A key that no answer has, where the answers have one like it or others in its place."""
+    for criterion in clues.lost:
+        path = (criterion.path or "") if isinstance(criterion, Replies) else ""
+        wanted = path.rpartition(".")[2]
+        for answer in clues.answers if path else ():
+            there = _keys_beside(answer, path)
+            if there and not any(wanted in _keys_beside(each, path) for each in clues.answers):
+                keys = " and ".join(map(quoted, there[:3]))
+                line = _line_of_key(there, clues) or where_returned(answer, clues, RETURNS)
+                yield f"{line}: the answer has {keys}; expected the key {quoted(wanted)}"
+                return
+    yield from _near_keys(clues)
+
+
+def of_missing_key(clues: Clues) -> Iterator[str]:
+    """A key that the assignment asks for and the robot looks for, and that no answer has."""
+    missing = (_NO_KEY.match(fault.message) for fault in clues.faults if fault.who == "program")
+    key = next((found[1] for found in missing if found), "")
+    if not key or f'"{key}"' not in clues.task or clues.missing == "responder":
+        return
+    given = list(dict.fromkeys(each for answer in clues.answers for each in _KEY.findall(answer)))
+    near = difflib.get_close_matches(key.casefold(), [each.casefold() for each in given], 1, _NEAR)
+    other = next((each for each in given if each.casefold() in near and f'"{each}"' not in clues.task), "")
+    line = _line_of_key([other], clues) if other and key not in given else ""
+    if line:
+        yield f"{line} answers the key {quoted(other)}; the assignment asks for {quoted(key)}. Write {quoted(key)}"
+
+
+def of_none_answers(clues: Clues) -> Iterator[str]:
+    """An answer with None in it, and the one line that returns None."""
+    answer = next((each for each in clues.answers if _NOTHING.search(each)), None)
+    if answer is None or not any(isinstance(each, Replies) for each in clues.lost):
+        return
+    found = [
+        (listing, each)
+        for listing in clues.answering
+        for each in listing.code.statements
+        if each.tokens in (("return", "None"), ("return",))
+    ]
+    if len(found) != 1:
+        return
+    listing, each = found[0]
+    condition = next((one for one in listing.code.around(each) if one.keyword in ("if", "elif")), None)
+    if condition is not None:
+        yield (
+            f"{listing.at(each.line)} returns None, and the answer was {quoted(answer)}. Check the condition in line "
+            f"{condition.line}: {joined(condition.condition)}"
+        )
+
+
+def of_swapped_values(clues: Clues) -> Iterator[str]:
+    """A number that another key of the answer has."""
+    reports = {each.id for each in clues.lost if isinstance(each, Reports) and each.source == "reply"}
+    for result in clues.results:
+        asked = _AFTER.search(_messages(result)) if result.id in reports else None
+        for answer in clues.answers if asked else ():
+            values = _object_of(answer)
+            number, key = asked.groups() if asked else ("", "")
+            other = next((each for each, value in values.items() if each != key and str(value) == number), None)
+            if other is None or key not in values or str(values[key]) == number:
+                continue
+            where = _line_of_key([key], clues)
+            if where:
+                yield (
+                    f"{where}: {quoted(key)} is {values[key]}; expected {number}, which {quoted(other)} has. "
+                    f"Check the values of {quoted(key)} and {quoted(other)}: they may be swapped"
+                )
+                return
+
+
+def of_text_numbers(clues: Clues) -> Iterator[str]:
+    """A number that is sent as a text, where the program compares it with a number."""
+    if not any(isinstance(each, Resends | FreshAnswers | Replies) for each in clues.lost):
+        return
+    for answer in clues.answers:
+        found = _TEXT_NUMBER.search(answer) if answer.startswith(JSON) else None
+        if found is None:
+            continue
+        key = found[1]
+        compared = re.compile(rf"""\[["']{key}["']\]\s*(?:==|!=|<|>)(?!\s*["'])""")
+        place = next((each for each in clues.programs if each.find(compared)), None)
+        if place is not None:
+            yield (
+                f"{_line_of_key([key], clues) or 'responder.py'} sends {quoted(key)} as the text {quoted(found[2])}, "
+                f"and {place.at(place.find(compared))} compares it with a number. Write int(...) around the text"
+            )
+            return
+
+
+def of_image_command(clues: Clues) -> Iterator[str]:
+    """A text that is nearly ``image_data left``."""
+    if not any(isinstance(each, ImageLog) for each in clues.lost):
+        return
+    for text in clues.printed:
+        near = difflib.SequenceMatcher(None, text.casefold(), "image_data left").ratio()
+        if near >= 0.75 and not _IMAGE_LOG.match(text) and "logged..." not in text:
+            where = clues.where("program", re.compile(re.escape(text)))
+            side = next((each for each in ("right", "both") if each in text), "left")
+            yield f'{where} prints {quoted(text)}, which logs no image; expected "image_data {side}"'
+            return
+
+
+def _near_keys(clues: Clues) -> Iterator[str]:
+    """A key that is asked for within a text, as in ``"'typ': 'PY'"``."""
+    for criterion in clues.lost:
+        texts = criterion.contains if isinstance(criterion, Replies) else ()
+        wanted = {key for text in texts for key in _KEY.findall(text)}
+        there = {key for answer in clues.answers for key in _KEY.findall(answer)}
+        for key in sorted(wanted - there):
+            near = difflib.get_close_matches(key, sorted(there - wanted), 1, _NEAR)
+            line = _line_of_key(near, clues) if near else ""
+            if line:
+                yield f"{line} writes the key {quoted(near[0])}; expected {quoted(key)}"
+                return
+
+
+def _keys_beside(answer: str, path: str) -> list[str]:
+    """The keys that an answer has where the last key of the path is to be."""
+    value = _parsed(answer)
+    for key in path.split(".")[:-1]:
+        value = value.get(key) if isinstance(value, dict) else None
+    return [str(key) for key in value] if isinstance(value, dict) else []
+
+
+def _object_of(answer: str) -> dict[str, object]:
+    """The innermost object of an answer that has numbers."""
+    value = _parsed(answer)
+    while isinstance(value, dict) and len(value) == 1:
+        value = next(iter(value.values()))
+    return {str(key): each for key, each in value.items()} if isinstance(value, dict) else {}
+
+
+def _parsed(answer: str) -> object:
+    with contextlib.suppress(ValueError, Unreadable):
+        return read_json(answer.removeprefix(JSON)) if answer.startswith(JSON) else None
+    return None
+
+
+def _line_of_key(keys: list[str], clues: Clues) -> str:
+    """The line of a responder that writes one of the keys."""
+    for listing in clues.answering:
+        for key in keys:
+            line = listing.find(re.compile(rf"""["']{re.escape(key)}["']\s*:"""))
+            if line is not None:
+                return listing.at(line)
+    return ""
+
+
+def _messages(result: CriterionResult) -> str:
+    return " ".join((result.message, *(each.message for each in result.evidence)))

@@ -1,0 +1,38 @@
+"""Hints on texts that went out with their braces: the f before the quotes is missing.
+
+They need a text that was printed, said, sent or answered, and a name in its braces that the submission defines.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from service.grading.hint_clues import Clues
+
+_BRACES = re.compile(r"\{([A-Za-z_]\w*)[^{}\"']{0,40}\}")
+_PLAIN_TEXT = re.compile(r"""[bru]?["']""", re.IGNORECASE)
+_LONGEST = 60
+
+
+def of_braces(clues: Clues) -> Iterator[str]:
+    """The line with the text that was meant as an f-string."""
+    if not clues.lost:
+        return
+    texts = (*clues.printed, *clues.spoken, *clues.sent, *clues.answers)
+    found = {each[0]: each[1] for text in texts for each in _BRACES.finditer(text)}
+    names = {
+        name for listing in clues.texts for each in listing.code.statements for name in (*each.bound, *each.tokens)
+    }
+    for listing in clues.texts:
+        for statement in listing.code.statements:
+            for token in statement.tokens:
+                braces = next((each for each, name in found.items() if each in token and name in names), None)
+                if braces is None or not _PLAIN_TEXT.match(token) or "format" in statement.tokens:
+                    continue
+                fixed = f"f{token}" if len(token) <= _LONGEST else "f before the first quote"
+                yield (
+                    f"{listing.at(statement.line)}: the f before the quotes is missing, so {braces} stays as it is "
+                    f"and is not replaced by its value. Write {fixed}"
+                )
+                return

@@ -1,0 +1,289 @@
+"""The statements of a student's text, as hints need them: their lines, indents and tokens, and what contains what.
+
+Texts are only split into tokens, by the standard library's tokenizer in Python, and never parsed or run.
+"""
+
+from __future__ import annotations
+
+import io
+import itertools
+import re
+import tokenize
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+_SKIPPED = frozenset({tokenize.COMMENT, tokenize.NL, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER})
+_NAME = re.compile(r"[^\W\d]\w*\Z")
+_MAGIC = re.compile(r"^\s*[%!]")
+_MOST_STATEMENTS, _MOST_TOKENS = 3000, 400
+LOOPS = frozenset({"while", "for"})
+_OPENING, _CLOSING = frozenset("([{"), frozenset(")]}")
+
+
+@dataclass(frozen=True, slots=True)
+class Called:
+    """One call in a statement: ``name`` is dotted, ``arguments`` are the tokens of each argument."""
+
+    name: str
+    arguments: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """One logical line. ``line`` counts from 1; ``tokens`` are without comments; ``last_line`` is where it ends.
+
+    ``number`` is its index in the code, ``parent`` that of the statement whose body it is in, -1 where there is none.
+    ``columns`` are where the tokens begin in their lines.
+    """
+
+    line: int
+    last_line: int
+    indent: int
+    tokens: tuple[str, ...]
+    number: int = 0
+    parent: int = -1
+    columns: tuple[int, ...] = ()
+
+    @property
+    def keyword(self) -> str:
+        """The first token."""
+        return self.tokens[0]
+
+    @property
+    def has_body(self) -> bool:
+        """Whether indented statements belong to it."""
+        return ":" in self.tokens and self.keyword in _WITH_BODY
+
+    @property
+    def condition(self) -> tuple[str, ...]:
+        """The tokens between the keyword and the colon of ``while`` or ``if``."""
+        end = len(self.tokens) - 1 - self.tokens[::-1].index(":") if ":" in self.tokens else len(self.tokens)
+        return self.tokens[1:end]
+
+    @property
+    def target(self) -> str:
+        """The single name that it assigns; empty where it assigns none."""
+        return self.tokens[0] if len(self.tokens) > 2 and self.tokens[1] == "=" and is_name(self.tokens[0]) else ""
+
+    @property
+    def bound(self) -> frozenset[str]:
+        """The names that it binds, by any kind of assignment, definition, import or loop."""
+        return frozenset(_bound(self.tokens))
+
+    @property
+    def calls(self) -> tuple[Called, ...]:
+        """The calls in it, from the left."""
+        return tuple(_calls(self.tokens)) if self.keyword not in ("def", "class") else ()
+
+    def has(self, *names: str) -> bool:
+        """Whether one of the names is among the tokens."""
+        return any(name in self.tokens for name in names)
+
+
+_WITH_BODY = frozenset({"while", "for", "if", "elif", "else", "def", "class", "with", "try", "except", "finally"})
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """The statements of one text, in order."""
+
+    statements: tuple[Statement, ...] = ()
+
+    def at(self, line: int | None) -> Statement | None:
+        """The statement that a line belongs to."""
+        if line is None:
+            return None
+        return next((each for each in self.statements if each.line <= line <= each.last_line), None)
+
+    def body(self, head: Statement) -> tuple[Statement, ...]:
+        """The statements inside a loop, condition or function."""
+        found = []
+        for each in self.after(head):
+            if each.indent <= head.indent:
+                break
+            found.append(each)
+        return tuple(found)
+
+    def after(self, statement: Statement) -> tuple[Statement, ...]:
+        """The statements below one."""
+        return self.statements[statement.number + 1 :]
+
+    def next_outside(self, head: Statement) -> Statement | None:
+        """The first statement below the body of ``head``."""
+        below = self.after(head)[len(self.body(head)) :]
+        return below[0] if below else None
+
+    def around(self, statement: Statement) -> tuple[Statement, ...]:
+        """The statements whose bodies contain it, the innermost first."""
+        found: list[Statement] = []
+        parent = statement.parent
+        while parent >= 0:
+            found.append(self.statements[parent])
+            parent = found[-1].parent
+        return tuple(found)
+
+    def loops_around(self, statement: Statement) -> tuple[Statement, ...]:
+        """The loops that it is in, itself among them, the innermost first; then those that call its function."""
+        around = self.around(statement)
+        loops = [each for each in (statement, *around) if each.keyword in LOOPS]
+        function = next((each.tokens[1] for each in around if each.keyword == "def" and len(each.tokens) > 1), "")
+        if function:
+            callers = (each for each in self.statements if any(call.name == function for call in each.calls))
+            loops += [outer for each in callers for outer in self.around(each) if outer.keyword in LOOPS]
+        return tuple(loops)
+
+    def functions(self) -> Iterator[Statement]:
+        """The heads of its functions."""
+        return (each for each in self.statements if each.keyword == "def" and len(each.tokens) > 1)
+
+    def number(self, tokens: Sequence[str]) -> float | None:
+        """The number that an argument is, also by way of a name that is assigned once."""
+        sign = -1.0 if tokens and tokens[0] == "-" else 1.0
+        tokens = tokens[1:] if sign < 0 else tokens
+        if len(tokens) > 3 and tokens[0].startswith("Speed") and tokens[1] == "(":
+            return self.number(tokens[2:-1])
+        if len(tokens) != 1:
+            return None
+        if is_name(tokens[0]):
+            given = [each for each in self.statements if each.target == tokens[0]]
+            if len(given) != 1 or len(given[0].tokens) != 3 or is_name(given[0].tokens[2]):
+                return None
+            tokens = given[0].tokens[2:]
+        return _as_number(tokens[0], sign)
+
+
+def read_code(lines: Sequence[str]) -> Code:
+    """Split a text into statements; what the tokenizer cannot take ends them. Magic lines are left out."""
+    text = "\n".join("#" if _MAGIC.match(line) else line for line in lines) + "\n"
+    found: list[Statement] = []
+    open_blocks: list[Statement] = []
+    for number, each in enumerate(itertools.islice(_statements(text), _MOST_STATEMENTS)):
+        while open_blocks and open_blocks[-1].indent >= each.indent:
+            open_blocks.pop()
+        found.append(replace(each, number=number, parent=open_blocks[-1].number if open_blocks else -1))
+        open_blocks.append(found[-1])
+    return Code(tuple(found))
+
+
+def result_of(body: Sequence[Statement]) -> str:
+    """The name that a function without return was probably to return: what is fitted, else what is assigned last."""
+    fitted = [call.name.removesuffix(".fit") for each in body for call in each.calls if call.name.endswith(".fit")]
+    assigned = [each.target for each in body if each.target]
+    return next(iter((*fitted, *assigned[::-1])), "")
+
+
+def is_name(token: str) -> bool:
+    """Whether a token is a name or a keyword."""
+    return _NAME.match(token) is not None
+
+
+def joined(tokens: Sequence[str]) -> str:
+    """The tokens as code that can be shown."""
+    text = ""
+    for before, token in zip(("", *tokens), tokens, strict=False):
+        tight = token in ".,:)]}" or before in "([{." or (token in "([" and (is_name(before) or before in (")", "]")))
+        text += token if tight or not before else f" {token}"
+    return text
+
+
+def depths(tokens: Sequence[str]) -> list[int]:
+    """How many brackets each token is in; a bracket itself is outside of its own."""
+    found, depth = [], 0
+    for token in tokens:
+        depth -= token in _CLOSING
+        found.append(depth)
+        depth += token in _OPENING
+    return found
+
+
+def _statements(text: str) -> Iterator[Statement]:
+    tokens: list[tokenize.TokenInfo] = []
+    try:
+        for token in tokenize.generate_tokens(io.StringIO(text).readline):
+            if token.type == tokenize.NEWLINE:
+                if tokens:
+                    yield from _statement(tokens)
+                tokens = []
+            elif token.type not in _SKIPPED:
+                tokens.append(token)
+    except (tokenize.TokenError, SyntaxError):
+        return
+
+
+def _statement(tokens: list[tokenize.TokenInfo]) -> Iterator[Statement]:
+    """The statements of one logical line; semicolons and a body on the same line split it."""
+    tokens = tokens[:_MOST_TOKENS]
+    first, words = tokens[0], [token.string for token in tokens]
+    indent, depth, begin = first.start[1], 0, 0
+    for place, word in enumerate(words):
+        depth += (word in _OPENING) - (word in _CLOSING)
+        ends = word == ";" or (word == ":" and words[begin] in _WITH_BODY and place + 1 < len(words))
+        if depth or not ends or words[begin] == "lambda":
+            continue
+        yield _made(tokens[begin : place + (word == ":")], indent)
+        indent, begin = indent + (word == ":"), place + 1
+    if begin < len(words):
+        yield _made(tokens[begin:], indent)
+
+
+def _made(tokens: list[tokenize.TokenInfo], indent: int) -> Statement:
+    words, columns = (token.string for token in tokens), (token.start[1] for token in tokens)
+    return Statement(tokens[0].start[0], tokens[-1].end[0], indent, tuple(words), columns=tuple(columns))
+
+
+def _bound(tokens: tuple[str, ...]) -> Iterator[str]:
+    match tokens:
+        case ("def" | "class" | "global", name, *_):
+            yield name
+        case ("import" | "from", *rest):
+            names = rest[rest.index("import") + 1 :] if tokens[0] == "from" and "import" in rest else rest
+            for place, name in enumerate(names):
+                renamed = place + 1 < len(names) and names[place + 1] == "as"
+                if is_name(name) and name != "as" and not renamed:
+                    yield name
+        case ("for", *rest):
+            yield from filter(is_name, rest[: rest.index("in")] if "in" in rest else rest)
+    depth = 0
+    for place, token in enumerate(tokens):
+        depth += (token in _OPENING) - (token in _CLOSING)
+        if token == ":=" and place:
+            yield tokens[place - 1]
+        if depth == 0 and token.endswith("=") and token not in ("==", "!=", "<=", ">=", ":="):
+            yield from _targets(tokens[:place])
+
+
+def _targets(tokens: Sequence[str]) -> Iterator[str]:
+    if all(is_name(token) or token in ".,()=[]" or token[0].isdigit() or token[0] in "\"'" for token in tokens):
+        yield from (
+            token for place, token in enumerate(tokens) if is_name(token) and tokens[place - 1 : place] != (".",)
+        )
+
+
+def _calls(tokens: Sequence[str]) -> Iterator[Called]:
+    for place, token in enumerate(tokens[:-1]):
+        if tokens[place + 1] != "(" or not is_name(token) or token in ("and", "or", "not", "in", "if", "while"):
+            continue
+        begin = place
+        while begin >= 2 and tokens[begin - 1] == "." and is_name(tokens[begin - 2]):
+            begin -= 2
+        yield Called("".join(tokens[begin : place + 1]), tuple(_arguments(tokens[place + 2 :])))
+
+
+def _arguments(tokens: Sequence[str]) -> Iterator[tuple[str, ...]]:
+    depth, begin = 0, 0
+    for place, token in enumerate(tokens):
+        if token in _CLOSING and depth == 0:
+            if place > begin:
+                yield tuple(tokens[begin:place])
+            return
+        depth += (token in _OPENING) - (token in _CLOSING)
+        if token == "," and depth == 0:
+            yield tuple(tokens[begin:place])
+            begin = place + 1
+
+
+def _as_number(token: str, sign: float) -> float | None:
+    try:
+        return sign * float(token)
+    except ValueError:
+        return None

@@ -1,0 +1,299 @@
+"""Hints on errors: the first error of each trial and of a notebook's cells, with what to do about it.
+
+The advice comes from ``hint_advice.py``'s table, or from what the submission has where only that tells the fix.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import PurePosixPath
+
+from service.grading.hint_advice import ADVICE, NOT_AVAILABLE, PROPERTIES, USAGE
+from service.grading.hint_clues import Clues, Listing, listing_of, place_of
+from service.grading.hint_code import Statement, joined
+from service.grading.hint_motion import loops_that_end_at_once
+from service.grading.hint_names import (
+    NO_NAME,
+    PRELOADED,
+    of_constant,
+    of_later_cell,
+    of_later_line,
+    of_other_process,
+    of_overwritten,
+    of_owner,
+)
+from service.grading.hint_rules import RETURNS, where_returned
+from service.grading.hint_syntax import of_syntax
+from service.grading.judging.words import quoted
+from sim.recorded import faults_of
+from sim.recording import Fault, Verdict
+from submissions.raw_files import shown
+
+_NO_ERRORS = (Verdict.TIME_LIMIT, Verdict.CPU_LIMIT, Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
+_MOST_ERRORS, _LONGEST_ERROR = 3, 300
+_NO_FILE = re.compile(r"FileNotFoundError: \[Errno 2\] No such file or directory: '([^']+)'")
+_NO_ACCESS = re.compile(r"^PermissionError|Permission denied|may only open files")
+_NO_KEY = re.compile(r"KeyError: '([^']+)'")
+_NULL = re.compile(r"^JSON::.*\bnull\b")
+_NOT_CALLABLE = re.compile(r"TypeError: '(\w+)' object is not callable")
+_TOO_FEW = re.compile(r"TypeError: (?:\w+\.)*(\w+)\(\) (?:missing|takes)")
+_NO_MODULE = re.compile(r"ModuleNotFoundError: No module named '([\w.]+)'")
+_UNPACKED = re.compile(r"ValueError: (?:too many|not enough) values to unpack")
+_LIBRARIES = ("joblib", "numpy", "pandas", "sklearn")
+_LABELS = re.compile(r"label|target|\by\b|y_train", re.IGNORECASE)
+#: Why a message was lost for good: no wait helps.
+_OUT_OF_REACH = {
+    "out of range": "was out of range. Drive nearer before you send",
+    "facing away": "faced away. Turn to the receiver before you send",
+    "blocked": "was behind an obstacle. Drive around it before you send",
+}
+_TEXT = re.compile(r"""(["'])((?:(?!\1).){1,200})\1""")
+#: Values that an error prints at length; nobody reads them.
+_VALUES = re.compile(r"(?:, got 1D array instead)?:?\s*\n.*|array=.*|: line \d+ column \d+ \(char \d+\)", re.DOTALL)
+_KEY = re.compile(r"""["'](\w{2,40})["']\s*:""")
+#: A guess of Python's that a surer advice replaces.
+_GUESS = re.compile(r"\. Perhaps you forgot a comma\?$")
+#: What a module that is not there leaves to choose from.
+_MODULES = re.compile(r"(?<='): numpy, .* are there$")
+_NEAR_KEY, _NEAR_MODULE = 0.6, 0.8
+
+
+def of_cell_errors(clues: Clues) -> Iterator[str]:
+    """The first cell of a notebook that failed, where something failed later: that came of it."""
+    if any(fault.verdict not in _NO_ERRORS for fault in clues.faults):
+        yield from _of_cells(clues)
+
+
+def of_other_cell_errors(clues: Clues) -> Iterator[str]:
+    """The first cell that failed, where nothing else did."""
+    if clues.lost:
+        yield from _of_cells(clues)
+
+
+def of_errors(clues: Clues) -> Iterator[str]:
+    """The first error of a trial in its own words, with what was probably meant."""
+    firsts = (faults[0] for recording in clues.recordings if (faults := faults_of(recording)))
+    for fault in list(dict.fromkeys(replace(each, t=0.0) for each in firsts))[:_MOST_ERRORS]:
+        if fault.verdict not in _NO_ERRORS:
+            yield from _of_error(fault, clues)
+
+
+def _of_cells(clues: Clues) -> Iterator[str]:
+    for fault in clues.cell_errors[:1]:
+        yield from _of_error(fault, clues)
+
+
+def _of_error(fault: Fault, clues: Clues) -> Iterator[str]:
+    where = place_of(fault, clues)
+    if not where:
+        return
+    name = NO_NAME.match(fault.message)
+    if name and fault.who == "program" and clues.preamble != "preloaded" and name[1] in PRELOADED:
+        yield (
+            f"{where} uses {name[1]}, which %%sim_magic_preloaded brings; expected that magic in the first line, "
+            "or the name to be defined"
+        )
+        return
+    yield f"{where}: {advised(fault, clues)}"
+
+
+def advised(fault: Fault, clues: Clues) -> str:
+    """An error in its own words, and what to do about it."""
+    sentence = _VALUES.sub("", fault.message)[:_LONGEST_ERROR].rstrip(".")
+    advice = advice_on(fault, clues)
+    if not advice:
+        return sentence
+    sentence = _MODULES.sub("", _GUESS.sub("", sentence))
+    return f"{sentence}{'' if sentence.endswith('?') else '.'} {advice}"
+
+
+def advice_on(fault: Fault, clues: Clues) -> str:
+    """What to do about an error; empty where nothing is known of it."""
+    listing = listing_of(fault, clues)
+    statement = None if listing is None else listing.code.at(fault.line)
+    for adviser in _ADVISERS:
+        advice = adviser(fault, clues, listing, statement)
+        if advice:
+            return advice
+    return ""
+
+
+def _of_null(fault: Fault, clues: Clues, *_: object) -> str:
+    """A value that the responder has sent as null."""
+    answer = next((text for text in clues.answers if _NULL.search(text)), None)
+    if fault.who != "program" or "'NoneType' object" not in fault.message or answer is None:
+        return ""
+    where = where_returned(answer, clues, RETURNS)
+    return f"The responder answered {quoted(answer)}: check why {where} is reached, and its condition."
+
+
+def _of_lost_message(fault: Fault, clues: Clues, _: Listing | None, statement: Statement | None) -> str:
+    """An answer that never came, because the channel lost what was sent."""
+    empty = "IndexError" in fault.message and statement is not None and statement.has("pyState", "messages")
+    lost = next((each for each in clues.messages if each.lost in _OUT_OF_REACH), None)
+    if fault.who != "program" or not empty or lost is None or clues.answers:
+        return ""
+    why = f"{quoted(lost.text)} was lost, because the robot {_OUT_OF_REACH[lost.lost]}"
+    ended = next((found for found, _ in loops_that_end_at_once(clues)), "") if clues.stood_still else ""
+    return f"No answer came: {why}.{ended and ' It never moved. In '}{ended}"
+
+
+def _of_module(fault: Fault, clues: Clues, *_: object) -> str:
+    """A module that is an agent, that only robot programs have, or that nobody has here."""
+    found = _NO_MODULE.match(fault.message)
+    if found is None:
+        return ""
+    name = found[1].partition(".")[0]
+    if name in clues.agents:
+        return f"{name}.py is an agent, and agents are not imported: delete this line and call {name}(...)."
+    if name.startswith("ev3dev2") and fault.who == "responder":
+        return f"Only a robot program can import {name}: delete this line."
+    if name in NOT_AVAILABLE:
+        return f"{name} is not available here: delete this line and what uses it."
+    near = difflib.get_close_matches(name.lower(), [*_LIBRARIES, *sys.stdlib_module_names], 1, _NEAR_MODULE)
+    return f"Did you mean {near[0]}?" if near and not fault.hint else ""
+
+
+def _of_message_text(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
+    """A message that the responder uses as an object and has not decoded."""
+    if fault.who != "responder" or listing is None or statement is None:
+        return ""
+    if not fault.message.startswith("TypeError: string indices") or any(
+        each.has("loads", "literal_eval") for each in listing.code.statements
+    ):
+        return ""
+    return "The message is still a text: write json.loads(...) around the text after IMG_DATA:: or PY::."
+
+
+def _of_unpacking(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
+    """A property with three values that is given to two names."""
+    if statement is None or not _UNPACKED.match(fault.message) or "=" not in statement.tokens:
+        return ""
+    place = statement.tokens.index("=")
+    value = statement.tokens[-1]
+    if value == "rgb":
+        return f"rgb has three values: write red, green, blue = {joined(statement.tokens[place + 1 :])}."
+    names = sum(token == "," for token in statement.tokens[:place]) + 1
+    return f"There are {names} names to the left of =: write as many names as there are values."
+
+
+def _of_fit(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
+    """The labels where a network is to be given the images."""
+    if statement is None or "could not convert string to float" not in fault.message:
+        return ""
+    for call in statement.calls:
+        plain = [joined(each) for each in call.arguments if "=" not in each]
+        if call.name.endswith(".fit") and len(plain) == 2 and _LABELS.search(plain[0]) and not _LABELS.search(plain[1]):
+            return f"fit takes the images first and then the labels: write {call.name}({plain[1]}, {plain[0]})."
+    return ""
+
+
+def _of_steering(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
+    """The speed where the steering is to be."""
+    calls = () if statement is None or "SpeedPercent" not in fault.message else statement.calls
+    usage = next((USAGE[call.name] for call in calls if call.name.startswith("tank_turn.") and call.name in USAGE), "")
+    return f"The arguments are in the wrong order: write {usage}." if usage else ""
+
+
+def _of_missing_file(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
+    """A file that was not submitted, or that is named with a folder."""
+    found = _NO_FILE.search(fault.message)
+    if found:
+        file = PurePosixPath(found[1].replace("\\", "/")).name
+        if file in clues.files or file != found[1]:
+            return f'Files lie beside your program: submit {shown(file)} with it and write "{shown(file)}", no folder.'
+        if fault.hint:
+            return f"{fault.hint} Submit {shown(file)} with your program if that is the right name."
+        return f"There is no such file. Submit {shown(file)} with your program."
+    if not _NO_ACCESS.search(fault.message) or listing is None or fault.line is None:
+        return ""
+    for text in _TEXT.finditer("".join(listing.lines[fault.line - 1 : fault.line])):
+        if "/" in text[2] or "\\" in text[2]:
+            file = PurePosixPath(text[2].replace("\\", "/")).name
+            return f'Only files beside your program can be opened: write "{shown(file)}", without folders.'
+    return ""
+
+
+def _of_key(fault: Fault, clues: Clues, *_: object) -> str:
+    """A key that is nearly one of those that were sent, or that the submission writes."""
+    found = _NO_KEY.match(fault.message)
+    if not found:
+        return ""
+    texts = (*clues.answers, *clues.sent, *(line for each in clues.listings for line in each.lines))
+    keys = list(dict.fromkeys(key for text in texts for key in _KEY.findall(text) if key != found[1]))[:200]
+    near = difflib.get_close_matches(found[1], keys, 1, _NEAR_KEY)
+    if near:
+        return f'Did you mean "{near[0]}"?'
+    answer = next((text for text in reversed(clues.answers) if text.startswith("JSON::")), "")
+    if fault.who == "program" and answer:
+        return f"Nothing is stored under this key. The responder answered {quoted(answer)}: use one of its keys."
+    return "Nothing is stored under this key. Print the object to see its keys."
+
+
+def _of_call(fault: Fault, clues: Clues, listing: Listing | None, statement: Statement | None) -> str:
+    """What is called and cannot be: a property, or a name that was given another value."""
+    found = _NOT_CALLABLE.match(fault.message)
+    if found is None or statement is None or listing is None:
+        return ""
+    for call in statement.calls:
+        name = call.name.rpartition(".")[2]
+        if name in PROPERTIES and "." in call.name:
+            return f"{name} is a property: write it without brackets, {call.name}."
+        given = next((each for each in listing.code.statements if each.target == call.name), None)
+        if given is not None:
+            return (
+                f"Line {given.line} gives {call.name} another value: {joined(given.tokens)}. Choose another name there."
+            )
+    return "A sign such as * or a comma is missing before the bracket, or the name stands for a value."
+
+
+def _of_usage(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
+    """A call with too few or too many values, and how it is written."""
+    found = _TOO_FEW.match(fault.message)
+    if found is None or statement is None:
+        return ""
+    call = next((each for each in statement.calls if each.name.rpartition(".")[2] == found[1]), None)
+    usage = USAGE.get(call.name) if call is not None else None
+    return f"Write {usage}." if usage else ""
+
+
+def _of_hint(fault: Fault, *_: object) -> str:
+    """What the process itself has found: a name that is like this one."""
+    return fault.hint
+
+
+def _of_table(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
+    code = "" if listing is None else "".join(listing.lines[(fault.line or 0) - 1 : fault.line])
+    text = f"{fault.message}\n{code}"
+    found = ((error.search(text), advice) for error, advice in ADVICE)
+    return next((match.expand(advice) for match, advice in found if match), "")
+
+
+_Adviser = Callable[[Fault, Clues, Listing | None, Statement | None], str]
+#: The first that knows something is heard.
+_ADVISERS: Sequence[_Adviser] = (
+    of_syntax,
+    of_constant,
+    of_owner,
+    of_later_cell,
+    of_other_process,
+    of_later_line,
+    of_overwritten,
+    _of_lost_message,
+    _of_null,
+    _of_module,
+    _of_message_text,
+    _of_missing_file,
+    _of_key,
+    _of_call,
+    _of_usage,
+    _of_unpacking,
+    _of_steering,
+    _of_fit,
+    _of_hint,
+    _of_table,
+)

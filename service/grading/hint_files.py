@@ -1,0 +1,155 @@
+"""Hints on what is in the wrong place: parts with each other's content, a second definition, a second robot program.
+
+They look at the texts as a whole; what is wrong within one statement is in ``hint_slips.py``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+
+from service.grading.hint_advice import MOVES_FOR, MOVES_ON
+from service.grading.hint_clues import Clues, Listing
+from service.grading.hint_code import Statement
+from service.grading.hint_structure import DRIVEN, moves
+from submissions.assignment.folder import assignment_folder, catalogue
+from submissions.criteria.code import SourceRules
+from submissions.criteria.drawing import Drawing
+from submissions.criteria.point import Circuits
+from submissions.magic_lines import magic_place
+
+_RESPONDER = re.compile(r"^def (?:\w+_)?responder\(")
+_ROBOT = re.compile(
+    r"^\s*(?:from|import) ev3dev2|^[^#]*(?:print\(f?[\"'](?:PY::|IMG_DATA)|tank_(?:drive|turn)\.|\bsay\()"
+)
+#: A word that is no flag, and in the line below the flag and the word before it.
+_CUT_VALUE = re.compile(r"'(\w+)' is not a flag\n.*?(-[br]|--background|--robotSetup) (\w+) \1\b")
+
+
+def of_starter(clues: Clues) -> Iterator[str]:
+    """Parts that are still what students are given to begin with."""
+    own = {each.name: each for each in clues.listings if each.part is not None}
+    given = {name: text for name, text in _starter(clues.assignment).items() if name in own}
+    if not clues.lost or not given or any(_plain(own[name].lines) != _plain(given[name]) for name in given):
+        return
+    name, text = next(
+        ((name, text) for name, text in given.items() if _place_to_begin(text)), next(iter(given.items()))
+    )
+    line = _place_to_begin(text)
+    as_given = f"{name} is the starter as it was given, and has nothing of your own yet"
+    if line:
+        yield f"line {line} of {name}: {as_given}. Begin here: {text[line - 1].strip(' #')}"
+    else:
+        yield f"{as_given}. Add your own lines to it"
+
+
+def _place_to_begin(lines: Sequence[str]) -> int:
+    return next((number for number, line in enumerate(lines, 1) if "TODO" in line), 0)
+
+
+def _plain(lines: Sequence[str]) -> list[str]:
+    return [line.rstrip() for line in lines if line.strip()]
+
+
+@cache
+def _starter(assignment: str) -> Mapping[str, tuple[str, ...]]:
+    """The lines of each file that students are given to begin with; the catalogue's alone are known."""
+    if assignment not in catalogue():
+        return {}
+    files = sorted((assignment_folder(assignment) / "starter").glob("*.py"))
+    return {file.name: tuple(file.read_text("utf-8").split("\n")) for file in files}
+
+
+def of_swapped_parts(clues: Clues) -> Iterator[str]:
+    """robot.py with the responder in it, and responder.py with the robot program."""
+    parts = {each.part: each for each in clues.listings if each.part is not None}
+    program, responder = parts.get("program"), parts.get("responder")
+    if not clues.lost or program is None or responder is None:
+        return
+    is_swapped = program.find(_RESPONDER) and responder.find(_ROBOT)
+    if is_swapped and not program.find(_ROBOT) and not responder.find(_RESPONDER):
+        yield (
+            f"{program.name} has the responder, and {responder.name} has the robot program. "
+            "Swap the names of the two files"
+        )
+
+
+def of_ignored_magic(clues: Clues) -> Iterator[str]:
+    """A magic line that is ignored as a whole, where its flags are asked for, or something was to be drawn with -p."""
+    draws = any(isinstance(each, Drawing | Circuits) for each in clues.lost)
+    asks = any(isinstance(each, SourceRules) and each.flags for each in clues.lost)
+    if not clues.ignored_magic or not (draws or asks):
+        return
+    for listing in clues.programs:
+        place = magic_place("\n".join(listing.lines))
+        if place is not None and (clues.marked_cell is None or listing.name == f"cell {clues.marked_cell}"):
+            why = clues.ignored_magic.partition(": ")[2] or clues.ignored_magic
+            cut = _CUT_VALUE.search(f"{why}\n{listing.lines[place]}")
+            if cut is not None:
+                fix = f"The value of {cut[2]} has no blank: write {cut[2]} {cut[3]}_{cut[1]}"
+            elif draws:
+                fix = "Write -p to put the pen down, and check the other flags"
+            else:
+                fix = "Correct it, and check the other flags"
+            pen = ", and the pen was never down" if draws else ""
+            yield f"{listing.at(place + 1)}: {why}, so all flags of the line are ignored{pen}. {fix}"
+            return
+
+
+def of_redefined(clues: Clues) -> Iterator[str]:
+    """A function that a later definition replaces before anything calls it."""
+    if not clues.lost:
+        return
+    programs = {each.name for each in clues.programs}
+    cells: list[Listing] = []
+    for listing in clues.texts:
+        is_cell = listing.part is None and listing in clues.listings
+        if is_cell and listing.name not in programs:
+            cells.append(listing)
+            continue
+        yield from _redefined([listing])
+        if is_cell:
+            # The robot program here has used all that is above it.
+            yield from _redefined(cells)
+            cells = []
+    yield from _redefined(cells)
+
+
+def of_several_programs(clues: Clues) -> Iterator[str]:
+    """A notebook with another robot cell that drives, of which nothing is marked."""
+    if clues.marked_cell is None or not any(isinstance(each, DRIVEN) for each in clues.lost):
+        return
+    marked = f"cell {clues.marked_cell}"
+    others = [
+        each for each in clues.programs if each.name != marked and any(_drives(one) for one in each.code.statements)
+    ]
+    if others:
+        yield (
+            f"only the robot program in {marked} is marked; {others[-1].name} is a program by itself. "
+            f"If they belong together, put both into {marked}"
+        )
+
+
+def _redefined(process: list[Listing]) -> Iterator[str]:
+    first: dict[str, tuple[Listing, Statement]] = {}
+    for listing in process:
+        for each in listing.code.statements:
+            if each.keyword == "def" and not each.indent and len(each.tokens) > 1:
+                name = each.tokens[1]
+                if name in first:
+                    before, head = first[name]
+                    where = f"line {head.line}" if before is listing else f"line {head.line} of {before.name}"
+                    yield (
+                        f"{listing.at(each.line)} defines {name} again, in place of the function in {where}. "
+                        "Delete one of the two, or give it another name"
+                    )
+                    return
+                first[name] = listing, each
+            elif not each.indent:
+                for called in {call.name for call in each.calls} & first.keys():
+                    del first[called]
+
+
+def _drives(statement: Statement) -> bool:
+    return moves(statement, MOVES_FOR | MOVES_ON)

@@ -1,0 +1,144 @@
+"""Hints on functions that are called by themselves: their name, what they return, and where.
+
+What was called and what came back is in the criteria's results; no robot is run.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterator
+
+from service.grading.hint_clues import Clues, Listing
+from service.grading.hint_code import LOOPS, Statement, result_of
+from service.grading.hint_errors import advised
+from sim.recording import Fault, Verdict
+from submissions.criteria.code import Functions
+from submissions.raw_files import shown
+
+_RETURNED_NOTHING = re.compile(r"returned (?:null|None|NoneType)")
+_GAVE_NOTHING = re.compile(r"TypeError: (\w+) returned NoneType, which has no \w+")
+_NO_FUNCTION = "there is no function called"
+_HIDDEN = "hidden calls"
+_CALLED = re.compile(r"Expected (\w+)\(")
+#: The list that was expected, and the one that came back.
+_LISTS = re.compile(r"to return (\[[^\]]+\]), but it returned (\[[^\]]*\])")
+_FAILED = re.compile(r"(?:but it did not|to be loaded, but): (\w+: .{1,300}?) \(line (\d+)\)")
+_NEAR = 0.75
+
+
+def of_functions(clues: Clues) -> Iterator[str]:
+    """One for each function that lost marks."""
+    messages = {each.id: each.message for each in clues.results}
+    for criterion in clues.lost:
+        if not isinstance(criterion, Functions):
+            continue
+        told = messages.get(criterion.id, "")
+        names = {criterion.function, *(call.function for call in criterion.calls)} - {""}
+        for name in sorted(names):
+            found = _of_error(told, clues) or _of_function(name, told, clues)
+            if found:
+                yield found
+                break
+
+
+def of_wrong_values(name: str, told: str) -> str:
+    """The function, its call, and the value that it gave; no line, as the line that returns a value may be right."""
+    expected = f"{told[0].lower()}{told[1:].rstrip('.')}"
+    if _HIDDEN not in told:
+        called = _CALLED.search(told)
+        return f"The function {called[1] if called else name}: {expected}"
+    return (
+        f"The function {name}: {expected}. Call it yourself with other arguments: 0, the largest and the smallest, "
+        "equal ones, numbers with a fraction, and those on the borders of each rule"
+    )
+
+
+def no_return(listing: Listing, head: Statement) -> str:
+    """That a function has no return, and the line to add."""
+    result = result_of(listing.code.body(head))
+    fix = f"Add return {result} as its last line" if result else "Add return with the result"
+    return f"{listing.at(head.line)}: {head.tokens[1]} has no return, so it gives nothing back. {fix}"
+
+
+def of_no_return(clues: Clues) -> Iterator[str]:
+    """A function such as ``train`` that ends without a return."""
+    name = next((found[1] for fault in clues.faults if (found := _GAVE_NOTHING.search(fault.message))), "")
+    for listing in clues.responders:
+        for head in listing.code.functions():
+            returns = any(each.keyword == "return" for each in listing.code.body(head))
+            if head.tokens[1] == name and not returns:
+                yield no_return(listing, head)
+                return
+
+
+def early_return(listing: Listing, head: Statement) -> Statement | None:
+    """A return that ends a loop in its first turn: directly in it, or in the else of an if that returns as well."""
+    for each in listing.code.body(head):
+        parent = listing.code.statements[each.parent] if each.parent >= 0 else None
+        if each.keyword != "return" or parent is None:
+            continue
+        if parent.keyword in LOOPS or (parent.keyword == "else" and _returns_in_any_case(listing, parent)):
+            return each
+    return None
+
+
+def _returns_in_any_case(listing: Listing, last: Statement) -> bool:
+    """Whether an ``else`` is directly in a loop, and all the branches before it end with a return too."""
+    loop = listing.code.statements[last.parent] if last.parent >= 0 else None
+    if loop is None or loop.keyword not in LOOPS:
+        return False
+    beside = [each for each in listing.code.body(loop) if each.parent == loop.number and each.number < last.number]
+    for each in reversed(beside):
+        ending = [one for one in listing.code.body(each) if one.parent == each.number][-1:]
+        if each.keyword not in ("if", "elif") or not ending or ending[0].keyword != "return":
+            return False
+        if each.keyword == "if":
+            return True
+    return False
+
+
+def _of_error(told: str, clues: Clues) -> str:
+    """The line in which a called function failed, and the advice on its error."""
+    found = _FAILED.search(told)
+    listing = next((each for each in clues.responders if each.part == "responder"), None)
+    if found is None or listing is None:
+        return ""
+    line, error = int(found[2]), found[1]
+    fault = Fault(0.0, Verdict.RESPONDER_ERROR, "responder", error, line)
+    return f"{listing.at(line)}: {advised(fault, clues)}"
+
+
+def _of_function(name: str, told: str, clues: Clues) -> str:
+    defined = [(listing, head) for listing in clues.responders for head in listing.code.functions() if not head.indent]
+    own = next(((listing, head) for listing, head in defined if head.tokens[1] == name), None)
+    if own is None:
+        if _NO_FUNCTION not in told:
+            return ""
+        near = difflib.get_close_matches(name, [head.tokens[1] for _, head in defined], 1, _NEAR)
+        listing, head = next(((one, each) for one, each in defined if each.tokens[1] in near), (None, None))
+        if listing is None or head is None:
+            return ""
+        return f"{listing.at(head.line)} defines {shown(head.tokens[1])}; expected a function called {name}"
+    listing, head = own
+    body = listing.code.body(head)
+    returns = [each for each in body if each.keyword == "return" and len(each.tokens) > 1]
+    prints = next((each for each in body if each.keyword == "print"), None)
+    if not returns and prints is not None:
+        return f"{listing.at(prints.line)} prints the result of {name} and does not return it. Write return there"
+    if not returns and _RETURNED_NOTHING.search(told):
+        return no_return(listing, head)
+    early = early_return(listing, head)
+    if early is not None:
+        return (
+            f"{listing.at(early.line)}: return is in the loop, so {name} ends in the loop's first turn. Move return "
+            "below the loop: indent it less"
+        )
+    stop = next((each for each in body if each.tokens == ("break",)), None)
+    lists = _LISTS.search(told)
+    if stop is not None and lists and len(lists[2].split(",")) < len(lists[1].split(",")) + (lists[2] == "[]"):
+        return (
+            f"{listing.at(stop.line)}: break ends the whole loop, so {name} returns too few values. To skip only this "
+            "value, write continue in place of break"
+        )
+    return ""

@@ -1,0 +1,294 @@
+"""Hints on programs that were stopped at the limit of simulated time or of computing: in which line, and why.
+
+A loop's reason to go on for ever is looked for in its condition and its body; where there is none that is plain, the
+line alone is named.
+"""
+
+from __future__ import annotations
+
+import keyword
+from collections.abc import Iterator, Sequence
+
+from service.grading.hint_advice import AMOUNTS, MOVES_FOR, PROPERTIES, READINGS
+from service.grading.hint_clues import Clues, Listing, listing_of, place_of
+from service.grading.hint_code import Code, Statement, is_name, joined
+from sim.recorded import faults_of
+from sim.recording import Fault, Verdict
+
+_LIMITS = (Verdict.TIME_LIMIT, Verdict.CPU_LIMIT)
+_FREE = frozenset({"position", "speed", "state", "is_running"})
+_WAITS = (
+    frozenset({"sleep", "wait_until_not_moving", "wait_until", "wait", "wait_while"}) | MOVES_FOR | (PROPERTIES - _FREE)
+)
+_KEYWORDS = frozenset({"and", "or", "not", "in", "is", "True", "False", "None", "len"})
+_MOST_TURNS = 100_000
+
+
+def of_limits(clues: Clues) -> Iterator[str]:
+    """The line that a program was in when it was stopped, and why the loop around it does not end."""
+    for fault in dict.fromkeys(_stopped(clues)):
+        where, listing = place_of(fault, clues), listing_of(fault, clues)
+        if not where or listing is None:
+            continue
+        statement = listing.code.at(fault.line)
+        if statement is None:
+            continue
+        yield _reason(fault, listing, statement, clues)
+        return
+
+
+def _stopped(clues: Clues) -> Iterator[Fault]:
+    """What ended the trials at a limit; time that was up only where a criterion names it."""
+    for recording in clues.recordings:
+        for fault in faults_of(recording)[:1]:
+            told = any(fault.message in each.message for each in clues.results)
+            if fault.verdict is Verdict.CPU_LIMIT or (fault.verdict is Verdict.TIME_LIMIT and told):
+                yield fault
+
+
+def _reason(fault: Fault, listing: Listing, statement: Statement, clues: Clues) -> str:
+    code = listing.code
+    amount = too_large_amount(code, statement, clues.limit)
+    if amount:
+        return f"{listing.at(statement.line)}: {amount}"
+    loops = code.loops_around(statement)
+    for loop in loops:
+        why = _endless(loop, code, listing, fault)
+        if why:
+            return why
+    up = "the simulated time was up" if fault.verdict is Verdict.TIME_LIMIT else "it was stopped"
+    who = "responder" if fault.who == "responder" else "program"
+    if loops:
+        head = joined(loops[0].tokens)
+        return (
+            f'{listing.at(loops[0].line)}: the {who} was still in the loop "{head}" when {up}. '
+            f"{_wait_for(loops[0], code, fault)}"
+        )
+    return (
+        f'{listing.at(statement.line)}: the {who} was still in the line "{joined(statement.tokens)}" when {up}. '
+        "Check what it waits for, and whether that ever happens"
+    )
+
+
+def _wait_for(loop: Statement, code: Code, fault: Fault) -> str:
+    if fault.verdict is Verdict.CPU_LIMIT and fault.who != "responder" and not _waits(loop, code):
+        return "Nothing in it waits, so the robot cannot move. Add time.sleep(0.1), or read a sensor, in the loop"
+    if fault.who == "responder":
+        return "Check when it ends, or make the calculation smaller"
+    return "Check when its condition becomes false, or end it with break"
+
+
+def too_large_amount(code: Code, statement: Statement, least: float) -> str:
+    """That a call asks for a time or an amount in the wrong unit; empty where it does not."""
+    for call in statement.calls:
+        known = AMOUNTS.get(call.name.rpartition(".")[2])
+        plain = [each for each in call.arguments if "=" not in each]
+        number = code.number(plain[-1]) if plain else None
+        if known is None or number is None or abs(number) < min(known[0], least or known[0]):
+            continue
+        most, unit, other = known
+        if abs(number) < most / 2:
+            continue
+        if other == "milliseconds":
+            fix = f"{number:g} milliseconds are {number / 1000:g} seconds: write {number / 1000:g}"
+        else:
+            fix = f"For {number:g} degrees of the wheels write on_for_degrees, or {number / 360:g} rotations"
+        return f"{call.name} takes {unit}, and {number:g} {unit} are too many. {fix}"
+    return ""
+
+
+def _endless(loop: Statement, code: Code, listing: Listing, fault: Fault) -> str:
+    """Why a loop does not end; empty where that is not plain."""
+    body = code.body(loop)
+    where = listing.at(loop.line)
+    if loop.keyword == "for":
+        turns = next((call for call in loop.calls if call.name == "range"), None)
+        numbers = [number for each in (turns.arguments if turns else ()) if (number := code.number(each)) is not None]
+        if numbers and max(map(abs, numbers)) >= _MOST_TURNS:
+            return f"{where}: this loop has {max(numbers):,.0f} turns, which is too many. Use a smaller number"
+        return ""
+    head, condition = joined(loop.tokens), loop.condition
+    for each in body:
+        effect = without_effect(each, code)
+        if effect and any(token in condition for token in each.tokens if is_name(token)):
+            never = f"so the loop in line {loop.line}, {head[:-1]}, never ends"
+            return f"{listing.at(each.line)}: {effect}, {never}. {fix_effect(each)}"
+    if condition in (("True",), ("1",), ("not", "False")):
+        once = _read_before(loop, body, code)
+        if once:
+            return f"{where}: {once}"
+        if any(each.keyword in ("break", "return") for each in body):
+            return ""
+        return f"{where}: {head[:-1]} repeats for ever{_lacks(body, fault)}. {_end_it(body, fault)}"
+    always = always_true(condition, code)
+    if always:
+        return f"{where}: {head[:-1]} never ends: {always}"
+    step = _wrong_step(loop, body)
+    if step:
+        each, effect, fix = step
+        never = f"so the loop in line {loop.line}, {head[:-1]}, never ends"
+        return f"{listing.at(each.line)}: {joined(each.tokens)} {effect}, {never}. {fix}"
+    names = {token for place, token in enumerate(condition) if is_name(token) and token not in _KEYWORDS}
+    reads = any(token in (".", "(") for token in condition)
+    changed = {name for each in body for name in each.bound}
+    calls = {call.name for each in body for call in each.calls}
+    if names and not reads and not names & changed and not any(each.keyword == "global" for each in code.statements):
+        return f"{where}: {head[:-1]} never ends: {_unchanged(sorted(names), loop, code, calls)}"
+    exact = [place for place, token in enumerate(condition) if token in ("!=", "==")]
+    if exact and any(token in PROPERTIES for token in condition) and any(each[:1].isdigit() for each in condition):
+        return (
+            f"{where}: {head[:-1]} does not end: the reading may pass the number between two looks. Compare with < or >"
+        )
+    return ""
+
+
+def _wrong_step(loop: Statement, body: Sequence[Statement]) -> tuple[Statement, str, str] | None:
+    """The statement that keeps a counted loop from its end, what it does, and the fix."""
+    condition = loop.condition
+    if len(condition) < 3 or condition[1] not in _AWAY or not is_name(condition[0]):
+        return None
+    name, sign = condition[0], condition[1]
+    for each in body:
+        if each.parent != loop.number:
+            continue
+        if each.target == name and len(each.tokens) == 3 and not is_name(each.tokens[2]):
+            again = f"gives {name} the same value in each turn"
+            return each, again, "Move it to the line before the loop, without indentation"
+        direction = _direction(each, name)
+        if direction == _AWAY[sign]:
+            away, towards = ("grow", "-") if direction == "+" else ("shrink", "+")
+            return each, f"makes {name} {away}", f"Write {towards} in place of {direction}"
+    return None
+
+
+def _direction(statement: Statement, name: str) -> str:
+    """Whether a statement adds to a name or takes from it; empty where it does neither."""
+    tokens = statement.tokens
+    if tokens[0] == name and len(tokens) == 3 and tokens[1] in ("+=", "-="):
+        return tokens[1][0]
+    if len(tokens) == 5 and tokens[:3] == (name, "=", name) and tokens[3] in ("+", "-"):
+        return tokens[3]
+    return ""
+
+
+#: The sign that leads away from the end of a loop on this comparison.
+_AWAY = {">": "+", ">=": "+", "<": "-", "<=": "-"}
+
+
+def _read_before(loop: Statement, body: Sequence[Statement], code: Code) -> str:
+    """A reading that the loop uses and that was taken only once, before it."""
+    if any(_reads(each) for each in body):
+        return ""
+    changed = {name for each in body for name in each.bound}
+    for each in code.statements[: loop.number]:
+        if each.target and _reads(each) and each.target not in changed and any(one.has(each.target) for one in body):
+            again = joined(each.tokens)
+            return f"{each.target} is read once, in line {each.line}, and not again. Repeat {again} in the loop"
+    return ""
+
+
+def _lacks(body: Sequence[Statement], fault: Fault) -> str:
+    missing = []
+    if fault.verdict is Verdict.CPU_LIMIT and fault.who != "responder":
+        missing.append("nothing in it waits")
+    if not any(_reads(each) for each in body) and fault.who != "responder":
+        missing.append("it reads no sensor")
+    return f", and {' and '.join(missing)}" if missing else ""
+
+
+def _end_it(body: Sequence[Statement], fault: Fault) -> str:
+    if fault.who == "responder":
+        return "End it with break, or write a condition in place of True"
+    if fault.verdict is Verdict.CPU_LIMIT:
+        return "Read a sensor in its condition, or add time.sleep(0.1) and end it with break"
+    return "End it with break, write a condition that reads a sensor, or remove the loop"
+
+
+def without_effect(statement: Statement, code: Code) -> str:
+    """That a statement computes something and keeps nothing; empty where it has an effect."""
+    tokens = statement.tokens
+    if _has_turned_operator(statement, code):
+        return f"{tokens[0]} ={tokens[2]} {tokens[3]} sets {tokens[0]} to {tokens[2]}{tokens[3]}"
+    operators = [token for token in tokens if token in ("+", "-", "*", "/", "==", "<", ">")]
+    if not is_name(tokens[0]) or not operators or any(each.endswith("=") and each != "==" for each in tokens):
+        return ""
+    plain = all(is_name(each) or each in "+-*/.==<>" or each[0].isdigit() for each in tokens)
+    return f"{joined(tokens)} has no effect" if plain and tokens[0] not in _STATEMENTS else ""
+
+
+def _has_turned_operator(statement: Statement, code: Code) -> bool:
+    """Whether ``count =- 1`` is written so, with these blanks, in a loop, for a variable that has a number before."""
+    tokens, columns, name = statement.tokens, statement.columns, statement.target
+    if len(tokens) != 4 or not name or name.isupper() or tokens[2] not in ("+", "-"):
+        return False
+    is_written_so = columns[2] == columns[1] + 1 and columns[3] > columns[2] + 1
+    has_value = any(each.target == name for each in code.statements[: statement.number])
+    return is_written_so and has_value and bool(code.loops_around(statement))
+
+
+_STATEMENTS = frozenset(keyword.kwlist)
+
+
+def fix_effect(statement: Statement) -> str:
+    """How a statement without effect is written so that it has one."""
+    tokens = statement.tokens
+    if tokens[1] == "=":
+        return f"Write {tokens[0]} {tokens[2]}= {tokens[3]}"
+    if tokens[1] == "==":
+        return f"Write one = for an assignment: {tokens[0]} = {joined(tokens[2:])}"
+    return f"Write {tokens[0]} = {joined(tokens)}"
+
+
+def always_true(condition: Sequence[str], code: Code) -> str:
+    """Why a comparison of a reading with a number always holds; empty where it may not."""
+    place = next((at for at, token in enumerate(condition) if token in ("<", ">", "<=", ">=")), None)
+    if place is None or any(token in ("and", "or", "not") for token in condition):
+        return ""
+    sign, name = condition[place], reading_in(condition[:place], code)
+    number = code.number(condition[place + 1 :])
+    if not name or number is None:
+        return ""
+    least, most, unit = READINGS[name]
+    holds = {">=": number <= least, ">": number < least, "<=": number >= most, "<": number > most}[sign]
+    if not holds:
+        return ""
+    what = joined(condition)
+    better = (
+        f"Write {sign[0]} {number:g}" if sign in (">=", "<=") and number in (least, most) else "Choose a number within"
+    )
+    return f"{what} is always true, because {name} {unit}. {better}"
+
+
+def reading_in(tokens: Sequence[str], code: Code) -> str:
+    """The reading that the one token is, or that the name was assigned; empty where it is neither."""
+    name = tokens[-1] if tokens and tokens[-1] in READINGS else _source(tokens, code)
+    return name if name in READINGS else ""
+
+
+def _source(tokens: Sequence[str], code: Code) -> str:
+    """The last token of what a name was assigned."""
+    if len(tokens) != 1:
+        return ""
+    given = next((each for each in code.statements if each.target == tokens[0]), None)
+    return given.tokens[-1] if given is not None else ""
+
+
+def _unchanged(names: Sequence[str], loop: Statement, code: Code, calls: set[str]) -> str:
+    listed = " and ".join(names[:2])
+    change = "does not change" if len(names) == 1 else "do not change"
+    for name in names:
+        given = next((each for each in code.statements[: loop.number] if each.target == name and _reads(each)), None)
+        if given is not None:
+            return (
+                f"{name} is read once, in line {given.line}, and not again. Repeat {joined(given.tokens)} in the loop"
+            )
+    return f"{listed} {change} in the loop. Assign {names[0]} in the loop"
+
+
+def _reads(statement: Statement) -> bool:
+    return any(token in PROPERTIES or token in ("get_clock", "pyState") for token in statement.tokens)
+
+
+def _waits(loop: Statement, code: Code) -> bool:
+    """Whether a loop does what takes simulated time: the state of a motor is read for nothing."""
+    return any(token in _WAITS for each in (loop, *code.body(loop)) for token in each.tokens)

@@ -1,0 +1,150 @@
+"""Advice on names that are not defined or were overwritten: those of another process, of a later line, of a module.
+
+A robot program does not see what the responder or another cell defines, and the responder does not see the robot's.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from service.grading.hint_clues import Clues, Listing
+from service.grading.hint_code import Statement, joined
+from sim.recording import Fault
+
+NO_NAME = re.compile(r"NameError: name '(\w+)' is not defined")
+_NO_ATTRIBUTE = re.compile(r"AttributeError: '(\w+)' object has no attribute '(\w+)'")
+_NOT_CALLABLE = re.compile(r"TypeError: '(\w+)' object is not callable")
+_CALLED = re.compile(r"(?<![.\w])(\w+)\(")
+#: How Python writes what JSON and other languages write so.
+_CONSTANTS = {"null": "None", "none": "None", "NULL": "None", "true": "True", "false": "False"}
+
+#: What %%sim_magic_preloaded binds and the other magics do not.
+PRELOADED = frozenset(("say", "speaker", "tank_turn", "tank_drive", "ultrasonic", "colorLeft", "colorRight", "gyro"))
+_GIVEN = PRELOADED | {"print", "str", "int", "float", "list", "len", "range", "max", "min", "sum", "round", "input"}
+#: Whose attributes are often written alone.
+_OWNERS = {
+    **dict.fromkeys(("left_motor", "right_motor"), ("tank_drive",)),
+    **dict.fromkeys(("on_for_seconds", "on_for_rotations", "on_for_degrees"), ("tank_drive", "tank_turn")),
+    **dict.fromkeys(("reflected_light_intensity", "reflected_light_intensity_pc"), ("colorLeft", "colorRight")),
+    **dict.fromkeys(("color", "color_name", "rgb"), ("colorLeft", "colorRight")),
+    **dict.fromkeys(("distance_centimeters", "distance_inches"), ("ultrasonic",)),
+    "angle": ("gyro",),
+}
+
+
+def of_owner(fault: Fault, clues: Clues, *_: object) -> str:
+    """An attribute of the robot's parts that is written without its owner."""
+    name = NO_NAME.match(fault.message)
+    owners = _OWNERS.get(name[1], ()) if name and fault.who == "program" and clues.preamble == "preloaded" else ()
+    if name is None or not owners:
+        return ""
+    return f"{name[1]} belongs to {' and '.join(owners)}: write {' or '.join(f'{each}.{name[1]}' for each in owners)}."
+
+
+def of_constant(fault: Fault, *_: object) -> str:
+    """``null`` or ``true``, as JSON has them."""
+    name = NO_NAME.match(fault.message)
+    return f"Write {_CONSTANTS[name[1]]} in place of {name[1]}." if name and name[1] in _CONSTANTS else ""
+
+
+def of_other_process(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
+    """A name that only the other process defines: the robot's or the responder's."""
+    name = NO_NAME.match(fault.message)
+    if name is None or listing is None:
+        return ""
+    robots = {each.name for each in clues.programs}
+    is_robot = listing.name in robots
+    others = (each for each in clues.listings if (each.name in robots) != is_robot)
+    other, found = next(_defining(name[1], others), (None, None))
+    if other is None or found is None or next(_defining(name[1], _same_process(listing, clues)), None):
+        return ""
+    whose = other.name.capitalize() if other.part is None else other.name
+    if found.keyword in ("import", "from"):
+        who = "the robot program" if not is_robot else "the responder"
+        return f"The import in {other.name} is only for {who}. Add {joined(found.tokens)} at the top of {listing.name}."
+    sees = "a robot program does not see it" if is_robot else "the responder does not see it"
+    below = ", below its first line" if listing.part is None and is_robot else ""
+    return f"{whose} defines {name[1]}, but {sees}. Define {name[1]} in {listing.name} as well{below}."
+
+
+def of_later_cell(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
+    """A name that a cell below defines, which is no robot program."""
+    name = NO_NAME.match(fault.message)
+    if name is None or listing is None or fault.cell is None:
+        return ""
+    cells = [each for each in _same_process(listing, clues) if each.part is None]
+    later = next((each for each, _ in _defining(name[1], cells[cells.index(listing) + 1 :])), None)
+    if later is None:
+        return ""
+    return f"{later.name.capitalize()} defines {name[1]}, but runs later. Move {later.name} above {listing.name}."
+
+
+def of_later_line(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
+    """A function that is defined below the line that calls it."""
+    name = NO_NAME.match(fault.message)
+    if name is None or listing is None or statement is None or listing.code.around(statement):
+        return ""
+    for each in listing.code.after(statement):
+        if not each.indent and each.keyword == "def" and name[1] in each.bound:
+            return f"Line {each.line} defines {name[1]}, but is below. Move line {statement.line} below the definition."
+    return ""
+
+
+def of_overwritten(fault: Fault, clues: Clues, listing: Listing | None, statement: Statement | None) -> str:
+    """A module or a function whose name was given to another value."""
+    if listing is None or statement is None:
+        return ""
+    lost = _NO_ATTRIBUTE.match(fault.message)
+    if lost:
+        owners = _owners_of(lost[2], statement)
+    elif _NOT_CALLABLE.match(fault.message):
+        # A call in an f-string is no token of its own.
+        owners = _CALLED.findall("".join(listing.lines[statement.line - 1 : statement.last_line]))
+    else:
+        return ""
+    for name in owners:
+        for other in _same_process(listing, clues):
+            for each in other.code.statements:
+                if each.target == name and _is_shared(name, listing, clues):
+                    at = f"Line {each.line}" if other is listing else f"Line {each.line} of {other.name}"
+                    return f"{at} gives {name} another value: {joined(each.tokens)}. Choose another name there."
+    return ""
+
+
+def _is_shared(name: str, listing: Listing, clues: Clues) -> bool:
+    """Whether a name is that of a module, a function or an object of the robot's, and not only this variable."""
+    binds = (
+        each
+        for other in _same_process(listing, clues)
+        for each in other.code.statements
+        if each.keyword in ("import", "from", "def") and name in each.bound
+    )
+    return name in _GIVEN or any(binds)
+
+
+def _owners_of(attribute: str, statement: Statement) -> list[str]:
+    tokens = statement.tokens
+    return [
+        owner
+        for owner, dot, name in zip(tokens, tokens[1:], tokens[2:], strict=False)
+        if dot == "." and name == attribute
+    ]
+
+
+def _defining(name: str, listings: Iterator[Listing] | list[Listing]) -> Iterator[tuple[Listing, Statement]]:
+    """The statements that bind a name outside of functions."""
+    for listing in listings:
+        for each in listing.code.statements:
+            if not each.indent and name in each.bound:
+                yield listing, each
+
+
+def _same_process(listing: Listing, clues: Clues) -> list[Listing]:
+    """The texts that run with this one, from the top; a robot's cell and a file are alone."""
+    if listing.part is not None or listing.name in {each.name for each in clues.programs}:
+        return [listing]
+    if listing not in clues.listings:
+        return [listing]
+    robots = {each.name for each in clues.programs}
+    return [each for each in clues.listings if each.part is None and each.name not in robots]

@@ -1,0 +1,108 @@
+"""Hints on images that are named wrongly: names in another order, one answer for all, the other sensor's image.
+
+They look at who was taken for whom in the trials that the student may see.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+
+from service.grading.grade import Accuracy, CriterionResult
+from service.grading.hint_clues import Clues
+from service.grading.judging.words import quoted
+
+_RIGHT = re.compile(r"""["']right["']|\bright(?:_\w*)?im(?:g|age)\w*|\bright_\w+""")
+_LEFT = re.compile(r"""["']left["']|\bleft(?:_\w*)?im(?:g|age)\w*|\bleft_\w+""")
+_DIVIDES = re.compile(r"/\s*\(?\s*(?:max|255|\w+\.max|np\.|\w+)")
+_NO_LABEL = re.compile(r"the answer names no label: (\"[^\"]{0,80}\")")
+_MOST = 0.5
+
+
+def of_recognition(clues: Clues) -> Iterator[str]:
+    """One for the first criterion that lost marks on images."""
+    for result in clues.results:
+        accuracy = result.accuracy
+        if accuracy is None or accuracy.value > _MOST + 0.2 or not accuracy.n:
+            continue
+        taken = {truth: answer for truth, answer, _ in accuracy.confusion if answer is not None}
+        if accuracy.value <= _MOST and taken:
+            found = _of_other_sensor(clues) or _of_order(taken, clues) or _of_constant(taken, accuracy, clues)
+        else:
+            found = _of_order(taken, clues)
+        found = found or _of_unknown(result, accuracy, clues)
+        if found:
+            yield found
+            return
+
+
+def _of_other_sensor(clues: Clues) -> str:
+    """The line that has the right sensor's image, where none has the left one's."""
+    for listing in clues.responders:
+        line = listing.find(_RIGHT)
+        if line is not None and not any(each.find(_LEFT) for each in clues.responders):
+            return (
+                f"{listing.at(line)} uses the right sensor's image, but the picture lies under the left sensor. "
+                f"Write left in place of right"
+            )
+    return ""
+
+
+def _of_order(taken: Mapping[str, str], clues: Clues) -> str:
+    """Names that stand in another order than the network's: two swapped, or all shifted."""
+    swapped = [(truth, answer) for truth, answer in taken.items() if truth != answer and taken.get(answer) == truth]
+    wrong = [truth for truth, answer in taken.items() if truth != answer]
+    if not wrong or len(set(taken.values())) < len(taken):
+        return ""
+    where = _list_of(taken, clues)
+    if len(swapped) == len(wrong) == 2:
+        one, other = swapped[0]
+        return f"{where}: {quoted(one)} and {quoted(other)} are swapped. Put the names into the order of the network"
+    if len(wrong) == len(taken) > 2:
+        return (
+            f"{where}: every image gets another's name, so the names are shifted by one place or in another order: "
+            f"{quoted(wrong[0])} is called {quoted(taken[wrong[0]])}. Put the names into the order of the network, and "
+            "count from 0"
+        )
+    if len(wrong) > 2:
+        return (
+            f"{where}: the names are in another order: {quoted(wrong[0])} is called {quoted(taken[wrong[0]])}. "
+            "Put the names into the order of the network"
+        )
+    return ""
+
+
+def _list_of(taken: Mapping[str, str], clues: Clues) -> str:
+    """The line with the first of the names in quotes."""
+    for listing in clues.responders:
+        for number, line in enumerate(listing.lines, 1):
+            if any(f'"{name}"' in line or f"'{name}'" in line for name in taken):
+                return listing.at(number)
+    return _predicting(clues)
+
+
+def _predicting(clues: Clues) -> str:
+    return clues.where("responder", re.compile(r"\.predict\(|class_predict"))
+
+
+def _of_constant(taken: Mapping[str, str], accuracy: Accuracy, clues: Clues) -> str:
+    """One name for all images."""
+    if len(set(taken.values())) > 1 or len(taken) < 3:
+        return ""
+    answer = next(iter(taken.values()))
+    normalises = any(each.find(_DIVIDES) for each in clues.responders)
+    fix = (
+        "Print what you give to predict: it must be different for different images"
+        if normalises
+        else "The network is for numbers from 0 to 1: divide the image by its largest value"
+    )
+    return f"{_predicting(clues)}: every image is called {quoted(answer)}, whatever it shows. {fix}"
+
+
+def _of_unknown(result: CriterionResult, accuracy: Accuracy, clues: Clues) -> str:
+    """An answer that is no name that is asked for."""
+    found = next((_NO_LABEL.search(each.message) for each in result.evidence if not each.passed), None)
+    if found is None or not accuracy.labels:
+        return ""
+    names = ", ".join(quoted(label) for label in accuracy.labels[:3])
+    return f"{_predicting(clues)}: the answer is {found[1]}; expected one of the names, as {names}"

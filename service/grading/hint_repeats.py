@@ -1,0 +1,146 @@
+"""Hints on words and programs that come too often or not often enough, by the loops that they are in or are not in.
+
+Each compares the loops of a program with what the robot said or how soon the program ended.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from service.grading.hint_advice import MOVES_FOR, PROPERTIES
+from service.grading.hint_clues import Clues
+from service.grading.hint_code import LOOPS, Statement, joined
+from service.grading.hint_slips import show_arguments
+from service.grading.hint_structure import moves, statements_of
+from service.grading.judging.words import quoted
+from sim.recording import Verdict
+from submissions.criteria.logged import Datalog
+from submissions.criteria.motion import Encounters
+from submissions.criteria.sequence import WordSequence
+
+_OUTPUT = frozenset({"say", "print"})
+_AGAIN = re.compile(r"these words (\d+) more times")
+#: The last number that came, and the one that did not.
+_ENDED_EARLY = re.compile(r'after "(-?\d+)" came (?:nothing|"[^\W\d]+") instead of "(-?\d+)"')
+_INCLUSIVE = {"<": "<=", ">": ">="}
+
+
+def of_words_in_loop(clues: Clues) -> Iterator[str]:
+    """A text that is said in each turn of a loop, where it is asked for once."""
+    for criterion in clues.lost:
+        if not isinstance(criterion, WordSequence):
+            continue
+        for listing, each in statements_of(clues):
+            call = next((one for one in each.calls if one.name in _OUTPUT), None)
+            loop = listing.code.statements[each.parent] if each.parent >= 0 else None
+            if call is None or loop is None or loop.keyword not in LOOPS or not call.arguments:
+                continue
+            text = call.arguments[0][0][1:-1] if call.arguments[0][0][:1] in ("'", '"') else ""
+            once = sum(text.casefold() in map(str.casefold, texts) for texts in criterion.words) == 1
+            lines = clues.recordings[0].spoken if call.name == "say" else clues.recordings[0].printed
+            count = sum(line.text == text for line in lines)
+            if once and count > 1 and len(call.arguments[0]) == 1:
+                yield (
+                    f"{listing.at(each.line)} {call.name}s {quoted(text)} {count} times, in each turn of the loop in "
+                    f"line {loop.line}; expected once. To run it after the loop, remove its indentation"
+                )
+                return
+
+
+def of_inner_loop(clues: Clues) -> Iterator[str]:
+    """A loop that repeats what it says, as it is inside another loop that it has nothing to do with."""
+    again = next((found for each in clues.results if (found := _AGAIN.search(each.message))), None)
+    if again is None:
+        return
+    for listing, each in statements_of(clues):
+        outer = listing.code.statements[each.parent] if each.parent >= 0 else None
+        if each.keyword != "for" or outer is None or outer.keyword != "for":
+            continue
+        body = listing.code.body(each)
+        speaks = any(call.name in _OUTPUT for one in body for call in one.calls)
+        if speaks and not any(one.has(*outer.bound - each.bound) for one in (each, *body)):
+            yield (
+                f"{listing.at(each.line)}: this loop is inside the loop of line {outer.line}, so it repeats its words "
+                f"in each turn of that loop. Words that were asked for once came {again[1]} more times. To run it "
+                "once, after the other loop, indent it less"
+            )
+            return
+
+
+def of_last_number(clues: Clues) -> Iterator[str]:
+    """A count that ends one number too early: ``< 10`` for ``<= 10``, ``range(5)`` for ``range(1, 6)``."""
+    for criterion in clues.lost:
+        result = next((each for each in clues.results if each.id == criterion.id), None)
+        found = _ENDED_EARLY.search(result.message) if isinstance(criterion, WordSequence) and result else None
+        if found is None or not isinstance(criterion, WordSequence):
+            continue
+        before, missing = int(found[1]), int(found[2])
+        for listing, each in statements_of(clues):
+            signed = each.condition if each.keyword == "while" else ()
+            if len(signed) == 3 and signed[1] in _INCLUSIVE and listing.code.number(signed[2:]) == missing:
+                better = f"{signed[0]} {_INCLUSIVE[signed[1]]} {signed[2]}"
+                yield f"{listing.at(each.line)}: the loop ends before {missing}. Write while {better}"
+                return
+            call = next((one for one in each.calls if one.name == "range"), None) if each.keyword == "for" else None
+            if call is None or not 1 <= len(call.arguments) <= 3:
+                continue
+            end = call.arguments[0] if len(call.arguments) == 1 else call.arguments[1]
+            if listing.code.number(end) != missing:
+                continue
+            first = ("1",) if len(call.arguments) == 1 and criterion.words[0][0] == "1" else call.arguments[0]
+            start = ("0",) if len(call.arguments) == 1 and criterion.words[0][0] == "0" else first
+            fixed = (start, (str(missing + (1 if missing > before else -1)),), *call.arguments[2:])
+            yield (
+                f"{listing.at(each.line)}: range({show_arguments(call.arguments)}) ends before {missing}. "
+                f"Write range({show_arguments(fixed)})"
+            )
+            return
+
+
+def of_exact_reading(clues: Clues) -> Iterator[str]:
+    """A loop that logs only as long as a reading is exactly one number."""
+    if not any(isinstance(each, Datalog) for each in clues.lost) or not _ended(clues):
+        return
+    for listing, each in statements_of(clues):
+        signed = each.condition if each.keyword == "while" else ()
+        body = listing.code.body(each)
+        prints = any(call.name in _OUTPUT for one in body for call in one.calls)
+        reads = any(signed and (token in PROPERTIES) for one in (each, *body) for token in one.tokens)
+        if "==" in signed and prints and reads and listing.code.number(signed[signed.index("==") + 1 :]) is not None:
+            yield (
+                f"{listing.at(each.line)}: the loop goes on only while {joined(signed)} is true, so it ends at the "
+                f"first other reading: the program ended after {clues.seconds:.1f} s. Write a condition that is true "
+                "until the last reading that is asked for"
+            )
+            return
+
+
+def of_single_round(clues: Clues) -> Iterator[str]:
+    """A program that waits for a sensor and reacts once, where the robot has to do so again and again."""
+    several = any(isinstance(each, Encounters) and each.at_least > 1 for each in clues.lost)
+    if not several or not _ended(clues) or clues.seconds > clues.limit / 2:
+        return
+    for listing, each in statements_of(clues):
+        waits = each.keyword == "while" and each.parent < 0 and any(token in PROPERTIES for token in each.condition)
+        if not waits:
+            continue
+        reacts = [one for one in listing.code.after(each) if one.parent < 0 and moves(one, MOVES_FOR)]
+        if reacts:
+            yield (
+                f"{listing.at(_first_move(listing.code.statements, each).line)}: the program does everything once, and "
+                f"ends after {clues.seconds:.1f} s of {clues.limit:g} s. To repeat it, write while True: above this "
+                f"line, and indent the lines from here to line {reacts[-1].last_line}"
+            )
+            return
+
+
+def _first_move(statements: tuple[Statement, ...], loop: Statement) -> Statement:
+    """The first statement above a loop that calls a motor, without one between; the loop itself where none does."""
+    above = [each for each in statements[: loop.number] if moves(each, frozenset({"on"}))]
+    return above[0] if above else loop
+
+
+def _ended(clues: Clues) -> bool:
+    """Whether the program came to its end by itself in every trial that is shown."""
+    return bool(clues.recordings) and all(each.verdict is Verdict.FINISHED for each in clues.recordings)

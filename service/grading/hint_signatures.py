@@ -1,0 +1,72 @@
+"""Hints on functions of the student's that are called with more or fewer values than they have parameters.
+
+For an agent or a method the definition is wrong, for it is called by others; for any other function it may be either.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from service.grading.hint_clues import Clues, Listing, place_of
+from service.grading.hint_code import Statement, is_name
+
+_CALLED = re.compile(r"TypeError: (?:(\w+)\.)?(\w+)\(\) (?:takes|missing) (\w+)(?:.* but (\d+) (?:was|were) given)?")
+
+
+def of_signatures(clues: Clues) -> Iterator[str]:
+    """The definition that a call does not fit."""
+    for fault in clues.faults:
+        found = _CALLED.match(fault.message)
+        listing, head = _definition(found[2], clues) if found else (None, None)
+        if found is None or listing is None or head is None:
+            continue
+        name = found[2]
+        inside = next((each for each in listing.code.around(head) if each.keyword == "class"), None)
+        if inside is not None and "self" not in head.tokens:
+            rest = "".join(f", {each}" for each in _parameters(head))
+            yield f'{listing.at(head.line)}: a method needs self as first parameter. Write "def {name}(self{rest}):"'
+            return
+        arguments = _arguments(name, clues)
+        if fault.agent and fault.line is None and arguments:
+            yield (
+                f"{listing.at(head.line)} defines {name} with {_count(len(_parameters(head)))}, but it is called with "
+                f'{len(arguments)}. Write "def {name}({", ".join(arguments)}):"'
+            )
+            return
+        where = place_of(fault, clues)
+        if where and fault.line is not None and inside is None:
+            yield (
+                f"{where} calls {name} with another number of values than line {head.line} of {listing.name} defines. "
+                f"Its parameters are: {', '.join(_parameters(head)) or 'none'}"
+            )
+            return
+
+
+def _definition(name: str, clues: Clues) -> tuple[Listing | None, Statement | None]:
+    heads = ((listing, head) for listing in clues.texts for head in listing.code.functions() if head.tokens[1] == name)
+    return next(heads, (None, None))
+
+
+def _parameters(head: Statement) -> list[str]:
+    end = head.tokens.index(")") if ")" in head.tokens else len(head.tokens)
+    return [
+        token
+        for place, token in enumerate(head.tokens[:end])
+        if is_name(token) and head.tokens[place - 1] in ("(", ",")
+    ]
+
+
+def _arguments(name: str, clues: Clues) -> list[str]:
+    """The names of the values in a call of a function; a name for each that has none."""
+    for listing in clues.answering:
+        for each in listing.code.statements:
+            for call in each.calls:
+                if call.name == name:
+                    plain = [one[0] if len(one) == 1 and is_name(one[0]) else "" for one in call.arguments]
+                    return [text or f"value{number}" for number, text in enumerate(plain, 1)]
+    return []
+
+
+def _count(number: int) -> str:
+    return {0: "no parameter", 1: "one parameter"}.get(number, f"{number} parameters")

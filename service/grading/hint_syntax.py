@@ -1,0 +1,116 @@
+"""Advice on lines that Python cannot read: ``else if``, texts without quotes or without their end, missing indentation.
+
+Such a text is not split into statements to its end, so the lines themselves are searched.
+"""
+
+from __future__ import annotations
+
+import re
+
+from service.grading.hint_clues import Clues, Listing
+from service.grading.hint_code import Statement
+from sim.recording import Fault
+
+_ELSE_IF = re.compile(r"\s*(else\s+if|else?if|elsif|elf)\b")
+_NO_BLOCK = re.compile(r"IndentationError: expected an indented block after (.{1,60}?) on line (\d+)")
+_UNCLOSED_TEXT = re.compile(r"SyntaxError: unterminated (triple-quoted )?(?:f-)?string literal")
+_WORDS = re.compile(r"\b(say|print|speak)\(\s*([^\W\d]\w*(?:[ ]+[\w!?.]+)+)\s*(?=[,)])")
+_NO_TEXT = re.compile(r"\b(?:and|or|not|if|else|for|in|is|lambda|f)\b")
+_KEYWORD_ARGUMENT = re.compile(r",\s*\w+\s*=\s*\w+\s*\)*\s*$")
+_STEP = 4
+
+
+def of_syntax(fault: Fault, _: Clues, listing: Listing | None, __: Statement | None) -> str:
+    """The fix of a line that Python cannot read; empty where it is not plain."""
+    if listing is None or fault.line is None or not fault.message.startswith(("SyntaxError", "IndentationError")):
+        return ""
+    line = "".join(listing.lines[fault.line - 1 : fault.line])
+    return (
+        _of_else_if(line)
+        or _of_block(fault, listing, line)
+        or _of_unclosed_text(fault, line)
+        or _of_words(line, listing)
+    )
+
+
+def _of_else_if(line: str) -> str:
+    found = _ELSE_IF.match(line)
+    if found is None:
+        return ""
+    words = " ".join(found[1].split())
+    return f"Python has no {words}. Write elif in place of {words}."
+
+
+def _of_block(fault: Fault, listing: Listing, line: str) -> str:
+    """The indentation of a line that begins no deeper than the head above it."""
+    found = _NO_BLOCK.match(fault.message)
+    if found is None:
+        return ""
+    head = int(found[2])
+    deep = _indent_of("".join(listing.lines[head - 1 : head])) + _STEP
+    if not line.strip() or fault.line == head:
+        return f"Write the lines that belong to line {head} below it. Begin each with {deep} blanks."
+    return f"If line {fault.line} belongs to line {head}, indent it: begin line {fault.line} with {deep} blanks."
+
+
+def _of_unclosed_text(fault: Fault, line: str) -> str:
+    """The line with the quote that ends its text."""
+    found = _UNCLOSED_TEXT.match(fault.message)
+    if found is None:
+        return ""
+    if found[1]:
+        return "A text that begins with three quotes must end with three quotes."
+    opening = _open_quote(line)
+    if opening is None:
+        return ""
+    quote, text = line[opening], line[opening + 1 :]
+    if quote == "'" and re.search(r"\w'\w", line):
+        return "The ' in the text ends it. Put \" around the text."
+    before = line[:opening]
+    words, end = _split_end(text.rstrip(), before.count("(") - before.count(")"))
+    other = "'" if quote == '"' else '"'
+    return f"The text has no closing {quote}. Write {before.strip()}{quote}{words.removesuffix(other)}{quote}{end}"
+
+
+def _split_end(text: str, brackets: int) -> tuple[str, str]:
+    """The words of a text, and the code after it: as many brackets as are open, and an argument with its name."""
+    named = _KEYWORD_ARGUMENT.search(text) if brackets > 0 else None
+    if named is not None:
+        return text[: named.start()], text[named.start() :]
+    end = ""
+    while text.endswith(")") and len(end) < brackets:
+        text, end = text[:-1], f"{end})"
+    return text, end
+
+
+def _open_quote(line: str) -> int | None:
+    """Where the text begins that no quote ends; None if there is none."""
+    opening: int | None = None
+    skip = False
+    for place, letter in enumerate(line):
+        if skip:
+            skip = False
+        elif opening is None and letter == "#":
+            return None
+        elif letter == "\\":
+            skip = True
+        elif opening is None and letter in "\"'":
+            opening = place
+        elif opening is not None and letter == line[opening]:
+            opening = None
+    return opening
+
+
+def _of_words(line: str, listing: Listing) -> str:
+    """Words in the brackets of a call, without quotes."""
+    found = _WORDS.search(line)
+    if found is None or _NO_TEXT.search(found[2]):
+        return ""
+    known = {name for each in listing.code.statements for name in each.bound}
+    if set(found[2].split()) <= known:
+        return ""
+    return f'A text needs quotes: write {found[1]}("{found[2]}"{line[found.end() :].strip()}'
+
+
+def _indent_of(line: str) -> int:
+    return len(line) - len(line.lstrip(" "))

@@ -1,0 +1,196 @@
+"""Hints on loops that a light sensor ends at the wrong place: a threshold that does not fit, ``or`` for ``and``.
+
+The readings are in the recordings, so what the condition was there can be calculated.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+from service.grading.hint_clues import Clues, Listing
+from service.grading.hint_code import Code, Statement, is_name, joined
+from service.grading.hint_structure import statements_of
+from service.grading.judging.geometry import Side, positions
+from sim.recording import Floats, Recording
+from submissions.criteria.stopping import StopOn
+
+_COMPARE: Mapping[str, Callable[[float, float], bool]] = {
+    "<": operator.lt,
+    ">": operator.gt,
+    "<=": operator.le,
+    ">=": operator.ge,
+    "==": operator.eq,
+    "!=": operator.ne,
+}
+_PERCENT = "reflected_light_intensity_pc"
+_SENSORS: Mapping[Side, str] = {"left": "colorLeft", "right": "colorRight"}
+_CHANNELS = ("red", "green", "blue")
+#: So much of a percent two readings differ in that a threshold can tell apart.
+_APART = 0.5
+_Colour = Sequence[float]
+
+
+def of_thresholds(clues: Clues) -> Iterator[str]:
+    """A loop that goes on although the sensor is where the robot should stop."""
+    for criterion in clues.lost:
+        if not isinstance(criterion, StopOn) or criterion.zone is None or criterion.sensor == "either":
+            continue
+        for listing, loop in _loops(clues):
+            found = _threshold(listing, loop, _SENSORS[criterion.sensor])
+            for recording in clues.recordings if found else ():
+                passed = _passed_over(recording, criterion.sensor, criterion.zone)
+                if passed is None or found is None:
+                    continue
+                sign, number = found
+                why = _of_passed(sign, number, *passed)
+                if why:
+                    yield f"{listing.at(loop.line)}: {why}"
+                    return
+
+
+def of_joined_colours(clues: Clues) -> Iterator[str]:
+    """``or`` between comparisons of a colour where ``and`` was meant, or the other way round."""
+    for criterion in clues.lost:
+        if not isinstance(criterion, StopOn) or criterion.rgb is None:
+            continue
+        sides = list(_SENSORS) if criterion.sensor == "either" else [criterion.sensor]
+        for listing, statement in statements_of(clues):
+            for recording in clues.recordings:
+                ends = [_colour_at_end(recording, side) for side in sides if len(recording.ticks)]
+                for end in ends:
+                    why = _wrong_word(listing.code, statement, end, criterion.rgb)
+                    if why:
+                        yield f"{listing.at(statement.line)}: {why}"
+                        return
+
+
+def _loops(clues: Clues) -> Iterator[tuple[Listing, Statement]]:
+    """The last loop on a condition of each program: it is what stops the robot."""
+    for listing in clues.programs:
+        loops = [each for each in listing.code.statements if each.keyword == "while"]
+        yield from ((listing, each) for each in loops[-1:])
+
+
+def _threshold(listing: Listing, loop: Statement, sensor: str) -> tuple[str, float] | None:
+    """The sign and the number that the sensor's reading is compared with; None where the loop asks anything else."""
+    place = next((at for at, token in enumerate(loop.condition) if token in _COMPARE), None)
+    if place is None or any(token in ("and", "or", "not") for token in loop.condition):
+        return None
+    reading = loop.condition[:place]
+    if len(reading) == 1:
+        given = [each.tokens[2:] for each in listing.code.statements if each.target == reading[0]]
+        reading = given[0] if given and all(each == given[0] for each in given) else ()
+    number = listing.code.number(loop.condition[place + 1 :])
+    is_this = tuple(reading) == (sensor, ".", _PERCENT) and loop.condition[place] in ("<", ">", "<=", ">=")
+    return (loop.condition[place], number) if is_this and number is not None else None
+
+
+def _passed_over(
+    recording: Recording, side: Side, zone: tuple[float, float, float, float]
+) -> tuple[Floats, Floats] | None:
+    """The readings before the zone and in it, in percent; None where the robot did not drive through it."""
+    places = positions(recording, "left_light" if side == "left" else "right_light")[1:]
+    left, bottom, right, top = zone
+    x, y = places[:, 0], places[:, 1]
+    inside = (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
+    if not inside.any() or inside[-1] or inside[0]:
+        return None
+    rgb = recording.ticks.left_rgb if side == "left" else recording.ticks.right_rgb
+    reads = 100 * rgb[:, 0].astype(int) / 255
+    first = int(inside.argmax())
+    return reads[:first], reads[inside]
+
+
+def _of_passed(sign: str, number: float, before: Floats, within: Floats) -> str:
+    """Why a loop did not end in the zone, where another number would have ended it there and not before."""
+    holds = _COMPARE[sign]
+    if not all(holds(float(each), number) for each in within):
+        return ""
+    falls = sign in (">", ">=")
+    there, earlier = (within.min(), before.min()) if falls else (within.max(), before.max())
+    if (earlier - there if falls else there - earlier) < _APART:
+        return ""
+    least, most = sorted((float(there), float(earlier)))
+    return (
+        f"the loop goes on, because the sensor reads {there:.1f} where the robot should stop, and {there:.1f} {sign} "
+        f"{number:g} is true. Choose a number between {least:.1f} and {most:.1f}"
+    )
+
+
+def _colour_at_end(recording: Recording, side: Side) -> _Colour:
+    rgb = recording.ticks.left_rgb if side == "left" else recording.ticks.right_rgb
+    return [float(part) for part in rgb[-1]]
+
+
+def _wrong_word(code: Code, statement: Statement, end: _Colour, wanted: _Colour) -> str:
+    """That ``and`` or ``or`` is the wrong word; empty where the colours do not prove it."""
+    pair = _compared_pair(code, statement)
+    if pair is None:
+        return ""
+    word, comparisons, stops = pair
+    ended = [_holds(each, end) for each in comparisons]
+    meant = [_holds(each, wanted) for each in comparisons]
+    # With the other word the loop would have gone on here, and would have ended over the colour that is asked for.
+    if ended[0] == ended[1] or meant != [stops, stops] or (word == "or") != stops:
+        return ""
+    other = "and" if word == "or" else "or"
+    one = comparisons[ended.index(stops)]
+    what = f"{one[0]} {one[1]} {one[2]:g}"
+    seen = ", ".join(str(int(part)) for part in end)
+    because = f"{word} lets {what} alone end it" if stops else f"{word} ends it as soon as {what} is false"
+    return f"the loop ended over the colour ({seen}), because {because}. Write {other} in place of {word}"
+
+
+_Comparison = tuple[str, str, float, int]
+
+
+def _compared_pair(code: Code, statement: Statement) -> tuple[str, list[_Comparison], bool] | None:
+    """The word between two comparisons of a colour, these, and whether the loop ends where they are true."""
+    tokens = statement.condition
+    if statement.keyword == "while" and tokens[:2] == ("not", "(") and tokens[-1:] == (")",):
+        tokens, stops = tokens[2:-1], True
+    elif statement.keyword == "while":
+        stops = False
+    elif statement.keyword == "if" and any(each.keyword == "break" for each in code.body(statement)):
+        stops = True
+    else:
+        return None
+    words = [at for at, token in enumerate(tokens) if token in ("and", "or", "not")]
+    if len(words) != 1 or tokens[words[0]] == "not":
+        return None
+    found = [_comparison(code, side) for side in (tokens[: words[0]], tokens[words[0] + 1 :])]
+    comparisons = [each for each in found if each is not None]
+    return (tokens[words[0]], comparisons, stops) if len(comparisons) == 2 else None
+
+
+def _comparison(code: Code, tokens: Sequence[str]) -> _Comparison | None:
+    """What is compared, the sign, the number, and which part of the colour it is."""
+    place = next((at for at, token in enumerate(tokens) if token in _COMPARE), None)
+    if place is None:
+        return None
+    number = code.number(tokens[place + 1 :])
+    channel = _channel(code, tokens[:place])
+    return None if number is None or channel is None else (joined(tokens[:place]), tokens[place], number, channel)
+
+
+def _channel(code: Code, tokens: Sequence[str]) -> int | None:
+    """0 to 2 for red, green and blue, read from the sensor or unpacked from ``rgb``."""
+    if not tokens:
+        return None
+    name = tokens[-1]
+    if len(tokens) > 1:
+        return _CHANNELS.index(name) if name in _CHANNELS else None
+    for each in code.statements:
+        if each.tokens[-1:] == ("rgb",) and "=" in each.tokens and len(each.tokens) > 6:
+            targets = [token for token in each.tokens[: each.tokens.index("=")] if is_name(token)]
+            if name in targets and len(targets) == 3:
+                return targets.index(name)
+        if each.target == name and each.tokens[-1] in _CHANNELS:
+            return _CHANNELS.index(each.tokens[-1])
+    return None
+
+
+def _holds(comparison: _Comparison, colour: _Colour) -> bool:
+    _, sign, number, channel = comparison
+    return _COMPARE[sign](int(colour[channel]), number)

@@ -1,0 +1,103 @@
+"""Hints on programs that wait too little, look too seldom, or begin to speak before they have finished.
+
+Each compares a number in the program with what the recordings show.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from service.grading.hint_advice import PROPERTIES
+from service.grading.hint_clues import Clues, Listing
+from service.grading.hint_code import Statement
+from service.grading.hint_motion import STOPPED
+from service.grading.hint_slips import show_arguments
+from service.grading.hint_structure import statements_of
+from submissions.criteria.coping import Resends
+from submissions.criteria.sequence import WordSequence
+
+_SPEAKING = "still speaking"
+_TOO_EARLY = "after its answer had come"
+_SELDOM = 0.5
+
+
+def of_overlapping_speech(clues: Clues) -> Iterator[str]:
+    """``say`` without ``wait=True``, where words were to be finished."""
+    if not any(_SPEAKING in each.message for each in clues.results) or not _lost(clues, WordSequence):
+        return
+    for listing, each in statements_of(clues):
+        for call in each.calls:
+            if call.name == "say" and call.arguments and not any("wait" in one for one in call.arguments):
+                said = show_arguments(call.arguments)
+                yield (
+                    f"{listing.at(each.line)}: the program goes on before the words are spoken. "
+                    f"Write say({said}, wait=True)"
+                )
+                return
+
+
+def of_short_waits(clues: Clues) -> Iterator[str]:
+    """A wait for an answer that is shorter than the answer takes."""
+    if not _lost(clues, Resends) or not any(_TOO_EARLY in each.message for each in clues.results):
+        return
+    takes = _fastest_answer(clues)
+    for listing, each in statements_of(clues):
+        number = _sleep(listing, each)
+        if number is not None and number < takes and listing.code.loops_around(each):
+            yield (
+                f"{listing.at(each.line)} waits {number:g} s, but an answer takes {takes:.2g} s. "
+                f"Wait longer, for example {max(0.5, math.ceil(20 * takes) / 10):g} s"
+            )
+            return
+
+
+def of_seldom_looks(clues: Clues) -> Iterator[str]:
+    """A loop that reads a sensor so seldom that the robot drives past what it looks for."""
+    if not _lost(clues, *STOPPED) or clues.stood_still:
+        return
+    for listing, each in statements_of(clues):
+        number = _sleep(listing, each)
+        loop = next((one for one in listing.code.loops_around(each) if one.keyword == "while"), None)
+        if number is None or number < _SELDOM or loop is None:
+            continue
+        body = listing.code.body(loop)
+        reads = any(token in PROPERTIES for one in (loop, *body) for token in one.tokens)
+        if reads and each.parent == loop.number:
+            way = _speed(clues) * number
+            yield (
+                f"{listing.at(each.line)}: the loop reads the sensor only every {number:g} s, and the robot drives "
+                f"about {way:.0f} mm in that time. Wait less, for example time.sleep(0.05)"
+            )
+            return
+
+
+def _lost(clues: Clues, *kinds: type) -> bool:
+    return any(isinstance(each, kinds) for each in clues.lost)
+
+
+def _sleep(listing: Listing, statement: Statement) -> float | None:
+    """For how many seconds a statement sleeps; None if it does not, or if that is not plain."""
+    call = next((each for each in statement.calls if each.name in ("time.sleep", "sleep")), None)
+    return listing.code.number(call.arguments[0]) if call is not None and call.arguments else None
+
+
+def _fastest_answer(clues: Clues) -> float:
+    """How long the fastest answer took from the question, in seconds."""
+    took = (
+        message.delivered - recording.messages[message.reply_to].t
+        for recording in clues.recordings
+        for message in recording.messages
+        if message.reply_to is not None and message.delivered is not None and message.sender == "responder"
+    )
+    return min(took, default=0.0)
+
+
+def _speed(clues: Clues) -> float:
+    """The fastest mean speed of a trial, in mm/s."""
+    found = [0.0]
+    for recording in clues.recordings:
+        xs, ys = recording.ticks.x, recording.ticks.y
+        way = sum(math.hypot(b - a, d - c) for a, b, c, d in zip(xs, xs[1:], ys, ys[1:], strict=False))
+        found.append(float(way) / recording.end_t if recording.end_t else 0.0)
+    return max(found)

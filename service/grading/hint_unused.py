@@ -1,0 +1,188 @@
+"""Hints on values that go nowhere or to the wrong place: unread variables, swapped ports and flags.
+
+The text of the program shows each of them; they are heard only where criteria that are shown have lost marks.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from service.grading.hint_advice import PROPERTIES
+from service.grading.hint_clues import Clues, Listing
+from service.grading.hint_code import Statement, is_name, joined
+from service.grading.hint_motion import STOPPED
+from service.grading.hint_structure import DRIVEN, statements_of
+from submissions.criteria.code import SourceRules
+from submissions.criteria.collecting import Collects
+from submissions.criteria.logged import Datalog
+from submissions.criteria.stopping import StopOn
+from submissions.magic_lines import magic_place
+
+_OPERATORS = frozenset("+-*/")
+_PAIRS = frozenset({"MoveTank", "MoveSteering"})
+_SWAPPED_PORTS = ("OUTPUT_C", ",", "OUTPUT_B")
+_MISSING_FLAG = re.compile(r"to have -(\w), but")
+#: A flag that takes a value, and the value behind it.
+_VALUED_FLAG = re.compile(r"(?<=\s)-(\w*?)([broxyaPNMs])([A-Za-z]{2,})(?=\s|$)")
+_FEW = re.compile(r"[Ee]xpected at least (\d+) samples of \w+, but there (?:is|are) (\d+)")
+_PAIRS_TAKEN = re.compile(r"\d+ of (\d+) pairs are usable")
+_READING = re.compile(r"reading (\S+) to (\S+) %, but it stopped with it reading (\d+(?:\.\d+)?) %")
+_X_NAME = re.compile(r"(?:\w*_)?d?x\d?\Z", re.IGNORECASE)
+_Y_NAME = re.compile(r"(?:\w*_)?d?y\d?\Z", re.IGNORECASE)
+
+
+def of_unread(clues: Clues) -> Iterator[str]:
+    """A value that is computed and that no line uses."""
+    for listing, each in statements_of(clues):
+        name, value = each.target, each.tokens[2:]
+        computes = name and (_OPERATORS & set(value) or value[-1] in PROPERTIES) and name not in value
+        if computes and not any(_reads(one, name) for one in listing.code.statements):
+            yield (
+                f"{listing.at(each.line)} computes {name}, but no line uses it. Write {name} where its value is needed"
+            )
+            return
+
+
+def _reads(statement: Statement, name: str) -> bool:
+    """Whether a statement has a name for anything but its one assignment, in a formatted string too."""
+    tokens = statement.tokens[2:] if statement.target == name else statement.tokens
+    return any(token == name or (not is_name(token) and name in token) for token in tokens)
+
+
+def of_swapped_ports(clues: Clues) -> Iterator[str]:
+    """``MoveTank(OUTPUT_C, OUTPUT_B)``: the left motor comes first, and it is on B."""
+    if not any(isinstance(each, DRIVEN + STOPPED) for each in clues.lost):
+        return
+    found = [(listing, each, call.name) for listing, each in statements_of(clues) for call in each.calls]
+    swapped = [
+        (listing, each, name)
+        for listing, each, name in found
+        if name.rpartition(".")[2] in _PAIRS and "".join(_SWAPPED_PORTS) in "".join(each.tokens)
+    ]
+    if swapped:
+        listing, each, name = swapped[0]
+        others = [one.line for _, one, _ in swapped[1:]]
+        more = f" Line {others[0]} has the same." if others else ""
+        yield (
+            f"{listing.at(each.line)} takes OUTPUT_C for the left motor, so the robot turns to the other side: the "
+            f"left motor is on OUTPUT_B. Write {name}(OUTPUT_B, OUTPUT_C).{more}"
+        )
+
+
+def of_swallowed_flags(clues: Clues) -> Iterator[str]:
+    """``-oAHWR``: a flag that takes a value, so that the flags behind it are its value."""
+    told = [each.message for each in clues.results for one in clues.lost if one.id == each.id and _is_source(one)]
+    missing = {flag for message in told for flag in _MISSING_FLAG.findall(message)}
+    for listing in clues.programs if missing else ():
+        place = magic_place("\n".join(listing.lines))
+        found = _VALUED_FLAG.search(listing.lines[place]) if place is not None else None
+        if place is None or found is None or not missing & set(found[3]):
+            continue
+        before, flag, value = found.groups()
+        other = flag.swapcase()
+        better = (
+            f"-{before}{other}{value}" if other in missing else f"-{before}{value}, and -{flag} with its value apart"
+        )
+        yield (
+            f"{listing.at(place + 1)}: -{flag} takes a value, so {value} is its value and sets no flags. Write {better}"
+        )
+        return
+
+
+def _is_source(criterion: object) -> bool:
+    return isinstance(criterion, SourceRules)
+
+
+def of_few_samples(clues: Clues) -> Iterator[str]:
+    """A log that has too few samples: whatever else it lacks may come of that."""
+    for criterion in clues.lost:
+        told = next((each.message for each in clues.results if each.id == criterion.id), "")
+        found = _FEW.search(told) if isinstance(criterion, Datalog) else None
+        if found is None or found[2] == "0":
+            continue
+        few = f"only {found[2]} samples were logged, and at least {found[1]} are asked for"
+        sleeping = _sleeping_loops(clues)
+        if len(sleeping) == 1:
+            listing, each, seconds = sleeping[0]
+            yield (
+                f"{listing.at(each.line)}: {few}. The loop waits {seconds:g} s after each of them: wait less, and let "
+                "the loop repeat more often"
+            )
+            return
+
+
+def _sleeping_loops(clues: Clues) -> list[tuple[Listing, Statement, float]]:
+    """The statements that sleep in a loop that prints, and for how long."""
+    found = []
+    for listing, each in statements_of(clues):
+        call = next((one for one in each.calls if one.name in ("time.sleep", "sleep")), None)
+        seconds = listing.code.number(call.arguments[0]) if call is not None and call.arguments else None
+        loops = listing.code.loops_around(each)
+        if (
+            seconds
+            and loops
+            and any(one.name == "print" for other in listing.code.body(loops[0]) for one in other.calls)
+        ):
+            found.append((listing, each, seconds))
+    return found
+
+
+def of_few_images(clues: Clues) -> Iterator[str]:
+    """A robot that drives past its patterns so fast that it takes too few images."""
+    for criterion in clues.lost:
+        told = next((each.message for each in clues.results if each.id == criterion.id), "")
+        found = _PAIRS_TAKEN.search(told) if isinstance(criterion, Collects) else None
+        driving = [
+            (listing, each)
+            for listing, each in statements_of(clues)
+            if any(call.name.endswith(".on") and call.arguments for call in each.calls)
+        ]
+        if found is None or len(driving) != 1 or clues.seconds > clues.limit / 4:
+            continue
+        listing, each = driving[0]
+        yield (
+            f"{listing.at(each.line)}: the robot passed the patterns in {clues.seconds:.1f} s and took only {found[1]} "
+            "pairs of images. Drive slower, or take images more often"
+        )
+        return
+
+
+def of_partial_reading(clues: Clues) -> Iterator[str]:
+    """A robot that stops as soon as the edge of its sensor is on what it looks for."""
+    for criterion in clues.lost:
+        told = next((each.message for each in clues.results if each.id == criterion.id), "")
+        found = _READING.search(told) if isinstance(criterion, StopOn) else None
+        if found is None or not float(found[2]) < float(found[3]) < 100:
+            continue
+        loops = [
+            (listing, each)
+            for listing, each in statements_of(clues)
+            if each.keyword == "while" and any(token in PROPERTIES for token in each.condition)
+        ]
+        if len(loops) == 1:
+            listing, each = loops[0]
+            yield (
+                f"{listing.at(each.line)}: the loop ends as soon as the edge of the sensor leaves the white: it read "
+                f"{found[3]} %, expected {found[1]} to {found[2]} %. Let the robot drive on a little after the loop, "
+                "for example with time.sleep(0.2)"
+            )
+            return
+
+
+def of_swapped_atan2(clues: Clues) -> Iterator[str]:
+    """``math.atan2(dx, dy)``, where the robot does not get where it should."""
+    if not any(isinstance(each, DRIVEN + STOPPED) for each in clues.lost):
+        return
+    for listing, each in statements_of(clues):
+        for call in each.calls:
+            if call.name.rpartition(".")[2] != "atan2" or len(call.arguments) != 2:
+                continue
+            first, second = ([token for token in one if is_name(token)] for one in call.arguments)
+            if first and second and all(map(_X_NAME.match, first)) and all(map(_Y_NAME.match, second)):
+                y, x = joined(call.arguments[1]), joined(call.arguments[0])
+                yield (
+                    f"{listing.at(each.line)}: atan2 takes y first, and then x. For the angle from the x axis write "
+                    f"{call.name}({y}, {x})"
+                )
+                return

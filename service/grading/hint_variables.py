@@ -1,0 +1,149 @@
+"""Slips with variables that the text of one program proves: another case, the other side's sensor, a step too early.
+
+``hint_slips.py`` looks for them beside its own.
+"""
+
+from __future__ import annotations
+
+import re
+
+from service.grading.hint_clues import Listing
+from service.grading.hint_code import Statement, is_name, joined
+
+_SIDE = re.compile("left|right", re.IGNORECASE)
+_OTHER_SIDE = {"left": "right", "right": "left", "Left": "Right", "Right": "Left", "LEFT": "RIGHT", "RIGHT": "LEFT"}
+
+
+def other_case(listing: Listing, statement: Statement) -> str:
+    """``Count = count + 1``: a name that is never read, beside one that differs only in upper and lower case."""
+    name, tokens = statement.target, statement.tokens
+    meant = next((each for each in tokens[2:] if each != name and each.casefold() == name.casefold()), "")
+    statements = listing.code.statements
+    if not name or not is_name(meant) or not any(each.target == meant for each in statements):
+        return ""
+    if any(name in (each.tokens[1:] if each.target == name else each.tokens) for each in statements):
+        return ""
+    return (
+        f"{listing.at(statement.line)} assigns {name}, so {meant} stays as it is: upper and lower case are different. "
+        f"Write {meant} = {joined(tokens[2:])}"
+    )
+
+
+def same_side(listing: Listing, statement: Statement) -> str:
+    """A name with right in it that is given what its left twin is given, from the left; and the other way round."""
+    name, value = statement.target, statement.tokens[2:]
+    twin = _mirrored(name)
+    fixed = tuple(_mirrored(token) if is_name(token) else token for token in value)
+    sides = {side.lower() for token in value if is_name(token) for side in _SIDE.findall(token)}
+    own = {side.lower() for side in _SIDE.findall(name)}
+    if len(own) != 1 or len(sides) != 1 or own == sides:
+        return ""
+    other = next((each for each in listing.code.statements if each.target == twin and each.tokens[2:] == value), None)
+    if other is None:
+        return ""
+    again = [each.line for each in listing.code.statements if each.target == name and each.tokens[2:] == value]
+    more = "" if len(again) < 2 else f" in lines {', '.join(map(str, again[:-1]))} and {again[-1]}"
+    return (
+        f"{listing.at(statement.line)} gives {name} the same value as {twin} in line {other.line}: {joined(value)}. "
+        f"Write {name} = {joined(fixed)}{more}"
+    )
+
+
+def early_step(listing: Listing, statement: Statement) -> str:
+    """``tosses[count]`` below ``count = count + 1`` in ``while count < len(tosses)``."""
+    code = listing.code
+    loop = next((each for each in code.around(statement) if each.keyword == "while"), None)
+    if loop is None or len(loop.condition) != 6 or loop.condition[1:4] != ("<", "len", "("):
+        return ""
+    name, items = loop.condition[0], loop.condition[4]
+    place = next(
+        (at for at in range(len(statement.tokens) - 3) if statement.tokens[at : at + 4] == _item(items, name)), None
+    )
+    from_zero = [each for each in code.statements[: loop.number] if each.target == name][-1:]
+    steps = [each for each in code.body(loop) if name in each.bound]
+    if place is None or not from_zero or from_zero[0].tokens[2:] != ("0",) or len(steps) != 1:
+        return ""
+    step = steps[0]
+    grows = step.tokens[1:] in (("+=", "1"), ("=", name, "+", "1"))
+    if not grows or step.parent != loop.number or step.number >= statement.number:
+        return ""
+    return (
+        f"{listing.at(statement.line)}: line {step.line} has already added 1 to {name}, so {items}[{name}] skips the "
+        f"first item and goes past the last. Write {items}[{name} - 1]"
+    )
+
+
+def removal_from_list(listing: Listing, statement: Statement) -> str:
+    """``days.remove(day)`` in ``for day in days``: the loop skips the item after each that is removed."""
+    tokens, code = statement.tokens, listing.code
+    loop = next((each for each in code.around(statement) if each.keyword == "for"), None)
+    if loop is None or len(loop.tokens) != 5 or tokens[1:4] != (".", "remove", "(") or tokens[0] != loop.tokens[3]:
+        return ""
+    after = code.statements[statement.number + 1 : statement.number + 2]
+    if after and after[0].keyword in ("break", "return") and after[0].parent == statement.parent:
+        return ""
+    name, items = loop.tokens[1], loop.tokens[3]
+    return (
+        f"{listing.at(statement.line)} removes from {items}, the list that the loop in line {loop.line} goes through, "
+        f"so the loop skips the item after it. Append each {name} that is kept to a new list"
+    )
+
+
+def unreachable_if(listing: Listing, statement: Statement) -> str:
+    """``if a < 5 and b < 5`` below ``if a < 9`` that has returned: the second is never true."""
+    code, asked = listing.code, _conjuncts(statement)
+    in_chain = statement.keyword == "elif"
+    for each in reversed(code.statements[: statement.number]) if asked else ():
+        if each.indent < statement.indent or (each.parent == statement.parent and each.keyword not in ("if", "elif")):
+            return ""
+        if each.parent != statement.parent:
+            if any(one[0] in each.bound for one in asked) and each.keyword not in _LEAVING:
+                return ""
+            continue
+        body, earlier = code.body(each), _conjuncts(each)
+        leaves = bool(body) and body[-1].parent == each.number and body[-1].keyword in _LEAVING
+        if (in_chain or leaves) and earlier and all(any(_implies(one, other) for one in asked) for other in earlier):
+            return (
+                f"{listing.at(statement.line)} is never true: wherever {joined(statement.condition)}, line {each.line} "
+                f"has already found that {joined(each.condition)}. Move this condition above line {each.line}"
+            )
+        in_chain = in_chain and each.keyword == "elif"
+    return ""
+
+
+_LEAVING = frozenset({"return", "break", "continue", "raise"})
+_Comparison = tuple[str, str, str]
+
+
+def _conjuncts(statement: Statement) -> list[_Comparison]:
+    """The comparisons of names that ``and`` joins in a condition; none where it has anything else."""
+    if statement.keyword not in ("if", "elif"):
+        return []
+    parts: list[tuple[str, ...]] = [()]
+    for token in statement.condition:
+        parts = [*parts, ()] if token == "and" else [*parts[:-1], (*parts[-1], token)]
+    found = [(each[0], each[1], each[2]) for each in parts if len(each) == 3 and is_name(each[0]) and each[1] in _SIGNS]
+    return found if len(found) == len(parts) else []
+
+
+_SIGNS = frozenset({"<", ">", "<=", ">=", "==", "!="})
+
+
+def _implies(one: _Comparison, other: _Comparison) -> bool:
+    """Whether one comparison is only true where the other is: the same, or with a number that is farther out."""
+    if one == other:
+        return True
+    if one[:2] != other[:2] or not all(each[2].replace(".", "", 1).isdecimal() for each in (one, other)):
+        return False
+    return (
+        float(one[2]) <= float(other[2]) if one[1][0] == "<" else one[1][0] == ">" and float(one[2]) >= float(other[2])
+    )
+
+
+def _item(items: str, name: str) -> tuple[str, ...]:
+    return items, "[", name, "]"
+
+
+def _mirrored(name: str) -> str:
+    """The name with left for right and right for left."""
+    return _SIDE.sub(lambda found: _OTHER_SIDE.get(found[0], found[0]), name)

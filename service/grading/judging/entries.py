@@ -1,0 +1,135 @@
+"""Finding a row of figures and words in a report: one matcher for the row that is wanted and for those that are not.
+
+What follows from a row that is found is decided in ``reporting.py``.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import takewhile
+
+from service.grading.judging.words import Token, tokens_of, words_of
+
+Entry = float | str
+Row = tuple[Entry, ...]
+Values = tuple[float, ...]
+#: Half of the last binary digit is no difference between two decimal numbers.
+_SLACK = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """How many entries of a row were found in order, and the numbers among them."""
+
+    count: int
+    values: Values
+
+
+class Report:
+    """The tokens of a report, in which rows are looked for.
+
+    Entries of a row come in order, with anything between them. After a text, however, the next entry is one of the
+    first of its kind: "rows 7 columns 9" has 7 rows, and not 9. The kinds are numbers, and the texts in ``rows``.
+    """
+
+    def __init__(self, tokens: Sequence[Token], rows: Collection[Row], tolerance: float) -> None:
+        self._words = [token.word for token in tokens]
+        self._numbers = [token.value for token in tokens]
+        self._tolerance = tolerance
+        self._by_word: dict[str, list[int]] = {}
+        self._by_number: dict[float, list[int]] = {}
+        for place, token in enumerate(tokens):
+            self._by_word.setdefault(token.word, []).append(place)
+            if token.value is not None:
+                self._by_number.setdefault(token.value, []).append(place)
+        self._sorted_numbers = sorted(self._by_number)
+        in_text = self._covered({entry for row in rows for entry in row if isinstance(entry, str)})
+        self._before_text = _ends_before_runs(in_text)
+        self._before_number = _ends_before_runs([number is not None for number in self._numbers])
+
+    def find(self, row: Row) -> Found:
+        """The longest beginning of ``row`` that is there."""
+        reached: Mapping[int, Values] = {0: ()}
+        for count, entry in enumerate(row):
+            after_text = count > 0 and isinstance(row[count - 1], str)
+            reached, before = self._next(entry, reached, after_text), reached
+            if not reached:
+                return Found(count, before[min(before)])
+        return Found(len(row), reached[min(reached)])
+
+    def has(self, row: Row) -> bool:
+        """Whether all entries of ``row`` are there."""
+        return self.find(row).count == len(row)
+
+    def _next(self, entry: Entry, reached: Mapping[int, Values], after_text: bool) -> Mapping[int, Values]:
+        """Where ``entry`` ends that comes after one of the places ``reached``, each with the numbers up to there."""
+        places = self._places(entry)
+        length = len(words_of(entry)) if isinstance(entry, str) else 1
+        starts = sorted(reached)
+        before_run = self._before_text if isinstance(entry, str) else self._before_number
+        ends: dict[int, Values] = {}
+        for place in places[bisect_left(places, starts[0]) :]:
+            # After a text, only the nearest place counts: between it and the entry's run is nothing of its kind.
+            start = starts[bisect_right(starts, place) - 1] if after_text else starts[0]
+            if after_text and start <= before_run[place]:
+                continue
+            number = self._numbers[place]
+            ends[place + length] = reached[start] if number is None else (*reached[start], number)
+            if not isinstance(entry, str):
+                break  # After a number anything goes: no later one leads further.
+        return ends
+
+    def _places(self, entry: Entry) -> list[int]:
+        """Where ``entry`` begins, in order."""
+        if isinstance(entry, str):
+            parts = words_of(entry)
+            return [
+                place for place in self._by_word.get(parts[0], ()) if self._words[place : place + len(parts)] == parts
+            ]
+        first = bisect_left(self._sorted_numbers, entry - self._tolerance - _SLACK)
+        near = takewhile(lambda number: number <= entry + self._tolerance + _SLACK, self._sorted_numbers[first:])
+        return sorted(place for number in near for place in self._by_number[number])
+
+    def _covered(self, texts: Iterable[str]) -> list[bool]:
+        """Whether each token is part of one of the texts."""
+        covered = [False] * len(self._words)
+        for text in texts:
+            length = len(words_of(text))
+            for place in self._places(text):
+                covered[place : place + length] = [True] * length
+        return covered
+
+
+def _ends_before_runs(fits: Sequence[bool]) -> list[int]:
+    """Return for each place the last one that fits before the run of the place; -1 where there is none."""
+    ends: list[int] = []
+    last, before = -1, -1
+    for place, is_fit in enumerate(fits):
+        if is_fit:
+            if last != place - 1:
+                before = last
+            last = place
+        ends.append(before)
+    return ends
+
+
+def suits(row: Row, wanted: Row, tolerance: float) -> bool:
+    """Whether a right report of ``wanted`` may be one of ``row`` as well."""
+    tokens = [token for entry in wanted for token in _tokens_of_entry(entry)]
+    return Report(tokens, (row, wanted), 2 * tolerance).has(row)
+
+
+def are_alike(row: Row, other: Row, tolerance: float) -> bool:
+    """Whether no report can be right for one of the rows and wrong for the other."""
+    return suits(row, other, tolerance) and suits(other, row, tolerance)
+
+
+def is_near(value: float | None, wanted: float, tolerance: float) -> bool:
+    """Whether a token's value is the wanted number."""
+    return value is not None and abs(value - wanted) <= tolerance + _SLACK
+
+
+def _tokens_of_entry(entry: Entry) -> list[Token]:
+    return tokens_of(entry) if isinstance(entry, str) else [Token(f"{entry:g}", entry)]

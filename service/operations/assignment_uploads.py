@@ -1,0 +1,139 @@
+"""Assignments that instructors upload, and reference solutions that are graded as a preview.
+
+What an assignment's folder may contain is ``submissions.assignment``'s to decide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from service.operations.assignments import CourseAssignment, prepare
+from service.operations.context import Actor, Service
+from service.operations.errors import Conflict
+from service.operations.lookup import course_for, own_enrolment
+from service.store.batches import intake
+from service.store.courses import open_assignments
+from service.store.models import Course
+from service.store.states import Lane, Role
+from sim.errors import UsageError
+from submissions.assignment.definition import Assignment
+from submissions.assignment.examples import EXAMPLES
+from submissions.assignment.folder import FILE_NAME, REFERENCE, assignment_folder, catalogue
+from submissions.assignment.reader import find_in_catalogue, read_assignment
+from submissions.bundle import read_submission
+from submissions.grading_request import GradingRequest
+from submissions.people import Student
+from submissions.unzipping import unzip
+
+_MOST_ENTRIES, _MOST_BYTES = 2000, 200_000_000
+
+
+class StudentsKnowAnother(Conflict):
+    """Students have been shown another assignment with this id, and the request does not say to replace it."""
+
+
+@dataclass(frozen=True, slots=True)
+class UploadRequest:
+    """The zip of an assignment's folder; with ``replace`` also in place of another that students have been shown."""
+
+    path: Path
+    replace: bool = False
+
+
+def prepare_from_catalogue(service: Service, actor: Actor, course_id: int, assignment: str) -> CourseAssignment:
+    """Put an assignment of the catalogue into a course, in its newest version and not yet open.
+
+    Raises NotFound where the actor does not instruct the course, and UsageError where there is no such assignment.
+    """
+    return prepare(service, actor, course_id, find_in_catalogue(assignment))
+
+
+def upload(service: Service, actor: Actor, course_id: int, request: UploadRequest) -> CourseAssignment:
+    """Put the assignment whose folder is in a zip into a course, and grade its reference solution if it has one.
+
+    Raises:
+        NotFound: the actor does not instruct the course.
+        StudentsKnowAnother: the upload would replace an assignment that students have been shown.
+        UsageError: the zip contains no assignment; each mistake is a line.
+    """
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+    folder = _unpacked(request.path)
+    found = read_assignment(folder)
+    if not request.replace:
+        _refuse_replacement(service, course_id, found)
+    made = prepare(service, actor, course_id, found)
+    reference = folder / EXAMPLES / REFERENCE
+    if reference.is_dir():
+        _grade(service, actor, course_id, found, reference)
+    return made
+
+
+def preview(service: Service, actor: Actor, course_id: int, assignment: str) -> str:
+    """Grade the catalogue's reference solution as the actor's own submission; returns the id of its grade.
+
+    Raises NotFound where the actor does not instruct the course, and UsageError where there is no reference solution of
+    the version that the course has.
+    """
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        found = open_assignments.load(session, course_id, assignment)
+    reference = reference_of(found)
+    if reference is None:
+        raise UsageError(
+            "there is no reference solution of this version of %(assignment)s; upload its folder again",
+            assignment=assignment,
+        )
+    return _grade(service, actor, course_id, found, reference)
+
+
+def reference_of(found: Assignment) -> Path | None:
+    """The catalogue's reference solution; None where the course marks by another version than the catalogue's."""
+    if found.id not in catalogue() or find_in_catalogue(found.id).version != found.version:
+        return None
+    folder = assignment_folder(found.id) / EXAMPLES / REFERENCE
+    return folder if folder.is_dir() else None
+
+
+def _refuse_replacement(service: Service, course_id: int, found: Assignment) -> None:
+    with service.store.reading() as session:
+        there = [each for each in open_assignments.of_course(session, course_id) if each.assignment == found.id]
+    if any(each.opened_at is not None and each.version != found.version for each in there):
+        raise StudentsKnowAnother(
+            "%(id)s: students have been shown another assignment of this id, %(title)s; "
+            "give yours another id, or say that it takes that one's place",
+            id=found.id,
+            title=repr(there[0].title),
+        )
+
+
+def _grade(service: Service, actor: Actor, course_id: int, found: Assignment, reference: Path) -> str:
+    with service.store.reading() as session:
+        student = Student(own_enrolment(session, actor, course_id, Role.INSTRUCTOR).written)
+        course = session.get_one(Course, course_id).name
+    submission = read_submission(reference, student=student.id, asked=found.parts)
+    accepted = intake.accept(
+        service.store,
+        GradingRequest(submission, found, REFERENCE, whose=student),
+        course=course,
+        max_attempts=service.settings.max_attempts,
+    )
+    if accepted.copied_from is None:
+        service.notifier.grade(Lane.INTERACTIVE)
+    return accepted.job_id
+
+
+def _unpacked(path: Path) -> Path:
+    """The folder of the assignment: the zip's own, or the only one in it."""
+    # Messages about its content name this folder where the zip has none of its own.
+    inside = path.parent / "unpacked" / path.stem
+    inside.mkdir(parents=True)
+    unzip(path, inside, _MOST_ENTRIES, _MOST_BYTES)
+    found = [each for each in inside.iterdir() if each.name != "__MACOSX"]
+    folder = found[0] if len(found) == 1 and found[0].is_dir() else inside
+    if not (folder / FILE_NAME).is_file():
+        raise UsageError(
+            "%(zip)s: has no %(file)s at its top or in its only folder, expected one", zip=path.name, file=FILE_NAME
+        )
+    return folder

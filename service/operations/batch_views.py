@@ -1,0 +1,284 @@
+"""Views of batches: lists, progress, tables, grades, overviews and changes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from decimal import Decimal
+from typing import TYPE_CHECKING
+
+from sqlalchemy.orm import Session
+
+from service.grading.ranks import RankTable
+from service.grading.statistics import PASS_SHARE, AssignmentStatistics, statistics_of
+from service.operations.context import Actor, Service
+from service.operations.lookup import batch_in, check_operator, course_for, course_named, existing_batch, names_for
+from service.store import audit
+from service.store.audit import AuditEntry as AuditEntry
+from service.store.batches import batch_table, batches, publishing, rankings, regrades
+from service.store.batches.batch_table import REFUSED as REFUSED
+from service.store.batches.batch_table import SORTS as SORTS
+from service.store.batches.batch_table import STATES as STATES
+from service.store.batches.batch_table import Remarked as Remarked
+from service.store.batches.batch_table import TableAsked as TableAsked
+from service.store.batches.batch_table import TableLine as TableLine
+from service.store.batches.batch_table import TablePage as TablePage
+from service.store.batches.batches import BatchLine as BatchLine
+from service.store.batches.batches import BatchProgress as BatchProgress
+from service.store.batches.batches import JobLine as JobLine
+from service.store.batches.overview import ClassOverview as ClassOverview
+from service.store.batches.overview import missing, overview
+from service.store.batches.regrades import Change, ChangesPage
+from service.store.courses import open_assignments
+from service.store.courses.hidden_names import HiddenNames
+from service.store.courses.open_assignments import CourseAssignment
+from service.store.courses.policies import in_days as in_days
+from service.store.grades.marked import marked
+from service.store.models import Batch
+from service.store.queue import metrics, workers
+from service.store.queue.metrics import Pace
+from service.store.queue.workers import WorkerDescription as WorkerDescription
+from service.store.states import BatchState, JobState, Role
+
+if TYPE_CHECKING:
+    from service.operations.batches import SubmittedBatch
+    from submissions.people import Student
+
+_BATCHES_A_PAGE = 30
+
+
+@dataclass(frozen=True, slots=True)
+class BatchesPage:
+    """Some batches of a course, newest first, and the assignments that it has prepared.
+
+    ``older`` is the last of these batches where older ones follow.
+    """
+
+    batches: tuple[BatchLine, ...]
+    older: str
+    prepared: tuple[CourseAssignment, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class BatchView:
+    """A batch, how far it is, and how fast that changes."""
+
+    batch: BatchLine
+    progress: BatchProgress
+    pace: Pace | None
+
+
+@dataclass(frozen=True, slots=True)
+class TableView:
+    """A batch with all its rows, and what was done to it, newest first."""
+
+    view: BatchView
+    lines: tuple[TableLine, ...]
+    nameless: bool  # names of some students are hidden
+    waiting_regrades: int
+    history: tuple[AuditEntry, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GradedView:
+    """A batch with the grades of its submissions, and their statistics by assignment."""
+
+    view: BatchView
+    lines: tuple[JobLine, ...]
+    statistics: tuple[AssignmentStatistics, ...]
+    waiting_regrades: int
+
+
+@dataclass(frozen=True, slots=True)
+class StatusView:
+    """All that is known of a batch; ``changes`` are those of a batch of regrades."""
+
+    graded: GradedView
+    ranks: tuple[RankTable, ...]
+    changes: tuple[Change, ...]
+    history: tuple[AuditEntry, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class OverviewView:
+    """What came of a batch by assignment.
+
+    ``missing`` are the students without a submission where the batch has no graded one at all.
+    """
+
+    batch: BatchLine
+    lines: tuple[TableLine, ...]
+    classes: tuple[ClassOverview, ...]
+    missing: tuple[Student, ...]
+
+
+def list_batches_page(service: Service, actor: Actor, course_id: int, after: str = "") -> BatchesPage:
+    """The newest batches of a course that are older than ``after``, if that is one of them. Raises NotFound."""
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        last = session.get(Batch, after) if after else None
+        place = None if last is None or last.course_id != course_id else (last.created_at, last.id)
+        found = batches.batches_of(session, course_id, _BATCHES_A_PAGE + 1, place)
+        prepared = open_assignments.of_course(session, course_id)
+    shown = tuple(found[:_BATCHES_A_PAGE])
+    return BatchesPage(shown, shown[-1].id if len(found) > len(shown) else "", tuple(prepared))
+
+
+def list_batches(
+    service: Service, actor: Actor, course_id: int, limit: int, after: tuple[datetime, str] | None = None
+) -> list[BatchLine]:
+    """The newest batches of a course; ``after`` is the time and id of the last one already seen. Raises NotFound."""
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        return batches.batches_of(session, course_id, limit, after)
+
+
+def list_newest(service: Service, actor: Actor, course: str | None) -> list[BatchLine]:
+    """The newest batches of the course of this name, or of all courses; for operators. Raises NotFound."""
+    with service.store.reading() as session:
+        check_operator(actor)
+        return batches.list_batches(session, None if course is None else course_named(session, actor, course).id)
+
+
+def look(service: Service, actor: Actor, batch_id: str) -> tuple[BatchProgress, BatchState]:
+    """How far a batch of any course is, and its state, in few queries; for operators who wait for it.
+
+    Raises NotFound.
+    """
+    check_operator(actor)
+    with service.store.reading() as session:
+        return batches.progress(session, batch_id), existing_batch(session, batch_id).state
+
+
+def list_workers(service: Service, actor: Actor) -> list[WorkerDescription]:
+    """The workers that run, for operators. Raises NotFound."""
+    check_operator(actor)
+    with service.store.reading() as session:
+        return [seen.worker for seen in workers.known_workers(session) if seen.lately]
+
+
+def show_progress(service: Service, actor: Actor, course_id: int, batch_id: str) -> BatchView:
+    """How far a batch is. Raises NotFound."""
+    with service.store.reading() as session:
+        return _view(session, actor, course_id, batch_id)
+
+
+def show_table(service: Service, actor: Actor, course_id: int, batch_id: str) -> TableView:
+    """A batch with a row for each submission and each refusal. Raises NotFound."""
+    hidden = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        view = _view(session, actor, course_id, batch_id)
+        lines = batch_table.table_lines(session, batch_id, view.batch.refusals, hidden)
+        history = audit.entries(session, "batch", batch_id)
+        waiting = _waiting_regrades(session, view.batch)
+    nameless = bool(hidden.assignments & {each.assignment for each in lines})
+    return TableView(view, tuple(lines), nameless, waiting, tuple(reversed(history)))
+
+
+def table_page(
+    service: Service, actor: Actor, course_id: int, lines: Sequence[TableLine], asked: TableAsked
+) -> tuple[TablePage, dict[str, Remarked]]:
+    """Some of the rows, and the remarks on them by job. Raises NotFound."""
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        table = batch_table.table_page(lines, asked)
+        return table, batch_table.remarked(session, table.lines)
+
+
+def show_graded(service: Service, actor: Actor, course_id: int, batch_id: str) -> GradedView:
+    """A batch with its grades and their statistics. Raises NotFound."""
+    hidden = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        return _graded(session, actor, course_id, batch_id, hidden)
+
+
+def show_status(service: Service, actor: Actor, course_id: int, batch_id: str) -> StatusView:
+    """All that is known of a batch. Raises NotFound."""
+    hidden = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        graded = _graded(session, actor, course_id, batch_id, hidden)
+        is_regrade = graded.view.batch.regrade_of is not None
+        changes = regrades.changes(session, batch_id, hidden) if is_regrade else []
+        ranks = rankings.rank_tables(session, graded.lines)
+        history = audit.entries(session, "batch", batch_id)
+    return StatusView(graded, tuple(ranks), tuple(changes), tuple(history))
+
+
+def list_grades(
+    service: Service, actor: Actor, course_id: int, batch_id: str, limit: int, after: str | None = None
+) -> list[JobLine]:
+    """Some grades of a batch, following the one with the id ``after``. Raises NotFound."""
+    hidden = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        batch_in(session, course_id, batch_id)
+        return batches.some_job_lines(session, batch_id, hidden, limit, after)
+
+
+def list_submitted(service: Service, actor: Actor, done: SubmittedBatch) -> list[JobLine]:
+    """The grades of submissions that were just made and of those known before, for operators. Raises NotFound."""
+    check_operator(actor)
+    with service.store.reading() as session:
+        lines = [batches.job_line(session, known.job_id) for known in done.known]
+        if done.batch is not None:
+            lines += batches.attempt_lines(session, done.batch.id)
+    return sorted(lines, key=lambda line: (line.student, line.id))
+
+
+def show_statistics(service: Service, actor: Actor, lines: Iterable[JobLine]) -> tuple[AssignmentStatistics, ...]:
+    """The statistics of these grades by assignment, for operators. Raises NotFound."""
+    check_operator(actor)
+    with service.store.reading() as session:
+        return _statistics(session, tuple(lines))
+
+
+def show_overview(
+    service: Service, actor: Actor, course_id: int, batch_id: str, pass_share: Decimal = PASS_SHARE
+) -> OverviewView:
+    """What came of a batch: marks, criteria, causes, who is missing and which grades need review. Raises NotFound."""
+    hidden = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        batch_in(session, course_id, batch_id)
+        line = batches.batch(session, batch_id)
+        lines = batch_table.table_lines(session, batch_id, line.refusals, hidden)
+        classes = overview(session, course_id, lines, pass_share, hidden)
+        asked = line.web_assignment if not classes else None
+        nobody = missing(session, course_id, asked, hidden) if asked else ()
+    return OverviewView(line, tuple(lines), classes, nobody)
+
+
+def changes_page(service: Service, actor: Actor, course_id: int, batch_id: str, number: int) -> ChangesPage:
+    """Some changes of a batch of regrades: other marks first. Raises NotFound."""
+    hidden = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        batch_in(session, course_id, batch_id)
+        return regrades.changes_page(session, batch_id, number, hidden)
+
+
+def is_graded(line: TableLine) -> bool:
+    """Whether the row has a grade that counts."""
+    return line.state == JobState.DONE and line.staff_only is None
+
+
+def _view(session: Session, actor: Actor, course_id: int, batch_id: str) -> BatchView:
+    course_for(session, actor, course_id, Role.INSTRUCTOR)
+    batch_in(session, course_id, batch_id)
+    line = batches.batch(session, batch_id)
+    return BatchView(line, batches.progress(session, batch_id), metrics.pace(session, batch_id))
+
+
+def _graded(session: Session, actor: Actor, course_id: int, batch_id: str, hidden: HiddenNames) -> GradedView:
+    view = _view(session, actor, course_id, batch_id)
+    lines = tuple(batches.job_lines(session, batch_id, hidden))
+    return GradedView(view, lines, _statistics(session, lines), _waiting_regrades(session, view.batch))
+
+
+def _statistics(session: Session, lines: Sequence[JobLine]) -> tuple[AssignmentStatistics, ...]:
+    return statistics_of(marked(session, lines))
+
+
+def _waiting_regrades(session: Session, line: BatchLine) -> int:
+    return 0 if line.regrade_of is not None else publishing.unpublished_regrades(session, line.id)

@@ -1,0 +1,326 @@
+"""Batches: find, submit, pause, resume, cancel and retry them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.operations.context import Actor, Service
+from service.operations.lookup import (
+    batch_in,
+    check_operator,
+    course_for,
+    course_named,
+    existing_batch,
+    names_for,
+)
+from service.store import audit
+from service.store.batches import batches, intake, preflight
+from service.store.batches.intake import Accepted as Accepted
+from service.store.batches.intake import AcceptedBatch, AcceptedNew
+from service.store.batches.intake import AlreadySubmitted as AlreadySubmitted
+from service.store.batches.preflight import Foreseen
+from service.store.courses import open_assignments
+from service.store.courses.hidden_names import HiddenNames
+from service.store.engine import now, retry_conflicts
+from service.store.installation import secret_of
+from service.store.models import Course, Enrolment, Job
+from service.store.people import people
+from service.store.people.students import DEFAULT_COURSE, course_of
+from service.store.queue import batch_control
+from service.store.queue.batch_control import Controlled as Controlled
+from service.store.queue.batch_control import Retried as Retried
+from service.store.states import Lane, Role
+from sim.errors import UsageError
+from submissions.people import Refusal
+
+if TYPE_CHECKING:
+    from submissions.assignment.definition import Assignment
+    from submissions.batch_folder import BatchContents
+    from submissions.grading_request import GradingRequest
+
+
+@dataclass(frozen=True, slots=True)
+class InCourse:
+    """The id of a batch or a grade, and the course that it belongs to."""
+
+    course_id: int
+    id: str
+
+
+def find(service: Service, actor: Actor, start: str) -> InCourse:
+    """The batch of any course whose id begins with ``start``, for operators.
+
+    Raises:
+        UsageError: no id or several ids begin so.
+    """
+    check_operator(actor)
+    with service.store.reading() as session:
+        row = existing_batch(session, batches.find_batch(session, start))
+        return InCourse(row.course_id, row.id)
+
+
+def find_grade(service: Service, actor: Actor, start: str) -> InCourse:
+    """The grade of any course whose id begins with ``start``, for operators.
+
+    Raises:
+        UsageError: no id or several ids begin so.
+    """
+    check_operator(actor)
+    with service.store.reading() as session:
+        row = session.get_one(Job, batches.find_job(session, start))
+        return InCourse(session.get_one(Enrolment, row.enrolment_id).course_id, row.id)
+
+
+@dataclass(frozen=True, slots=True)
+class ForeseenSubmission:
+    """A submission that would be taken in, its student's name where it is known, and what would come of it."""
+
+    asked: GradingRequest
+    name: str
+    ahead: Foreseen
+
+
+@dataclass(frozen=True, slots=True)
+class SubmitRequest:
+    """Submissions of several students, as they were read; ``again`` grades also those that were submitted before."""
+
+    name: str
+    contents: BatchContents
+    again: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SubmittedBatch:
+    """The batch that was made, None where nothing was new; submissions known before, and all refusals."""
+
+    batch: AcceptedBatch | None
+    known: tuple[AlreadySubmitted, ...]
+    refusals: tuple[Refusal, ...]
+    refused_now: tuple[Refusal, ...]  # those of them that the course refused, not the reading
+
+    @property
+    def jobs(self) -> tuple[Accepted, ...]:
+        """The submissions of the batch that was made."""
+        return () if self.batch is None else self.batch.jobs
+
+    @property
+    def queued(self) -> int:
+        """How many submissions are to be graded."""
+        return sum(job.copied_from is None for job in self.jobs)
+
+    @property
+    def copied(self) -> int:
+        """How many got the grade of an identical submission at once."""
+        return sum(job.copied_from is not None for job in self.jobs)
+
+
+def submit(service: Service, actor: Actor, course_id: int, request: SubmitRequest) -> SubmittedBatch:
+    """Make a batch of submissions and notify the workers. Students appear under the names that the actor may see.
+
+    Raises:
+        NotFound: the actor does not instruct the course.
+        UsageError: none of the submissions can be taken in.
+    """
+    with service.store.reading() as session:
+        course = course_for(session, actor, course_id, Role.INSTRUCTOR).name
+    checked = request.contents
+    if not checked.grading_requests:
+        raise _none_taken_in(checked.refusals)
+    record = partial(_record_submission, actor.name, len(checked.refusals))
+    batch = (request.name, checked.grading_requests, checked.refusals)
+    most = service.settings.max_attempts
+    if request.again:
+        made = intake.accept_batch(service.store, *batch, course=course, max_attempts=most, record=record)
+        accepted = AcceptedNew(made, (), made.refused)
+    else:
+        accepted = intake.accept_new(service.store, *batch, course=course, max_attempts=most, record=record)
+    refusals = (*checked.refusals, *accepted.refused)
+    if accepted.batch is None and not accepted.known:
+        raise _none_taken_in(refusals)
+    done = _under_shown_names(accepted, refusals, names_for(service, actor, course_id))
+    service.notifier.grade(Lane.BATCH, done.queued)
+    return done
+
+
+def course_of_batches(service: Service, actor: Actor, name: str | None) -> int:
+    """The id of the course of this name, for operators; without a name the default course, created if necessary.
+
+    Raises:
+        NotFound: no course has this name.
+    """
+    check_operator(actor)
+    with service.store.reading() as session:
+        named = session.scalars(select(Course.id).where(Course.name == (name or DEFAULT_COURSE))).one_or_none()
+        if name is not None and named is None:
+            return course_named(session, actor, name).id
+    if named is not None:
+        return named
+    with service.store.transaction() as session:
+        return course_of(session, DEFAULT_COURSE, now(session))
+
+
+def assignment_for(service: Service, actor: Actor, course_id: int, name: str) -> Assignment | None:
+    """The assignment that a batch is submitted to, as the course or the catalogue has it; None for an empty name.
+
+    Raises:
+        NotFound: the actor does not instruct the course.
+        UsageError: neither the course nor the catalogue has it.
+    """
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        return assignment_named(session, course_id, name) if name else None
+
+
+def foresee(service: Service, actor: Actor, course_id: int, contents: BatchContents) -> list[ForeseenSubmission]:
+    """Each submission of an upload with what would come of it if it were submitted now. Raises NotFound."""
+    secret = secret_of(service.store).sha256
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        foreseen = preflight.foresee(session, course_id, contents.grading_requests, secret)
+        names = {each.id: each.name for each in people.members(session, course_id)}
+    return [
+        ForeseenSubmission(asked, _known_name(asked, names), ahead)
+        for asked, ahead in zip(contents.grading_requests, foreseen, strict=True)
+    ]
+
+
+def assignment_named(session: Session, course_id: int, name: str) -> Assignment:
+    """An assignment as the course has it, otherwise the catalogue's; never a folder. Raises UsageError for neither."""
+    if name in {each.assignment for each in open_assignments.of_course(session, course_id)}:
+        return open_assignments.load(session, course_id, name)
+    from submissions.assignment.reader import find_in_catalogue
+
+    return find_in_catalogue(name)
+
+
+@retry_conflicts
+def pause(service: Service, actor: Actor, course_id: int, batch_id: str) -> Controlled:
+    """Begin no more jobs of a batch; running jobs continue.
+
+    Raises:
+        NotFound: the course has no such batch, or the actor does not instruct it.
+        UsageError: the batch was cancelled, or consists of submissions on the web.
+    """
+    with service.store.transaction() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        batch_in(session, course_id, batch_id)
+        done = batch_control.pause(session, batch_id)
+        if done.changed:
+            audit.note(session, actor.name, "pause", "batch", batch_id)
+        return done
+
+
+def resume(service: Service, actor: Actor, course_id: int, batch_id: str) -> Controlled:
+    """Resume a paused batch and notify the workers.
+
+    Raises:
+        NotFound: the course has no such batch, or the actor does not instruct it.
+        UsageError: the batch was cancelled, or consists of submissions on the web.
+    """
+    done = _resume(service, actor, course_id, batch_id)
+    service.notifier.grade(Lane.BATCH, done.waiting)
+    return done
+
+
+@retry_conflicts
+def cancel(service: Service, actor: Actor, course_id: int, batch_id: str) -> Controlled:
+    """End all jobs of a batch that have not ended; existing marks stay.
+
+    Raises:
+        NotFound: the course has no such batch, or the actor does not instruct it.
+        UsageError: the batch consists of submissions on the web.
+    """
+    with service.store.transaction() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        batch_in(session, course_id, batch_id)
+        done = batch_control.cancel(session, batch_id)
+        if done.changed:
+            audit.note(session, actor.name, "cancel", "batch", batch_id, not_begun=done.waiting, stopped=done.running)
+        return done
+
+
+def retry(service: Service, actor: Actor, course_id: int, batch_id: str) -> Retried:
+    """Queue the dead jobs of a batch again and notify the workers.
+
+    Raises:
+        NotFound: the course has no such batch, or the actor does not instruct it.
+        UsageError: the batch was cancelled.
+    """
+    return _notified(service, _retry(service, actor, course_id, batch_id))
+
+
+def retry_dead(service: Service, actor: Actor, batch_id: str | None) -> Retried:
+    """Queue the dead jobs of a batch of any course again, or with None all dead jobs; for operators.
+
+    Raises:
+        NotFound: there is no such batch, or the actor is no operator.
+        UsageError: the batch was cancelled.
+    """
+    return _notified(service, _retry(service, actor, None, batch_id))
+
+
+def _none_taken_in(refusals: Sequence[Refusal]) -> UsageError:
+    first = refusals[0].sentence if refusals else "there are none"
+    return UsageError(f"none of {len(refusals)} submissions can be taken in; {first}")
+
+
+def _record_submission(actor: str, refused: int, session: Session, accepted: AcceptedNew) -> None:
+    if accepted.batch is not None:
+        counts = {"submissions": len(accepted.batch.jobs), "refused": refused + len(accepted.refused)}
+        audit.note(session, actor, "submit", "batch", accepted.batch.id, **counts, known=len(accepted.known))
+
+
+def _under_shown_names(accepted: AcceptedNew, refusals: tuple[Refusal, ...], hidden: HiddenNames) -> SubmittedBatch:
+    batch = accepted.batch
+    if batch is not None:
+        jobs = (replace(job, student=hidden.called(job.assignment, job.student)) for job in batch.jobs)
+        batch = replace(batch, jobs=tuple(jobs))
+    known = (replace(each, student=hidden.called(each.assignment, each.student)) for each in accepted.known)
+    return SubmittedBatch(batch, tuple(known), refusals, accepted.refused)
+
+
+def _known_name(asked: GradingRequest, names: Mapping[str, str]) -> str:
+    """The student's name where it differs from the id: as in the batch, otherwise as in the course."""
+    name = asked.student.name if asked.student.name != asked.student.id else ""
+    return name or names.get(asked.submission.student, "")
+
+
+@retry_conflicts
+def _resume(service: Service, actor: Actor, course_id: int, batch_id: str) -> Controlled:
+    with service.store.transaction() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        batch_in(session, course_id, batch_id)
+        done = batch_control.resume(session, batch_id)
+        if done.changed:
+            audit.note(session, actor.name, "resume", "batch", batch_id)
+        return done
+
+
+@retry_conflicts
+def _retry(service: Service, actor: Actor, course_id: int | None, batch_id: str | None) -> Retried:
+    """Without a course for operators, who retry batches of all courses."""
+    with service.store.transaction() as session:
+        if course_id is None:
+            check_operator(actor)
+            if batch_id is not None:
+                existing_batch(session, batch_id)
+        else:
+            course_for(session, actor, course_id, Role.INSTRUCTOR)
+            batch_in(session, course_id, batch_id or "")
+        done = batch_control.retry(session, batch_id)
+        if done.queued:
+            audit.note(session, actor.name, "retry", "batch", batch_id or "all", queued=done.queued)
+        return done
+
+
+def _notified(service: Service, done: Retried) -> Retried:
+    # Each job returns to its own queue; extra notices are harmless.
+    for lane in Lane:
+        service.notifier.grade(lane, done.queued)
+    return done

@@ -1,0 +1,118 @@
+"""The courses of an installation: found by name, listed, and created with their first instructor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sqlalchemy import select
+
+from service.operations.context import Actor, Service
+from service.operations.errors import Forbidden, Invalid
+from service.operations.lookup import check_operator, course_named
+from service.operations.people import check_lengths
+from service.operations.sign_in_links import make_link
+from service.store import audit
+from service.store.engine import now
+from service.store.models import Course
+from service.store.people import people
+from service.store.people.people import CourseLine as CourseLine
+from service.store.people.people import Member
+from service.store.people.students import DEFAULT_COURSE as DEFAULT_COURSE
+from service.store.people.students import course_of
+from service.store.states import Role
+from submissions.people import Student
+
+#: Longest name of a course.
+LONGEST_NAME = 100
+
+
+@dataclass(frozen=True, slots=True)
+class MemberRequest:
+    """A person to add to a course. ``word`` is what their sign-in link follows from; empty for a random one."""
+
+    course: str
+    id: str
+    name: str = ""
+    email: str = ""
+    role: Role = Role.INSTRUCTOR
+    operator: bool = False
+    word: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class AddedMember:
+    """A member, the secret of their sign-in link, and the instructors elsewhere who have the same id."""
+
+    member: Member
+    secret: str
+    elsewhere: tuple[tuple[str, Member], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class OwnCourse:
+    """A course, and the actor's role in it."""
+
+    id: int
+    name: str
+    role: Role
+
+
+def find(service: Service, actor: Actor, name: str) -> int:
+    """The id of the course of this name. The default course is created where an installation has none yet.
+
+    Raises NotFound for every other name that no course has.
+    """
+    check_operator(actor)
+    with service.store.reading() as session:
+        if name != DEFAULT_COURSE or name in {each.name for each in people.courses(session)}:
+            return course_named(session, actor, name).id
+    with service.store.transaction() as session:
+        return course_of(session, name, now(session))
+
+
+def list_own(service: Service, actor: Actor) -> list[OwnCourse]:
+    """The courses that the actor has a role in, by id."""
+    with service.store.reading() as session:
+        rows = session.scalars(select(Course).where(Course.id.in_(actor.roles)).order_by(Course.id))
+        return [OwnCourse(row.id, row.name, actor.roles[row.id]) for row in rows]
+
+
+def list_courses(service: Service, actor: Actor) -> list[CourseLine]:
+    """All courses by name, with their numbers of members, for operators. Raises NotFound."""
+    check_operator(actor)
+    with service.store.reading() as session:
+        return people.courses(session)
+
+
+def add_member(service: Service, actor: Actor, request: MemberRequest) -> AddedMember:
+    """Add an instructor or a student to a course, with a link that signs them in once.
+
+    An instructor's course is created where there is none of the name; a student's has to exist.
+
+    Raises:
+        NotFound: the actor is no operator, or there is no such course.
+        Forbidden: somebody else than a command makes an operator.
+        Invalid: a name is blank or too long.
+        UsageError: the id is a student's already, or cannot be told from another's.
+    """
+    check_operator(actor)
+    if request.operator and not actor.is_machine:
+        raise Forbidden("only a command on the machine itself makes operators")
+    course, who = request.course.strip(), Student(request.id.strip(), request.name.strip(), request.email.strip())
+    if not course or not who.id:
+        raise Invalid("a course and its members need a name that can be seen")
+    if len(course) > LONGEST_NAME:
+        raise Invalid("the name of a course has at most %(most)s characters", most=LONGEST_NAME)
+    check_lengths([who])
+    is_student = request.role is Role.STUDENT
+    if is_student:
+        find(service, actor, course)
+    with service.store.transaction() as session:
+        member = (people.make_student if is_student else people.make_instructor)(session, course, who)
+        if request.operator:
+            people.make_operator(session, member.person_id)
+        detail = {"role": member.role.value, "operator": request.operator}
+        audit.note(session, actor.name, "add", "person", str(member.person_id), **detail)
+        secret = make_link(session, actor, member.person_id, word=request.word)
+        elsewhere = () if is_student else tuple(people.elsewhere(session, member.enrolment_id))
+    return AddedMember(member, secret, elsewhere)

@@ -1,0 +1,93 @@
+"""A person's own sessions and tokens: make, list and end them, as far as the actor's own credential reaches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from datetime import timedelta
+
+from sqlalchemy.orm import Session
+
+from service.operations.context import Actor, Service
+from service.operations.errors import Conflict, Forbidden, Invalid, NotFound
+from service.operations.scopes import offered_scopes
+from service.store import audit
+from service.store.people import credentials
+from service.store.people.credentials import MOST_TOKENS, CredentialLine, Reach
+from service.store.states import Role
+
+
+@dataclass(frozen=True, slots=True)
+class TokenRequest:
+    """A token to make. ``word`` is what its secret follows from, so that the same request twice makes one token."""
+
+    name: str
+    scopes: frozenset[str]
+    days: int
+    word: str
+
+
+def make_token(service: Service, actor: Actor, request: TokenRequest) -> None:
+    """Make a token for the actor, which reaches no further than what they signed in with.
+
+    Raises Invalid for scopes that are of no use to them, Conflict where they have too many tokens.
+    """
+    person_id = _person(actor)
+    check_scopes(request.scopes, list(actor.roles.values()), operator=actor.operator, limit=actor.reach.scopes)
+    reach = replace(actor.reach, scopes=request.scopes)
+    with service.store.transaction() as session:
+        if not credentials.unused_token(session, person_id, request.word):
+            check_number(session, person_id)
+        lifetime = timedelta(days=request.days)
+        credentials.make_token(session, person_id, lifetime, request.word, name=request.name, reach=reach)
+        audit.note(session, actor.name, "token", "person", str(person_id), scopes=sorted(request.scopes))
+
+
+def show_unused_token(service: Service, actor: Actor, word: str) -> str:
+    """The secret of the actor's token that was made of this word; empty once it has been used."""
+    with service.store.reading() as session:
+        return credentials.unused_token(session, _person(actor), word)
+
+
+def list_credentials(service: Service, actor: Actor) -> list[CredentialLine]:
+    """The actor's sessions and tokens, newest first."""
+    with service.store.reading() as session:
+        return credentials.of_person(session, _person(actor), actor.reach)
+
+
+def end_credential(service: Service, actor: Actor, credential_id: str) -> None:
+    """End one of the actor's sessions or tokens. Raises NotFound where they have none of this id."""
+    person_id = _person(actor)
+    with service.store.transaction() as session:
+        if not credentials.revoke(session, credential_id, person_id, actor.reach):
+            raise NotFound("you have no session and no token of this id")
+        audit.note(session, actor.name, "sign out", "person", str(person_id), ended=1)
+
+
+def end_other_credentials(service: Service, actor: Actor) -> int:
+    """End the actor's links, sessions and tokens, except the one that they use now; returns how many ended."""
+    person_id = _person(actor)
+    with service.store.transaction() as session:
+        ended = credentials.revoke_all(session, person_id, but=actor.credential_id, reach=actor.reach)
+        audit.note(session, actor.name, "sign out", "person", str(person_id), ended=ended)
+    return ended
+
+
+def check_scopes(
+    scopes: frozenset[str], roles: list[Role], *, operator: bool, limit: frozenset[str] = Reach().scopes
+) -> None:
+    """Raise Invalid unless these are scopes that somebody with these roles can use; an empty ``limit`` is none."""
+    offered = offered_scopes(roles, operator=operator, limit=limit or None)
+    if not scopes or not scopes <= offered.keys():
+        raise Invalid("Say what the token may do: %(scopes)s.", scopes=", ".join(offered))
+
+
+def check_number(session: Session, person_id: int) -> None:
+    """Raise Conflict where a person has as many tokens as one may have."""
+    if credentials.count_tokens(session, person_id) >= MOST_TOKENS:
+        raise Conflict("There are %(count)s tokens already. Revoke one first.", count=MOST_TOKENS)
+
+
+def _person(actor: Actor) -> int:
+    if actor.person_id is None:
+        raise Forbidden("only somebody who is signed in has sessions and tokens")
+    return actor.person_id

@@ -1,0 +1,175 @@
+"""Exports of a batch's grades: a table, a file for each submission, or a package for another program."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import BinaryIO
+
+from service.batch_rows import rows_of, why_not_shown
+from service.grading.grade import Grade
+from service.operations.context import Actor, Service
+from service.operations.errors import Invalid
+from service.operations.lookup import batch_in, course_for, names_for
+from service.report_files import report_pages
+from service.reports.formats import FORMATS, Format
+from service.reports.rows import TableRow
+from service.reports.written import file_stems, refused_stems
+from service.store.batches import batches, publishing
+from service.store.batches.batches import JobLine as JobLine
+from service.store.states import JobState, Role
+from submissions.raw_files import shown
+
+_TYPES: Mapping[str, str] = MappingProxyType(
+    {
+        ".csv": "text/csv; charset=utf-8",
+        ".json": "application/json",
+        ".xml": "application/xml",
+        ".txt": "text/plain; charset=utf-8",
+        ".zip": "application/zip",
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ExportRequest:
+    """The format, and whether only published grades are exported.
+
+    ``worksheet`` is the text that a format fills in. ``one_each`` asks for a file for each submission where the format
+    also has a table.
+    """
+
+    form: str
+    published: bool = False
+    worksheet: str | None = None
+    one_each: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Export:
+    """The exported texts: one, or by file name one for each submission; none where a package was written.
+
+    ``for_staff`` are grades that only staff can see, ``unjudged`` exported ones with criteria that could not be judged,
+    and ``left_over`` the rows that the other program would not recognise.
+    """
+
+    text: str
+    files: tuple[tuple[str, str], ...]
+    left_over: tuple[str, ...]
+    for_staff: tuple[JobLine, ...]
+    unjudged: tuple[JobLine, ...]
+    waiting_regrades: int
+
+
+@dataclass(frozen=True, slots=True)
+class Download:
+    """An export as one file."""
+
+    name: str
+    media_type: str
+    data: bytes
+
+
+def export(
+    service: Service,
+    actor: Actor,
+    course_id: int,
+    batch_id: str,
+    request: ExportRequest,
+    sink: BinaryIO | None = None,
+) -> Export:
+    """The grades of a batch that stand, in a format. A package is written to ``sink``.
+
+    Raises:
+        NotFound: the course has no such batch, or the actor does not instruct it.
+        Invalid: there is no such format, it does not go with the worksheet, or it needs names that are hidden.
+    """
+    chosen = _format(request)
+    hidden = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        batch_in(session, course_id, batch_id)
+        lines = batches.job_lines(session, batch_id, hidden)
+        refusals = batches.batch(session, batch_id).refusals
+        waiting = publishing.unpublished_regrades(session, batch_id)
+    nameless = sorted({line.assignment for line in lines} & hidden.assignments)
+    if nameless and (chosen.packed is not None or chosen.filled_in is not None):
+        raise Invalid(
+            "%(form)s needs the names of the students, which are hidden for %(assignment)s; show them first",
+            form=request.form,
+            assignment=nameless[0],
+        )
+    released = [line for line in lines if not why_not_shown(line, published=request.published)]
+    text, files = "", list[tuple[str, str]]()
+    left_over: Sequence[str] = ()
+    if chosen.packed is not None:
+        left_over = chosen.packed(report_pages(service.store, released, refusals), sink or io.BytesIO())
+    else:
+        rows = rows_of(service.store, lines, refusals, published=request.published)
+        if chosen.filled_in is not None:
+            filled = chosen.filled_in(rows, request.worksheet or "")
+            text, left_over = filled.text, filled.left_over
+        elif chosen.table is None or (request.one_each and chosen.document is not None):
+            files = _files(chosen, rows)
+        else:
+            text = chosen.table(rows)
+    return Export(
+        text,
+        tuple(files),
+        tuple(left_over),
+        tuple(each for each in lines if _is_for_staff(each)),
+        tuple(each for each in released if each.unjudged),
+        waiting,
+    )
+
+
+def download(service: Service, actor: Actor, course_id: int, batch_id: str, request: ExportRequest) -> Download:
+    """The same as one file; several are a zip. Raises as ``export`` does."""
+    chosen, sink = _format(request), io.BytesIO()
+    found = export(service, actor, course_id, batch_id, request, sink)
+    suffix, data = chosen.suffix, sink.getvalue() if chosen.packed is not None else found.text.encode()
+    if chosen.packed is None and chosen.filled_in is None and chosen.table is None:
+        suffix, data = ".zip", _zipped(found.files)
+    with service.store.reading() as session:
+        name = batches.batch(session, batch_id).name
+    return Download(f"{shown(name) or batch_id}-{request.form}{suffix}", _TYPES[suffix], data)
+
+
+def _format(request: ExportRequest) -> Format:
+    chosen = FORMATS.get(request.form)
+    if chosen is None or (chosen.filled_in is not None) != (request.worksheet is not None):
+        others = sorted(name for name, each in FORMATS.items() if each.filled_in is None)
+        raise Invalid(
+            "expected a format of %(formats)s, or a worksheet that is to be filled in", formats=", ".join(others)
+        )
+    return chosen
+
+
+def _is_for_staff(line: JobLine) -> bool:
+    return line.state is JobState.DONE and line.suspect is None and line.staff_only is not None
+
+
+def _files(chosen: Format, rows: Sequence[TableRow[Grade]]) -> list[tuple[str, str]]:
+    """A file for each grade and, where the format has a text for them, for each refusal.
+
+    Files are named after the student, and after the assignment where one student has several.
+    """
+    graded = [(row, row.grade) for row in rows if row.grade is not None]
+    stems = file_stems([(row.student.id, row.assignment) for row, _ in graded])
+    texts = [] if chosen.document is None else [chosen.document(grade) for _, grade in graded]
+    if chosen.refusal is not None:
+        refused = [row for row in rows if row.refused]
+        texts += map(chosen.refusal, refused)
+        stems += refused_stems([(row.source, row.student.id) for row in refused])
+    return [(f"{stem}{chosen.suffix}", text) for stem, text in zip(stems, texts, strict=True)]
+
+
+def _zipped(files: Sequence[tuple[str, str]]) -> bytes:
+    sink = io.BytesIO()
+    with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, text in files:
+            archive.writestr(name, text)
+    return sink.getvalue()

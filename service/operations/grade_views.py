@@ -1,0 +1,151 @@
+"""One grade as staff see it: how far it is, its report and replay, the grades beside it, and what was submitted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from service.language import ENGLISH, Language
+from service.operations.context import Actor, Service
+from service.operations.errors import NotFound
+from service.operations.lookup import course_for, job_in, names_for, submission_in
+from service.plotting import own_floors
+from service.report_files import report_alone, report_body
+from service.reports.html import ReportParts
+from service.reports.replay.document import replay_of_grade
+from service.reports.view import View, staff_view
+from service.store import audit
+from service.store.audit import AuditEntry
+from service.store.batches import batch_table, batches, intake, regrades
+from service.store.batches.batches import JobLine
+from service.store.batches.regrades import Change, Grading
+from service.store.courses.hidden_names import HiddenNames
+from service.store.grades import own_gradings, results
+from service.store.grades.own_gradings import OwnGrading
+from service.store.models import Job
+from service.store.queue.jobs import OVER_A_LIMIT
+from service.store.states import JobState, Role
+
+
+@dataclass(frozen=True, slots=True)
+class Neighbours:
+    """The ids of the grades before and after one in the table of its batch; empty where there is none."""
+
+    before: str = ""
+    after: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class GradeView:
+    """A grade with its report, where there is one, the other grades of its submission, and what was done with it."""
+
+    line: JobLine
+    batch_id: str | None  # in which it was graded
+    report: ReportParts | None
+    change: Change | None  # of a regrade
+    gradings: list[Grading]
+    attempts: list[OwnGrading]
+    history: list[AuditEntry]
+    put_aside: bool  # over a limit, and not graded until staff ask for it
+
+
+@dataclass(frozen=True, slots=True)
+class SubmittedFiles:
+    """What was submitted, as a zip that can be submitted again."""
+
+    data: bytes
+    name: str
+
+
+def show_state(service: Service, actor: Actor, course_id: int, job_id: str) -> JobLine:
+    """How far one grading is. Raises NotFound."""
+    hidden = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        _grade(session, actor, course_id, job_id)
+        return batches.job_line(session, job_id).hidden_by(hidden)
+
+
+def show_grade(service: Service, actor: Actor, course_id: int, job_id: str, language: Language = ENGLISH) -> GradeView:
+    """One grade with all that its page shows. Raises NotFound."""
+    hidden = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        row = _grade(session, actor, course_id, job_id)
+        whole = batches.job_line(session, job_id)
+        line = whole.hidden_by(hidden)
+        change = regrades.change(session, job_id)
+        gradings = regrades.gradings(session, row.submission_id)
+        attempts = own_gradings.newest(session, row.enrolment_id, line.assignment)
+        view = _view(session, line, language) if line.state is JobState.DONE else None
+        history = audit.entries(session, "job", job_id)
+    report = None if view is None else report_body(service.store, whole, view)
+    put_aside = line.state is JobState.CANCELLED and line.error == OVER_A_LIMIT
+    return GradeView(line, row.batch_id, report, change, gradings, attempts, history, put_aside)
+
+
+def show_neighbours(service: Service, actor: Actor, course_id: int, job_id: str) -> Neighbours:
+    """The grades before and after one in the table of its batch, in the order that the actor sees. Raises NotFound."""
+    hidden = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        row = _grade(session, actor, course_id, job_id)
+        if row.batch_id is None:
+            return Neighbours()
+        ids = [line.id for line in batch_table.table_lines(session, row.batch_id, (), hidden) if line.id]
+    if job_id not in ids:
+        return Neighbours()
+    place = ids.index(job_id)
+    return Neighbours(ids[place - 1] if place else "", ids[place + 1] if place + 1 < len(ids) else "")
+
+
+def show_result(service: Service, actor: Actor, course_id: int, job_id: str) -> View:
+    """All of a grade, hidden criteria and trials among it. Raises NotFound, also where there is no grade yet."""
+    return _result(service, actor, course_id, job_id, ENGLISH)[1]
+
+
+def show_report(service: Service, actor: Actor, course_id: int, job_id: str, language: Language = ENGLISH) -> str:
+    """The report of a grade as a page of its own. Raises NotFound, also where there is no grade yet."""
+    return report_alone(service.store, *_result(service, actor, course_id, job_id, language))
+
+
+def show_replay(service: Service, actor: Actor, course_id: int, job_id: str) -> dict[str, Any]:
+    """What a replay of the grade's trials plays. Raises NotFound, also where there is no grade yet."""
+    _, view = _result(service, actor, course_id, job_id, ENGLISH)
+    with service.store.reading() as session:
+        return replay_document(session, job_id, view)
+
+
+def show_files(service: Service, actor: Actor, course_id: int, submission_id: int) -> SubmittedFiles:
+    """What was submitted, which names its student. Raises NotFound, also where names are hidden."""
+    hidden = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        row = submission_in(session, course_id, submission_id)
+        if row.assignment in hidden.assignments:
+            raise NotFound("There is nothing here, or nothing that you may see.")
+        return SubmittedFiles(row.packed, f"submission-{row.id}.zip")
+
+
+def replay_document(session: Session, job_id: str, view: View) -> dict[str, Any]:
+    """What a replay plays of the trials in a view of a job's grade."""
+    submission = intake.load_submission(session, job_id)
+    return replay_of_grade(view, submission, own_floors(intake.load_assignment(session, job_id)))
+
+
+def _grade(session: Session, actor: Actor, course_id: int, job_id: str) -> Job:
+    course_for(session, actor, course_id, Role.INSTRUCTOR)
+    return job_in(session, course_id, job_id)
+
+
+def _result(service: Service, actor: Actor, course_id: int, job_id: str, language: Language) -> tuple[JobLine, View]:
+    hidden: HiddenNames = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        _grade(session, actor, course_id, job_id)
+        line = batches.job_line(session, job_id).hidden_by(hidden)
+        if line.state is not JobState.DONE:
+            raise NotFound("There is nothing here, or nothing that you may see.")
+        return line, _view(session, line, language)
+
+
+def _view(session: Session, line: JobLine, language: Language) -> View:
+    return staff_view(replace(results.load(session, line.id), student=line.student), language)

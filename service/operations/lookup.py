@@ -1,0 +1,116 @@
+"""The objects that operations act on, each found only by an actor who has the role for it in its course.
+
+Whoever has not learns the same as where there is no such object, so that no answer reveals what exists.
+"""
+
+from __future__ import annotations
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.operations.context import Actor, Service
+from service.operations.errors import NotFound
+from service.store.courses.hidden_names import NAMED, HiddenNames, hidden_names_of
+from service.store.models import Batch, Course, Enrolment, Job, SubmissionRow
+from service.store.states import Role
+
+
+def check_operator(actor: Actor) -> None:
+    """Raise NotFound unless the actor runs the installation."""
+    if not actor.operator:
+        raise _nothing()
+
+
+def course_for(session: Session, actor: Actor, course_id: int, *roles: Role) -> Course:
+    """The course, in which the actor has one of these roles; operators of the machine have every role.
+
+    Raises:
+        NotFound: there is no such course, or the actor has none of the roles in it.
+    """
+    found = session.get(Course, course_id)
+    if found is None or not (actor.is_machine or actor.roles.get(course_id) in roles):
+        raise _nothing()
+    return found
+
+
+def course_named(session: Session, actor: Actor, name: str) -> Course:
+    """The course of this name, for operators; no course is made of a mistyped name.
+
+    Raises:
+        NotFound: there is no course of this name, or the actor is no operator.
+    """
+    check_operator(actor)
+    found = session.scalars(select(Course).where(Course.name == name)).one_or_none()
+    if found is None:
+        raise NotFound("there is no course called %(name)s", name=repr(name))
+    return found
+
+
+def batch_in(session: Session, course_id: int, batch_id: str) -> Batch:
+    """A batch of the course. Raises NotFound."""
+    row = session.get(Batch, batch_id)
+    if row is None or row.course_id != course_id:
+        raise _nothing()
+    return row
+
+
+def existing_batch(session: Session, batch_id: str) -> Batch:
+    """A batch of any course, for operators. Raises NotFound."""
+    row = session.get(Batch, batch_id)
+    if row is None:
+        raise _nothing()
+    return row
+
+
+def job_in(session: Session, course_id: int, job_id: str) -> Job:
+    """A job of the course. Raises NotFound."""
+    row = session.get(Job, job_id)
+    if row is None or session.get_one(Enrolment, row.enrolment_id).course_id != course_id:
+        raise _nothing()
+    return row
+
+
+def submission_in(session: Session, course_id: int, submission_id: int) -> SubmissionRow:
+    """A submission in the course. Raises NotFound."""
+    row = session.get(SubmissionRow, submission_id)
+    if row is None or session.get_one(Enrolment, row.enrolment_id).course_id != course_id:
+        raise _nothing()
+    return row
+
+
+def own_submission(session: Session, actor: Actor, course_id: int, submission_id: int) -> SubmissionRow:
+    """A submission of the actor's own in the course. Raises NotFound."""
+    row = submission_in(session, course_id, submission_id)
+    if session.get_one(Enrolment, row.enrolment_id).person_id != actor.person_id:
+        raise _nothing()
+    return row
+
+
+def student_in(session: Session, actor: Actor, course_id: int, enrolment_id: int) -> Enrolment:
+    """A student of a course that the actor instructs. Raises NotFound."""
+    course_for(session, actor, course_id, Role.INSTRUCTOR)
+    row = session.get(Enrolment, enrolment_id)
+    if row is None or row.course_id != course_id:
+        raise _nothing()
+    if row.role is not Role.STUDENT:
+        raise NotFound("%(id)s is no student of this course", id=row.student)
+    return row
+
+
+def own_enrolment(session: Session, actor: Actor, course_id: int, *roles: Role) -> Enrolment:
+    """The actor's enrolment in a course, in which they have one of these roles. Raises NotFound."""
+    course_for(session, actor, course_id, *roles)
+    mine = (Enrolment.course_id == course_id, Enrolment.person_id == actor.person_id)
+    row = session.scalars(select(Enrolment).where(*mine)).one_or_none()
+    if row is None:
+        raise _nothing()
+    return row
+
+
+def names_for(service: Service, actor: Actor, course_id: int) -> HiddenNames:
+    """The labels that the actor sees in place of students' names; commands on the machine show every name."""
+    return NAMED if actor.is_machine else hidden_names_of(service.store, course_id)
+
+
+def _nothing() -> NotFound:
+    return NotFound("There is nothing here, or nothing that you may see.")

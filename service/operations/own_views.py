@@ -1,0 +1,227 @@
+"""What a student sees in a course: its assignments, their own submissions, and grades as far as these are shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from service.language import ENGLISH, Language
+from service.operations import own_work
+from service.operations.context import Actor, Service
+from service.operations.errors import NotFound
+from service.operations.grade_views import SubmittedFiles, replay_document
+from service.operations.lookup import own_enrolment, own_submission
+from service.operations.own_work import Allowance, OwnAssignment, OwnSubmission
+from service.report_files import report_alone, report_body
+from service.reports.html import ReportParts
+from service.reports.view import View, student_view
+from service.store.batches import batches, intake
+from service.store.batches.batches import JobLine
+from service.store.courses import open_assignments, policies
+from service.store.courses.open_assignments import CourseAssignment
+from service.store.grades import appeals, results
+from service.store.grades.appeals import AppealLine
+from service.store.queue import tryouts
+from service.store.queue.queue_places import QueuePlace, queue_place
+from service.store.states import Role
+from service.trying import tryout_assignment
+from submissions.assignment.definition import Assignment
+from submissions.assignment.task_sheet import TaskSheet, task_sheet
+
+
+@dataclass(frozen=True, slots=True)
+class TaskView:
+    """An assignment with a student's attempts at it."""
+
+    sheet: TaskSheet
+    attempts: list[OwnSubmission]
+    counting: OwnSubmission | None
+    allowance: Allowance
+    is_open: bool
+    can_try: bool
+    has_tried: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SubmissionView:
+    """One of a student's submissions, and its place in the queue; None once nothing is to come."""
+
+    submission: OwnSubmission
+    place: QueuePlace | None
+
+
+@dataclass(frozen=True, slots=True)
+class ReportView:
+    """One of a student's submissions with its report, where there is one, and the attempts and appeals beside it."""
+
+    submission: OwnSubmission
+    place: QueuePlace | None
+    attempts: list[OwnSubmission]
+    counting: OwnSubmission | None
+    allowance: Allowance
+    is_open: bool
+    appeals: list[AppealLine]
+    report: ReportParts | None
+
+
+def list_assignments(service: Service, actor: Actor, course_id: int) -> list[OwnAssignment]:
+    """What is open to the actor or was submitted by them, most urgent first. Raises NotFound."""
+    with service.store.reading() as session:
+        return own_work.own_assignments(session, course_id, _enrolment_id(session, actor, course_id))
+
+
+def list_opened(
+    service: Service, actor: Actor, course_id: int, *, limit: int, after: str = ""
+) -> list[tuple[CourseAssignment, Allowance]]:
+    """Some of the assignments that the course shows its students, by id, those after this one. Raises NotFound."""
+    with service.store.reading() as session:
+        enrolment_id = _enrolment_id(session, actor, course_id)
+        opened = [each for each in open_assignments.of_course(session, course_id) if each.opened_at is not None]
+        some = [each for each in opened if each.assignment > after][:limit]
+        return [(each, own_work.allowance(session, enrolment_id, each.assignment)) for each in some]
+
+
+def show_sheet(service: Service, actor: Actor, course_id: int, assignment: str) -> TaskSheet:
+    """What an assignment asks of students. Raises NotFound where it is not open, unless the actor submitted to it."""
+    with service.store.reading() as session:
+        enrolment_id = _enrolment_id(session, actor, course_id)
+        return task_sheet(seen_assignment(session, course_id, enrolment_id, assignment))
+
+
+def show_given_file(service: Service, actor: Actor, course_id: int, assignment: str, file: str) -> bytes:
+    """A file that an assignment gives its students. Raises NotFound."""
+    given = show_sheet(service, actor, course_id, assignment).given
+    if file not in given:
+        raise _nothing()
+    return given[file]
+
+
+def show_task(service: Service, actor: Actor, course_id: int, assignment: str) -> TaskView:
+    """An assignment with the actor's attempts at it. Raises NotFound as ``show_sheet`` does."""
+    with service.store.reading() as session:
+        enrolment_id = _enrolment_id(session, actor, course_id)
+        seen = seen_assignment(session, course_id, enrolment_id, assignment)
+        is_open = _is_open(session, course_id, assignment)
+        return TaskView(
+            task_sheet(seen),
+            own_work.own_submissions(session, enrolment_id, assignment),
+            own_work.counting_submission(session, enrolment_id, assignment),
+            own_work.allowance(session, enrolment_id, assignment),
+            is_open,
+            can_try=is_open and tryout_assignment(seen) is not None,
+            has_tried=tryouts.newest(session, enrolment_id, assignment) is not None,
+        )
+
+
+def list_submissions(
+    service: Service, actor: Actor, course_id: int, *, limit: int, before: int | None = None
+) -> list[SubmissionView]:
+    """Some of the actor's submissions in the course, the newest first, those before this id. Raises NotFound."""
+    with service.store.reading() as session:
+        enrolment_id = _enrolment_id(session, actor, course_id)
+        found = own_work.own_submissions_before(session, enrolment_id, before, limit)
+        return [_with_place(session, each) for each in found]
+
+
+def show_submission(service: Service, actor: Actor, course_id: int, submission_id: int) -> SubmissionView:
+    """One of the actor's submissions, and how far it is. Raises NotFound."""
+    with service.store.reading() as session:
+        return _with_place(session, _own(session, _enrolment_id(session, actor, course_id), submission_id))
+
+
+def show_submission_report(
+    service: Service, actor: Actor, course_id: int, submission_id: int, language: Language = ENGLISH
+) -> ReportView:
+    """One of the actor's submissions with all that its page shows. Raises NotFound."""
+    with service.store.reading() as session:
+        enrolment_id = _enrolment_id(session, actor, course_id)
+        found = _with_place(session, _own(session, enrolment_id, submission_id))
+        own, assignment = found.submission, found.submission.assignment
+        attempts = own_work.own_submissions(session, enrolment_id, assignment)
+        counting = own_work.counting_submission(session, enrolment_id, assignment)
+        allowance = own_work.allowance(session, enrolment_id, assignment)
+        is_open = _is_open(session, course_id, assignment)
+        asked = appeals.of_submission(session, submission_id)
+        shown = _view(session, own, language) if own.shown else None
+    report = None if shown is None else report_body(service.store, *shown)
+    return ReportView(own, found.place, attempts, counting, allowance, is_open, asked, report)
+
+
+def show_result(service: Service, actor: Actor, course_id: int, submission_id: int) -> tuple[str, View]:
+    """The grade's id, and what the actor may see of it. Raises NotFound, also while there is nothing to see."""
+    line, view = _result(service, actor, course_id, submission_id, ENGLISH)
+    return line.id, view
+
+
+def show_report(
+    service: Service, actor: Actor, course_id: int, submission_id: int, language: Language = ENGLISH
+) -> str:
+    """The report as a page of its own, as far as the actor may see it. Raises NotFound as ``show_result`` does."""
+    return report_alone(service.store, *_result(service, actor, course_id, submission_id, language))
+
+
+def show_replay(service: Service, actor: Actor, course_id: int, submission_id: int) -> dict[str, Any]:
+    """What a replay plays of the trials that the actor may see. Raises NotFound as ``show_result`` does."""
+    line, view = _result(service, actor, course_id, submission_id, ENGLISH)
+    with service.store.reading() as session:
+        return replay_document(session, line.id, view)
+
+
+def show_files(service: Service, actor: Actor, course_id: int, submission_id: int) -> SubmittedFiles:
+    """The files of one of the actor's submissions. Raises NotFound."""
+    with service.store.reading() as session:
+        own_enrolment(session, actor, course_id, Role.STUDENT)
+        row = own_submission(session, actor, course_id, submission_id)
+        return SubmittedFiles(row.packed, f"{row.assignment}-{row.attempt}.zip")
+
+
+def seen_assignment(session: Session, course_id: int, enrolment_id: int, assignment: str) -> Assignment:
+    """An assignment that a student may see: it is open, or they have submitted to it. Raises NotFound."""
+    if _is_open(session, course_id, assignment):
+        return open_assignments.load(session, course_id, assignment)
+    submitted = own_work.own_submissions(session, enrolment_id, assignment)
+    if not submitted:
+        raise _nothing()
+    return intake.load_assignment(session, submitted[0].job_id)
+
+
+def _enrolment_id(session: Session, actor: Actor, course_id: int) -> int:
+    return own_enrolment(session, actor, course_id, Role.STUDENT).id
+
+
+def _is_open(session: Session, course_id: int, assignment: str) -> bool:
+    prepared = open_assignments.of_course(session, course_id)
+    return any(each.assignment == assignment and each.open for each in prepared)
+
+
+def _own(session: Session, enrolment_id: int, submission_id: int) -> OwnSubmission:
+    found = own_work.own_submission(session, enrolment_id, submission_id)
+    if found is None:
+        raise _nothing()
+    return found
+
+
+def _with_place(session: Session, found: OwnSubmission) -> SubmissionView:
+    return SubmissionView(found, queue_place(session, found.job_id) if found.waits else None)
+
+
+def _result(
+    service: Service, actor: Actor, course_id: int, submission_id: int, language: Language
+) -> tuple[JobLine, View]:
+    with service.store.reading() as session:
+        found = _own(session, _enrolment_id(session, actor, course_id), submission_id)
+        if not found.shown:
+            raise _nothing()
+        return _view(session, found, language)
+
+
+def _view(session: Session, found: OwnSubmission, language: Language) -> tuple[JobLine, View]:
+    released = policies.released(session, found.job_id)
+    view = student_view(results.load(session, found.job_id), released, language)
+    return batches.job_line(session, found.job_id), view
+
+
+def _nothing() -> NotFound:
+    return NotFound("There is nothing here, or nothing that you may see.")

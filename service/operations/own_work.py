@@ -1,0 +1,263 @@
+"""What a student asks of their own work: what is open, what they submitted, and what marks they see of it.
+
+Reads what is stored and lets ``reports.view`` decide what of it is shown; what to do with it is the pages'.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+from decimal import Decimal
+
+from sqlalchemy import ColumnElement, Select, and_, func, select
+from sqlalchemy.orm import Session, aliased
+
+from service.reports.view import student_view
+from service.store.courses import open_assignments, policies
+from service.store.courses.policies import OverLimit, PolicyLimits
+from service.store.engine import now
+from service.store.grades import appeals, current, results
+from service.store.grades.appeals import AppealLine
+from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
+from service.store.queue import jobs
+from service.store.states import UNFINISHED, BatchState, JobState, Standing
+
+#: Of one student and one assignment; a student who submits more often sees the newest.
+MOST_SHOWN = 50
+
+
+@dataclass(frozen=True, slots=True)
+class OwnSubmission:
+    """One of a student's submissions, with the marks that its student sees; None while there are none."""
+
+    id: int
+    job_id: str
+    assignment: str
+    title: str
+    attempt: int
+    source: str
+    submitted_at: datetime
+    days_late: int
+    staff_only: str  # the limit that it is over
+    same_as: int | None  # the student's first attempt with these files, which is the same attempt
+    state: JobState
+    held_back: bool  # its batch is paused or called off
+    suspect: bool
+    superseded: bool
+    published: bool  # whether all of the grade is released
+    marks: Decimal | None = None
+    max_marks: Decimal | None = None
+
+    @property
+    def waits(self) -> bool:
+        """Whether something is still to come."""
+        return self.state in UNFINISHED
+
+    @property
+    def shown(self) -> bool:
+        """Whether its student may see its grade."""
+        return self.state is JobState.DONE and not self.suspect and not self.staff_only
+
+    @property
+    def over(self) -> OverLimit | None:
+        """Which limit it is over."""
+        return policies.limit_of(self.staff_only)
+
+
+@dataclass(frozen=True, slots=True)
+class Allowance:
+    """How often, and for how long yet, a student may submit to an assignment."""
+
+    limits: PolicyLimits
+    attempts_made: int
+    left: timedelta | None  # until the due date, their own; below zero when it is over, None where there is none
+    late_left: timedelta | None  # until nothing counts any more
+
+    @property
+    def attempts_left(self) -> int | None:
+        """None where there is no limit."""
+        return None if self.limits.attempts is None else max(0, self.limits.attempts - self.attempts_made)
+
+    @property
+    def days_left(self) -> int:
+        """Whole days until the due date, and what is left of the last one."""
+        return 0 if self.left is None else max(0, math.ceil(self.left / timedelta(days=1)))
+
+    @property
+    def hours_left(self) -> int | None:
+        """Whole hours until the due date; None where there is none, or it is over."""
+        return None if self.left is None or self.left < timedelta(0) else self.left // timedelta(hours=1)
+
+    @property
+    def date_over(self) -> bool:
+        """Whether a submission would be too late to count."""
+        return self.late_left is not None and self.late_left < timedelta(0)
+
+    @property
+    def used_up(self) -> bool:
+        """Whether nothing that is new counts any more."""
+        return self.attempts_left == 0 or self.date_over
+
+    def hours_late(self, found: OwnSubmission) -> int | None:
+        """Whole hours that it is late; None where it is in time, by a day or more, or its due date has moved since."""
+        if found.days_late != 1 or self.limits.due_at is None or found.submitted_at <= self.limits.due_at:
+            return None
+        late = found.submitted_at - self.limits.due_at
+        return late // timedelta(hours=1) if late < timedelta(days=1) else None
+
+
+@dataclass(frozen=True, slots=True)
+class OwnAssignment:
+    """An assignment as its student sees it in a list."""
+
+    assignment: str
+    title: str
+    open: bool
+    allowance: Allowance
+    newest: OwnSubmission | None
+    counting: OwnSubmission | None  # the newest that is graded and over no limit
+    appeal: AppealLine | None  # what was asked last
+
+
+def own_assignments(session: Session, course_id: int, enrolment_id: int) -> list[OwnAssignment]:
+    """What is open to a student or was submitted by them: first what is open, of that what is due soonest."""
+    newest = _newest_of_each(session, enrolment_id)
+    counting = _counting(session, SubmissionRow.enrolment_id == enrolment_id, enrolment_id)
+    asked = appeals.newest_of(session, enrolment_id)
+    prepared = open_assignments.of_course(session, course_id)
+    titles = {each.assignment: each.title for each in prepared if each.open}
+    is_open = frozenset(titles)
+    titles = {name: each.title for name, each in newest.items()} | titles
+    lines = [
+        OwnAssignment(
+            name,
+            title,
+            name in is_open,
+            allowance(session, enrolment_id, name),
+            newest.get(name),
+            counting.get(name),
+            asked.get(name),
+        )
+        for name, title in titles.items()
+    ]
+    return sorted(lines, key=_by_urgency)
+
+
+def counting_submission(session: Session, enrolment_id: int, assignment: str) -> OwnSubmission | None:
+    """The one of a student's submissions whose marks count: the newest that is graded and over no limit."""
+    of_both = and_(SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment == assignment)
+    return _counting(session, of_both, enrolment_id).get(assignment)
+
+
+def own_submissions(session: Session, enrolment_id: int, assignment: str) -> list[OwnSubmission]:
+    """A student's submissions to an assignment, the newest first."""
+    query = _submissions(enrolment_id).where(SubmissionRow.assignment == assignment)
+    rows = session.execute(query.order_by(SubmissionRow.attempt.desc()).limit(MOST_SHOWN))
+    return [_submission(session, *row) for row in rows]
+
+
+def own_submissions_before(
+    session: Session, enrolment_id: int, submission_id: int | None, limit: int
+) -> list[OwnSubmission]:
+    """Some of a student's submissions, to whatever assignment, the newest first: those before this one."""
+    query = _submissions(enrolment_id)
+    if submission_id is not None:
+        query = query.where(SubmissionRow.id < submission_id)
+    rows = session.execute(query.order_by(SubmissionRow.id.desc()).limit(limit))
+    return [_submission(session, *row) for row in rows]
+
+
+def own_submission(session: Session, enrolment_id: int, submission_id: int) -> OwnSubmission | None:
+    """One of a student's submissions; None where they have none of this id."""
+    row = session.execute(_submissions(enrolment_id).where(SubmissionRow.id == submission_id)).one_or_none()
+    return None if row is None else _submission(session, *row)
+
+
+def allowance(session: Session, enrolment_id: int, assignment: str) -> Allowance:
+    """What a student may still do, extensions included."""
+    limits, at = policies.limits(session, enrolment_id, assignment), now(session)
+    return Allowance(
+        limits,
+        policies.attempts_made(session, enrolment_id, assignment),
+        None if limits.due_at is None else limits.due_at - at,
+        None if limits.closed_at is None else limits.closed_at - at,
+    )
+
+
+_Submissions = Select[SubmissionRow, Job, str, BatchState | None, int | None]
+
+
+def _counting(session: Session, which: ColumnElement[bool], enrolment_id: int) -> dict[str, OwnSubmission]:
+    """The attempts of a student that count, by assignment."""
+    query = _submissions(enrolment_id).where(SubmissionRow.id.in_(current.counting(which)))
+    found = (_submission(session, *row) for row in session.execute(query))
+    return {each.assignment: each for each in found}
+
+
+def _newest_of_each(session: Session, enrolment_id: int) -> dict[str, OwnSubmission]:
+    """By assignment; only the newest are looked at closely."""
+    latest = (
+        select(SubmissionRow.assignment, func.max(SubmissionRow.attempt).label("attempt"))
+        .join(Job, Job.submission_id == SubmissionRow.id)
+        .where(SubmissionRow.enrolment_id == enrolment_id, Job.standing == Standing.STANDS)
+        .group_by(SubmissionRow.assignment)
+        .subquery()
+    )
+    query = _submissions(enrolment_id).join(
+        latest, (latest.c.assignment == SubmissionRow.assignment) & (latest.c.attempt == SubmissionRow.attempt)
+    )
+    found = (_submission(session, *row) for row in session.execute(query))
+    return {each.assignment: each for each in found}
+
+
+def _submissions(enrolment_id: int) -> _Submissions:
+    earlier = aliased(SubmissionRow)
+    same_as = (
+        select(func.min(earlier.attempt))
+        .where(
+            earlier.enrolment_id == SubmissionRow.enrolment_id,
+            earlier.assignment == SubmissionRow.assignment,
+            earlier.sha256 == SubmissionRow.sha256,
+            earlier.attempt < SubmissionRow.attempt,
+        )
+        .scalar_subquery()
+    )
+    return (
+        select(SubmissionRow, Job, AssignmentVersion.title, Batch.state, same_as)
+        .join(Job, Job.submission_id == SubmissionRow.id)
+        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+        .outerjoin(Batch, Job.batch_id == Batch.id)
+        .where(SubmissionRow.enrolment_id == enrolment_id, Job.standing == Standing.STANDS)
+    )
+
+
+def _submission(
+    session: Session, row: SubmissionRow, job: Job, title: str, batch: BatchState | None, same_as: int | None
+) -> OwnSubmission:
+    found = OwnSubmission(
+        id=row.id,
+        job_id=job.id,
+        assignment=row.assignment,
+        title=title,
+        attempt=row.attempt,
+        source=row.source,
+        submitted_at=row.submitted_at or row.created_at,
+        days_late=row.days_late,
+        staff_only=row.staff_only or "",
+        same_as=same_as,
+        state=job.state,
+        held_back=batch not in (None, BatchState.OPEN),
+        suspect=job.suspect is not None,
+        superseded=jobs.superseded_by(job.error) is not None,
+        published=job.published_at is not None,
+    )
+    if not found.shown:
+        return found
+    shown = student_view(results.load_marks(session, job.id), policies.released(session, job.id)).grade
+    return replace(found, marks=shown.marks, max_marks=shown.max_marks)
+
+
+def _by_urgency(line: OwnAssignment) -> tuple[bool, bool, float, str]:
+    due_at = line.allowance.limits.due_at
+    return not line.open, line.allowance.date_over, math.inf if due_at is None else due_at.timestamp(), line.title

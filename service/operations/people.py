@@ -1,0 +1,231 @@
+"""Members of a course and the persons behind them: enrol, show, sign out, remove and join them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+
+from sqlalchemy.orm import Session
+
+from service.operations.context import Actor, Service
+from service.operations.credentials import check_number, check_scopes
+from service.operations.errors import Conflict, Invalid, NotFound
+from service.operations.lookup import check_operator, course_for
+from service.store import audit
+from service.store.engine import now, retry_conflicts
+from service.store.locks import lock_course, lock_persons
+from service.store.models import Enrolment, Person
+from service.store.people import credentials, people
+from service.store.people.credentials import CredentialLine, Reach
+from service.store.people.people import Member as Member
+from service.store.people.students import Students
+from service.store.purge import remove_student
+from service.store.states import CredentialKind, Role
+from sim.sentences import Sentence
+from submissions.people import Student
+
+_LONGEST = 200
+
+
+@dataclass(frozen=True, slots=True)
+class PersonView:
+    """A person, for operators: their enrolments with the courses' names, and what they sign in with."""
+
+    member: Member
+    enrolments: tuple[tuple[str, Member], ...]
+    credentials: tuple[CredentialLine, ...]
+    from_platform: bool
+    elsewhere: tuple[tuple[str, Member], ...]  # instructors with the same id in other courses, who are other persons
+
+
+@dataclass(frozen=True, slots=True)
+class JoinRequest:
+    """Two enrolments whose persons are one; people from a learning platform only with ``from_platform``."""
+
+    enrolment_id: int
+    other_id: int
+    from_platform: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class TokenForRequest:
+    """A token for a member of a course, which counts in this course."""
+
+    name: str
+    scopes: frozenset[str]
+    days: int
+
+
+def find(service: Service, actor: Actor, course: str, student: str) -> Member:
+    """The member of a course by its name and their id. Raises NotFound, UsageError where there is none."""
+    check_operator(actor)
+    with service.store.reading() as session:
+        return people.member(session, course, student)
+
+
+def show(service: Service, actor: Actor, enrolment_id: int) -> PersonView:
+    """A person by one of their enrolments. Raises NotFound."""
+    check_operator(actor)
+    with service.store.reading() as session:
+        row = _enrolment(session, enrolment_id)
+        return PersonView(
+            people.member_of(session, row),
+            tuple(people.enrolments(session, row.person_id)),
+            tuple(credentials.of_person(session, row.person_id)),
+            people.is_from_platform(session, row.person_id),
+            tuple(people.elsewhere(session, row.id)),
+        )
+
+
+def sign_out(service: Service, actor: Actor, enrolment_id: int, *, release: bool = False) -> int:
+    """End all links, sessions and tokens of a person; returns how many ended.
+
+    With ``release`` a student's next launch from the course's learning platform may take this enrolment, although
+    somebody has signed in as this person. Raises NotFound.
+    """
+    check_operator(actor)
+    with service.store.transaction() as session:
+        row = _enrolment(session, enrolment_id)
+        ended = credentials.revoke_all(session, row.person_id)
+        if release:
+            session.get_one(Person, row.person_id).signed_in_at = None
+        audit.note(session, actor.name, "sign out", "person", str(row.person_id), ended=ended, released=release)
+    return ended
+
+
+def join(service: Service, actor: Actor, request: JoinRequest) -> Member:
+    """Make the persons of two enrolments in different courses one, and sign both out.
+
+    Raises NotFound; Conflict where they are one already or both in one course; Invalid where a learning platform
+    vouches for one of them and the request does not say so.
+    """
+    check_operator(actor)
+    with service.store.transaction() as session:
+        row, other = _enrolment(session, request.enrolment_id), _enrolment(session, request.other_id)
+        person_id, other_person = row.person_id, other.person_id
+        if person_id == other_person:
+            raise Conflict("these two are one person already")
+        lock_persons(session, person_id, other_person)
+        ours, theirs = (
+            {each.enrolment_id: name for name, each in people.enrolments(session, which)}
+            for which in (person_id, other_person)
+        )
+        if shared := sorted(set(ours.values()) & set(theirs.values())):
+            raise Conflict("both are in the course %(course)s, so they cannot be one person", course=shared[0])
+        vouched = any(people.is_from_platform(session, each) for each in (person_id, other_person))
+        if vouched and not request.from_platform:
+            raise Invalid(
+                "a learning platform signs one of them in, and would sign in the person whom you join; "
+                "say explicitly that it may"
+            )
+        people.join(session, person_id, other_person)
+        detail = {"joined": other_person, "enrolments": sorted(theirs)}
+        audit.note(session, actor.name, "join", "person", str(person_id), **detail)
+        return people.member_of(session, row)
+
+
+def enrol(service: Service, actor: Actor, course_id: int, students: Sequence[Student]) -> list[int]:
+    """Enrol students, all or none; those who are enrolled already get the names and addresses. Returns enrolments.
+
+    Raises:
+        NotFound: there is no such course, or the actor does not instruct it.
+        Invalid: an id, a name or an address is too long.
+        UsageError: an id names nobody, or cannot be told from another's.
+    """
+    check_lengths(students)
+    with service.store.transaction() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        return _enrol(session, actor, course_id, students)
+
+
+def enrol_new(service: Service, actor: Actor, course_id: int, student: Student) -> int:
+    """Enrol a student who is not in the course yet; returns the enrolment. Raises as ``enrol`` does, and Conflict."""
+    check_lengths([student])
+    with service.store.transaction() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        known = people.known(session, course_id, student)
+        if known is not None:
+            raise _already_there(known)
+        return _enrol(session, actor, course_id, [student])[0]
+
+
+def check_lengths(students: Sequence[Student]) -> None:
+    """Raise Invalid where an id, a name or an address is too long."""
+    for each in students:
+        if max(map(len, (each.id, each.name, each.email))) > _LONGEST:
+            raise Invalid(
+                "%(id)s: an id, a name and an address have at most %(most)s characters",
+                id=each.id[:_LONGEST],
+                most=_LONGEST,
+            )
+
+
+@retry_conflicts
+def remove(service: Service, actor: Actor, course_id: int, enrolment_id: int) -> str:
+    """Remove somebody from a course who has submitted nothing to it; what they sign in with there ends.
+
+    Instructors remove students, operators also instructors. Returns the id that the course had for them. Raises
+    NotFound, and UsageError for who has submitted.
+    """
+    with service.store.transaction() as session:
+        lock_course(session, course_id)
+        row = _enrolment(session, enrolment_id)
+        is_ours = row.course_id == course_id
+        may = actor.roles.get(course_id) is Role.INSTRUCTOR and row.role is Role.STUDENT
+        if not is_ours or not (actor.operator or may):
+            raise NotFound("there is no such member of this course")
+        removed = row.student
+        people.set_role(session, row, Role.STUDENT)
+        remove_student(session, row.id, actor.name)
+    return removed
+
+
+def issue_token(service: Service, actor: Actor, enrolment_id: int, request: TokenForRequest) -> str:
+    """The secret of a new token for a member, which counts in their course. Raises NotFound, Invalid and Conflict."""
+    check_operator(actor)
+    with service.store.transaction() as session:
+        row = _enrolment(session, enrolment_id)
+        check_scopes(request.scopes, [row.role], operator=False)
+        check_number(session, row.person_id)
+        secret = credentials.issue(
+            session,
+            row.person_id,
+            CredentialKind.TOKEN,
+            timedelta(days=request.days),
+            name=request.name,
+            reach=Reach(course_id=row.course_id, scopes=request.scopes),
+        )
+        audit.note(session, actor.name, "token", "person", str(row.person_id), scopes=sorted(request.scopes))
+        return secret
+
+
+def _enrol(session: Session, actor: Actor, course_id: int, listed: Sequence[Student]) -> list[int]:
+    lock_course(session, course_id)
+    at, students = now(session), Students(session, course_id)
+    enrolled = [students.enrol(each, at) for each in listed]
+    audit.note(session, actor.name, "enrol", "course", str(course_id), students=len(listed))
+    return enrolled
+
+
+def _already_there(known: Member) -> Conflict:
+    has_name = known.name and known.name != known.id
+    called = Sentence(", as %(name)s", {"name": known.name}) if has_name else ""
+    if known.role is Role.INSTRUCTOR:
+        return Conflict(
+            "%(id)s is an instructor of this course%(called)s; expected the id of a student.",
+            id=known.id,
+            called=called,
+        )
+    return Conflict(
+        "%(id)s is in this course already%(called)s; a table gives other names and addresses.",
+        id=known.id,
+        called=called,
+    )
+
+
+def _enrolment(session: Session, enrolment_id: int) -> Enrolment:
+    row = session.get(Enrolment, enrolment_id)
+    if row is None:
+        raise NotFound("there is no such member of a course")
+    return row

@@ -1,0 +1,98 @@
+"""The members of a course as its instructors see them: all, some, and one student."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from service.operations.context import Actor, Service
+from service.operations.lookup import course_for, student_in
+from service.store.courses import open_assignments, policies
+from service.store.courses.open_assignments import CourseAssignment
+from service.store.courses.policies import ExtensionLine
+from service.store.grades import own_gradings
+from service.store.grades.own_gradings import OwnGrading
+from service.store.people import lti, people
+from service.store.people.lti import CourseLink
+from service.store.people.people import Member
+from service.store.purge import has_submitted
+from service.store.states import Role
+
+_A_PAGE = 100
+
+
+@dataclass(frozen=True, slots=True)
+class MemberPage:
+    """One page of the members who match a search, and numbers of the whole course."""
+
+    members: tuple[Member, ...]
+    found: int
+    number: int
+    pages: int
+    students: int
+    extended: frozenset[int]  # enrolments that have an extension
+    platform: CourseLink | None
+
+
+@dataclass(frozen=True, slots=True)
+class StudentView:
+    """A student with their newest submissions, except for assignments with hidden names, and their extensions."""
+
+    member: Member
+    gradings: tuple[OwnGrading, ...]
+    some_hidden: bool
+    extensions: tuple[ExtensionLine, ...]
+    has_submitted: bool
+    assignments: tuple[CourseAssignment, ...]
+
+
+def list_members(service: Service, actor: Actor, course_id: int) -> list[Member]:
+    """All members of a course, by id. Raises NotFound."""
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        return people.members(session, course_id)
+
+
+def list_members_after(service: Service, actor: Actor, course_id: int, enrolment_id: int, limit: int) -> list[Member]:
+    """Members of a course in the order in which they were enrolled, those after this one. Raises NotFound."""
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        return people.members_after(session, course_id, enrolment_id, limit)
+
+
+def search_members(service: Service, actor: Actor, course_id: int, text: str = "", number: int = 1) -> MemberPage:
+    """A page of the members whose id, name or address contains a text. Raises NotFound."""
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        members = people.members(session, course_id)
+        extended = frozenset(each.enrolment_id for each in policies.extensions(session, course_id))
+        platform = lti.course_link(session, course_id)
+    wanted = text.strip().casefold()
+    found = [each for each in members if wanted in f"{each.id} {each.name} {each.email}".casefold()]
+    pages = max(1, -(-len(found) // _A_PAGE))
+    number = min(number, pages)
+    return MemberPage(
+        tuple(found[(number - 1) * _A_PAGE : number * _A_PAGE]),
+        len(found),
+        number,
+        pages,
+        sum(each.role is Role.STUDENT for each in members),
+        extended,
+        platform,
+    )
+
+
+def show_student(service: Service, actor: Actor, course_id: int, enrolment_id: int) -> StudentView:
+    """One student of a course. Raises NotFound."""
+    with service.store.reading() as session:
+        row = student_in(session, actor, course_id, enrolment_id)
+        hidden = open_assignments.with_names_hidden(session, course_id)
+        gradings = own_gradings.newest(session, enrolment_id)
+        extensions = policies.extensions(session, course_id)
+        return StudentView(
+            people.member_of(session, row),
+            tuple(each for each in gradings if each.assignment not in hidden),
+            bool(hidden),
+            tuple(each for each in extensions if each.enrolment_id == row.id),
+            has_submitted(session, row.id, hidden),
+            tuple(open_assignments.of_course(session, course_id)),
+        )

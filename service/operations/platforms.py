@@ -1,0 +1,137 @@
+"""Learning platforms: registered by operators; members fetched and marks sent by the instructors of a course."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sqlalchemy.orm import Session
+
+from service.operations.context import Actor, Service
+from service.operations.errors import Invalid
+from service.operations.lookup import check_operator, course_for
+from service.store import audit
+from service.store.courses import open_assignments
+from service.store.courses.open_assignments import CourseAssignment
+from service.store.people import lti
+from service.store.people.lti import LONGEST_REGISTERED as LONGEST_REGISTERED
+from service.store.people.lti import CourseLink, Platform
+from service.store.states import Role
+from sim.errors import UsageError
+
+
+@dataclass(frozen=True, slots=True)
+class PlatformRequest:
+    """A platform to register, or to change where its issuer and client are those of a registered one."""
+
+    name: str
+    issuer: str
+    client_id: str
+    deployments: tuple[str, ...]
+    authorization_url: str
+    token_url: str
+    keys_url: str
+    service_origins: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class CoursePlatform:
+    """The platform that launches a course, if one does, and the course's assignments."""
+
+    link: CourseLink | None
+    assignments: tuple[CourseAssignment, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class EnrolledMembers:
+    """How many of a platform's members are in the course, and why others are not."""
+
+    members: int
+    refused: tuple[str, ...]
+
+
+def list_platforms(service: Service, actor: Actor) -> list[Platform]:
+    """All registered platforms, by name. Raises NotFound."""
+    check_operator(actor)
+    with service.store.reading() as session:
+        return lti.platforms(session)
+
+
+def register(service: Service, actor: Actor, request: PlatformRequest) -> list[Platform]:
+    """Register a platform, or change the one of the same issuer and client; returns all that are registered then.
+
+    Raises NotFound for anybody but operators, Invalid without a name or a deployment, and UsageError for an address or
+    an id that cannot be used.
+    """
+    check_operator(actor)
+    if not request.name.strip():
+        raise Invalid("a platform needs a name that can be seen")
+    if not request.deployments:
+        raise Invalid("a platform needs the id of a deployment")
+    with service.store.transaction() as session:
+        platform_id = lti.register(
+            session,
+            request.name,
+            request.issuer,
+            request.client_id,
+            request.deployments,
+            request.authorization_url,
+            request.token_url,
+            request.keys_url,
+            request.service_origins,
+        )
+        audit.note(session, actor.name, "register", "lti_platform", str(platform_id), issuer=request.issuer)
+        return lti.platforms(session)
+
+
+def show_course_platform(service: Service, actor: Actor, course_id: int) -> CoursePlatform:
+    """The platform of a course. Raises NotFound."""
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        assignments = open_assignments.of_course(session, course_id)
+        return CoursePlatform(lti.course_link(session, course_id), tuple(assignments))
+
+
+def enrol_members(service: Service, actor: Actor, course_id: int) -> EnrolledMembers:
+    """Enrol all members that the platform has in the course.
+
+    Raises NotFound, UsageError where there is no platform, PlatformError where it gives no list.
+    """
+    from service.lti import services
+
+    with service.store.reading() as session:
+        link = _link(session, actor, course_id)
+    found = services.members(service.store, link)
+    refused = []
+    with service.store.transaction() as session:
+        for each in found:
+            try:
+                with session.begin_nested():
+                    lti.enrol(session, link.platform, course_id, each.subject, each.student, each.role)
+            except UsageError as error:
+                refused.append(str(error))
+        enrolled = EnrolledMembers(len(found) - len(refused), tuple(refused))
+        audit.note(session, actor.name, "enrol", "course", str(course_id), members=enrolled.members)
+    return enrolled
+
+
+def pass_back(service: Service, actor: Actor, course_id: int, assignment: str) -> int:
+    """Send the published marks of an assignment to the platform's gradebook; returns how many there were.
+
+    Raises NotFound, UsageError where there is no platform, PlatformError where it takes none.
+    """
+    from service.lti.passing_back import send_marks
+
+    with service.store.reading() as session:
+        link = _link(session, actor, course_id)
+    sent = send_marks(service.store, link, course_id, assignment)
+    with service.store.transaction() as session:
+        audit.note(session, actor.name, "pass_back", "course", str(course_id), assignment=assignment, sent=sent)
+    return sent
+
+
+def _link(session: Session, actor: Actor, course_id: int) -> CourseLink:
+    course_for(session, actor, course_id, Role.INSTRUCTOR)
+    link = lti.course_link(session, course_id)
+    if link is None:
+        raise Invalid("this course is launched from no learning platform")
+    return link

@@ -1,0 +1,125 @@
+"""When and how often students may submit: the policies of a course, and extensions for single students."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from service.operations.context import Actor, Service
+from service.operations.errors import Invalid
+from service.operations.lookup import course_for, student_in
+from service.store import audit
+from service.store.courses import policies
+from service.store.courses.policies import PolicyLimits as PolicyLimits
+from service.store.courses.versions import check_assignment
+from service.store.states import Role
+
+_MOST_LATE_DAYS, _MOST_ATTEMPTS, _MOST_COOL_DOWN_SECONDS = 365, 1000, 600_000
+
+
+@dataclass(frozen=True, slots=True)
+class ExtensionRequest:
+    """Time and attempts that one student is allowed beyond the policy; an empty ``assignment`` is every one."""
+
+    assignment: str = ""
+    due_at: datetime | None = None
+    more_attempts: int = 0
+
+
+def list_policies(service: Service, actor: Actor, course_id: int) -> dict[str, PolicyLimits]:
+    """The policies of a course by assignment; the empty one is for all that have none of their own. Raises NotFound."""
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        return policies.policies(session, course_id)
+
+
+def set_policy(service: Service, actor: Actor, course_id: int, assignment: str, limits: PolicyLimits) -> None:
+    """Set the limits of an assignment, or with an empty one of all that have no policy of their own.
+
+    Raises:
+        NotFound: there is no such course, or the actor does not instruct it.
+        Invalid: a limit is out of range.
+        UsageError: there is no such assignment.
+    """
+    _check_due(limits.due_at)
+    if not 0 <= limits.late_days <= _MOST_LATE_DAYS:
+        raise Invalid("the days late have to be from 0 to %(most)s", most=_MOST_LATE_DAYS)
+    if limits.attempts is not None and not 1 <= limits.attempts <= _MOST_ATTEMPTS:
+        raise Invalid("attempts have to be from 1 to %(most)s, or empty for any number", most=_MOST_ATTEMPTS)
+    if not 0 <= limits.cool_down_seconds <= _MOST_COOL_DOWN_SECONDS:
+        raise Invalid(
+            "the time between two submissions has to be from 0 to %(most)s minutes", most=_MOST_COOL_DOWN_SECONDS // 60
+        )
+    with service.store.transaction() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        check_assignment(session, assignment)
+        policies.set_policy(session, course_id, assignment, limits)
+        audit.note(
+            session,
+            actor.name,
+            "policy",
+            "course",
+            str(course_id),
+            assignment=assignment,
+            due_at=_written(limits.due_at),
+            late_days=limits.late_days,
+            attempts=limits.attempts,
+            cool_down_seconds=limits.cool_down_seconds,
+        )
+
+
+def drop_policy(service: Service, actor: Actor, course_id: int, assignment: str) -> None:
+    """Remove the policy of an assignment, which then has the one for all of the course. Raises NotFound."""
+    with service.store.transaction() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        policies.drop_policy(session, course_id, assignment)
+        audit.note(session, actor.name, "policy", "course", str(course_id), assignment=assignment, dropped=True)
+
+
+def extend(
+    service: Service, actor: Actor, course_id: int, enrolment_id: int, request: ExtensionRequest
+) -> PolicyLimits:
+    """Allow one student more time or attempts, in place of an earlier extension for the same; returns their limits.
+
+    Raises:
+        NotFound: there is no such student, or the actor does not instruct the course.
+        Invalid: the extension allows nothing, or is out of range.
+        UsageError: there is no such assignment.
+    """
+    if request.due_at is None and not request.more_attempts:
+        raise Invalid("say what to allow: a later date, more attempts, or both")
+    _check_due(request.due_at)
+    if not 0 <= request.more_attempts <= _MOST_ATTEMPTS:
+        raise Invalid("additional attempts have to be from 0 to %(most)s", most=_MOST_ATTEMPTS)
+    with service.store.transaction() as session:
+        row = student_in(session, actor, course_id, enrolment_id)
+        check_assignment(session, request.assignment)
+        policies.extend(session, enrolment_id, request.assignment, request.due_at, request.more_attempts)
+        audit.note(
+            session,
+            actor.name,
+            "extend",
+            "course",
+            str(course_id),
+            student=row.student,
+            assignment=request.assignment,
+            due_at=_written(request.due_at),
+            more_attempts=request.more_attempts,
+        )
+        return policies.limits(session, enrolment_id, request.assignment)
+
+
+def show_limits(service: Service, actor: Actor, course_id: int, enrolment_id: int, assignment: str) -> PolicyLimits:
+    """The limits of one student for an assignment, extensions included. Raises NotFound."""
+    with service.store.reading() as session:
+        student_in(session, actor, course_id, enrolment_id)
+        return policies.limits(session, enrolment_id, assignment)
+
+
+def _check_due(due_at: datetime | None) -> None:
+    if due_at is not None and not 2000 <= due_at.year < 2200:
+        raise Invalid("%(date)s is no deadline, expected a year from 2000 to 2199", date=due_at.date().isoformat())
+
+
+def _written(due_at: datetime | None) -> str | None:
+    return None if due_at is None else due_at.isoformat()

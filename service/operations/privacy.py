@@ -1,0 +1,97 @@
+"""A student's data: export all of it, erase all of it, and remove what was submitted long ago."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import timedelta
+from pathlib import Path
+
+from service.operations.context import Actor, Service
+from service.operations.errors import Forbidden, Invalid
+from service.operations.lookup import course_for, own_enrolment, student_in
+from service.store import purge as purging
+from service.store.backup import back_up
+from service.store.courses import open_assignments
+from service.store.engine import now, retry_conflicts
+from service.store.locks import lock_course
+from service.store.purge import Purged
+from service.store.states import Role
+
+_MOST_DAYS = 36_500
+
+
+@dataclass(frozen=True, slots=True)
+class StudentData:
+    """Everything about a student as a zip."""
+
+    enrolment_id: int
+    zip: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class PurgeRequest:
+    """Remove submissions older than so many days; ``only_count`` removes nothing."""
+
+    older_than_days: int
+    only_count: bool = False
+
+
+def export_own(service: Service, actor: Actor, course_id: int) -> StudentData:
+    """The actor's own data in a course that they are a student of, as they may see it. Raises NotFound."""
+    # Reports take long to load.
+    from service.student_export import export_student as exported
+
+    with service.store.reading() as session:
+        enrolment_id = own_enrolment(session, actor, course_id, Role.STUDENT).id
+    return StudentData(enrolment_id, exported(service.store, enrolment_id))
+
+
+def export_student(service: Service, actor: Actor, course_id: int, enrolment_id: int) -> StudentData:
+    """A student's data as they may see it. Instructors get none of assignments with hidden names. Raises NotFound."""
+    from service.student_export import export_student as exported
+
+    with service.store.reading() as session:
+        student_in(session, actor, course_id, enrolment_id)
+        hidden = frozenset() if actor.is_machine else open_assignments.with_names_hidden(session, course_id)
+    return StudentData(enrolment_id, exported(service.store, enrolment_id, hidden))
+
+
+@retry_conflicts
+def erase_student(service: Service, actor: Actor, course_id: int, enrolment_id: int) -> Purged:
+    """Remove all submissions of a student, what came of them, and who the student is; nothing brings them back.
+
+    Raises NotFound, and UsageError while a submission of theirs is being graded.
+    """
+    with service.store.transaction() as session:
+        lock_course(session, course_id)
+        student_in(session, actor, course_id, enrolment_id)
+        return purging.erase_student(session, enrolment_id, actor.name)
+
+
+def archive(service: Service, actor: Actor, file: Path) -> int:
+    """Copy the whole database into a new file; returns its size in bytes.
+
+    Raises Forbidden for anybody but commands, UsageError where the file exists, HostError where it cannot be written.
+    """
+    _check_machine(actor)
+    back_up(service.store.engine, file)
+    return file.stat().st_size
+
+
+def purge(service: Service, actor: Actor, course_id: int, request: PurgeRequest) -> Purged:
+    """Remove old submissions of a course, with grades, recordings and students who have nothing left.
+
+    Raises Forbidden for anybody but commands, NotFound, and Invalid for a number of days that is out of range.
+    """
+    _check_machine(actor)
+    if not 1 <= request.older_than_days <= _MOST_DAYS:
+        raise Invalid("the age has to be from 1 to %(most)s days", most=_MOST_DAYS)
+    with service.store.reading() as session:
+        course_for(session, actor, course_id)
+        before = now(session) - timedelta(days=request.older_than_days)
+    return purging.purge(service.store, before, actor.name, course_id=course_id, only_count=request.only_count)
+
+
+def _check_machine(actor: Actor) -> None:
+    if not actor.is_machine:
+        raise Forbidden("only a command on the machine itself does this")

@@ -1,0 +1,160 @@
+"""Regrade a batch or one submission, publish grades, and queue what is over a limit."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from service.operations.batches import assignment_named
+from service.operations.context import Actor, Service
+from service.operations.errors import Conflict
+from service.operations.lookup import batch_in, course_for, job_in, names_for
+from service.store import audit, outbox
+from service.store.batches import publishing, regrades
+from service.store.batches.publishing import Publication as Publication
+from service.store.batches.publishing import Published as Published
+from service.store.batches.regrades import Change as Change
+from service.store.batches.regrades import ChangesPage as ChangesPage
+from service.store.batches.regrades import CriterionChange as CriterionChange
+from service.store.batches.regrades import Regraded as Regraded
+from service.store.courses.versions import Frozen, freeze
+from service.store.engine import now, retry_conflicts
+from service.store.queue import jobs
+from service.store.states import Lane, Role
+
+if TYPE_CHECKING:
+    from submissions.assignment.definition import Assignment
+
+
+def regrade_batch(
+    service: Service, actor: Actor, course_id: int, batch_id: str, assignment: Assignment | str = ""
+) -> Regraded:
+    """Queue every graded submission of a batch again and notify the workers; the old grades stand until publication.
+
+    Args:
+        service: the installation.
+        actor: an instructor of the course, or the machine.
+        course_id: the course.
+        batch_id: the batch to grade again.
+        assignment: the assignment to grade against, or its id in the course or the catalogue. Empty: the version
+            that each submission was graded against.
+
+    Raises:
+        NotFound: the course has no such batch, or the actor does not instruct it.
+        UsageError: there is nothing to grade again, or no such assignment.
+    """
+    frozen = _frozen(service, actor, course_id, assignment)
+    made = _regrade_batch(service, actor, course_id, batch_id, frozen)
+    service.notifier.grade(Lane.BATCH, made.jobs)
+    return made
+
+
+def regrade_one(service: Service, actor: Actor, course_id: int, job_id: str, assignment: Assignment | str = "") -> str:
+    """Queue the submission of one grade again and notify the workers; returns the id of the new job.
+
+    ``assignment`` and errors as in ``regrade_batch``.
+    """
+    frozen = _frozen(service, actor, course_id, assignment)
+    made = _regrade_one(service, actor, course_id, job_id, frozen)
+    service.notifier.grade(Lane.INTERACTIVE)
+    return made
+
+
+def list_changes(service: Service, actor: Actor, course_id: int, batch_id: str) -> list[Change]:
+    """The changes that a batch of regrades makes, by student; none for any other batch. Raises NotFound."""
+    hidden = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        batch_in(session, course_id, batch_id)
+        return regrades.changes(session, batch_id, hidden)
+
+
+@retry_conflicts
+def publish(service: Service, actor: Actor, course_id: int, batch_id: str, *, anyway: bool = False) -> Published:
+    """Let the newest grades of a batch stand, and release them to the students.
+
+    With ``anyway`` also grades with a criterion that could not be judged. Raises NotFound.
+    """
+    with service.store.transaction() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        batch_in(session, course_id, batch_id)
+        done = publishing.publish(session, batch_id, actor=actor.name, anyway=anyway)
+        audit.note(session, actor.name, "publish", "batch", batch_id, **_logged_counts(done))
+        if done.published:
+            outbox.grades_published(session, course_id, batch=batch_id, published=done.published)
+        return done
+
+
+@retry_conflicts
+def publish_one(service: Service, actor: Actor, course_id: int, job_id: str, *, anyway: bool = False) -> Published:
+    """Let the newest grade of one submission stand, and release it to its student.
+
+    With ``anyway`` also a grade with a criterion that could not be judged. Raises NotFound.
+    """
+    with service.store.transaction() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        job_in(session, course_id, job_id)
+        done = publishing.publish_one(session, job_id, actor=actor.name, anyway=anyway)
+        audit.note(session, actor.name, "publish", "job", job_id, **_logged_counts(done))
+        if done.published:
+            outbox.grades_published(session, course_id, grade=job_id, published=done.published)
+        return done
+
+
+def preview(service: Service, actor: Actor, course_id: int, batch_id: str) -> Publication:
+    """The effect that publishing a batch would have now, without ``anyway``. Raises NotFound."""
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        batch_in(session, course_id, batch_id)
+        return publishing.would_publish(session, batch_id)
+
+
+def grade_over_limit(service: Service, actor: Actor, course_id: int, job_id: str) -> None:
+    """Queue a submission that was put aside because it is over a limit, and notify the workers.
+
+    Raises:
+        NotFound: the course has no such grade, or the actor does not instruct it.
+        Conflict: the submission was not put aside.
+    """
+    with service.store.transaction() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        job_in(session, course_id, job_id)
+        if not jobs.ask_for(session, job_id, now(session)):
+            raise Conflict("this submission does not wait for staff to ask for its grade")
+        audit.note(session, actor.name, "grade over limit", "job", job_id)
+    service.notifier.grade(Lane.BATCH)
+
+
+@retry_conflicts
+def _regrade_batch(service: Service, actor: Actor, course_id: int, batch_id: str, frozen: Frozen | None) -> Regraded:
+    with service.store.transaction() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        original = batch_in(session, course_id, batch_id)
+        made = regrades.regrade(session, original, frozen, max_attempts=service.settings.max_attempts)
+        audit.note(session, actor.name, "regrade", "batch", batch_id, as_batch=made.batch_id, grades=made.jobs)
+        return made
+
+
+@retry_conflicts
+def _regrade_one(service: Service, actor: Actor, course_id: int, job_id: str, frozen: Frozen | None) -> str:
+    with service.store.transaction() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        asked = job_in(session, course_id, job_id)
+        proposal = regrades.regrade_one(session, asked, frozen, max_attempts=service.settings.max_attempts)
+        audit.note(session, actor.name, "regrade", "job", proposal.regrade_of or job_id, as_job=proposal.id)
+        return proposal.id
+
+
+def _frozen(service: Service, actor: Actor, course_id: int, assignment: Assignment | str) -> Frozen | None:
+    """The assignment to grade against, frozen before the transaction."""
+    if isinstance(assignment, str):
+        if not assignment:
+            return None
+        with service.store.reading() as session:
+            course_for(session, actor, course_id, Role.INSTRUCTOR)
+            assignment = assignment_named(session, course_id, assignment)
+    return freeze(assignment)
+
+
+def _logged_counts(done: Published) -> dict[str, int]:
+    return {name: count for name, count in asdict(done).items() if count or name in ("published", "replaced")}

@@ -1,0 +1,31 @@
+"""Scopes of tokens and of the sessions that follow from them. Each route says which one it needs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from types import MappingProxyType
+
+from service.language import translatable
+from service.store.states import Role
+
+#: By name; a token may do what its owner may do, as far as its scopes name it.
+SCOPES: Mapping[str, str] = MappingProxyType(
+    {
+        "read": translatable("read what its owner may see"),
+        "submit": translatable("submit, for oneself as a student, or batches as an instructor"),
+        "mark": translatable("override, comment, publish, regrade"),
+        "manage": translatable("open assignments, set policies, enrol, delete"),
+        "sign-in": translatable("sign a browser in, as far as the other scopes reach; end sessions and tokens"),
+    }
+)
+_OF_STAFF = frozenset({"mark", "manage"})
+
+
+def offered_scopes(roles: Collection[Role], *, operator: bool, limit: frozenset[str] | None = None) -> dict[str, str]:
+    """Scopes that a token of somebody with these roles can use, within those of the session that makes it."""
+    is_staff = operator or Role.INSTRUCTOR in roles
+    return {
+        scope: words
+        for scope, words in SCOPES.items()
+        if (is_staff or scope not in _OF_STAFF) and (limit is None or scope in limit)
+    }

@@ -1,0 +1,75 @@
+"""Similar submissions of a batch's students: a reason to look and to ask, without any effect on marks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from service.operations.context import Actor, Service
+from service.operations.errors import Invalid
+from service.operations.lookup import batch_in, course_for, names_for
+from service.similarity.pairs import Similarity
+from service.store.batches import batches
+from service.store.batches.batches import BatchLine, JobLine
+from service.store.batches.similarities import MOST_AT_ONCE, SourceTexts, similarities
+from service.store.states import Role
+
+
+@dataclass(frozen=True, slots=True)
+class SimilarityView:
+    """A batch, the compared submissions, and the similar ones by assignment; None where too many to compare at once.
+
+    ``source`` reads the text of a file by assignment, student and name.
+    """
+
+    batch: BatchLine
+    lines: tuple[JobLine, ...]
+    found: tuple[Similarity, ...] | None
+    source: Callable[[str, str, str], str]
+
+
+def show_similar(service: Service, actor: Actor, course_id: int, batch_id: str) -> SimilarityView:
+    """Compare the newest submissions of the whole course for the assignments of a batch. Raises NotFound."""
+    hidden = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        batch_in(session, course_id, batch_id)
+        line = batches.batch(session, batch_id)
+        assignments = sorted({each.assignment for each in batches.job_lines(session, batch_id)})
+        lines = tuple(batches.course_lines(session, course_id, assignments, hidden))
+    found = tuple(similarities(service.store, lines)) if len(lines) <= MOST_AT_ONCE else None
+    return SimilarityView(line, lines, found, SourceTexts(service.store, lines).of)
+
+
+def list_similar(service: Service, actor: Actor, course_id: int, batch_id: str) -> tuple[Similarity, ...]:
+    """The same without the batch. Raises NotFound, and Invalid where too many would have to be compared at once."""
+    shown = show_similar(service, actor, course_id, batch_id)
+    if shown.found is None:
+        raise Invalid(
+            "%(count)s submissions are too many to compare while you wait, expected %(most)s at most; "
+            "robomark batch similar %(batch)s compares those of this batch",
+            count=len(shown.lines),
+            most=MOST_AT_ONCE,
+            batch=batch_id,
+        )
+    return shown.found
+
+
+def show_similar_in_batch(
+    service: Service, actor: Actor, course_id: int, batch_id: str, given: Path | None = None
+) -> SimilarityView:
+    """Compare the submissions of one batch alone, however many, without the code in ``given``.
+
+    Raises:
+        NotFound: the course has no such batch, or the actor does not instruct it.
+        UsageError: ``given`` cannot be read.
+    """
+    hidden = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        batch_in(session, course_id, batch_id)
+        line = batches.batch(session, batch_id)
+        lines = tuple(batches.job_lines(session, batch_id, hidden))
+    found = tuple(similarities(service.store, lines, given))
+    return SimilarityView(line, lines, found, SourceTexts(service.store, lines).of)

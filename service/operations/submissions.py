@@ -1,0 +1,110 @@
+"""What a student submits: files become a submission and its job, whose student is the actor whatever the files say.
+
+What files have to be is ``submissions.bundle``'s; what students see of their submissions is ``own_views.py``'s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from service.operations.context import Actor, Service
+from service.operations.errors import Invalid, NotFound
+from service.operations.lookup import own_enrolment
+from service.store.batches import intake
+from service.store.batches.intake import Accepted
+from service.store.courses import open_assignments
+from service.store.courses.open_assignments import CourseAssignment
+from service.store.models import Course
+from service.store.states import Lane, Role
+from sim.errors import UsageError
+from submissions.assignment.definition import Assignment
+from submissions.bundle import empty_parts, missing_part, submission_of
+from submissions.grading_request import GradingRequest
+from submissions.people import Student
+from submissions.raw_files import MEGABYTE, SentFile, read_sent, shown
+from submissions.submission import PART_FILES
+
+__all__ = ["Accepted"]
+
+
+class LacksPart(Invalid):
+    """One of two parts is missing: the student may have forgotten it, or do without it."""
+
+
+@dataclass(frozen=True, slots=True)
+class SubmitRequest:
+    """Files for an assignment; ``even_in_part`` also where one of two parts is missing."""
+
+    assignment: str
+    sent: Sequence[SentFile]
+    even_in_part: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Sending:
+    """A student's enrolment, and the open assignment that they send files for."""
+
+    course: str
+    enrolment_id: int
+    student: Student
+    opened: CourseAssignment
+    assignment: Assignment
+
+    def read(self, sent: Sequence[SentFile]) -> GradingRequest:
+        """The submission in these files. Raises UsageError where they are none."""
+        if not sent:
+            raise UsageError("nothing was sent; choose a file, or paste a program.")
+        source = shown(", ".join(dict.fromkeys(each.flat_name for each in sent)))
+        asked = self.assignment
+        submission = submission_of(read_sent(sent, source), source, self.student.id, asked.id, asked.parts)
+        for name in empty_parts(submission):
+            raise UsageError("%(name)s is empty, expected a program.", name=name)
+        return GradingRequest(submission, asked, source, whose=self.student)
+
+
+def sending(service: Service, actor: Actor, course_id: int, assignment: str) -> Sending:
+    """What a student sends files for.
+
+    Raises NotFound where there is no such assignment for students, and UsageError where it is closed.
+    """
+    with service.store.reading() as session:
+        enrolment = own_enrolment(session, actor, course_id, Role.STUDENT)
+        opened = {each.assignment: each for each in open_assignments.of_course(session, course_id)}.get(assignment)
+        if opened is None or opened.opened_at is None:
+            raise NotFound("There is nothing here, or nothing that you may see.")
+        if not opened.open:
+            raise UsageError("%(title)s is closed; nothing can be submitted to it any more.", title=opened.title)
+        found = open_assignments.load(session, course_id, assignment)
+        course = session.get_one(Course, course_id).name
+        return Sending(course, enrolment.id, Student(enrolment.written), opened, found)
+
+
+def submit(service: Service, actor: Actor, course_id: int, request: SubmitRequest) -> Accepted:
+    """Accept a student's files for an assignment, and notify the workers.
+
+    Raises:
+        NotFound: there is no such assignment for students.
+        LacksPart: one of two parts is missing.
+        UsageError: the assignment is closed, or the files are no submission.
+    """
+    way = sending(service, actor, course_id, request.assignment)
+    asked = way.read(request.sent)
+    lacking = missing_part(asked.submission, way.assignment.parts)
+    if lacking is not None and not request.even_in_part:
+        raise LacksPart(
+            "there is no %(name)s: add it, or say below that you submit without it, which uses an attempt.",
+            name=PART_FILES[lacking],
+        )
+    accepted = intake.accept(
+        service.store,
+        asked,
+        course=way.course,
+        max_attempts=service.settings.max_attempts,
+        batch_id=way.opened.batch_id,
+        most_bytes=service.settings.student_quota_mb * MEGABYTE,
+        enrolment_id=way.enrolment_id,
+    )
+    if accepted.copied_from is None and not accepted.staff_only:
+        service.notifier.grade(Lane.INTERACTIVE)
+    return accepted

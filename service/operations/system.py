@@ -1,0 +1,65 @@
+"""The installation as its operators see it: queues, workers, checks and failed jobs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from service.operations.context import Actor, Service
+from service.operations.lookup import check_operator
+from service.store.queue import dead_letters, tryouts, workers
+from service.store.queue.dead_letters import DeadLetter
+from service.store.queue.metrics import ServiceMetrics, collect
+from service.store.queue.tryouts import TryoutLane
+from service.store.queue.workers import InQuarantine, Seen
+from service.version import GRADER_VERSION
+
+if TYPE_CHECKING:
+    from service.doctor import Finding
+
+
+@dataclass(frozen=True, slots=True)
+class SystemView:
+    """The whole service at one moment."""
+
+    version: str
+    findings: tuple[Finding, ...]
+    metrics: ServiceMetrics
+    quarantined: Mapping[str, InQuarantine]  # by worker
+    failed: tuple[DeadLetter, ...]  # the newest
+    failed_count: int
+    test_runs: TryoutLane
+
+
+def show(service: Service, actor: Actor) -> SystemView:
+    """The state of the service. Raises NotFound for anybody but operators."""
+    from service.doctor import examine_service
+
+    check_operator(actor)
+    findings = examine_service(service.settings, service.store)
+    with service.store.reading() as session:
+        return SystemView(
+            GRADER_VERSION,
+            tuple(findings),
+            collect(session),
+            {each.worker: each for each in workers.in_quarantine(session)},
+            tuple(dead_letters.dead_letters(session)),
+            dead_letters.count(session),
+            tryouts.lane(session),
+        )
+
+
+def list_workers(service: Service, actor: Actor) -> list[tuple[Seen, InQuarantine | None]]:
+    """The known workers by name, each with its quarantine if it is in one. Raises NotFound."""
+    check_operator(actor)
+    with service.store.reading() as session:
+        quarantined = {each.worker: each for each in workers.in_quarantine(session)}
+        return [(seen, quarantined.get(seen.worker.name)) for seen in workers.known_workers(session)]
+
+
+def list_failed(service: Service, actor: Actor) -> list[DeadLetter]:
+    """The newest failed jobs of all courses. Raises NotFound."""
+    check_operator(actor)
+    with service.store.reading() as session:
+        return dead_letters.dead_letters(session)

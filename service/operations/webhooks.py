@@ -1,0 +1,55 @@
+"""Webhooks of a course: addresses that are told of events in it, and the deliveries to them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from datetime import datetime
+
+from service.operations.context import Actor, Service
+from service.operations.errors import NotFound
+from service.operations.lookup import course_for
+from service.store import audit
+from service.store.outbox import WebhookEvent as WebhookEvent
+from service.store.people import webhooks
+from service.store.people.webhooks import LONGEST_URL as LONGEST_URL
+from service.store.people.webhooks import DeliveryLine, WebhookLine
+from service.store.states import Role
+
+
+def list_webhooks(service: Service, actor: Actor, course_id: int) -> list[WebhookLine]:
+    """The webhooks of a course, the oldest first. Raises NotFound."""
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        return webhooks.of_course(session, course_id)
+
+
+def create(
+    service: Service, actor: Actor, course_id: int, url: str, events: Collection[WebhookEvent]
+) -> tuple[WebhookLine, str]:
+    """A new webhook, and the secret that its deliveries are signed with, which is shown this once.
+
+    Raises NotFound, and UsageError for an address that cannot be used or where the course has too many webhooks.
+    """
+    with service.store.transaction() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        line, secret = webhooks.create(session, course_id, url, [event.value for event in events])
+        audit.note(session, actor.name, "create webhook", "course", str(course_id), webhook=line.id, url=url)
+        return line, secret
+
+
+def revoke(service: Service, actor: Actor, course_id: int, webhook_id: str) -> None:
+    """Revoke a webhook, with the deliveries that wait for it. Raises NotFound."""
+    with service.store.transaction() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        if not webhooks.revoke(session, course_id, webhook_id):
+            raise NotFound("There is nothing here, or nothing that you may see.")
+        audit.note(session, actor.name, "revoke webhook", "course", str(course_id), webhook=webhook_id)
+
+
+def list_deliveries(
+    service: Service, actor: Actor, course_id: int, limit: int, after: tuple[datetime, str] | None = None
+) -> list[DeliveryLine]:
+    """Deliveries to a course's webhooks, the newest first, after the one of a moment and id. Raises NotFound."""
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        return webhooks.deliveries(session, course_id, limit, after)

@@ -1,0 +1,191 @@
+"""Statements in one spelling: the order of operands, brackets that change nothing, and places of a pair do not count.
+
+Nothing is parsed: whatever is no Python, or nested too deeply, stays nearly as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from keyword import iskeyword
+from typing import TypeAlias
+
+#: Brackets in brackets, beyond which a statement stays as it is.
+_DEEPEST = 20
+_CLOSING = {"(": ")", "[": "]", "{": "}"}
+#: From those that bind least on; of each level, whether operands may change places.
+_LEVELS: tuple[tuple[frozenset[str], bool], ...] = (
+    (frozenset({"or"}), True),
+    (frozenset({"and"}), True),
+    (frozenset({"==", "!=", "<", ">", "<=", ">="}), False),
+    (frozenset("|"), True),
+    (frozenset("^"), True),
+    (frozenset("&"), True),
+    (frozenset({"<<", ">>"}), False),
+    (frozenset("+-"), True),
+    (frozenset("*/"), True),
+)
+_OPERATORS = frozenset().union(*(operators for operators, _ in _LEVELS))
+_FLIPPED = {">": "<", ">=": "<="}
+#: An operand that comes first has this operator, where its level has one that can also be another.
+_UNWRITTEN = {"-": "+", "/": "*"}
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """One token as it is compared, and its line."""
+
+    text: str
+    line: int
+
+
+@dataclass(slots=True)
+class _Group:
+    """What is between two brackets."""
+
+    opening: Word
+    items: list[_Item] = field(default_factory=list)
+    closing: Word | None = None
+
+
+_Item: TypeAlias = "Word | _Group"
+
+
+def normalised(statement: Sequence[Word]) -> list[Word]:
+    """The words of a statement in one spelling, each with the line it was on."""
+    items = _grouped(statement)
+    return list(statement) if items is None else list(_segments(items))
+
+
+def _grouped(statement: Sequence[Word]) -> list[_Item] | None:
+    """What is in brackets as groups; None where brackets do not match, or are nested too deeply."""
+    items: list[_Item] = []
+    open_groups: list[_Group] = []
+    for word in statement:
+        inside = open_groups[-1].items if open_groups else items
+        if word.text in _CLOSING:
+            open_groups.append(_Group(word))
+            inside.append(open_groups[-1])
+        elif open_groups and word.text == _CLOSING[open_groups[-1].opening.text]:
+            open_groups.pop().closing = word
+        elif word.text in _CLOSING.values():
+            return None
+        else:
+            inside.append(word)
+        if len(open_groups) > _DEEPEST:
+            return None
+    return None if open_groups else items
+
+
+def _segments(items: Sequence[_Item]) -> Iterator[Word]:
+    """The expressions between commas, colons, assignments and keywords, each in one spelling."""
+    expression: list[_Item] = []
+    for item in items:
+        if isinstance(item, Word) and _separates(item.text):
+            yield from _expression(expression)
+            yield item
+            expression = []
+        else:
+            expression.append(item)
+    yield from _expression(expression)
+
+
+def _separates(text: str) -> bool:
+    return text in (",", ";", ":") or (text[-1:] == "=" and text not in _OPERATORS) or _is_keyword(text)
+
+
+def _is_keyword(text: str) -> bool:
+    return iskeyword(text) and text not in ("and", "or", "None", "True", "False")
+
+
+def _expression(items: Sequence[_Item]) -> list[Word]:
+    for operators, may_swap in _LEVELS:
+        operands = _split(items, operators)
+        if len(operands) > 1:
+            return _joined(operands, may_swap)
+    return list(_atoms(items))
+
+
+def _split(items: Sequence[_Item], operators: frozenset[str]) -> list[tuple[Word | None, list[_Item]]]:
+    """The operands between these operators, each with the one before it."""
+    operands: list[tuple[Word | None, list[_Item]]] = [(None, [])]
+    if "-" in operators and len(items) > 1 and isinstance(items[0], Word) and items[0].text in operators:
+        operands, items = [(items[0], [])], items[1:]
+    for item in items:
+        # After another operator it is a sign.
+        if isinstance(item, Word) and item.text in operators and _ends_operand(operands[-1][1]):
+            operands.append((item, []))
+        else:
+            operands[-1][1].append(item)
+    return operands
+
+
+def _ends_operand(items: Sequence[_Item]) -> bool:
+    return bool(items) and not (isinstance(items[-1], Word) and items[-1].text in _OPERATORS)
+
+
+def _joined(operands: Sequence[tuple[Word | None, list[_Item]]], may_swap: bool) -> list[Word]:
+    written = [(operator, _expression(items)) for operator, items in operands]
+    first = next(operator for operator, _ in written if operator is not None)
+    # Texts are put together in the order that they have.
+    if not may_swap or any(words and words[0].text == "text" for _, words in written):
+        return _compared(written) if len(written) == 2 else [word for each in written for word in _with_operator(*each)]
+    unwritten = Word(_UNWRITTEN.get(first.text, first.text), first.line)
+    pairs = [(operator or unwritten, words) for operator, words in written]
+    pairs.sort(key=lambda pair: (pair[0].text, [word.text for word in pair[1]]))
+    (operator, words), *rest = pairs
+    sign = [operator] if operator.text == "-" else []
+    return [*sign, *words, *(word for each in rest for word in _with_operator(*each))]
+
+
+def _compared(written: Sequence[tuple[Word | None, list[Word]]]) -> list[Word]:
+    (_, one), (operator, other) = written
+    assert operator is not None
+    swaps = operator.text in _FLIPPED or (
+        operator.text in ("==", "!=") and [word.text for word in other] < [word.text for word in one]
+    )
+    operator = Word(_FLIPPED.get(operator.text, operator.text), operator.line)
+    return [*other, operator, *one] if swaps else [*one, operator, *other]
+
+
+def _with_operator(operator: Word | None, words: Sequence[Word]) -> list[Word]:
+    return [*words] if operator is None else [operator, *words]
+
+
+def _atoms(items: Sequence[_Item]) -> Iterator[Word]:
+    """Names, calls, subscripts and brackets; brackets that only group are left out."""
+    before: _Item | None = None
+    for place, item in enumerate(items):
+        if isinstance(item, Word):
+            if not (item.text == "sum" and _summands(items[place + 1 : place + 2])):
+                yield item
+        elif isinstance(before, Word) and before.text == "sum" and (summands := _summands([item])):
+            yield from _expression(summands)
+        elif item.opening.text == "(" and item.items and not _is_called(before):
+            yield from _segments(item.items)
+        elif not (_is_called(before) and _is_place(item)):
+            yield item.opening
+            yield from _segments(item.items)
+            if item.closing is not None:
+                yield item.closing
+        before = item
+
+
+def _is_called(before: _Item | None) -> bool:
+    """Whether brackets after this are those of a call or a subscript."""
+    return isinstance(before, _Group) or (before is not None and before.text.isidentifier())
+
+
+def _is_place(group: _Group) -> bool:
+    """Whether it is ``[0]``: a variable of a pair is like a variable."""
+    inside = [item.text for item in group.items if isinstance(item, Word)]
+    return group.opening.text == "[" and len(group.items) == 1 and inside == ["number"]
+
+
+def _summands(items: Sequence[_Item]) -> list[_Item]:
+    """``a + b`` of the brackets in ``sum([a, b])``; nothing of other brackets."""
+    match items:
+        case [_Group(items=[_Group(items=list() as inside, opening=Word("[" | "("))])]:
+            return [Word("+", item.line) if isinstance(item, Word) and item.text == "," else item for item in inside]
+        case _:
+            return []

@@ -1,0 +1,61 @@
+"""Days as people count them: by the wall clock of a time zone, in which a day may have 23 or 25 hours.
+
+Knows no policy and no table.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from datetime import UTC, datetime, timedelta, tzinfo
+from functools import cache
+from pathlib import Path
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+
+_ONE_DAY = timedelta(days=1)
+_LOCALTIME = Path("/etc/localtime")
+
+
+def local_zone() -> str:
+    """The name of this server's time zone, such as Europe/Berlin; empty where the server does not say."""
+    named = os.environ.get("TZ", "").removeprefix(":")
+    if not named:
+        _, found, named = os.fspath(_LOCALTIME.resolve()).rpartition("zoneinfo/")
+        named = named if found else ""
+    return named if _zone(named) is not None else ""
+
+
+def add_days(moment: datetime, days: int, zone: str) -> datetime:
+    """The moment at which the wall clock of a zone shows the same time ``days`` later; the later one of two such."""
+    if not days:
+        return moment
+    here = _wall(moment, zone)
+    tz = _zone(zone)
+    moved = here + timedelta(days=days)
+    return max(moved.replace(tzinfo=tz, fold=fold).astimezone(UTC) for fold in (0, 1))
+
+
+def days_after(moment: datetime, later: datetime, zone: str) -> int:
+    """How many days of a zone, the last one begun included, ``later`` is after ``moment``; 0 where it is not."""
+    if later <= moment:
+        return 0
+    days = max(1, math.ceil((_wall(later, zone) - _wall(moment, zone)) / _ONE_DAY))
+    while add_days(moment, days, zone) < later:
+        days += 1
+    while days > 1 and add_days(moment, days - 1, zone) >= later:
+        days -= 1
+    return days
+
+
+def _wall(moment: datetime, zone: str) -> datetime:
+    """What the wall clock of the zone shows, without the zone."""
+    return moment.astimezone(_zone(zone)).replace(tzinfo=None)
+
+
+@cache
+def _zone(name: str) -> tzinfo | None:
+    """The zone of this name; None, which is this server's zone, for none that is known here."""
+    try:
+        return ZoneInfo(name) if name else None
+    except (ZoneInfoNotFoundError, ValueError, OSError):
+        return None

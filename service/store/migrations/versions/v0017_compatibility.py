@@ -1,0 +1,31 @@
+"""The database keeps the oldest revision whose code can use it, and each worker's reason for claiming nothing.
+
+The environment of the migrations writes that revision after each one, from its ``OLDEST_COMPATIBLE``.
+"""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+from alembic import op
+
+from service.store.columns import SafeText
+from service.store.migrate import refuse_downgrade
+
+revision = "0017"
+down_revision = "0016"
+branch_labels = None
+depends_on = None
+OLDEST_COMPATIBLE = "0017"
+
+
+def upgrade() -> None:
+    op.create_table(
+        "schema_compatibility",
+        sa.Column("id", sa.Integer(), nullable=False),
+        sa.Column("oldest_compatible", sa.String(length=32), nullable=False),
+        sa.PrimaryKeyConstraint("id", name=op.f("pk_schema_compatibility")),
+    )
+    op.add_column("heartbeat", sa.Column("problem", SafeText(), nullable=True))
+
+
+downgrade = refuse_downgrade

@@ -1,0 +1,61 @@
+"""The token's owner's sessions and tokens: listed, and ended one by one."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated
+
+from fastapi import Depends
+from fastapi.responses import Response
+from pydantic import Field
+
+from service.operations import credentials
+from service.store.states import CredentialKind
+from service.web.access import RowName, actor_from
+from service.web.api.shapes import Shape, like
+from service.web.api_access import Caller, with_scope
+from service.web.api_routes import Listed, api_router
+from service.web.context import Context
+
+router = api_router("me")
+
+
+class CredentialShape(Shape):
+    """A session or a token."""
+
+    id: str
+    kind: CredentialKind
+    name: str
+    scopes: list[str] = Field(description="Empty for a session that may do all its owner may.")
+    course_id: int | None = Field(description="The only course that it reaches; null where it has no such limit.")
+    created_at: datetime
+    expires_at: datetime
+    used_at: datetime | None
+
+    model_config = like(
+        id="7xk2v9q4m0ab",
+        kind="token",
+        name="marks to the office",
+        scopes=["read"],
+        course_id=1,
+        created_at="2026-11-02T09:00:00Z",
+        expires_at="2027-01-31T09:00:00Z",
+        used_at="2026-11-03T09:00:00Z",
+    )
+
+
+@router.get("/me/credentials")
+def list_credentials(
+    caller: Annotated[Caller, Depends(with_scope("read"))], context: Context
+) -> Listed[CredentialShape]:
+    """The valid sessions and tokens of the token's owner, as far as the token reaches, newest first."""
+    found = credentials.list_credentials(context.service, actor_from(caller.identity))
+    return Listed(items=[CredentialShape.model_validate(each) for each in found])
+
+
+@router.delete("/me/credentials/{credential_id}", status_code=204, response_class=Response)
+def end_credential(
+    caller: Annotated[Caller, Depends(with_scope("sign-in"))], context: Context, credential_id: RowName
+) -> None:
+    """End one of these sessions and tokens, which may be the token itself."""
+    credentials.end_credential(context.service, actor_from(caller.identity), credential_id)

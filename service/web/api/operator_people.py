@@ -1,0 +1,108 @@
+"""One person, for operators: their courses, what they sign in with, signing them out, and joining two persons."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import Depends, Query
+from pydantic import BaseModel, Field
+
+from service.operations import people
+from service.operations.people import JoinRequest, PersonView
+from service.operations.types import Role
+from service.web.access import RowNumber
+from service.web.api.credentials import CredentialShape
+from service.web.api.shapes import Shape, example_of, like
+from service.web.api_access import Caller, operating
+from service.web.api_routes import api_router
+from service.web.context import Context
+
+router = api_router("operator")
+Reads = Annotated[Caller, Depends(operating("read"))]
+Manages = Annotated[Caller, Depends(operating("manage"))]
+
+
+class PersonEnrolmentShape(Shape):
+    """What a person is in one course."""
+
+    enrolment: int
+    course: str
+    id: str
+    name: str
+    role: Role
+
+    model_config = like(enrolment=9, course="TM129", id="grace", name="Grace Hopper", role="instructor")
+
+
+class PersonShape(Shape):
+    """A person: all enrolments, and what they sign in with."""
+
+    enrolments: list[PersonEnrolmentShape]
+    credentials: list[CredentialShape]
+    from_platform: bool = Field(description="Whether a learning platform signs them in.")
+
+    model_config = like(
+        enrolments=[example_of(PersonEnrolmentShape)], credentials=[example_of(CredentialShape)], from_platform=False
+    )
+
+
+class SignOutAsked(BaseModel):
+    """How to sign somebody out."""
+
+    release: bool = Field(False, description="A student's next launch with this id may take this account.")
+
+
+class SignedOutShape(Shape):
+    """How many links, sessions and tokens ended."""
+
+    ended: int
+
+    model_config = like(ended=3)
+
+
+class JoinAsked(BaseModel):
+    """The other person."""
+
+    other: int = Field(ge=1, le=2**31 - 1, description="One of their enrolments.", examples=[4])
+    from_platform: bool = Field(False, description="Also if a learning platform signs one of them in.")
+
+
+@router.get("/operator/people")
+def find(
+    operator: Reads,
+    context: Context,
+    course: Annotated[str, Query(min_length=1, max_length=100)],
+    id: Annotated[str, Query(min_length=1, max_length=200)],
+) -> PersonShape:
+    """The person with this id in this course."""
+    actor = operator.acting
+    member = people.find(context.service, actor, course, id)
+    return _shape(people.show(context.service, actor, member.enrolment_id))
+
+
+@router.post("/operator/people/{member_id}/sign-out")
+def sign_out(
+    operator: Manages, context: Context, member_id: RowNumber, asked: SignOutAsked | None = None
+) -> SignedOutShape:
+    """End all links, sessions and tokens of a person."""
+    release = asked is not None and asked.release
+    return SignedOutShape(ended=people.sign_out(context.service, operator.acting, member_id, release=release))
+
+
+@router.post("/operator/people/{member_id}/join")
+def join(operator: Manages, context: Context, member_id: RowNumber, asked: JoinAsked) -> PersonShape:
+    """Make one person of two in different courses, and sign both out."""
+    actor = operator.acting
+    people.join(context.service, actor, JoinRequest(member_id, asked.other, asked.from_platform))
+    return _shape(people.show(context.service, actor, member_id))
+
+
+def _shape(view: PersonView) -> PersonShape:
+    return PersonShape(
+        enrolments=[
+            PersonEnrolmentShape(enrolment=each.enrolment_id, course=name, id=each.id, name=each.name, role=each.role)
+            for name, each in view.enrolments
+        ],
+        credentials=[CredentialShape.model_validate(each) for each in view.credentials],
+        from_platform=view.from_platform,
+    )

@@ -1,0 +1,70 @@
+"""One person, for operators: their courses, what they sign in with, and other persons to join them with."""
+
+from __future__ import annotations
+
+from typing import Annotated
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Form, Query, Request
+from fastapi.responses import RedirectResponse, Response
+
+from service.operations import people
+from service.operations.people import JoinRequest
+from service.web.access import Operating, RowNumber, SentRowNumber
+from service.web.context import Context
+from service.web.rendering import page
+
+router = APIRouter(prefix="/operator/people")
+CourseName = Annotated[str, Query(max_length=100)]
+Id = Annotated[str, Query(max_length=200)]
+
+
+@router.get("")
+def find(request: Request, reader: Operating, context: Context, course: CourseName = "", who: Id = "") -> Response:
+    """A form that finds somebody by course and id."""
+    if not course or not who:
+        return page(request, reader, "operator_people.html")
+    found = people.find(context.service, reader.acting, course.strip(), who.strip())
+    return RedirectResponse(f"/operator/people/{found.enrolment_id}", 303)
+
+
+@router.get("/{member_id}")
+def show(
+    request: Request,
+    reader: Operating,
+    context: Context,
+    member_id: RowNumber,
+    course: CourseName = "",
+    who: Id = "",
+    ended: Annotated[int | None, Query(ge=0, le=1_000_000)] = None,
+) -> Response:
+    """A person; with a course and an id also the other person whom these would be joined with."""
+    actor = reader.acting
+    view = people.show(context.service, actor, member_id)
+    other = None
+    if course and who:
+        found = people.find(context.service, actor, course.strip(), who.strip())
+        other = people.show(context.service, actor, found.enrolment_id)
+    return page(request, reader, "operator_person.html", view=view, other=other, ended=ended)
+
+
+@router.post("/{member_id}/sign-out")
+def sign_out(
+    reader: Operating, context: Context, member_id: RowNumber, release: Annotated[bool, Form()] = False
+) -> Response:
+    """End all links, sessions and tokens of a person."""
+    ended = people.sign_out(context.service, reader.acting, member_id, release=release)
+    return RedirectResponse(f"/operator/people/{member_id}?{urlencode({'ended': ended})}", 303)
+
+
+@router.post("/{member_id}/join")
+def join(
+    reader: Operating,
+    context: Context,
+    member_id: RowNumber,
+    other_id: SentRowNumber,
+    from_platform: Annotated[bool, Form()] = False,
+) -> Response:
+    """Make one person of two, whom the page has shown."""
+    people.join(context.service, reader.acting, JoinRequest(member_id, other_id, from_platform))
+    return RedirectResponse(f"/operator/people/{member_id}", 303)

@@ -1,0 +1,44 @@
+"""The folder in which one web server keeps uploads while it reads them: removed at its end, or at the next start."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from responders.sandbox.private_folders import locked_folder, remove_left_overs
+
+_PREFIX = "robomark-web-"
+#: Folders of earlier versions and of commands, which have no lock: only their age says that nobody uses them.
+_UNLOCKED = ("robomark-upload-", "robomark-batch-", "robomark-assignment-", "robomark-people-")
+_OLD_SECONDS = 24 * 3600
+
+
+@contextlib.contextmanager
+def own_temporary_folder() -> Iterator[Path]:
+    """Let everything temporary of this process lie in a folder of its own; remove those that others left over."""
+    remove_left_overs(_PREFIX)
+    _remove_old()
+    before = tempfile.gettempdir()
+    folder, lock = locked_folder(_PREFIX, 0o700)
+    tempfile.tempdir = str(folder)
+    try:
+        yield folder
+    finally:
+        tempfile.tempdir = before
+        shutil.rmtree(folder, ignore_errors=True)
+        os.close(lock)
+
+
+def _remove_old() -> None:
+    for prefix in _UNLOCKED:
+        for folder in Path(tempfile.gettempdir()).glob(f"{prefix}*"):
+            # Another server may be doing the same at this moment.
+            with contextlib.suppress(OSError):
+                about = folder.lstat()
+                if about.st_uid == os.getuid() and about.st_mtime < time.time() - _OLD_SECONDS:
+                    shutil.rmtree(folder, ignore_errors=True)

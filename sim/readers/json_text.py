@@ -1,0 +1,60 @@
+"""JSON, bounded by the values that it would become and by their depth.
+
+A list of empty lists takes thirty times its length in memory, and each level of nesting a level of the reader's stack.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from json import JSONDecodeError
+from typing import Any
+
+from sim.readers.unreadable import DEEPEST, TooMany, Unreadable, check_depth
+
+__all__ = ["MOST_VALUES", "JSONDecodeError", "read_json"]
+
+MOST_VALUES = 200_000
+#: A string without an end reaches to the end of the text, so that it is not looked for again at each later quote.
+_STRINGS = re.compile(r'"[^"\\]*+(?:\\.[^"\\]*+)*+(?:"|\\?\Z)', re.DOTALL)
+
+
+def read_json(
+    text: str | bytes,
+    *,
+    most_values: int = MOST_VALUES,
+    parse_constant: Callable[[str], Any] | None = None,
+    strict: bool = True,
+) -> Any:
+    """Return the value in the text; bytes are UTF-8, with or without a byte order mark.
+
+    Raises JSONDecodeError for what is no JSON, and Unreadable for what would take too much work.
+    """
+    if isinstance(text, bytes):
+        try:
+            text = text.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            raise Unreadable("it is not UTF-8") from None
+    _check(text, most_values)
+    try:
+        return json.loads(text, parse_constant=parse_constant, strict=strict)
+    except JSONDecodeError:
+        raise
+    except RecursionError:
+        raise Unreadable("it is nested too deeply") from None
+    except ValueError as error:
+        if "integer string conversion" not in str(error):
+            raise
+        # Python refuses whole numbers of thousands of digits.
+        raise Unreadable("it has a number that is too long") from None
+
+
+def _check(text: str, most_values: int) -> None:
+    opened = text.count("[") + text.count("{")
+    if opened <= DEEPEST and opened + text.count(",") <= most_values:
+        return
+    structure = _STRINGS.sub("", text)
+    if structure.count(",") + structure.count("[") + structure.count("{") > most_values:
+        raise TooMany("it has more than %(most)s values", most=most_values)
+    check_depth(structure)

@@ -1,0 +1,26 @@
+"""Python source as a syntax tree, bounded by its tokens: each becomes an object of several hundred bytes.
+
+For our own processes, which look at source and never compile or run it; students' code runs inside the sandbox.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+
+from sim.readers.unreadable import TooMany, Unreadable
+
+MOST_TOKENS = 200_000
+_TOKEN = re.compile(r"\w++|[^\w\s]")
+
+
+def parse_module(text: str, most_tokens: int = MOST_TOKENS) -> ast.Module:
+    """Return the tree of a module. Raises SyntaxError, and Unreadable for what would take too much work."""
+    if len(text) > most_tokens and sum(1 for _ in _TOKEN.finditer(text)) > most_tokens:
+        raise TooMany("it has more than %(most)s tokens", most=most_tokens)
+    try:
+        return ast.parse(text)
+    except (RecursionError, MemoryError):
+        raise Unreadable("it is nested too deeply") from None
+    except ValueError:
+        raise Unreadable("it has a character that Python source cannot have") from None

@@ -1,0 +1,78 @@
+"""TOML, bounded by the keys, tables and values that it would become.
+
+``tomllib`` keeps every prefix of a dotted key, so its time and memory grow with the square of the key's parts.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable
+from tomllib import TOMLDecodeError
+from typing import Any
+
+from sim.readers.unreadable import TooMany, Unreadable, check_depth
+
+__all__ = ["MOST_KEY_PARTS", "TOMLDecodeError", "read_toml"]
+
+MOST_KEY_PARTS = 10
+#: Each key, table and list costs up to 1 kB while it is read.
+MOST_KEYS = 20_000
+MOST_VALUES = 200_000
+#: Strings and comments, read from the start as TOML does, so that what is left is structure alone. A string without an
+#: end reaches to the end of the text or line, so that it is not looked for again at each later quote.
+_TEXTS = re.compile(
+    r'"""[^"\\]*+(?:(?:\\.|"(?!""))[^"\\]*+)*+(?:"{3,5}|\\?\Z)'
+    r"|'''[^']*+(?:'(?!'')[^']*+)*+(?:'{3,5}|\Z)"
+    r'|"[^"\\\n]*+(?:\\.[^"\\\n]*+)*+(?:"|\\?(?=\n|\Z))'
+    r"|'[^'\n]*+(?:'|(?=\n|\Z))"
+    r"|\#[^\n]*+",
+    re.DOTALL,
+)
+_DOTTED = re.compile(r"(?<![\w.-])[\w-]++(?:[ \t]*+\.[ \t]*+[\w-]++)++")
+
+
+def read_toml(text: str, parse_float: Callable[[str], Any] = float) -> dict[str, Any]:
+    """Return what the text says.
+
+    Raises TOMLDecodeError for what is no TOML, and Unreadable for what would take too much work.
+    """
+    _check(_TEXTS.sub(_placeholder, text))
+    try:
+        document = tomllib.loads(text, parse_float=parse_float)
+    except TOMLDecodeError:
+        raise
+    except RecursionError:
+        raise Unreadable("it is nested too deeply") from None
+    except ValueError:
+        # Python refuses whole numbers of thousands of digits.
+        raise Unreadable("it has a number that is too long") from None
+    _check_numbers(document)
+    return document
+
+
+def _check_numbers(value: object) -> None:
+    """Raise Unreadable for a number beyond TOML's 64 bits; Python refuses to write one of thousands of digits."""
+    if isinstance(value, int) and value.bit_length() > 64:
+        raise Unreadable("it has a number that is too long")
+    for each in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        _check_numbers(each)
+
+
+def _placeholder(found: re.Match[str]) -> str:
+    return "" if found[0].startswith("#") else "x"
+
+
+def _check(structure: str) -> None:
+    check_depth(structure)
+    parts = 0
+    for dotted in _DOTTED.finditer(structure):
+        dots = dotted[0].count(".")
+        if dots >= MOST_KEY_PARTS:
+            raise Unreadable("it has a key of more than %(most)s parts", most=MOST_KEY_PARTS)
+        # One dot may be that of a number.
+        parts += dots if dots > 1 else 0
+    if structure.count("=") + structure.count("[") + structure.count("{") + parts > MOST_KEYS:
+        raise TooMany("it has more than %(most)s keys, tables and lists", most=MOST_KEYS)
+    if structure.count(",") > MOST_VALUES:
+        raise TooMany("it has more than %(most)s values", most=MOST_VALUES)

@@ -1,0 +1,103 @@
+"""Operations on a store as an operator of its machine does them, without workers to notify."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from builders import settings_in
+from service.operations import batches, exports, regrades
+from service.operations.batches import Controlled, Retried
+from service.operations.context import Actor, Service
+from service.operations.exports import Download, ExportRequest
+from service.operations.regrades import Published, Regraded
+from service.store.engine import Store
+from service.store.models import Batch, Enrolment, Job
+from service.store.states import Lane
+from submissions.assignment.definition import Assignment
+
+
+@dataclass(frozen=True, slots=True)
+class Notices:
+    """Keeps what workers would be notified of: the queue and how many jobs."""
+
+    sent: list[tuple[str, int]] = field(default_factory=list)
+
+    def grade(self, lane: Lane, count: int = 1) -> None:
+        if count > 0:
+            self.sent.append((lane.value, count))
+
+    def try_out(self, count: int = 1) -> None:
+        self.sent.append(("tryouts", count))
+
+    def plot(self, count: int = 1) -> None:
+        self.sent.append(("plots", count))
+
+
+def service_on(store: Store, max_attempts: int = 3) -> Service:
+    return Service(settings_in(Path("/nonexistent"), max_attempts=max_attempts), store, Notices())
+
+
+def machine(name: str = "staff") -> Actor:
+    return Actor(name, operator=True)
+
+
+def pause(store: Store, batch_id: str, actor: str = "staff") -> Controlled:
+    return batches.pause(service_on(store), machine(actor), _course(store, batch_id), batch_id)
+
+
+def resume(store: Store, batch_id: str, actor: str = "staff") -> Controlled:
+    return batches.resume(service_on(store), machine(actor), _course(store, batch_id), batch_id)
+
+
+def cancel(store: Store, batch_id: str, actor: str = "staff") -> Controlled:
+    return batches.cancel(service_on(store), machine(actor), _course(store, batch_id), batch_id)
+
+
+def retry(store: Store, batch_id: str | None, actor: str = "staff") -> Retried:
+    return batches.retry_dead(service_on(store), machine(actor), batch_id)
+
+
+def publish(store: Store, batch_id: str, actor: str = "staff", *, anyway: bool = False) -> Published:
+    course_id = _course(store, batch_id)
+    return regrades.publish(service_on(store), machine(actor), course_id, batch_id, anyway=anyway)
+
+
+def publish_one(store: Store, job_id: str, actor: str = "staff", *, anyway: bool = False) -> Published:
+    course_id = _course_of_job(store, job_id)
+    return regrades.publish_one(service_on(store), machine(actor), course_id, job_id, anyway=anyway)
+
+
+def regrade(
+    store: Store,
+    batch_id: str,
+    assignment: Assignment | None = None,
+    *,
+    max_attempts: int = 3,
+    actor: str = "staff",
+) -> Regraded:
+    service, course_id = service_on(store, max_attempts), _course(store, batch_id)
+    return regrades.regrade_batch(service, machine(actor), course_id, batch_id, assignment or "")
+
+
+def regrade_one(
+    store: Store, job_id: str, assignment: Assignment | None = None, *, max_attempts: int = 3, actor: str = "staff"
+) -> str:
+    service, course_id = service_on(store, max_attempts), _course_of_job(store, job_id)
+    return regrades.regrade_one(service, machine(actor), course_id, job_id, assignment or "")
+
+
+def export_file(store: Store, batch_id: str, form: str, *, published: bool, given: str | None = None) -> Download:
+    asked = ExportRequest(form, published, given)
+    return exports.download(service_on(store), machine(), _course(store, batch_id), batch_id, asked)
+
+
+def _course(store: Store, batch_id: str) -> int:
+    with store.reading() as session:
+        row = session.get(Batch, batch_id)
+        return 0 if row is None else row.course_id
+
+
+def _course_of_job(store: Store, job_id: str) -> int:
+    with store.reading() as session:
+        return session.get_one(Enrolment, session.get_one(Job, job_id).enrolment_id).course_id

@@ -1,0 +1,82 @@
+"""``verify`` tells a program that uses chance of its own from a fault of ours, by repeating what differs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from decimal import Decimal
+
+import pytest
+
+from responders.code import Code
+from service.commands.verifying import _cause_of, _compare_marks, _compared
+from service.grading.grade import Grade, TrialResult
+from service.grading.grader import grade
+from service.grading.trial_runner import TrialRunner
+from sim.recording import Line, Verdict
+from submissions.assignment.reader import find_assignment
+from submissions.grading_request import GradingRequest
+from submissions.seeds import PUBLIC
+from submissions.submission import Submission
+
+
+def _stored_otherwise(graded: Grade) -> list[tuple[TrialResult, TrialResult]]:
+    """The trials as they would be compared if the stored recordings had had other hashes."""
+    return [(replace(each, recording=replace(each.recording, sha256="0" * 64)), each) for each in graded.trials]
+
+
+@pytest.mark.parametrize(
+    ("program", "cause"),
+    [
+        ("import os\nprint(os.getpid())", "program"),
+        ("import ctypes\nprint(ctypes.CDLL(None).clock() % 1000, 'and so on')", "program"),
+        ("for word in {'a', 'b', 'c'}: print(word, hash(word))", "grader"),
+    ],
+)
+def test_a_trial_that_differs_is_repeated_in_fresh_processes(program: str, cause: str, runner: TrialRunner) -> None:
+    request = GradingRequest(Submission("ada", Code("robot.py", program)), find_assignment("say-tm129"), "ada")
+    again = grade(request.submission, request.assignment, runner=runner)
+    assert _cause_of(_stored_otherwise(again), [], again, request, PUBLIC) == cause
+    assert _cause_of(list(zip(again.trials, again.trials, strict=True)), [], again, request, PUBLIC) is None
+
+
+def _graded(runner: TrialRunner) -> tuple[GradingRequest, Grade]:
+    request = GradingRequest(Submission("ada", Code("robot.py", "say('ok')")), find_assignment("say-tm129"), "ada")
+    return request, grade(request.submission, request.assignment, runner=runner)
+
+
+def _cut(trial: TrialResult, *said: str) -> TrialResult:
+    """The trial as if a limit had ended it after it said this."""
+    spoken = tuple(Line(0.0, text) for text in said)
+    recording = replace(trial.recording, sha256="0" * 64, verdict=Verdict.CPU_LIMIT, spoken=spoken, faults=())
+    return replace(trial, recording=recording)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "compared"),
+    [((), ("ok",), "cut by a limit"), (("ok",), ("ok", "a"), "cut by a limit"), (("no",), ("ok",), "differs")],
+)
+def test_a_trial_that_was_cut_has_to_begin_alike(
+    before: tuple[str, ...], after: tuple[str, ...], compared: str, runner: TrialRunner
+) -> None:
+    trial = _graded(runner)[1].trials[0]
+    other = _cut(trial, *after)
+    other = replace(other, recording=replace(other.recording, sha256="1" * 64))
+    assert _compared(_cut(trial, *before), other) == compared
+
+
+def test_only_criteria_that_look_at_a_cut_trial_may_differ(runner: TrialRunner) -> None:
+    request, again = _graded(runner)
+    stored = replace(again, criteria=tuple(replace(each, marks=Decimal(-1)) for each in again.criteria))
+    cut = [(_cut(each), each) for each in again.trials]
+    criteria = request.assignment.criteria
+    assert set(_compare_marks(stored, again, cut, criteria)) == {"cut by a limit"}
+    elsewhere = [each.model_copy(update={"scenarios": ("another",)}) for each in criteria]
+    assert set(_compare_marks(stored, again, cut, elsewhere)) == {"differs"}
+    whole = [(each, each) for each in again.trials]
+    assert set(_compare_marks(stored, again, whole, criteria)) == {"differs"}
+
+
+def test_marks_that_differ_have_a_cause_without_trials(runner: TrialRunner) -> None:
+    request, again = _graded(runner)
+    assert _cause_of([], ["differs"], again, request, PUBLIC) == "grader"
+    assert _cause_of([], ["same"], again, request, PUBLIC) is None

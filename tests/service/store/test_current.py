@@ -1,0 +1,158 @@
+"""One attempt counts for a student and an assignment, and every reader of grades names the same."""
+
+from __future__ import annotations
+
+import random
+from datetime import UTC, datetime
+
+import pytest
+from sqlalchemy import select
+
+import acting
+import report_builders
+from builders import grading_request
+from service.lti import passing_back
+from service.lti.services import Score
+from service.operations import own_work
+from service.store.batches import batch_table, batches
+from service.store.batches.intake import accept, accept_batch
+from service.store.courses import policies
+from service.store.courses.hidden_names import HiddenNames
+from service.store.courses.policies import PolicyLimits
+from service.store.engine import Store
+from service.store.grades import overrides, results
+from service.store.models import Enrolment, Job, SubmissionRow
+from service.store.people import lti
+from service.store.people.students import course_of
+from service.store.queue import jobs, self_tests
+from service.store.queue.jobs import Retry
+from service.store.states import JobState, Standing
+
+GRADE = report_builders.faulty_grade()
+NOBODY = HiddenNames(frozenset(), b"")
+
+
+def _submit(store: Store, program: str, batch_id: str | None = None) -> str:
+    request = grading_request("ada", f"print({program!r})\n")
+    return accept(store, request, max_attempts=1, batch_id=batch_id).job_id
+
+
+def _end_next(store: Store, how: str = "done", worker: str = "worker") -> None:
+    claim = jobs.claim(store, worker, 60)
+    if claim is None or how == "running":
+        return
+    if how == "dead":
+        jobs.fail(store, claim, "the disk is full", Retry(0.0))
+    else:
+        jobs.finish(store, claim, results.prepare(GRADE), datetime.now(UTC))
+
+
+def _readers(store: Store, batch_id: str | None) -> dict[str, str | None]:
+    """The job of the attempt that counts for Ada, as each reader says; None where none does."""
+    found: dict[str, str | None] = {}
+    with store.reading() as session:
+        enrolment_id = session.scalars(select(Enrolment.id)).one()
+        of_all = own_work.own_assignments(session, 1, enrolment_id)
+        found["own list"] = None if of_all[0].counting is None else of_all[0].counting.job_id
+        own = own_work.counting_submission(session, enrolment_id, "echo-responder")
+        found["own page"] = None if own is None else own.job_id
+        lines = {"course": batches.course_lines(session, 1, ["echo-responder"])}
+        if batch_id is not None:
+            lines["batch"] = batches.job_lines(session, batch_id)
+            lines["some of a batch"] = batches.some_job_lines(session, batch_id, NOBODY, 10)
+            (row,) = batch_table.table_lines(session, batch_id, (), NOBODY)
+            found["table"] = row.id if row.marks is not None and not row.staff_only else None
+        for name, (line,) in lines.items():
+            found[name] = line.id if line.marks is not None and not line.staff_only else None
+    return found
+
+
+@pytest.mark.parametrize("how", ["dead", "waiting", "running"])
+def test_a_newer_attempt_without_a_grade_leaves_the_marks_of_the_earlier_one(store: Store, how: str) -> None:
+    batch = accept_batch(store, "class", [grading_request("ada")], [], max_attempts=1)
+    _end_next(store)
+    acting.publish(store, batch.id, actor="grace")
+    _submit(store, "newer", batch.id)
+    if how != "waiting":
+        _end_next(store, how)
+    assert set(_readers(store, batch.id).values()) == {batch.jobs[0].job_id}
+    with store.reading() as session:
+        (line,) = batches.job_lines(session, batch.id)
+        (row,) = batch_table.table_lines(session, batch.id, (), NOBODY)
+    assert (line.marks, line.newer_attempt, row.newer_attempt) == (GRADE.marks, 2, 2)
+    exported = acting.export_file(store, batch.id, "moodle", published=True).data.decode()
+    assert f"ada,{GRADE.marks:f}," in exported
+    assert "disk is full" not in exported
+
+
+def test_a_batch_shows_the_attempt_that_counts_from_wherever_it_came(store: Store) -> None:
+    old = accept_batch(store, "from Moodle", [grading_request("ada")], [], max_attempts=1)
+    _end_next(store)
+    newer = _submit(store, "newer")
+    _end_next(store)
+    assert set(_readers(store, old.id).values()) == {newer}
+    with store.reading() as session:
+        (line,) = batches.job_lines(session, old.id)
+        (row,) = batch_table.table_lines(session, old.id, (), NOBODY)
+        (own,) = batches.attempt_lines(session, old.id)
+    # By that name the system that the batch came from knows it again.
+    assert (line.attempt, line.source, row.elsewhere) == (2, "ada.zip", True)
+    assert (own.id, own.attempt) == (old.jobs[0].job_id, 1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_all_readers_name_the_same_attempt_after_any_history(store: Store, seed: int) -> None:
+    chance = random.Random(seed)
+    with store.transaction() as session:
+        course_of(session, "default", datetime.now(UTC))
+        policies.set_policy(session, 1, "", PolicyLimits(attempts=chance.choice([2, None])))
+    first = accept_batch(store, "class", [grading_request("ada")], [], max_attempts=1)
+    for number in range(20):
+        match chance.choice(("submit", "end", "end", "quarantine")):
+            case "submit":
+                _submit(store, str(number), chance.choice([None, first.id]))
+            case "end":
+                _end_next(store, chance.choice(["done", "done", "dead"]), f"worker-{number // 4}")
+            case "quarantine":
+                self_tests.quarantine(store, f"worker-{number // 4}", "it adds wrongly")
+        with store.reading() as session:
+            query = (
+                select(Job.id)
+                .join(SubmissionRow)
+                .where(
+                    Job.standing == Standing.STANDS,
+                    Job.state == JobState.DONE,
+                    Job.suspect.is_(None),
+                    SubmissionRow.staff_only.is_(None),
+                )
+                .order_by(SubmissionRow.attempt.desc())
+            )
+            expected = session.scalars(query.limit(1)).one_or_none()
+        assert set(_readers(store, first.id).values()) == {expected}
+
+
+def test_an_earlier_attempt_is_not_passed_back_where_all_of_the_newest_is_excused(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sent: list[Score] = []
+
+    def send(_store: Store, _link: object, _assignment: str, _title: str, scores: list[Score]) -> int:
+        sent.extend(scores)
+        return len(scores)
+
+    monkeypatch.setattr(lti, "subjects", lambda *_: {"ada": "subject-1"})
+    monkeypatch.setattr(passing_back, "send_scores", send)
+    link = object.__new__(lti.CourseLink)
+    object.__setattr__(link, "platform", None)
+    for program in ("one", "two"):
+        job_id = _submit(store, program)
+        _end_next(store)
+        acting.publish_one(store, job_id, actor="grace", anyway=True)
+    passing_back.send_marks(store, link, 1, "echo-responder")
+    assert [score.marks for score in sent] == [GRADE.marks]
+    with store.transaction() as session:
+        for criterion in GRADE.criteria:
+            overrides.excuse(session, job_id, criterion.id, "the task was wrong", "grace")
+    sent.clear()
+    passing_back.send_marks(store, link, 1, "echo-responder")
+    assert sent == []

@@ -1,0 +1,149 @@
+"""Where names are hidden, no order and no value of an instructor's answer tells whose row is whose."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import zipfile
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+import acting
+import report_builders
+from builders import echo, grading_request
+from naming import is_named
+from service.store.batches import intake, regrades
+from service.store.courses import open_assignments
+from service.store.courses.hidden_names import HiddenNames, hidden_names_of
+from service.store.courses.versions import freeze
+from service.store.grades import results
+from service.store.people.people import Member
+from service.store.queue import jobs
+from web import COURSE, Web, submit, web_in, words
+from zips import zipped
+
+STUDENTS = ("ada", "bea", "cyd", "dot", "eve", "fay", "gil", "hal")
+HERE = "/api/v1/courses/1"
+
+
+@pytest.fixture
+def web(tmp_path: Path) -> Iterator[Web]:
+    with web_in(tmp_path) as made:
+        yield made
+
+
+@pytest.fixture
+def grace(web: Web) -> Member:
+    return web.instructor("grace")
+
+
+@pytest.fixture
+def regrade(web: Web, grace: Member) -> str:
+    """A regrade of eight submissions, one each, with names hidden."""
+    requests = [grading_request(who) for who in STUDENTS]
+    batch = intake.accept_batch(web.store, "week one", requests, (), course=COURSE, max_attempts=3)
+    _grade_all(web)
+    with web.store.transaction() as session:
+        open_assignments.prepare(session, 1, freeze(echo()))
+        open_assignments.hide_names(session, 1, "echo-responder", True)
+    made = acting.regrade(web.store, batch.id, None, max_attempts=3, actor="grace")
+    _grade_all(web)
+    return made.batch_id
+
+
+def _grade_all(web: Web) -> None:
+    while claim := jobs.claim(web.store, "worker", 60):
+        jobs.finish(web.store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+
+
+def test_changes_of_a_regrade_are_in_the_order_of_the_shown_names(web: Web, grace: Member, regrade: str) -> None:
+    token = web.token(grace, "read")
+    changes = web.browser().get(f"{HERE}/batches/{regrade}/changes", headers=token).json()["items"]
+    shown = hidden_names_of(web.store, 1)
+    assert [each["student"] for each in changes] == sorted(shown.called("echo-responder", who) for who in STUDENTS)
+
+
+def test_the_page_of_changes_is_in_the_order_of_random_ids(web: Web, grace: Member, regrade: str) -> None:
+    with web.store.reading() as session:
+        found = regrades.changes_page(session, regrade, 1, hidden_names_of(web.store, 1))
+    assert [each.job_id for each in found.changes] == sorted(each.job_id for each in found.changes)
+    text = web.browser(grace).get(f"/courses/1/batches/{regrade}/changes").text
+    assert [who for who in STUDENTS if re.search(rf"\b{who}\b", text, re.IGNORECASE)] == []
+
+
+def test_a_students_data_has_nothing_that_a_nameless_row_has_too(web: Web, grace: Member, regrade: str) -> None:
+    token = web.token(grace, "manage", "read")
+    people = web.browser().get(f"{HERE}/people", headers=token).json()["items"]
+    enrolment = next(each["enrolment"] for each in people if each["id"] == "ada")
+    packed = web.browser().get(f"{HERE}/people/{enrolment}/data", headers=token).content
+    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
+        assert archive.namelist() == ["student.json"]
+        student = json.loads(archive.read("student.json"))
+    assert student["submissions"] == []
+    rows = web.browser().get(f"{HERE}/batches/{regrade}/grades", headers=token).json()["items"]
+    times = {each[name] for each in rows for name in ("queued_at", "finished_at")}
+    assert times
+    assert not {"since", "signed_in_with"} & set(student)
+    assert not {value[:10] for value in times if value[:10] in json.dumps(student)}
+
+
+def test_students_still_have_all_of_their_own_data(web: Web, regrade: str) -> None:
+    token = web.token(web.student("ada"), "read")
+    packed = web.browser().get(f"{HERE}/mine/data", headers=token).content
+    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
+        assert len(json.loads(archive.read("student.json"))["submissions"]) == 1
+
+
+def test_an_upload_that_is_not_new_names_nobody_beside_a_grade(web: Web, grace: Member, regrade: str) -> None:
+    again = zipped({f"{who}/{name}": text for who in STUDENTS for name, text in _files(who).items()})
+    token = web.token(grace, "submit")
+    path = f"{HERE}/batches?assignment=echo-responder&name=again"
+    headers = {**token, "content-type": "application/zip"}
+    known = web.browser().post(path, headers=headers, content=again).json()["known"]
+    shown = hidden_names_of(web.store, 1)
+    assert [each["student"] for each in known] == sorted(shown.called("echo-responder", who) for who in STUDENTS)
+    browser = web.browser(grace)
+    files = {"files": ("again.zip", again, "application/zip")}
+    upload = submit(browser, "/courses/1/batches/uploads", {"assignment": "echo-responder"}, files=files)
+    answer = submit(browser, f"{upload.headers['location']}/confirm")
+    assert set(re.findall(r"Participant \w{6}", answer.text)) == {each["student"] for each in known}
+    assert [who for who in STUDENTS if is_named(who, words(answer.text))] == []
+
+
+def _files(who: str) -> dict[str, str]:
+    submission = grading_request(who).submission
+    assert submission.program is not None
+    assert submission.responder is not None
+    return {"robot.py": submission.program.text, "responder.py": submission.responder.text}
+
+
+@pytest.mark.parametrize("form", ["moodle-worksheet", "moodle-feedback"])
+def test_a_file_that_is_matched_by_names_is_refused(web: Web, grace: Member, regrade: str, form: str) -> None:
+    token = web.token(grace, "read")
+    path = f"{HERE}/batches/{regrade}"
+    if form == "moodle-worksheet":
+        headers = {**token, "content-type": "text/csv"}
+        answer = web.browser().post(f"{path}/worksheet", headers=headers, content=b"Identifier,Grade\n")
+    else:
+        answer = web.browser().get(f"{path}/export?format={form}", headers=token)
+    assert answer.status_code == 422
+    assert "which are hidden for echo-responder; show them first" in answer.json()["detail"]
+
+
+def test_numbers_of_submissions_are_not_in_the_order_of_the_names(web: Web) -> None:
+    requests = [grading_request(f"student-{number:02}", f"print({number})\n") for number in range(30)]
+    batch = intake.accept_batch(web.store, "week two", requests, (), course=COURSE, max_attempts=3)
+    numbers = [job.submission_id for job in batch.jobs]
+    assert [job.student for job in batch.jobs] == [each.submission.student for each in requests]
+    hashes = [each.submission.sha256 for each in requests]
+    assert sorted(range(30), key=lambda place: numbers[place]) == sorted(range(30), key=lambda place: hashes[place])
+
+
+def test_a_student_has_another_label_in_each_assignment() -> None:
+    names = HiddenNames(frozenset({"one", "two"}), b"key")
+    assert names.called("one", "ada") == names.called("one", "ada")
+    assert len({names.called(assignment, "ada") for assignment in ("one", "two", "named")}) == 3

@@ -1,0 +1,148 @@
+"""Students are answered the same however many scenarios and criteria are hidden from them.
+
+Each example of an assignment is graded against two versions that differ in their hidden parts alone. The routes are
+those that the application has, so that a new one is asked for by itself.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from datetime import UTC, datetime
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+
+import acting
+import builders
+from builders import echo
+from responders.code import Code
+from service.grading.grade import Grade, unjudged_notes
+from service.grading.grader import grade
+from service.grading.trial_runner import TrialRunner
+from service.store.batches import intake
+from service.store.courses import open_assignments
+from service.store.courses.versions import freeze
+from service.store.grades import results
+from service.store.installation import secret_of
+from service.store.queue import jobs
+from service.trying import tryout_assignment
+from sim.recording import Pose
+from student_reader import StudentReader
+from submissions.assignment.definition import Assignment
+from submissions.assignment.folder import assignment_folder
+from submissions.bundle import read_submission
+from submissions.grading_request import GradingRequest
+from submissions.submission import Submission
+from web import web_in
+
+_WAITING = "waiting"
+#: Right, wrong, ended by an exception, and ended by the limits of CPU time (where trials are spared) and of time.
+_EXAMPLES = (
+    *(pytest.param(name, marks=pytest.mark.long) for name in ("reference", "responder-raises", "endless", _WAITING)),
+    "flawed",
+)
+_MOMENT = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?")
+
+
+def _assignment(hidden: int, *, first: bool, seconds: float) -> Assignment:
+    """The echo assignment with so many hidden scenarios and criteria, whose marks are the same in all."""
+    whole = echo()
+    (own,) = whole.scenarios
+    shown = replace(own, poses=tuple(Pose(x, 800, 0) for x in (100, 150, 200, 250)), seconds=90)
+    others = tuple(replace(own, id=f"secret-{n}", visibility="hidden", seconds=seconds) for n in range(hidden))
+    criteria = tuple(
+        whole.criteria[0].model_copy(
+            update={"id": f"secret-{n}", "visibility": "hidden", "marks": Decimal(12) / hidden, "scenarios": ()}
+        )
+        for n in range(hidden)
+    )
+    limits = replace(whole.limits, program_cpu=0.5, responder_cpu=0.5)
+    scenarios = (*others, shown) if first else (shown, *others)
+    return replace(whole, scenarios=scenarios, criteria=(*whole.criteria, *criteria), limits=limits)
+
+
+_FEW = _assignment(1, first=False, seconds=90)
+_MANY = _assignment(3, first=True, seconds=60)
+
+
+@pytest.mark.parametrize("example", _EXAMPLES)
+def test_answers_do_not_depend_on_what_is_hidden(
+    tmp_path: Path, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch, example: str
+) -> None:
+    monkeypatch.setattr(builders, "token_hex", lambda size: "5e" * size)
+    few, many = (
+        _answers(tmp_path / name, assignment, example, runner, progress)
+        for name, assignment, progress in (("few", _FEW, 0.5), ("many", _MANY, 0.2))
+    )
+    assert len(few) > 20
+    assert {path for path in few if few[path] != many[path]} == set()
+
+
+def test_programs_are_tried_the_same_whatever_is_hidden() -> None:
+    assert tryout_assignment(_FEW) == tryout_assignment(_MANY)
+
+
+def _answers(
+    home: Path, assignment: Assignment, example: str, runner: TrialRunner, progress: float
+) -> dict[str, object]:
+    """What Ada is answered while her submission is graded, once it is, and once it is published."""
+    submission = _submission(example)
+    with web_in(home) as web:
+        ada = web.student("ada")
+        with web.store.transaction() as session:
+            open_assignments.prepare(session, 1, freeze(assignment))
+            open_assignments.open_for_students(session, 1, assignment.id)
+            batch_id = open_assignments.find(session, 1, assignment.id).batch_id or ""
+        request = GradingRequest(submission, assignment, example)
+        accepted = intake.accept(web.store, request, max_attempts=3, batch_id=batch_id)
+        asked = StudentReader(web, ada, {"submission_id": str(accepted.submission_id), "assignment": assignment.id})
+        claim = jobs.claim(web.store, "worker", 60)
+        assert claim is not None
+        jobs.heartbeat(web.store, claim, 60, progress)
+        found = asked.everything("while it is graded")
+        graded = _unjudged(grade(submission, assignment, secret=secret_of(web.store), runner=runner))
+        jobs.finish(web.store, claim, results.prepare(graded), datetime.now(UTC))
+        found |= asked.everything("graded")
+        acting.publish(web.store, batch_id, actor="grace", anyway=True)
+        found |= asked.everything("published")
+        for form in ("moodle", "gradescope"):
+            found[form] = acting.export_file(web.store, batch_id, form, published=False).data.decode()
+        found["gradescope"] = _shown_by_gradescope(str(found["gradescope"]))
+        changing = {accepted.job_id: "JOB", batch_id: "BATCH", asked.word: "WORD"}
+        return {path: _without(changing, content) for path, content in found.items()}
+
+
+def _submission(example: str) -> Submission:
+    if example != _WAITING:
+        return read_submission(assignment_folder("echo-responder") / "examples" / example, student="ada")
+    program = Code("robot.py", "import time\ntime.sleep(70)\ntime.sleep(70)\n")
+    return replace(_submission("reference"), program=program)
+
+
+def _unjudged(graded: Grade) -> Grade:
+    """The grade as if no hidden criterion, and the first visible one, could be judged."""
+    broken = {graded.criteria[0].id, *(each.id for each in graded.criteria if each.visibility == "hidden")}
+    criteria = tuple(
+        replace(each, unjudged="The check failed." if each.id in broken else "") for each in graded.criteria
+    )
+    return replace(graded, criteria=criteria, notes=(*graded.notes, *unjudged_notes(criteria)))
+
+
+def _shown_by_gradescope(text: str) -> str:
+    """What students see there: tests are hidden by the visibility that they are sent with."""
+    (document,) = json.loads(text)
+    return json.dumps(document | {"tests": [each for each in document["tests"] if each["visibility"] == "visible"]})
+
+
+def _without(changing: Mapping[str, str], content: object) -> object:
+    """The same without what is new each time: ids, moments, a form's word."""
+    if isinstance(content, dict):
+        return {name: _without(changing, text) for name, text in content.items()}
+    text = _MOMENT.sub("MOMENT", str(content))
+    for value, name in changing.items():
+        text = text.replace(value, name)
+    return text

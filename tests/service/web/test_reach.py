@@ -1,0 +1,422 @@
+"""A credential reaches no further than its issuer, and ends with the role; its owner and operators can end it."""
+
+from __future__ import annotations
+
+import io
+import json
+import tomllib
+import zipfile
+from datetime import timedelta
+
+import pytest
+from sqlalchemy import update
+from starlette.testclient import TestClient
+
+from paths import DATA
+from service.operations import people as operations
+from service.operations.context import Actor
+from service.operations.scopes import SCOPES
+from service.store.engine import now
+from service.store.models import Enrolment
+from service.store.people import credentials, lti, people
+from service.store.people.credentials import MOST_SESSIONS, MOST_TOKENS, Reach
+from service.store.people.people import Member
+from service.store.people.students import Students
+from service.store.states import CredentialKind, Role
+from service.store.web_tables import LtiCourse, LtiPerson
+from service.web.access import SESSION_COOKIE
+from service.web.page_scopes import scope_of_page
+from sim.errors import UsageError
+from submissions.people import Student
+from web import Web, csrf, submit, words
+
+EVERY_SCOPE = tuple(SCOPES)
+
+
+def also_in(web: Web, member: Member, course: str, role: Role) -> Member:
+    """The same person in another course."""
+    with web.store.transaction() as session:
+        other = (people.make_student if role is Role.STUDENT else people.make_instructor)(
+            session, course, Student(f"{member.id}-{course}", "Also Ada")
+        )
+    web.join(member, other)
+    return other
+
+
+def token_of(browser: TestClient, *scopes: str) -> dict[str, str]:
+    """A token that the account's page makes."""
+    data = {"name": "t", "days": "366", "word": f"w{len(scopes)}", "scopes": list(scopes)}
+    answer = submit(browser, "/account/tokens", data)
+    assert answer.status_code == 303, answer.text
+    secret = browser.get(answer.headers["location"]).text.partition('readonly value="')[2].partition('"')[0]
+    assert secret.startswith("rmt_")
+    return {"authorization": f"Bearer {secret}"}
+
+
+def sign_in(web: Web, secret: str) -> TestClient:
+    browser = web.browser()
+    assert browser.post("/sign-in", data={"secret": secret}).status_code == 303
+    return browser
+
+
+def instructors_link(web: Web, grace: TestClient, ada: Member) -> str:
+    answer = submit(grace, f"/courses/1/people/{ada.enrolment_id}/link")
+    return grace.get(answer.headers["location"]).text.partition("/sign-in/")[2].partition('"')[0]
+
+
+def credential(web: Web, member: Member, kind: CredentialKind, **reach: object) -> str:
+    with web.store.transaction() as session:
+        limits = Reach(**reach)  # type: ignore[arg-type]
+        return credentials.issue(session, member.person_id, kind, timedelta(hours=1), reach=limits)
+
+
+@pytest.fixture
+def ada(web: Web, grace: TestClient) -> Member:
+    return web.student("ada")
+
+
+def test_an_instructors_link_reaches_one_course_and_one_role(web: Web, grace: TestClient, ada: Member) -> None:
+    """So does all that follows from it, whatever its owner becomes, without any sign-out in between."""
+    browser = sign_in(web, instructors_link(web, grace, ada))
+    token = token_of(browser, "read", "submit", "sign-in")
+    second = sign_in(web, token["authorization"].removeprefix("Bearer "))
+    unused = instructors_link(web, grace, ada)
+    with web.store.transaction() as session:
+        elsewhere = people.make_student(session, "two", Student("ada"))
+        staff = people.make_instructor(session, "three", Student("ada"))
+        for each in (elsewhere, staff):
+            session.get_one(Enrolment, each.enrolment_id).person_id = ada.person_id
+        people.make_operator(session, ada.person_id)
+    for signed_in in (browser, second, sign_in(web, unused)):
+        assert signed_in.get("/courses/1/mine").status_code == 200
+        assert signed_in.get("/courses/2/mine").status_code == 404
+        assert signed_in.get("/courses/3/people").status_code == 404
+        assert signed_in.get("/operator").status_code == 404
+    told = web.browser().get("/api/v1/me", headers=token).json()
+    assert ([course["id"] for course in told["courses"]], told["operator"]) == ([1], False)
+    assert web.browser().get("/api/v1/courses/2/mine/assignments", headers=token).status_code == 404
+    # Nor does it reach the same course in another role.
+    with web.store.transaction() as session:
+        session.execute(update(Enrolment).where(Enrolment.id == ada.enrolment_id).values(role=Role.INSTRUCTOR))
+    assert browser.get("/courses/1/people").status_code == 404
+    assert browser.get("/courses/1/mine").status_code == 404
+
+
+def test_links_for_a_whole_course_reach_as_far(web: Web, ada: Member) -> None:
+    token = web.token(web.instructor(), "manage")
+    (made,) = web.browser().post("/api/v1/courses/1/people/links", headers=token).json()["links"]
+    browser = sign_in(web, made["path"].rpartition("/")[2])
+    with web.store.transaction() as session:
+        other = people.make_student(session, "two", Student("ada"))
+        session.get_one(Enrolment, other.enrolment_id).person_id = ada.person_id
+    assert browser.get("/courses/1/mine").status_code == 200
+    assert browser.get("/courses/2/mine").status_code == 404
+
+
+def test_a_token_opens_no_browser_that_may_more(web: Web) -> None:
+    root = web.operator()
+    with web.store.transaction() as session:
+        course = people.make_instructor(session, "A", Student("root"))
+        session.get_one(Enrolment, course.enrolment_id).person_id = root.person_id
+    scopes = frozenset({"read", "sign-in"})
+    secret = credential(web, root, CredentialKind.TOKEN, course_id=course.course_id, scopes=scopes)
+    browser = sign_in(web, secret)
+    assert browser.get(f"/courses/{course.course_id}/people").status_code == 200
+    assert browser.get(f"/courses/{root.course_id}/people").status_code == 404
+    assert browser.get("/operator").status_code == 404
+    # What the scopes of the token lack the browser may not.
+    answer = submit(browser, f"/courses/{course.course_id}/people", {"who": "new"})
+    assert answer.status_code == 403
+    assert "scopes do not include this" in answer.text
+    offered = browser.get("/account").text
+    assert [scope for scope in SCOPES if f'value="{scope}"' in offered] == ["read", "sign-in"]
+    wider = {"name": "t", "word": "w", "scopes": ["read", "manage"]}
+    assert submit(browser, "/account/tokens", wider).status_code == 422
+    follows = token_of(browser, "read")
+    told = web.browser().get("/api/v1/me", headers=follows).json()
+    assert ([each["id"] for each in told["courses"]], told["scopes"]) == ([course.course_id], ["read"])
+
+
+def test_a_token_without_course_but_with_scopes_limits_its_browser(web: Web) -> None:
+    browser = sign_in(web, credential(web, web.operator(), CredentialKind.TOKEN, scopes=frozenset({"read", "sign-in"})))
+    assert browser.get("/operator").status_code == 200
+    assert submit(browser, "/operator/retry").status_code == 403
+    scopes = frozenset({"read", "manage", "sign-in"})
+    staff = sign_in(web, credential(web, web.instructor("grace", "operators"), CredentialKind.TOKEN, scopes=scopes))
+    assert submit(staff, "/courses/1/people", {"who": "new"}).status_code == 303
+    assert submit(staff, "/courses/1/batches/x/publish").status_code == 403
+    only = sign_in(web, credential(web, web.student(), CredentialKind.TOKEN, scopes=frozenset({"sign-in"})))
+    assert only.get("/courses/2/mine").status_code == 403
+    assert submit(only, "/sign-out").status_code == 303
+
+
+def _scopes_of_pages() -> dict[str, str]:
+    """The scope of each page's route of the API."""
+    routes = {
+        route: who.split()[-1]
+        for table in sorted((DATA / "access").glob("*.toml"))
+        for route, who in tomllib.loads(table.read_text()).items()
+    }
+    pages = tomllib.loads((DATA / "page_to_api.toml").read_text())
+    return {page: routes[api.replace(" /", " /api/v1/", 1)] for page, api in pages.items() if "none: " not in api}
+
+
+@pytest.mark.parametrize(("page", "scope"), sorted(_scopes_of_pages().items()))
+def test_a_page_needs_the_scope_of_its_route_of_the_api(page: str, scope: str) -> None:
+    method, route = page.split(" ")
+    if page not in ("GET /", "GET /account") and not (method == "GET" and route.endswith("/uploads/{upload_id}")):
+        assert scope_of_page(method, route) == scope
+
+
+def test_a_platforms_session_reaches_the_platforms_courses(web: Web) -> None:
+    member = web.operator()
+    with web.store.transaction() as session:
+        urls = ("https://p.example.org/a", "https://p.example.org/t", "https://p.example.org/k")
+        platform = lti.register(session, "Moodle", "i", "c", ["1"], *urls)
+        local = people.make_instructor(session, "local", Student("root"))
+        launched = people.make_instructor(session, "launched", Student("root"))
+        for each in (local, launched):
+            session.get_one(Enrolment, each.enrolment_id).person_id = member.person_id
+        session.add(LtiCourse(platform_id=platform, deployment="1", context="c", course_id=launched.course_id))
+    browser = web.browser()
+    secret = credential(web, member, CredentialKind.SESSION, platform_id=platform)
+    browser.cookies.set(SESSION_COOKIE, secret, domain="localhost.local")
+    assert browser.get(f"/courses/{launched.course_id}/people").status_code == 200
+    for path in (f"/courses/{local.course_id}/people", "/operator"):
+        assert browser.get(path).status_code == 404
+    told = web.browser().get("/api/v1/me", headers=token_of(browser, *EVERY_SCOPE)).json()
+    assert [each["id"] for each in told["courses"]] == [launched.course_id]
+
+
+def test_owners_see_and_end_their_sessions_and_tokens(web: Web, ada: Member) -> None:
+    browser, other = web.browser(ada), web.browser(ada)
+    token = token_of(browser, "read", "sign-in")
+    listed = web.browser().get("/api/v1/me/credentials", headers=token).json()["items"]
+    assert sorted(each["kind"] for each in listed) == ["session", "session", "token"]
+    shown = browser.get("/account").text
+    assert shown.count("/account/sessions/") == 1
+    (ends,) = [each["id"] for each in listed if f"/account/sessions/{each['id']}/end" in shown]
+    assert submit(browser, f"/account/sessions/{ends}/end").status_code == 303
+    assert other.get("/account").status_code == 303
+    assert submit(browser, f"/account/sessions/{ends}/end").status_code == 404
+    third = web.browser(ada)
+    assert submit(browser, "/account/end-others").status_code == 303
+    assert third.get("/account").status_code == 303
+    assert browser.get("/account").status_code == 200
+    assert web.browser().get("/api/v1/me", headers=token).status_code == 401
+
+
+def test_programs_end_sessions_and_tokens(web: Web, ada: Member) -> None:
+    browser = web.browser(ada)
+    token, program = token_of(browser, "read", "sign-in"), web.browser()
+    listed = program.get("/api/v1/me/credentials", headers=token).json()["items"]
+    assert program.delete("/api/v1/me/credentials/0123456789ab", headers=token).status_code == 404
+    for each in sorted(listed, key=lambda each: each["kind"]):
+        assert program.delete(f"/api/v1/me/credentials/{each['id']}", headers=token).status_code == 204
+    assert browser.get("/account").status_code == 303
+    assert program.get("/api/v1/me", headers=token).status_code == 401
+
+
+def test_a_limited_session_sees_and_ends_nothing_beyond_its_reach(web: Web, grace: TestClient, ada: Member) -> None:
+    own = web.browser(ada)
+    token = token_of(own, "read")
+    limited = sign_in(web, instructors_link(web, grace, ada))
+    listed = web.browser().get("/api/v1/me/credentials", headers=token_of(limited, "read", "sign-in")).json()["items"]
+    assert {each["course_id"] for each in listed} == {1}
+    for each in web.browser().get("/api/v1/me/credentials", headers=token).json()["items"]:
+        if each["course_id"] is None:
+            assert submit(limited, f"/account/sessions/{each['id']}/end").status_code == 404
+    submit(limited, "/account/end-others")
+    assert own.get("/account").status_code == 200
+
+
+@pytest.mark.parametrize("how", ["command", "platform", "removed"])
+def test_the_loss_of_a_role_ends_what_reaches_the_course(web: Web, how: str) -> None:
+    linus = web.instructor("linus")
+    elsewhere = credential(web, web.student("x", "two"), CredentialKind.TOKEN, scopes=frozenset({"read"}))
+    with web.store.transaction() as session:
+        two = people.make_student(session, "two", Student("linus2"))
+        session.get_one(Enrolment, two.enrolment_id).person_id = linus.person_id
+    browser, link = web.browser(linus), web.link(linus)
+    tokens = {
+        course_id: credential(web, linus, CredentialKind.TOKEN, course_id=course_id, scopes=frozenset({"read"}))
+        for course_id in (None, 1, two.course_id)
+    }
+    with web.store.transaction() as session:
+        if how == "command":
+            people.make_student(session, "default", Student("linus"))
+        elif how == "platform":
+            people.set_role(session, session.get_one(Enrolment, linus.enrolment_id), Role.STUDENT)
+    if how == "removed":
+        root = web.browser(web.operator())
+        assert root.get("/operator").status_code == 200
+        _remove(web, linus)
+    assert browser.get("/account").status_code == 303
+    assert web.browser().post("/sign-in", data={"secret": link}).status_code == 403
+    counts = {
+        course_id: web.browser().get("/api/v1/me", headers={"authorization": f"Bearer {secret}"}).status_code
+        for course_id, secret in tokens.items()
+    }
+    assert counts == {None: 401, 1: 401, two.course_id: 200}
+    assert web.browser().get("/api/v1/me", headers={"authorization": f"Bearer {elsewhere}"}).status_code == 200
+
+
+def _remove(web: Web, member: Member) -> None:
+    service = web.app.state.context.service
+    operations.remove(service, Actor("root", operator=True), member.course_id, member.enrolment_id)
+
+
+def test_the_number_of_sessions_and_tokens_is_bounded(web: Web, ada: Member) -> None:
+    first = web.browser(ada)
+    browsers = [web.browser(ada) for _ in range(MOST_SESSIONS)]
+    assert first.get("/account").status_code == 303
+    assert all(each.get("/account").status_code == 200 for each in browsers)
+    browser = browsers[0]
+    for number in range(MOST_TOKENS + 1):
+        asked = {"name": "t", "word": f"w{number}", "scopes": ["read"]}
+        answer = submit(browser, "/account/tokens", asked)
+        assert answer.status_code == (303 if number < MOST_TOKENS else 409)
+    assert "Revoke one first" in answer.text
+    # The same form again makes no other one, so it is answered as before.
+    assert submit(browser, "/account/tokens", {"name": "t", "word": "w0", "scopes": ["read"]}).status_code == 303
+
+
+def test_students_are_offered_what_students_may_do(web: Web, grace: TestClient, ada: Member) -> None:
+    browser = web.browser(ada)
+    shown = browser.get("/account").text
+    assert [scope for scope in SCOPES if f'value="{scope}"' in shown] == ["read", "submit", "sign-in"]
+    shown = grace.get("/account").text
+    assert [scope for scope in SCOPES if f'value="{scope}"' in shown] == list(SCOPES)
+    for scope in ("mark", "manage", "nothing"):
+        asked = {"name": "t", "word": "w", "scopes": ["read", scope]}
+        refused = submit(browser, "/account/tokens", asked)
+        assert (refused.status_code, "read, submit, sign-in" in words(refused.text)) == (422, True)
+
+
+def test_a_name_is_that_of_its_course(web: Web, grace: TestClient, ada: Member) -> None:
+    other = also_in(web, ada, "two", Role.STUDENT)
+    table = {"file": ("x.csv", b"id,name,email\nada,Renamed,renamed@example.org\n")}
+    assert submit(grace, "/courses/1/people/table", files=table).status_code == 303
+    with web.store.reading() as session:
+        found = {each.course_id: (each.name, each.email) for _, each in people.enrolments(session, ada.person_id)}
+    assert found == {1: ("Renamed", "renamed@example.org"), other.course_id: ("Also Ada", "")}
+    linus = web.browser(web.instructor("linus", "two"))
+    assert "Renamed" not in linus.get(f"/courses/{other.course_id}/people").text
+
+
+def test_a_courses_data_tells_no_credentials_of_another(web: Web, ada: Member) -> None:
+    also_in(web, ada, "two", Role.STUDENT)
+    with web.store.transaction() as session:
+        for name, course_id in (("here", 1), ("there", 2), ("everywhere", None)):
+            reach = Reach(course_id=course_id, scopes=frozenset({"read"}))
+            kind = CredentialKind.TOKEN
+            credentials.issue(session, ada.person_id, kind, timedelta(hours=1), name=name, reach=reach)
+    headers = web.token(web.instructor(), "manage")
+    packed = web.browser().get(f"/api/v1/courses/1/people/{ada.enrolment_id}/data", headers=headers).content
+    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
+        told = json.loads(archive.read("student.json"))
+    assert [each["name"] for each in told["signed_in_with"]] == ["here"]
+
+
+def test_a_stored_answer_ends_with_the_role(web: Web) -> None:
+    grace = web.instructor()
+    headers = web.token(grace, "manage") | {"idempotency-key": "k"}
+    path, asked = "/api/v1/courses/1/people", {"students": [{"id": "bob"}]}
+    for _ in range(2):
+        assert web.browser().post(path, headers=headers, json=asked).status_code == 201
+    with web.store.transaction() as session:
+        # Without what would end the token, too.
+        session.execute(update(Enrolment).where(Enrolment.id == grace.enrolment_id).values(role=Role.STUDENT))
+    assert web.browser().post(path, headers=headers, json=asked).status_code == 404
+
+
+def test_an_operator_signs_somebody_out(web: Web, ada: Member) -> None:
+    root, browser, token = web.browser(web.operator()), web.browser(ada), web.token(ada, "read")
+    where = root.get("/operator/people", params={"course": "default", "who": "ada"}).headers["location"]
+    assert "session" in words(root.get(where).text)
+    answer = submit(root, f"{where}/sign-out")
+    assert "Signed out: 2 links, sessions and tokens ended" in words(root.get(answer.headers["location"]).text)
+    assert browser.get("/account").status_code == 303
+    assert web.browser().get("/api/v1/me", headers=token).status_code == 401
+    program = web.token(web.operator(), "read", "manage")
+    browser = web.browser(ada)
+    path = f"/api/v1{where}/sign-out"
+    assert web.browser().post(path, headers=program, json={"release": True}).json() == {"ended": 1}
+    assert browser.get("/account").status_code == 303
+
+
+def test_a_released_place_is_the_next_launchs(web: Web, grace: TestClient) -> None:
+    with web.store.transaction() as session:
+        urls = ("https://p.example.org/a", "https://p.example.org/t", "https://p.example.org/k")
+        lti.register(session, "Moodle", "i", "c", ["1"], *urls)
+        (platform,) = lti.platforms(session)
+        student = Students(session, 1).enrol(Student("ada"), now(session))
+        person_id = session.get_one(Enrolment, student).person_id
+        credentials.issue(session, person_id, CredentialKind.SESSION, timedelta(hours=1))
+    root = web.browser(web.operator())
+    for release in (False, True):
+        submit(root, f"/operator/people/{student}/sign-out", {"release": "true"} if release else {})
+        with web.store.transaction() as session:
+            try:
+                lti.enrol(session, platform, 1, "subject", Student("ada"), Role.STUDENT)
+                taken = True
+            except UsageError:
+                taken = False
+        assert taken is release
+
+
+def test_an_operator_joins_two_whom_the_form_names(web: Web) -> None:
+    root = web.browser(web.operator())
+    first = web.instructor("grace", "one")
+    browser = web.browser(first)
+    where = submit(root, "/operator/courses", {"course": "two", "who": "grace", "name": "G. Hopper"})
+    shown = root.get(where.headers["location"]).text
+    assert "Grace (grace) instructs one, too." in words(shown)
+    target = shown.partition('href="/operator/people/')[2].partition('"')[0].replace("&amp;", "&")
+    both = root.get(f"/operator/people/{target}").text
+    assert "This makes G. Hopper and Grace one person with all these courses" in words(both)
+    second = int(target.partition("?")[0])
+    data = {"other_id": str(first.enrolment_id), "csrf": csrf(root.get("/account"))}
+    assert root.post(f"/operator/people/{second}/join", data=data).status_code == 303
+    assert browser.get("/account").status_code == 303
+    with web.store.reading() as session:
+        person_id = session.get_one(Enrolment, second).person_id
+        assert [course for course, _ in people.enrolments(session, person_id)] == ["one", "two"]
+    assert root.post(f"/operator/people/{second}/join", data=data).status_code == 409
+
+
+def test_programs_join_and_say_whom_an_id_is_shared_with(web: Web) -> None:
+    program, headers = web.browser(), web.token(web.operator(), "read", "manage")
+    made = [
+        program.post("/api/v1/operator/courses", headers=headers, json={"course": course, "id": "grace"}).json()
+        for course in ("one", "two")
+    ]
+    assert [each["elsewhere"] for each in made] == [
+        [],
+        [{"course": "one", "enrolment": made[0]["enrolment"], "name": ""}],
+    ]
+    path = f"/api/v1/operator/people/{made[1]['enrolment']}/join"
+    joined = program.post(path, headers=headers, json={"other": made[0]["enrolment"]})
+    assert sorted(each["course"] for each in joined.json()["enrolments"]) == ["one", "two"]
+    found = program.get("/api/v1/operator/people", headers=headers, params={"course": "one", "id": "grace"}).json()
+    assert found == joined.json()
+
+
+@pytest.mark.parametrize("case", ["the same course", "a platform's person", "nobody"])
+def test_who_is_not_joined(web: Web, case: str) -> None:
+    headers = web.token(web.operator(), "manage")
+    first = web.instructor("grace", "one")
+    second = web.instructor("linus", "one" if case == "the same course" else "two")
+    other = 10_000 if case == "nobody" else second.enrolment_id
+    if case == "a platform's person":
+        with web.store.transaction() as session:
+            urls = ("https://p.example.org/a", "https://p.example.org/t", "https://p.example.org/k")
+            platform = lti.register(session, "Moodle", "i", "c", ["1"], *urls)
+            session.add(LtiPerson(platform_id=platform, subject="s", person_id=second.person_id))
+    path = f"/api/v1/operator/people/{first.enrolment_id}/join"
+    answer = web.browser().post(path, headers=headers, json={"other": other})
+    status = {"the same course": 409, "a platform's person": 422, "nobody": 404}[case]
+    assert answer.status_code == status, answer.text
+    if case == "a platform's person":
+        joined = web.browser().post(path, headers=headers, json={"other": other, "from_platform": True})
+        assert joined.status_code == 200

@@ -1,0 +1,194 @@
+"""Where names are hidden, an instructor's answers are the same whatever the students are called.
+
+The routes are those that the application has, so that a new one is asked for by itself.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import itertools
+import re
+import zipfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import pytest
+from fastapi.routing import iter_route_contexts
+from httpx2 import Response
+
+from nameless_world import (
+    IDLE,
+    STUDENTS,
+    NamelessCourse,
+    make_nameless_course,
+    names_of,
+    rename_students,
+)
+from naming import is_named
+from service.reports.formats import FORMATS
+from service.store.courses.hidden_names import HiddenNames
+from web import Web, web_in
+
+API = "/api/v1"
+_COURSE = "/courses/{course_id}"
+_BATCH = f"{_COURSE}/batches/{{batch_id}}"
+_EVERYBODY = (*STUDENTS, IDLE)
+#: Who is in the course is no secret. These say it, and nothing about what a named student submitted.
+_WITH_NAMES = {f"{start}{_COURSE}/people{rest}" for start in ("", API) for rest in ("", "/{enrolment_id}")} | {
+    f"{API}{_COURSE}/people/{{enrolment_id}}/data"
+}
+#: They say nothing about students.
+_OF_NO_STUDENT = {
+    f"{_COURSE}/assignments/uploads/my-assignment.zip",
+    f"{_COURSE}/batches/uploads/{{upload_id}}",
+}
+#: These lead back to another page, or are withheld while names are hidden.
+_WITHOUT_ANSWER = {
+    f"{_COURSE}/assignments/uploads",
+    f"{_COURSE}/people/table",
+    f"{_COURSE}/people/{{enrolment_id}}/link",
+    f"{API}{_COURSE}/submissions/{{submission_id}}/files",
+}
+_FORMATS = [f"?format={name}" for name, each in FORMATS.items() if each.filled_in is None and each.packed is None]
+_SORTS = [f"?sort={way}{by}" for way in ("", "-") for by in ("student", "name", "assignment", "marks", "state")]
+#: What else is asked of a route.
+_QUERIES: Mapping[str, list[str]] = {
+    _BATCH: _SORTS,
+    f"{_BATCH}/export": _FORMATS,
+    f"{API}{_BATCH}/export": _FORMATS,
+    f"{API}{_BATCH}/grades": ["?limit=1"],
+    f"{API}{_BATCH}/changes": ["?limit=1"],
+    f"{API}{_COURSE}/appeals": ["?limit=1", "?answered=true"],
+}
+_NAME = re.compile(r"\{(\w+)(?::\w+)?\}")
+#: All routes are asked twice.
+pytestmark = pytest.mark.long
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """What each path was answered, by the route it is of."""
+
+    course: NamelessCourse
+    before: Mapping[tuple[str, str], Response]
+    after: Mapping[tuple[str, str], Response]
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Answers]:
+    """The answers of all routes before and after the students change names, where labels go with the students."""
+    labels = dict(zip(_EVERYBODY, ("Participant D", "Participant B", "Participant E", *"AC"), strict=True))
+    with pytest.MonkeyPatch.context() as patch, web_in(tmp_path_factory.mktemp("home")) as web:
+        course = make_nameless_course(web)
+
+        def called(names: HiddenNames, assignment: str, student: str) -> str:
+            return labels[student] if assignment in names.assignments else student
+
+        patch.setattr(HiddenNames, "called", called)
+        asked = _Asked(web, course)
+        before = asked.everything()
+        renamed = dict(zip(_EVERYBODY, reversed(_EVERYBODY), strict=True))
+        with web.store.transaction() as session:
+            rename_students(session, renamed)
+        labels = {renamed[who]: label for who, label in labels.items()}
+        yield Answers(course, before, asked.everything())
+
+
+class _Asked:
+    """An instructor's browser and program."""
+
+    def __init__(self, web: Web, course: NamelessCourse) -> None:
+        self._web, self._course = web, course
+        self._browser, self._program = web.browser(course.grace), web.browser()
+        self._token = web.token(course.grace, "read", "submit", "mark", "manage")
+
+    def everything(self) -> dict[tuple[str, str], Response]:
+        return {(route, path): self._get(path) for route in _routes(self._web) for path in self._paths(route)}
+
+    def _get(self, path: str) -> Response:
+        return self._program.get(path, headers=self._token) if path.startswith(API) else self._browser.get(path)
+
+    def _paths(self, route: str) -> Iterator[str]:
+        parts = [self._course.values[name] for name in _NAME.findall(route)]
+        for values in itertools.product(*parts):
+            path = _NAME.sub("%s", route) % values
+            yield path
+            yield from (path + query for query in _QUERIES.get(route, ()))
+
+
+def _routes(web: Web) -> list[str]:
+    """The routes that answer instructors of a course, but for those that say nothing about students."""
+    found = {str(each.path) for each in iter_route_contexts(web.app.routes) if "GET" in (each.methods or ())}
+    return sorted(
+        path
+        for path in found
+        if path.removeprefix(API).startswith(_COURSE) and "/mine" not in path and path not in _OF_NO_STUDENT
+    )
+
+
+def _content(answer: Response) -> bytes | dict[str, bytes]:
+    """The answer without the time that a zip was made."""
+    if not answer.content.startswith(b"PK"):
+        return answer.content
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def _texts(answer: Response) -> str:
+    """All that an answer says, places of the next page included."""
+    content = _content(answer)
+    found = content if isinstance(content, dict) else {"": content}
+    places = re.findall(r'"next":"([\w-]+)"', answer.text)
+    told = [base64.urlsafe_b64decode(place + "=" * (-len(place) % 4)) for place in places]
+    header = " ".join(answer.headers.values())
+    return "\n".join([header, *found, *(data.decode("utf-8", "replace") for data in (*found.values(), *told))])
+
+
+def test_every_route_answers(answers: Answers) -> None:
+    answered = {route for (route, _), answer in answers.before.items() if answer.status_code == 200}
+    assert {route for route, _ in answers.before} - answered == _WITHOUT_ANSWER
+
+
+def test_no_answer_depends_on_the_names(answers: Answers) -> None:
+    found = {
+        route
+        for (route, path), answer in answers.before.items()
+        if route not in _WITH_NAMES and _content(answer) != _content(answers.after[route, path])
+    }
+    assert found == set()
+
+
+def test_no_other_answer_has_a_name(answers: Answers) -> None:
+    names = [name for who in _EVERYBODY for name in names_of(who)]
+    found = {
+        (route, name)
+        for (route, _), answer in answers.before.items()
+        if route not in _WITH_NAMES
+        for name in names
+        if is_named(name, _texts(answer))
+    }
+    assert found == set()
+
+
+def test_answers_with_names_share_no_value_with_rows_without(answers: Answers) -> None:
+    """A time, size, number, id or hash that both have would tell whose a row is."""
+    values = {key: _values(answer) for key, answer in answers.before.items()}
+    named = {key: found for key, found in values.items() if key[0] in _WITH_NAMES}
+    nameless = set().union(*(found for key, found in values.items() if key not in named))
+    known = {each for who in _EVERYBODY for each in _in_text(" ".join(names_of(who)))}
+    for route in {route for route, _ in named if "{enrolment_id}" in route}:
+        known |= set.intersection(*(found for key, found in named.items() if key[0] == route))
+    assert {(route, value) for (route, _), found in named.items() for value in (found - known) & nameless} == set()
+
+
+def _values(answer: Response) -> set[str]:
+    """What an answer says; of a zip the data on the student, as the same work has the same report."""
+    content = _content(answer)
+    return _in_text(answer.text if isinstance(content, bytes) else content.get("student.json", b"").decode())
+
+
+def _in_text(text: str) -> set[str]:
+    """What of a text could identify something: words with a digit that are not short, and the beginnings of moments."""
+    words = {word for word in re.findall(r"[\w.:+-]+", text) if len(word) > 4 and any(map(str.isdigit, word))}
+    return words | {word[:19] for word in words if re.match(r"\d{4}-\d\d-\d\dT", word)}

@@ -1,0 +1,78 @@
+"""Every page against values that no page sends, in its path, its query and its form: never answered as our fault."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import quote
+
+import pytest
+from fastapi.routing import iter_route_contexts
+
+from service.settings import Settings
+from web import Web, csrf, web_in
+from web_world import World, filled, make_world
+
+#: PostgreSQL takes no NUL in text and no whole number beyond 32 bits, SQLite none beyond 64.
+_VALUES = ("\0", "\u00b2", str(2**31), str(2**63))
+_NOT_PAGES = ("/api", "/static", "/health", "/metrics")
+#: The browser that asks is signed out by these.
+_ENDS_SESSION = ("/sign-out", "/account/end-others")
+_VALID = {"assignment": "echo-responder", "course": "default", "reason": "because"}
+
+
+pytestmark = pytest.mark.long
+
+
+@pytest.fixture
+def asked(service_settings: Settings) -> Iterator[tuple[Web, World]]:
+    changes = {"database_url": service_settings.database_url, "api_calls_per_minute": 1_000_000}
+    with web_in(service_settings.home, **changes) as web:
+        yield web, make_world(web)
+
+
+def test_no_page_fails_by_an_unusual_value(asked: tuple[Web, World]) -> None:
+    web, world = asked
+    browsers = {
+        who: web.browser(member, raise_server_exceptions=False)
+        for who, member in (("student", world.ada), ("instructor", world.grace), ("operator", web.operator()))
+    }
+    words = {who: {"x-csrf-token": csrf(browser.get("/account"))} for who, browser in browsers.items()}
+    failed = set()
+    for route in iter_route_contexts(web.app.routes):
+        path = route.path or ""
+        if path.startswith((*_NOT_PAGES, *_ENDS_SESSION)):
+            continue
+        who = _reader(path)
+        for method in (route.methods or set()) - {"HEAD"}:
+            for name, address, form in _requests(route, path, world.values):
+                answer = browsers[who].request(method, address, data=form or None, headers=words[who])
+                if answer.status_code >= 500:
+                    failed.add((method, path, name))
+    assert failed == set()
+
+
+def _reader(path: str) -> str:
+    """Who may open a page, so that the store is asked for the values."""
+    if path.startswith("/operator"):
+        return "operator"
+    return "student" if "/mine" in path or path.startswith("/account") else "instructor"
+
+
+def _requests(route: Any, path: str, values: dict[str, str]) -> Iterator[tuple[str, str, dict[str, str]]]:
+    """What is varied, the address and the form of each request: all is valid but one value."""
+    names = re.findall(r"\{(\w+)", path)
+    for name in names:
+        for value in _VALUES:
+            yield name, filled(path, {**values, name: quote(value, safe="")}), {}
+    dependant = getattr(route, "dependant", None)
+    if dependant is None:
+        return
+    address, form = filled(path, values), [field.alias for field in dependant.body_params]
+    valid = {name: _VALID.get(name, values.get(name, "1")) for name in form}
+    for value in _VALUES:
+        for field in dependant.query_params:
+            yield field.alias, f"{address}?{field.alias}={quote(value, safe='')}", {}
+        for name in form:
+            yield name, address, {**valid, name: value}
