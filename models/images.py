@@ -44,7 +44,8 @@ class Photographer:
 
     def __init__(self) -> None:
         self._arena = Arena(())
-        self._cameras = Cameras(most=2)
+        # A test goes through its sheets, six at most, once for each value that it varies.
+        self._cameras = Cameras(most=6)
         self._robot = robot("Default_Robot")
 
     def __enter__(self) -> Photographer:
