@@ -75,6 +75,7 @@ def test_both_forms_of_a_notebook_are_the_same_notebook(tmp_path: Path) -> None:
     assert sources[0][0] == 34
 
 
+@pytest.mark.long
 def test_run_shows_every_robot_of_the_course_notebook(tmp_path: Path) -> None:
     shutil.copy(MESSAGING, tmp_path)
     command = "from service.cli import main; main()"
@@ -121,7 +122,9 @@ def test_run_prints_what_cells_print_around_the_robots_that_they_start(tmp_path:
     assert places == sorted(places)
 
 
-@pytest.mark.parametrize(("tick", "end"), [("thirtieth", "1.11 s  end"), ("browser", "1.10 s  end")])
+@pytest.mark.parametrize(
+    ("tick", "end"), [("thirtieth", "1.11 s  end"), pytest.param("browser", "1.10 s  end", marks=pytest.mark.long)]
+)
 def test_run_has_ticks_of_both_lengths(tmp_path: Path, tick: str, end: str) -> None:
     (tmp_path / "robot.py").write_text("tank_drive.on_for_seconds(30, 30, 1)\nprint(get_clock())\n")
     assert end in run_in(tmp_path, "robot.py", "--tick", tick)

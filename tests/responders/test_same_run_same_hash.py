@@ -142,11 +142,12 @@ ELSEWHERE = textwrap.dedent("""
 """)
 
 
-def _beside_a_busy_core(runner: TrialRunner, pairs: int) -> None:
+@pytest.mark.long
+def test_ten_processes_in_shuffled_order_beside_a_busy_core(runner: TrialRunner) -> None:
     here = {name: chain(name, runner) for name in RUNS}
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     try:
-        for number in range(pairs):
+        for number in range(5):
             pair = []
             for half in range(2):
                 names = list(RUNS)
@@ -160,15 +161,6 @@ def _beside_a_busy_core(runner: TrialRunner, pairs: int) -> None:
     finally:
         busy.kill()
         busy.wait()
-
-
-def test_two_processes_in_shuffled_order_beside_a_busy_core(runner: TrialRunner) -> None:
-    _beside_a_busy_core(runner, pairs=1)
-
-
-@pytest.mark.long
-def test_ten_processes_in_shuffled_order_beside_a_busy_core(runner: TrialRunner) -> None:
-    _beside_a_busy_core(runner, pairs=5)
 
 
 def test_another_seed_gives_another_run(runner: TrialRunner) -> None:

@@ -48,6 +48,7 @@ def test_every_exported_name_is_documented() -> None:
         assert name == "__version__" or f"`{name}" in table, name
 
 
+@pytest.mark.long
 def test_every_documented_script_runs(folder: Path) -> None:
     assert len(SCRIPTS) == 3
     told = ""

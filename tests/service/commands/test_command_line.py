@@ -134,6 +134,7 @@ _ASKING = {
 }  # fmt: skip
 
 
+@pytest.mark.long
 def test_what_only_asks_imports_nothing_heavy(tmp_path: Path) -> None:
     """Each line is run in a process of its own, forked from one that has imported nothing of ours."""
     with opened(Settings(home=tmp_path)) as store:

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 
 from judging import START, criterion, recorded
 from responders.code import Code
+from rows import quick_first
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.grader import grade
 from service.grading.judging import bounded
@@ -72,7 +73,7 @@ _CRITERIA: Sequence[tuple[str, dict[str, Any]]] = [
 ]
 
 
-@pytest.mark.parametrize("name", _TEXTS)
+@pytest.mark.parametrize("name", quick_first(_TEXTS, quick=2))
 def test_hostile_texts_are_judged_in_little_time(name: str) -> None:
     texts = _TEXTS[name]
     lines = tuple(Line(3 * n / len(texts), text) for n, text in enumerate(texts))
@@ -172,7 +173,7 @@ path = "0.0"
 """
 
 
-@pytest.mark.parametrize("name", _PROGRAMS)
+@pytest.mark.parametrize("name", quick_first(_PROGRAMS, quick=3))
 def test_hostile_programs_are_graded_in_little_time(name: str, runner: TrialRunner, tmp_path: Path) -> None:
     (tmp_path / "assignment.toml").write_text(_HARD_ASSIGNMENT)
     (tmp_path / "echo.py").write_text("def responder(text):\n    return text[4:]\n")

@@ -351,6 +351,7 @@ def test_a_lap_is_whole_though_the_robot_began_twice() -> None:
     assert result.marks == 4, result.message
 
 
+@pytest.mark.long
 @given(st.lists(st.tuples(st.sampled_from((-400, 0, 300, 700, 1000)), st.booleans()), min_size=2, max_size=7))
 @settings(max_examples=100, deadline=None)
 def test_laps_are_those_that_an_exhaustive_search_finds(ways: list[tuple[int, bool]]) -> None:

@@ -154,6 +154,7 @@ def test_a_killed_worker_loses_nothing(service: Service) -> None:
     assert {job.id: job.attempt for job in graded}[running.id] == 1
 
 
+@pytest.mark.long
 def test_a_killed_pool_child_loses_nothing(service: Service) -> None:
     batch = service.submit(_spinning(1))
     service.until_running(batch)

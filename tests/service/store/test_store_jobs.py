@@ -335,6 +335,7 @@ def _submit_again(settings: Settings) -> None:
             accept_one(store)
 
 
+@pytest.mark.long
 def test_courses_share_alike_however_many_batches_they_have(store: Store) -> None:
     """A submits eight batches of 30, B and C one each: B and C have all of theirs after about 90 grades."""
     for course, count in (("A", 8), ("B", 1), ("C", 1)):

@@ -320,6 +320,7 @@ _LAUNCHES = st.lists(
 )
 
 
+@pytest.mark.long
 @settings(max_examples=40)
 @given(launches=_LAUNCHES)
 def test_no_launch_changes_the_person_or_the_role_of_a_row_that_another_has(

@@ -266,6 +266,7 @@ def _remove(web: Web, member: Member) -> None:
     operations.remove(service, Actor("root", operator=True), member.course_id, member.enrolment_id)
 
 
+@pytest.mark.long
 def test_the_number_of_sessions_and_tokens_is_bounded(web: Web, ada: Member) -> None:
     first = web.browser(ada)
     browsers = [web.browser(ada) for _ in range(MOST_SESSIONS)]

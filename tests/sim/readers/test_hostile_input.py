@@ -158,6 +158,7 @@ print("all read")
 """
 
 
+@pytest.mark.long
 def test_what_is_allowed_is_read_in_little_memory() -> None:
     done = subprocess.run([sys.executable, "-c", _AT_THE_LIMIT], capture_output=True, text=True, check=False)
     assert done.stdout == "all read\n", done.stderr[-2000:]
