@@ -20,10 +20,9 @@ from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from sim.recorded import faults_of
 from submissions.assignment.definition import Assignment
-from submissions.assignment.examples import EXPECTED, Expectation, OriginalMeasure, examples, expected
+from submissions.assignment.examples import EXPECTED, Expectation, OriginalMeasure, examples, expected, read_example
 from submissions.assignment.folder import REFERENCE
 from submissions.assignment.reader import find_assignment
-from submissions.bundle import read_submission
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +127,7 @@ def _check_example(
 ) -> tuple[ExampleResult, Grade | None]:
     begin = time.monotonic()
     try:
-        submission = read_submission(examples(name_or_path) / name, asked=assignment.parts)
+        submission = read_example(name_or_path, name)
         graded = grade(submission, assignment, runner=runner)
     except UsageError as error:
         return ExampleResult(name, None, (), time.monotonic() - begin, (f"{name}: {error}",)), None

@@ -1,6 +1,7 @@
 """The example submissions beside an assignment, and what each is expected to get: ``examples/`` and ``expected.toml``.
 
-They are submissions like any other: nothing here reads or grades them.
+They are submissions like any other. An example that shares files with another names it as ``like``, and has only what
+differs.
 """
 
 from __future__ import annotations
@@ -18,10 +19,13 @@ from sim.errors import UsageError
 from sim.recording import Verdict
 from submissions.assignment.folder import assignment_folder
 from submissions.assignment.problems import AssignmentProblems, Problems
-from submissions.assignment.reader import parse
-from submissions.assignment.schema import problem_of
+from submissions.assignment.reader import find_assignment, parse
+from submissions.assignment.schema import Slug, problem_of
 from submissions.assignment.toml_lines import find_lines
+from submissions.bundle import read_submission, submission_of
+from submissions.raw_files import RawFiles, read_folder
 from submissions.strict_table import StrictTable
+from submissions.submission import Submission
 
 EXAMPLES = "examples"
 EXPECTED = "expected.toml"
@@ -37,6 +41,7 @@ class Expectation(StrictTable):
     """
 
     marks: _Marks
+    like: Annotated[str, Slug] = ""  # the example whose other files it has, too
     verdict: Verdict = Verdict.FINISHED
     loses: tuple[str, ...] | None = None
     earns: dict[str, _Marks] = Field(default_factory=dict)
@@ -88,6 +93,21 @@ def expected(assignment: str) -> Expected:
             problem = problem_of(schema, {**details, "loc": tuple(each for each in rest if each != "")})
             problems.add((*place, *problem.path), problem.sentence)
         raise AssignmentProblems(problems.sorted()) from error
+
+
+def read_example(assignment: str, name: str) -> Submission:
+    """Read the example ``name`` of an assignment, with the files of the example that it is like.
+
+    Raises UsageError as ``read_submission`` does, and AssignmentProblems as ``expected`` does.
+    """
+    asked = find_assignment(assignment).parts
+    folder = examples(assignment)
+    wanted = expected(assignment).examples.get(name)
+    if wanted is None or not wanted.like:
+        return read_submission(folder / name, asked=asked)
+    shared, own = read_folder(folder / wanted.like), read_folder(folder / name)
+    files = RawFiles({**shared.files, **own.files}, (*shared.notes, *own.notes))
+    return submission_of(files, name, name, EXAMPLES, asked)
 
 
 def add_expected(assignment: str, new: Mapping[str, Expectation]) -> Path:

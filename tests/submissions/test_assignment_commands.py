@@ -12,7 +12,7 @@ from command import robomark
 from service.grading.example_check import ComparedMeasure, check_examples
 from service.grading.trial_runner import TrialRunner
 from sim.errors import AssignmentError, UsageError
-from submissions.assignment.examples import Expectation, OriginalMeasure, add_expected, expected
+from submissions.assignment.examples import Expectation, OriginalMeasure, add_expected, expected, read_example
 from submissions.assignment.export import export_for_students, export_whole, write_new
 from submissions.assignment.folder import assignment_folder, catalogue
 from submissions.assignment.overview import overview
@@ -68,7 +68,19 @@ def test_what_is_not_as_expected_is_said(change: str, problem: str, tmp_path: Pa
     assert any(each.startswith(problem) for each in check_examples(str(tmp_path / "task"), runner=runner).problems)
 
 
-@pytest.mark.parametrize("text", ["[reference", '[reference]\nmark = "6"\n', '[reference]\nmarks = "many"\n'])
+def test_an_example_like_another_has_its_files_but_for_those_of_its_own(tmp_path: Path) -> None:
+    write_new(tmp_path / "task", "echo-responder")
+    (tmp_path / "task" / "expected.toml").write_text('[flawed]\nmarks = "1"\nlike = "reference"\n')
+    own = tmp_path / "task" / "examples" / "flawed"
+    (own / "robot.py").write_text("pass\n")
+    (own / "responder.py").unlink()
+    reference, flawed = (read_example(str(tmp_path / "task"), name) for name in ("reference", "flawed"))
+    assert (flawed.student, flawed.responder) == ("flawed", reference.responder)
+    assert flawed.program is not None
+    assert flawed.program.text == "pass\n"
+
+
+@pytest.mark.parametrize("text", ["[reference", '[a]\nmark = "6"\n', '[a]\nmarks = "many"\n', '[a]\nlike="../a"\n'])
 def test_expectations_that_cannot_be_read_are_refused(text: str, tmp_path: Path) -> None:
     write_new(tmp_path / "task")
     (tmp_path / "task" / "expected.toml").write_text(text)

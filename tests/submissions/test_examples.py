@@ -5,7 +5,6 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -34,7 +33,7 @@ from service.grading.hints import Rule, near_misses
 from service.grading.run_plan import RunPlan
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
-from submissions.assignment.examples import Expectation, examples, expected
+from submissions.assignment.examples import Expectation, expected, read_example
 from submissions.assignment.folder import REFERENCE, catalogue
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
@@ -76,9 +75,13 @@ FOLDER = DATA / "failing_submissions"
 FAILING: Mapping[str, Mapping[str, Any]] = tomllib.loads((FOLDER / "expected.toml").read_text())
 
 
-def graded(folder: Path, assignment: str, runner: TrialRunner) -> Grade:
-    asked = find_assignment(assignment)
-    return grade(read_submission(folder, asked=asked.parts), asked, runner=runner)
+def grade_example(assignment: str, name: str, runner: TrialRunner) -> Grade:
+    return grade(read_example(assignment, name), find_assignment(assignment), runner=runner)
+
+
+def grade_failing(name: str, runner: TrialRunner) -> Grade:
+    asked = find_assignment("echo-responder")
+    return grade(read_submission(FOLDER / name, asked=asked.parts), asked, runner=runner)
 
 
 def assert_as_expected(result: Grade, wanted: Expectation) -> None:
@@ -145,10 +148,10 @@ def test_failing_submission_gets_a_verdict_or_one_sentence(name: str, runner: Tr
     wanted = FAILING[name]
     if "refused" in wanted:
         with pytest.raises(UsageError) as refusal:
-            graded(FOLDER / name, "echo-responder", runner)
+            grade_failing(name, runner)
         assert str(refusal.value) == wanted["refused"]
     else:
-        assert_as_expected(graded(FOLDER / name, "echo-responder", runner), Expectation(**wanted))
+        assert_as_expected(grade_failing(name, runner), Expectation(**wanted))
 
 
 def test_every_failing_submission_has_an_expectation() -> None:
@@ -158,7 +161,7 @@ def test_every_failing_submission_has_an_expectation() -> None:
 @pytest.mark.long
 def test_what_the_database_keeps_is_graded_alike(runner: TrialRunner) -> None:
     asked = find_assignment("shape-at-random")
-    submission = read_submission(examples("shape-at-random") / "flawed", asked=asked.parts)
+    submission = read_example(asked.id, "flawed")
     kept = unpack_submission(pack_submission(submission))
     first, second = grade(submission, asked, runner=runner), grade(kept, asked, runner=runner)
     assert [trial.recording.sha256 for trial in first.trials] == [trial.recording.sha256 for trial in second.trials]
@@ -166,7 +169,7 @@ def test_what_the_database_keeps_is_graded_alike(runner: TrialRunner) -> None:
 
 
 def test_seed_echo_has_three_exchanges_and_ends_with_all_done(runner: TrialRunner) -> None:
-    recording = graded(examples("echo-responder") / "seed", "echo-responder", runner).trials[0].recording
+    recording = grade_example("echo-responder", "seed", runner).trials[0].recording
     assert [(message.sender, message.text) for message in recording.messages] == [
         (sender, text)
         for number in (0, 2, 4)
@@ -177,14 +180,14 @@ def test_seed_echo_has_three_exchanges_and_ends_with_all_done(runner: TrialRunne
 
 
 def test_seed_json_queue_grows_by_one_a_message(runner: TrialRunner) -> None:
-    recording = graded(examples("json-queue") / "seed", "json-queue", runner).trials[0].recording
+    recording = grade_example("json-queue", "seed", runner).trials[0].recording
     queues = [line.text.count("Py saw") for line in recording.printed if line.text.startswith("Message queue")]
     assert queues == [0, 1, 1, 2, 2, 3]
     assert recording.spoken[-1].text == "Last Python message was ...Py saw: 4"
 
 
 def test_seed_names_all_six_shapes_and_says_so(runner: TrialRunner) -> None:
-    result = graded(examples("shape-recognition") / "seed", "shape-recognition", runner)
+    result = grade_example("shape-recognition", "seed", runner)
     assert result.accuracy is not None
     assert (result.accuracy.value, result.accuracy.n) == (1.0, 6)
     said = {(t.recording.start.x, t.recording.start.y): t.recording.spoken[-1].text for t in result.trials}

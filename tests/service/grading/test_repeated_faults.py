@@ -17,7 +17,7 @@ from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Recording, Ticks, Verdict
-from submissions.assignment.examples import examples, expected
+from submissions.assignment.examples import expected, read_example
 from submissions.assignment.reader import find_assignment, read_assignment
 from submissions.bundle import read_submission
 
@@ -174,7 +174,7 @@ def test_faulty_examples_get_the_same_with_every_trial_run(
     runner: TrialRunner, runs_all: TrialRunner, name: str, example: str
 ) -> None:
     asked = find_assignment(name)
-    submission = read_submission(examples(name) / example, asked=asked.parts)
+    submission = read_example(name, example)
     found, wanted = (grade(submission, asked, runner=each) for each in (runner, runs_all))
     assert [(each.id, each.marks) for each in found.criteria] == [(each.id, each.marks) for each in wanted.criteria]
     assert [each.verdict for each in found.trials] == [each.verdict for each in wanted.trials]

@@ -21,9 +21,8 @@ from service.grading.trial_runner import TrialRunner
 from service.store.codec import decode, encode
 from sim.recording import Pose
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import read_example
 from submissions.assignment.reader import find_assignment, read_assignment
-from submissions.bundle import read_submission
 from submissions.criteria.robustness import Robustness
 from submissions.submission import Submission
 from submissions.sweep import CONDITIONS, Sweep
@@ -209,7 +208,7 @@ def test_cheats_gain_where_nothing_forbids_them_and_nothing_where_it_does(runner
     allowing = replace(forbidding, world=replace(forbidding.world, background="Simple_Shapes", labels=True, sheet=0))
     got = {}
     for name in ("by-the-way-driven", "counts-the-messages", "echoes-the-patch"):
-        submission = read_submission(examples("shapes-on-the-move") / name, asked=forbidding.parts)
+        submission = read_example("shapes-on-the-move", name)
         results = [grade(submission, asked, runner=runner).criteria for asked in (allowing, forbidding)]
         got[name] = [next(found.marks for found in criteria if found.id == "shapes") for criteria in results]
     assert got == {"by-the-way-driven": [9, 0], "counts-the-messages": [9, 0], "echoes-the-patch": [9, 0]}

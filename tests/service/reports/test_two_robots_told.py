@@ -19,14 +19,12 @@ from service.reports.trace import trace
 from service.reports.view import staff_view
 from service.store.grades.recordings import from_bytes, keep, to_bytes
 from sim.recording import Recording, Verdict
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import read_example
 from submissions.assignment.reader import find_assignment
-from submissions.bundle import read_submission
 
 
 def graded(assignment: str, example: str, runner: TrialRunner) -> Grade:
-    asked = find_assignment(assignment)
-    return grade(read_submission(examples(assignment) / example, asked=asked.parts), asked, runner=runner)
+    return grade(read_example(assignment, example), find_assignment(assignment), runner=runner)
 
 
 @pytest.fixture(scope="module")

@@ -1,2 +1,0 @@
-def agent(text):
-    return f"Py saw: {parser(text)}"

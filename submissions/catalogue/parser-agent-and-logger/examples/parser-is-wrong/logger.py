@@ -1,9 +1,0 @@
-logged = 0
-
-
-def logger(text, response):
-    global logged
-    logged += 1
-    with open("logger.txt", "a") as file:
-        file.write(f"Received message: {text}\nResponse: {response}\n---\n")
-    return logged

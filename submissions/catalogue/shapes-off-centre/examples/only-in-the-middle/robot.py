@@ -1,7 +1,0 @@
-import time
-import ev3dev2_glue as glue
-
-print("IMG_DATA")
-while not glue.pyState()["messages"]:
-    time.sleep(0.1)
-say("Is that a " + glue.pyState()["messages"][-1]["message"]["shape"])
