@@ -16,7 +16,7 @@ from responders.sandbox.inside.libraries import BESIDE
 from sim.readers.python_source import parse_module
 from sim.readers.unreadable import Unreadable
 
-_LOADED = ("nbev3devsim.load_nbev3devwidget", "inside.source_reader")
+_LOADED = ("nbev3devsim.load_nbev3devwidget", "inside.static_analysis.reader")
 #: Characters of one text; reading a longer one takes long.
 _MOST_READ = 60_000
 #: Names by which a program can come to what is loaded, or to code that no tree shows, or by which it sees when memory

@@ -31,7 +31,7 @@ from submissions.submission import Part
 _MEGABYTE = 1 << 20
 #: Its limits are much more than the longest text takes: how fast a machine is must make no difference.
 _READER = ResponderSpec(
-    Code("source_reader.py", "from inside.source_reader import read"), {}, ChildLimits(30.0, 512 * _MEGABYTE), 100_000
+    Code("reader.py", "from inside.static_analysis.reader import read"), {}, ChildLimits(30.0, 512 * _MEGABYTE), 100_000
 )
 #: What is handed to it of all files together, and of one; a little more than it reads, so that it says so.
 _MOST_READ, _MOST_OF_ONE = 1_000_001, 300_001

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import importlib
 
-from . import libraries, source_reader  # noqa: F401
+from . import libraries
 from .agent_role import AgentRole
 from .frames import Wire
 from .lockdown import Grants
 from .notebook_role import NotebookRole
 from .responder_role import ResponderRole
+from .static_analysis import reader  # noqa: F401
 
 #: What answering takes.
 NEEDED = ("nbev3devsim.load_nbev3devwidget", "nbev3devsim.unseen")

@@ -11,9 +11,9 @@ import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from .source_lookups import makes_text
-from .source_names import bound_in, dotted, root
-from .source_words import TABLE_CALLS
+from .lookups import makes_text
+from .names import bound_in, dotted, root
+from .vocabulary import TABLE_CALLS
 
 _MOST_NAMES = 8
 

@@ -1,6 +1,6 @@
 """What is written down of a file that is read: what stands in it, where, and which code is run at one go.
 
-Finding it is ``source_walk.py``'s, and what the rules make of it ``source_reader.py``'s.
+Finding it is ``walk.py``'s, and what the rules make of it ``reader.py``'s.
 """
 
 from __future__ import annotations

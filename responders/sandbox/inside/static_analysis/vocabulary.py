@@ -1,6 +1,6 @@
 """The words that a reader of student code looks out for: constructs, and what takes, imports or runs what a text says.
 
-Only the words; what follows from one is in ``source_walk.py``.
+Only the words; what follows from one is in ``walk.py``.
 """
 
 from __future__ import annotations

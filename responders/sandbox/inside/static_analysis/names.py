@@ -1,6 +1,6 @@
 """What a piece of Python's syntax is by itself: its dotted name, the text it comes to, whether it is ever run.
 
-Nothing is looked up and nothing is run; what a whole file has in it is ``source_walk.py``'s.
+Nothing is looked up and nothing is run; what a whole file has in it is ``walk.py``'s.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import ast
 import sys
 from collections.abc import Iterator, Sequence, Set
 
-from .source_words import DOUBTFUL_PARTS, PLAIN_MODULES
+from .vocabulary import DOUBTFUL_PARTS, PLAIN_MODULES
 
 _MOST_PARTS = 10
 _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)

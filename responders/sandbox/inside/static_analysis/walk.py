@@ -1,6 +1,6 @@
 """Walks through a syntax tree and writes down what stands in it: where, whether it can be come to, whether in a loop.
 
-It runs nothing of what it reads, and judges nothing: what the rules make of it is ``source_reader.py``'s.
+It runs nothing of what it reads, and judges nothing: what the rules make of it is ``reader.py``'s.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ import ast
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from . import cell_source
-from .source_lookups import may_unpickle, name_arguments
-from .source_names import (
+from .. import cell_source
+from .lookups import may_unpickle, name_arguments
+from .names import (
     arguments_of,
     blocks,
     bound_in,
@@ -25,9 +25,9 @@ from .source_names import (
     text_of,
     truth,
 )
-from .source_scopes import Naming
-from .source_units import Mention, SourcePlace, Unit
-from .source_words import (
+from .scopes import Naming
+from .units import Mention, SourcePlace, Unit
+from .vocabulary import (
     CONSTRUCTS,
     DOUBTFUL,
     DOUBTFUL_ALONE,

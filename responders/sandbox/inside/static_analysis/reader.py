@@ -14,12 +14,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from fnmatch import fnmatchcase
 from typing import Any
 
-from . import cell_source
-from .source_names import leads_to_doubt
-from .source_units import Mention, SourcePlace, Unit
-from .source_walk import Walk
-from .source_words import CONSTRUCTS, PLAIN_MODULES
-from .withheld import rule_for
+from .. import cell_source
+from ..withheld import rule_for
+from .names import leads_to_doubt
+from .units import Mention, SourcePlace, Unit
+from .vocabulary import CONSTRUCTS, PLAIN_MODULES
+from .walk import Walk
 
 _IMPORT = "import "
 _CONSTRUCTS = frozenset({*CONSTRUCTS.values(), "else"})

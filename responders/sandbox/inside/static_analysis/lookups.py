@@ -1,6 +1,6 @@
 """Finds the arguments of a call that may be texts to look up or run: names of methods, and files with pickled objects.
 
-It reads the syntax only; ``source_walk.py`` decides which arguments are doubtful.
+It reads the syntax only; ``walk.py`` decides which arguments are doubtful.
 """
 
 from __future__ import annotations
@@ -8,8 +8,8 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Set
 
-from .source_names import text_of
-from .source_words import MAY_TAKE_NAME, MAY_UNPICKLE, NAME_IN_ANY_KEYWORD, NAME_KEYWORDS
+from .names import text_of
+from .vocabulary import MAY_TAKE_NAME, MAY_UNPICKLE, NAME_IN_ANY_KEYWORD, NAME_KEYWORDS
 
 _MAKES_TEXT = frozenset({"str", "chr", "repr", "ascii", "join", "decode"})
 
