@@ -28,14 +28,14 @@ from service.store.courses import open_assignments
 from service.store.courses.versions import freeze
 from service.store.engine import Store, open_store
 from service.store.models import Job
-from service.store.people import credentials, people
+from service.store.people import credentials, membership
 from service.store.people.students import DEFAULT_COURSE
 from service.store.queue.metrics import quantile
 from service.store.states import CredentialKind, JobState
 from service.web.access import CSRF_HEADER, SESSION_COOKIE, csrf_word
 from service.web.listening import listen
 from submissions.assignment.reader import find_assignment
-from submissions.people import Student
+from submissions.student_identity import Student
 
 _STUDENTS = 200
 _WITHIN_SECONDS = 60.0
@@ -105,7 +105,7 @@ def _page(server: PostgresqlServer, times: int) -> list[Measurement]:
 def _instructor(store: Store) -> int:
     """An instructor of the first course."""
     with store.transaction() as session:
-        return people.make_instructor(session, DEFAULT_COURSE, Student("instructor")).person_id
+        return membership.make_instructor(session, DEFAULT_COURSE, Student("instructor")).person_id
 
 
 def _class(server: PostgresqlServer) -> list[Measurement]:
@@ -113,7 +113,7 @@ def _class(server: PostgresqlServer) -> list[Measurement]:
         store, port = _served(held, server, workers=2)
         names = [f"student-{number}" for number in range(_STUDENTS)]
         with store.transaction() as session:
-            members = [people.make_student(session, DEFAULT_COURSE, Student(name)).person_id for name in names]
+            members = [membership.make_student(session, DEFAULT_COURSE, Student(name)).person_id for name in names]
             open_assignments.prepare(session, 1, freeze(find_assignment(ASSIGNMENT)))
             open_assignments.open_for_students(session, 1, ASSIGNMENT)
         browsers = [_Browser(port, _session(store, person_id)) for person_id in members]

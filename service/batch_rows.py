@@ -14,7 +14,7 @@ from service.store.batches.batches import JobLine
 from service.store.engine import Store
 from service.store.grades import results
 from service.store.states import JobState
-from submissions.people import Refusal, Student
+from submissions.student_identity import Refusal, Student
 
 
 def rows_of(

@@ -39,7 +39,7 @@ from sim.errors import UsageError
 from sim.floors import names
 from sim.recording import Verdict
 from submissions.assignment.folder import REFERENCE
-from submissions.people import Refusal
+from submissions.student_identity import Refusal
 from submissions.submission import Submission
 
 _INDEX = "index.html"

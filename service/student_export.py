@@ -23,7 +23,7 @@ from service.store.courses import policies
 from service.store.engine import Store
 from service.store.grades import results
 from service.store.models import Course, Enrolment, Extension, Job, Person, SubmissionRow
-from service.store.people import people
+from service.store.people import membership
 from service.store.states import JobState, Standing
 from service.store.web_tables import Appeal, Credential
 
@@ -70,7 +70,7 @@ def _moments(session: Session, enrolment_id: int) -> dict[str, Any]:
     enrolment = session.get_one(Enrolment, enrolment_id)
     person = session.get_one(Person, enrolment.person_id)
     here = Credential.course_id == enrolment.course_id
-    if not people.is_more_than(session, enrolment):
+    if not membership.is_more_than(session, enrolment):
         # One course is all they have, so what reaches everywhere reaches this course alone.
         here = or_(here, Credential.course_id.is_(None))
     signs_in = select(Credential).where(Credential.person_id == person.id, here).order_by(Credential.created_at)

@@ -21,9 +21,9 @@ from submissions.bundle import fit_parts, read_submission, submission_of
 from submissions.downloads import IGNORED, StudentFiles, is_one_students, student_files
 from submissions.grading_request import GradingRequest
 from submissions.names import LONGEST_NAME, alike, cannot_be_told, shown_name
-from submissions.people import People, Refusal, Student
 from submissions.raw_files import read_listed, shown
 from submissions.roster import RosterRow, file_inside, read_roster
+from submissions.student_identity import People, Refusal, Student
 from submissions.submission import Submission
 from submissions.unzipping import unzip
 

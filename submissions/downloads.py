@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from submissions.people import NAMELESS, NOBODY, Student, told_apart
 from submissions.raw_files import shown
+from submissions.student_identity import NAMELESS, NOBODY, Student, told_apart
 
 IGNORED = {"__MACOSX", "__pycache__", "Thumbs.db", "desktop.ini"}
 #: Moodle makes blanks of the underscores in a name, so that the first number between underscores is its own.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import TYPE_CHECKING
 
-from submissions.people import NOBODY, Student
+from submissions.student_identity import NOBODY, Student
 from submissions.submission import Submission
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from pathlib import Path, PurePosixPath
 from sim.errors import UsageError
 from submissions.csv_table import CsvRow, read_csv
 from submissions.names import LONGEST_NAME, shown_name
-from submissions.people import NOBODY, PERSON_COLUMNS, Student
 from submissions.raw_files import shown
+from submissions.student_identity import NOBODY, PERSON_COLUMNS, Student
 
 _OWN_COLUMNS = ("file", "assignment", "submitted_at")
 _USUAL = "student (or id), file, assignment"

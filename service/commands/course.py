@@ -20,8 +20,8 @@ from service.operations.assignments import CourseAssignment
 from service.operations.courses import DEFAULT_COURSE
 from service.operations.policies import ExtensionRequest, PolicyLimits
 from sim.errors import UsageError
-from submissions.people import read_people, students_of
 from submissions.roster import moment
+from submissions.student_identity import read_people, students_of
 
 Assignment = Annotated[
     str,

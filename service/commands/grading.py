@@ -30,8 +30,8 @@ from submissions.assignment.definition import Assignment
 from submissions.assignment.reader import find_assignment, find_in_catalogue
 from submissions.bundle import fit_parts, named_by, read_submission
 from submissions.names import alike, cannot_be_told, shown_name
-from submissions.people import Student
 from submissions.raw_files import shown
+from submissions.student_identity import Student
 from submissions.submission import Submission
 
 

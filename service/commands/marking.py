@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.commands.batch.words import out_of
+from service.commands.batch.batch_summary import out_of
 from service.commands.operating import operating
 from service.commands.shown import document, show, table, tell
 

@@ -20,7 +20,7 @@ from service.queue.supervisor import Supervisor, alone_in
 from service.settings import Settings, load_settings
 from service.store import audit
 from service.store.engine import Store, open_store
-from service.store.people import credentials, people
+from service.store.people import credentials, membership
 from service.store.people.credentials import LINK_LIFETIME
 from service.store.people.students import DEFAULT_COURSE
 from service.store.states import CredentialKind
@@ -28,7 +28,7 @@ from service.web.listening import address, check_reach, listen
 from service.web.server import serve_on
 from sim.errors import HostError, RobomarkError, UsageError
 from sim.processes import leave_current_folder
-from submissions.people import Student
+from submissions.student_identity import Student
 
 _log = structlog.get_logger(__name__)
 _LOOK_SECONDS = 0.5
@@ -111,11 +111,11 @@ def _first_link(settings: Settings, store: Store, listening_at: str) -> str:
     account = audit.this_user().partition("@")[0]
     with store.transaction() as session:
         try:
-            member = people.make_instructor(session, DEFAULT_COURSE, Student(account))
+            member = membership.make_instructor(session, DEFAULT_COURSE, Student(account))
         except UsageError:
             # A student is called like the account.
-            member = people.make_instructor(session, DEFAULT_COURSE, Student(f"operator {account}"))
-        people.make_operator(session, member.person_id)
+            member = membership.make_instructor(session, DEFAULT_COURSE, Student(f"operator {account}"))
+        membership.make_operator(session, member.person_id)
         secret = credentials.issue(session, member.person_id, CredentialKind.LINK, LINK_LIFETIME)
     return f"{settings.public_url or listening_at}/sign-in/{secret}"
 

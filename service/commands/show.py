@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from sqlalchemy.orm import Session
 
-from service.commands.batch.words import remarks
+from service.commands.batch.batch_summary import remarks
 from service.commands.film_option import FilmOption
 from service.commands.language_option import LanguageOption
 from service.commands.shown import document, note, tell

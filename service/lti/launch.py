@@ -18,7 +18,7 @@ from service.lti.fetching import fetch
 from service.store.people.lti import PendingLaunch, Platform
 from service.store.states import Role
 from sim.errors import UsageError
-from submissions.people import Student
+from submissions.student_identity import Student
 
 CLAIM = "https://purl.imsglobal.org/spec/lti/claim/"
 MEMBERS_CLAIM = "https://purl.imsglobal.org/spec/lti-nrps/claim/namesroleservice"

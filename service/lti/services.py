@@ -24,7 +24,7 @@ from service.lti.launch import role_of, student_of, tables_in, text_of
 from service.store.engine import Store
 from service.store.people.lti import CourseLink, Platform, origin_of
 from service.store.states import Role
-from submissions.people import Student
+from submissions.student_identity import Student
 
 _MEMBERS_SCOPE = "https://purl.imsglobal.org/spec/lti-nrps/scope/contextmembership.readonly"
 _GRADES_SCOPES = (

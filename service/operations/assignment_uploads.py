@@ -23,7 +23,7 @@ from submissions.assignment.folder import FILE_NAME, REFERENCE, assignment_folde
 from submissions.assignment.reader import find_in_catalogue, read_assignment
 from submissions.bundle import read_submission
 from submissions.grading_request import GradingRequest
-from submissions.people import Student
+from submissions.student_identity import Student
 from submissions.unzipping import unzip
 
 _MOST_ENTRIES, _MOST_BYTES = 2000, 200_000_000

@@ -27,8 +27,8 @@ from service.store.batches.batch_table import TablePage as TablePage
 from service.store.batches.batches import BatchLine as BatchLine
 from service.store.batches.batches import BatchProgress as BatchProgress
 from service.store.batches.batches import JobLine as JobLine
-from service.store.batches.overview import ClassOverview as ClassOverview
-from service.store.batches.overview import missing, overview
+from service.store.batches.class_overview import ClassOverview as ClassOverview
+from service.store.batches.class_overview import missing, overview
 from service.store.batches.regrades import Change, ChangesPage
 from service.store.courses import open_assignments
 from service.store.courses.hidden_names import HiddenNames
@@ -43,7 +43,7 @@ from service.store.states import BatchState, JobState, Role
 
 if TYPE_CHECKING:
     from service.operations.batches import SubmittedBatch
-    from submissions.people import Student
+    from submissions.student_identity import Student
 
 _BATCHES_A_PAGE = 30
 

@@ -30,14 +30,14 @@ from service.store.courses.hidden_names import HiddenNames
 from service.store.engine import now, retry_conflicts
 from service.store.installation import secret_of
 from service.store.models import Course, Enrolment, Job
-from service.store.people import people
+from service.store.people import membership
 from service.store.people.students import DEFAULT_COURSE, course_of
 from service.store.queue import batch_control
 from service.store.queue.batch_control import Controlled as Controlled
 from service.store.queue.batch_control import Retried as Retried
 from service.store.states import Lane, Role
 from sim.errors import UsageError
-from submissions.people import Refusal
+from submissions.student_identity import Refusal
 
 if TYPE_CHECKING:
     from submissions.assignment.definition import Assignment
@@ -183,7 +183,7 @@ def foresee(service: Service, actor: Actor, course_id: int, contents: BatchConte
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         foreseen = preflight.foresee(session, course_id, contents.grading_requests, secret)
-        names = {each.id: each.name for each in people.members(session, course_id)}
+        names = {each.id: each.name for each in membership.members(session, course_id)}
     return [
         ForeseenSubmission(asked, _known_name(asked, names), ahead)
         for asked, ahead in zip(contents.grading_requests, foreseen, strict=True)

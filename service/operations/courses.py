@@ -14,13 +14,13 @@ from service.operations.sign_in_links import make_link
 from service.store import audit
 from service.store.engine import now
 from service.store.models import Course
-from service.store.people import people
-from service.store.people.people import CourseLine as CourseLine
-from service.store.people.people import Member
+from service.store.people import membership
+from service.store.people.membership import CourseLine as CourseLine
+from service.store.people.membership import Member
 from service.store.people.students import DEFAULT_COURSE as DEFAULT_COURSE
 from service.store.people.students import course_of
 from service.store.states import Role
-from submissions.people import Student
+from submissions.student_identity import Student
 
 #: Longest name of a course.
 LONGEST_NAME = 100
@@ -64,7 +64,7 @@ def find(service: Service, actor: Actor, name: str) -> int:
     """
     check_operator(actor)
     with service.store.reading() as session:
-        if name != DEFAULT_COURSE or name in {each.name for each in people.courses(session)}:
+        if name != DEFAULT_COURSE or name in {each.name for each in membership.courses(session)}:
             return course_named(session, actor, name).id
     with service.store.transaction() as session:
         return course_of(session, name, now(session))
@@ -81,7 +81,7 @@ def list_courses(service: Service, actor: Actor) -> list[CourseLine]:
     """All courses by name, with their numbers of members, for operators. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
-        return people.courses(session)
+        return membership.courses(session)
 
 
 def add_member(service: Service, actor: Actor, request: MemberRequest) -> AddedMember:
@@ -108,11 +108,11 @@ def add_member(service: Service, actor: Actor, request: MemberRequest) -> AddedM
     if is_student:
         find(service, actor, course)
     with service.store.transaction() as session:
-        member = (people.make_student if is_student else people.make_instructor)(session, course, who)
+        member = (membership.make_student if is_student else membership.make_instructor)(session, course, who)
         if request.operator:
-            people.make_operator(session, member.person_id)
+            membership.make_operator(session, member.person_id)
         detail = {"role": member.role.value, "operator": request.operator}
         audit.note(session, actor.name, "add", "person", str(member.person_id), **detail)
         secret = make_link(session, actor, member.person_id, word=request.word)
-        elsewhere = () if is_student else tuple(people.elsewhere(session, member.enrolment_id))
+        elsewhere = () if is_student else tuple(membership.elsewhere(session, member.enrolment_id))
     return AddedMember(member, secret, elsewhere)

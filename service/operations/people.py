@@ -16,14 +16,14 @@ from service.store import audit
 from service.store.engine import now, retry_conflicts
 from service.store.locks import lock_course, lock_persons
 from service.store.models import Enrolment, Person
-from service.store.people import credentials, people
+from service.store.people import credentials, membership
 from service.store.people.credentials import CredentialLine, Reach
-from service.store.people.people import Member as Member
+from service.store.people.membership import Member as Member
 from service.store.people.students import Students
 from service.store.purge import remove_student
 from service.store.states import CredentialKind, Role
 from sim.sentences import Sentence
-from submissions.people import Student
+from submissions.student_identity import Student
 
 _LONGEST = 200
 
@@ -61,7 +61,7 @@ def find(service: Service, actor: Actor, course: str, student: str) -> Member:
     """The member of a course by its name and their id. Raises NotFound, UsageError where there is none."""
     check_operator(actor)
     with service.store.reading() as session:
-        return people.member(session, course, student)
+        return membership.member(session, course, student)
 
 
 def show(service: Service, actor: Actor, enrolment_id: int) -> PersonView:
@@ -70,11 +70,11 @@ def show(service: Service, actor: Actor, enrolment_id: int) -> PersonView:
     with service.store.reading() as session:
         row = _enrolment(session, enrolment_id)
         return PersonView(
-            people.member_of(session, row),
-            tuple(people.enrolments(session, row.person_id)),
+            membership.member_of(session, row),
+            tuple(membership.enrolments(session, row.person_id)),
             tuple(credentials.of_person(session, row.person_id)),
-            people.is_from_platform(session, row.person_id),
-            tuple(people.elsewhere(session, row.id)),
+            membership.is_from_platform(session, row.person_id),
+            tuple(membership.elsewhere(session, row.id)),
         )
 
 
@@ -108,21 +108,21 @@ def join(service: Service, actor: Actor, request: JoinRequest) -> Member:
             raise Conflict("these two are one person already")
         lock_persons(session, person_id, other_person)
         ours, theirs = (
-            {each.enrolment_id: name for name, each in people.enrolments(session, which)}
+            {each.enrolment_id: name for name, each in membership.enrolments(session, which)}
             for which in (person_id, other_person)
         )
         if shared := sorted(set(ours.values()) & set(theirs.values())):
             raise Conflict("both are in the course %(course)s, so they cannot be one person", course=shared[0])
-        vouched = any(people.is_from_platform(session, each) for each in (person_id, other_person))
+        vouched = any(membership.is_from_platform(session, each) for each in (person_id, other_person))
         if vouched and not request.from_platform:
             raise Invalid(
                 "a learning platform signs one of them in, and would sign in the person whom you join; "
                 "say explicitly that it may"
             )
-        people.join(session, person_id, other_person)
+        membership.join(session, person_id, other_person)
         detail = {"joined": other_person, "enrolments": sorted(theirs)}
         audit.note(session, actor.name, "join", "person", str(person_id), **detail)
-        return people.member_of(session, row)
+        return membership.member_of(session, row)
 
 
 def enrol(service: Service, actor: Actor, course_id: int, students: Sequence[Student]) -> list[int]:
@@ -144,7 +144,7 @@ def enrol_new(service: Service, actor: Actor, course_id: int, student: Student) 
     check_lengths([student])
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
-        known = people.known(session, course_id, student)
+        known = membership.known(session, course_id, student)
         if known is not None:
             raise _already_there(known)
         return _enrol(session, actor, course_id, [student])[0]
@@ -176,7 +176,7 @@ def remove(service: Service, actor: Actor, course_id: int, enrolment_id: int) ->
         if not is_ours or not (actor.operator or may):
             raise NotFound("there is no such member of this course")
         removed = row.student
-        people.set_role(session, row, Role.STUDENT)
+        membership.set_role(session, row, Role.STUDENT)
         remove_student(session, row.id, actor.name)
     return removed
 

@@ -11,9 +11,9 @@ from service.store.courses.open_assignments import CourseAssignment
 from service.store.courses.policies import ExtensionLine
 from service.store.grades import own_gradings
 from service.store.grades.own_gradings import OwnGrading
-from service.store.people import lti, people
+from service.store.people import lti, membership
 from service.store.people.lti import CourseLink
-from service.store.people.people import Member
+from service.store.people.membership import Member
 from service.store.purge import has_submitted
 from service.store.states import Role
 
@@ -49,21 +49,21 @@ def list_members(service: Service, actor: Actor, course_id: int) -> list[Member]
     """All members of a course, by id. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
-        return people.members(session, course_id)
+        return membership.members(session, course_id)
 
 
 def list_members_after(service: Service, actor: Actor, course_id: int, enrolment_id: int, limit: int) -> list[Member]:
     """Members of a course in the order in which they were enrolled, those after this one. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
-        return people.members_after(session, course_id, enrolment_id, limit)
+        return membership.members_after(session, course_id, enrolment_id, limit)
 
 
 def search_members(service: Service, actor: Actor, course_id: int, text: str = "", number: int = 1) -> MemberPage:
     """A page of the members whose id, name or address contains a text. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
-        members = people.members(session, course_id)
+        members = membership.members(session, course_id)
         extended = frozenset(each.enrolment_id for each in policies.extensions(session, course_id))
         platform = lti.course_link(session, course_id)
     wanted = text.strip().casefold()
@@ -89,7 +89,7 @@ def show_student(service: Service, actor: Actor, course_id: int, enrolment_id: i
         gradings = own_gradings.newest(session, enrolment_id)
         extensions = policies.extensions(session, course_id)
         return StudentView(
-            people.member_of(session, row),
+            membership.member_of(session, row),
             tuple(each for each in gradings if each.assignment not in hidden),
             bool(hidden),
             tuple(each for each in extensions if each.enrolment_id == row.id),

@@ -15,9 +15,9 @@ from service.operations.errors import Invalid
 from service.operations.lookup import check_operator, course_for, student_in
 from service.store import audit
 from service.store.engine import now
-from service.store.people import credentials, people
+from service.store.people import credentials, membership
 from service.store.people.credentials import EVERYWHERE, LINK_LIFETIME, Reach
-from service.store.people.people import Member
+from service.store.people.membership import Member
 from service.store.states import Role
 from sim.errors import UsageError
 
@@ -53,7 +53,7 @@ def make_links(service: Service, actor: Actor, course_id: int, days: int = DAYS)
     lifetime = timedelta(days=days)
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
-        listed = people.students(session, course_id)
+        listed = membership.students(session, course_id)
         person_ids = [each.person_id for each, more in listed if not more]
         made = credentials.replace_links(session, person_ids, lifetime, reach=_reach(course_id))
         until = now(session) + lifetime
@@ -73,7 +73,7 @@ def make_students_link(service: Service, actor: Actor, course_id: int, enrolment
     """
     with service.store.transaction() as session:
         row = student_in(session, actor, course_id, enrolment_id)
-        if people.is_more_than(session, row):
+        if membership.is_more_than(session, row):
             raise UsageError(f"this person {_ELSEWHERE}")
         return make_link(session, actor, row.person_id, word=word, reach=_reach(course_id))
 
@@ -82,7 +82,7 @@ def make_members_link(service: Service, actor: Actor, course: str, who: str) -> 
     """A member of a course by its name and their id, with the secret of their new link. Raises NotFound, UsageError."""
     check_operator(actor)
     with service.store.transaction() as session:
-        member = people.member(session, course, who)
+        member = membership.member(session, course, who)
         return member, make_link(session, actor, member.person_id)
 
 

@@ -21,8 +21,8 @@ from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
 from submissions.bundle import empty_parts, missing_part, submission_of
 from submissions.grading_request import GradingRequest
-from submissions.people import Student
 from submissions.raw_files import MEGABYTE, SentFile, read_sent, shown
+from submissions.student_identity import Student
 from submissions.submission import PART_FILES
 
 __all__ = ["Accepted"]

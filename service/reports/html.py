@@ -28,7 +28,7 @@ from service.reports.page import page_of
 from service.reports.plots.plot import DPI
 from service.reports.readable import number, readable
 from service.reports.replay.document import REPORT_BYTES, Pixels, packed, replay_of_grade
-from service.reports.replay.words import replay_words
+from service.reports.replay.labels import replay_words
 from service.reports.rows import TableRow
 from service.reports.view import NO_OTHERS, OtherTrials, View
 from service.reports.words import verdict_words

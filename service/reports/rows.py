@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from service.grading.grade import Grade
-from submissions.people import Student
+from submissions.student_identity import Student
 
 _V = TypeVar("_V")
 _W = TypeVar("_W")

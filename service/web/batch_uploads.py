@@ -13,7 +13,7 @@ from service.web.context import WebContext
 from service.web.refusing import Declined
 from sim.sentences import Sentence
 from submissions.batch_folder import BatchContents, read_batch_for
-from submissions.people import People
+from submissions.student_identity import People
 
 _UNPACKING_SECONDS = 30
 

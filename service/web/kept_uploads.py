@@ -17,8 +17,8 @@ from pathlib import Path
 from service.store.codec import decode, encode
 from sim.errors import UsageError
 from sim.readers.json_text import read_json
-from submissions.people import Refusal
 from submissions.raw_files import SentFile, shown
+from submissions.student_identity import Refusal
 
 _KEPT_SECONDS = 24 * 3600
 _MOST_OF_ONE, _MOST_OF_ALL = 3, 30

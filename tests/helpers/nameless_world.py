@@ -22,12 +22,12 @@ from service.store.courses.versions import freeze
 from service.store.grades import appeals, comments, overrides, results
 from service.store.models import Enrolment, Job, SubmissionRow
 from service.store.people import webhooks
-from service.store.people.people import Member
+from service.store.people.membership import Member
 from service.store.people.students import Students
 from service.store.queue import jobs
 from service.store.states import JobState
 from submissions.grading_request import GradingRequest
-from submissions.people import Refusal, Student
+from submissions.student_identity import Refusal, Student
 from web import COURSE, Web
 
 ASSIGNMENT = "echo-responder"

@@ -42,7 +42,7 @@ from sim.recording import (
     Touch,
     Verdict,
 )
-from submissions.people import Student
+from submissions.student_identity import Student
 from submissions.submission import Submission
 
 SHAPES = (

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from fastapi.routing import iter_route_contexts
 from httpx2 import Response
 
-from service.store.people.people import Member
+from service.store.people.membership import Member
 from web import Web, csrf
 
 _PREFIX = "/api/v1"

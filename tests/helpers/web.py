@@ -24,13 +24,13 @@ from service.queue.broker import broker_url
 from service.settings import Settings
 from service.store.engine import Store
 from service.store.grades import results
-from service.store.people import credentials, people
+from service.store.people import credentials, membership
 from service.store.people.credentials import Reach
-from service.store.people.people import Member
+from service.store.people.membership import Member
 from service.store.queue import jobs
 from service.store.states import CredentialKind
 from service.web.app import make_app
-from submissions.people import Student
+from submissions.student_identity import Student
 
 COURSE = "default"
 
@@ -70,11 +70,11 @@ class Web:
 
     def instructor(self, who: str = "grace", course: str = COURSE) -> Member:
         with self.store.transaction() as session:
-            return people.make_instructor(session, course, Student(who, who.capitalize()))
+            return membership.make_instructor(session, course, Student(who, who.capitalize()))
 
     def student(self, who: str = "ada", course: str = COURSE) -> Member:
         with self.store.transaction() as session:
-            return people.make_student(session, course, Student(who, who.capitalize()))
+            return membership.make_student(session, course, Student(who, who.capitalize()))
 
     def join(self, member: Member, other: Member, *, from_platform: bool = False) -> None:
         """Two members become one person, as an operator decides it."""
@@ -85,7 +85,7 @@ class Web:
     def operator(self, who: str = "root") -> Member:
         member = self.instructor(who, "operators")
         with self.store.transaction() as session:
-            people.make_operator(session, member.person_id)
+            membership.make_operator(session, member.person_id)
         return member
 
 

@@ -15,7 +15,7 @@ from service.store.courses import open_assignments
 from service.store.courses.versions import freeze
 from service.store.grades import appeals, results
 from service.store.people import credentials, webhooks
-from service.store.people.people import Member
+from service.store.people.membership import Member
 from service.store.queue import jobs, tryouts
 from service.store.states import CredentialKind
 from service.web.kept_uploads import KeptUploads

@@ -24,8 +24,8 @@ from sim.errors import HostError
 from submissions.assignment.definition import Assignment, Limits, Scenario, Visibility
 from submissions.assignment.reader import find_assignment
 from submissions.packed import pack_submission
-from submissions.people import Student
 from submissions.seeds import Secret
+from submissions.student_identity import Student
 
 HIDDEN = "hidden-place"
 

@@ -12,10 +12,10 @@ from command import robomark
 from service.grading.example_check import ComparedMeasure, check_examples
 from service.grading.trial_runner import TrialRunner
 from sim.errors import AssignmentError, UsageError
+from submissions.assignment.assignment_overview import overview
 from submissions.assignment.examples import Expectation, OriginalMeasure, add_expected, expected, read_example
 from submissions.assignment.export import export_for_students, export_whole, write_new
 from submissions.assignment.folder import assignment_folder, catalogue
-from submissions.assignment.overview import overview
 from submissions.assignment.problems import AssignmentProblems
 from submissions.assignment.reader import find_assignment, read_assignment
 

@@ -11,7 +11,7 @@ import pytest
 from sim.errors import UsageError
 from submissions.batch_folder import BatchContents, read_batch
 from submissions.downloads import moodle_number
-from submissions.people import People, read_people
+from submissions.student_identity import People, read_people
 from zips import zipped
 
 ASSIGNMENT = "echo-responder"

@@ -24,7 +24,7 @@ from sim.errors import UsageError
 from submissions.batch_folder import BatchContents, read_batch
 from submissions.bundle import read_submission
 from submissions.names import alike, forms, shown_name
-from submissions.people import Student
+from submissions.student_identity import Student
 
 ASSIGNMENT = "echo-responder"
 RESPONDER = "def responder(msg):\n    return msg\n"

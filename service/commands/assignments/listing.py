@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from service.commands.shown import document, show, table
 from service.reports.readable import number, one_line
+from submissions.assignment.assignment_overview import overview
 from submissions.assignment.folder import assignment_folder, catalogue
-from submissions.assignment.overview import overview
 
 
 def list_assignments() -> None:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import BinaryIO
 
-from service.commands.batch.words import unjudged_words
+from service.commands.batch.batch_summary import unjudged_words
 from service.commands.operating import operating
 from service.commands.shown import document, note, tell
 from service.home import for_the_user

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from service.commands.batch.words import summary
+from service.commands.batch.batch_summary import summary
 from service.commands.operating import operating
 from service.commands.shown import document, show, table
 

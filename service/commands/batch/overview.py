@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from service.operations.batch_views import ClassOverview, TableLine
-    from submissions.people import Student
+    from submissions.student_identity import Student
 
 _WHY = {"low": "far below the others", "slow": "took far longer than the others", "close": "close to the pass mark"}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from service.commands.batch.batch_summary import summary, unjudged_words
 from service.commands.batch.control import BatchId
 from service.commands.batch.tables import (
     changes_table,
@@ -9,7 +10,6 @@ from service.commands.batch.tables import (
     marks_table,
     rank_table,
 )
-from service.commands.batch.words import summary, unjudged_words
 from service.commands.operating import operating
 from service.commands.shown import document, show, tell
 from service.commands.statistics_shown import statistics_parts

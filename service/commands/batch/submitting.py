@@ -26,7 +26,7 @@ from service.operations.context import Actor, Service
 from service.operations.types import JobState
 from sim.errors import Cancelled, HostError, UsageError
 from submissions.batch_folder import read_batch
-from submissions.people import Refusal, read_people
+from submissions.student_identity import Refusal, read_people
 
 if TYPE_CHECKING:
     from service.grading.statistics import AssignmentStatistics

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rich.console import Group
 from rich.text import Text
 
-from service.commands.batch.words import out_of, remarks
+from service.commands.batch.batch_summary import out_of, remarks
 from service.commands.shown import table
 from service.operations.types import JobState, Standing
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from service.grading.ranks import RankTable
     from service.operations.batch_views import AuditEntry, JobLine
     from service.operations.regrades import Change, CriterionChange
-    from submissions.people import Refusal
+    from submissions.student_identity import Refusal
 
 _STYLES: Mapping[JobState, str] = MappingProxyType(
     {JobState.DONE: "green", JobState.DEAD: "red", JobState.RUNNING: "cyan", JobState.CANCELLED: "yellow"}

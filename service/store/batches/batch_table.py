@@ -28,7 +28,7 @@ from service.store.models import (
     TrialRow,
 )
 from service.store.states import JobState
-from submissions.people import Refusal
+from submissions.student_identity import Refusal
 
 REFUSED = "refused"
 ROWS_A_PAGE = 100

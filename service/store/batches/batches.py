@@ -31,7 +31,7 @@ from service.store.states import UNFINISHED, BatchState, JobState, PlotState, Ro
 from service.store.web_tables import OpenAssignment, Override
 from sim.errors import UsageError
 from submissions.nearest import did_you_mean
-from submissions.people import Refusal
+from submissions.student_identity import Refusal
 
 #: What is read of each job.
 _Asked = tuple[

@@ -31,8 +31,8 @@ from service.version import grader_sha256
 from sim.errors import HostError, UsageError
 from submissions.grading_request import GradingRequest
 from submissions.packed import pack_submission, unpack_submission
-from submissions.people import Refusal
 from submissions.raw_files import MEGABYTE
+from submissions.student_identity import Refusal
 from submissions.submission import Submission
 
 if TYPE_CHECKING:

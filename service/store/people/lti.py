@@ -19,12 +19,12 @@ from service.store.engine import now
 from service.store.inserting import insert_if_new
 from service.store.models import Course, Enrolment, Person
 from service.store.people import credentials
-from service.store.people.people import is_from_platform, is_more_than, set_role
+from service.store.people.membership import is_from_platform, is_more_than, set_role
 from service.store.people.students import DEFAULT_COURSE, Students, course_of
 from service.store.states import Role
 from service.store.web_tables import Credential, LtiCourse, LtiKey, LtiLaunch, LtiPerson, LtiPlatform
 from sim.errors import UsageError
-from submissions.people import Student
+from submissions.student_identity import Student
 
 _LAUNCH_TAKES = timedelta(minutes=10)
 

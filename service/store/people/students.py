@@ -17,8 +17,8 @@ from service.store.states import Role
 from sim.errors import UsageError
 from submissions.names import cannot_be_told, forms, shown_name
 from submissions.nearest import did_you_mean
-from submissions.people import Student
 from submissions.raw_files import shown
+from submissions.student_identity import Student
 
 #: The course of an installation that has only one.
 DEFAULT_COURSE = "default"

@@ -17,9 +17,9 @@ from service.web.api_routes import After, Limit, Listed, api_router, page_of, pl
 from service.web.api_uploads import LARGEST_ASSIGNMENT, ZIP_BODY, Uploaded
 from service.web.context import Context
 from service.web.request_bodies import takes_upload
+from submissions.assignment.assignment_overview import overview
 from submissions.assignment.definition import Assignment
 from submissions.assignment.folder import assignment_folder, catalogue
-from submissions.assignment.overview import overview
 from submissions.assignment.reader import find_in_catalogue
 
 router = api_router("assignments")

@@ -18,7 +18,7 @@ from service.web.api.shapes import Shape, like
 from service.web.api_access import CallerInCourse, in_course
 from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
 from service.web.context import Context
-from submissions.people import Student
+from submissions.student_identity import Student
 
 router = api_router("people")
 Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]

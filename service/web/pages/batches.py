@@ -30,8 +30,8 @@ from sim.errors import UsageError
 from submissions.assignment.folder import catalogue
 from submissions.batch_folder import BatchContents
 from submissions.bundle import empty_parts, missing_part
-from submissions.people import read_people
 from submissions.raw_files import SentFile, shown
+from submissions.student_identity import read_people
 from submissions.submission import PART_FILES
 
 router = APIRouter(prefix="/courses/{course_id}/batches")

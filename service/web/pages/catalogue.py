@@ -12,8 +12,8 @@ from service.operations import assignment_views
 from service.web.access import Instructing
 from service.web.context import Context
 from service.web.rendering import page
+from submissions.assignment.assignment_overview import TOPICS, overview
 from submissions.assignment.folder import assignment_folder, catalogue
-from submissions.assignment.overview import TOPICS, overview
 from submissions.assignment.reader import find_in_catalogue
 
 router = APIRouter()

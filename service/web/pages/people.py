@@ -30,8 +30,8 @@ from service.web.moments import written_moment
 from service.web.rendering import page
 from service.web.request_bodies import takes_upload
 from sim.errors import UsageError
-from submissions.people import Student, read_people, students_of
 from submissions.raw_files import SentFile
+from submissions.student_identity import Student, read_people, students_of
 
 router = APIRouter(prefix="/courses/{course_id}/people")
 _LONGEST = 200

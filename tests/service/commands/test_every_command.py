@@ -30,10 +30,10 @@ from service.store.engine import now, open_store
 from service.store.grades import appeals, comments, overrides, results
 from service.store.installation import secret_of
 from service.store.models import Job
-from service.store.people.people import make_instructor
+from service.store.people.membership import make_instructor
 from service.store.queue import jobs
 from submissions.assignment.examples import examples
-from submissions.people import Refusal, Student
+from submissions.student_identity import Refusal, Student
 
 
 def _all() -> Iterator[tuple[tuple[str, ...], Command]]:

@@ -37,7 +37,7 @@ from submissions.assignment.definition import Assignment
 from submissions.assignment.examples import examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
-from submissions.people import Student
+from submissions.student_identity import Student
 
 NEAR_MISSES = tomllib.loads((DATA / "near_misses.toml").read_text("utf-8"))["near_miss"]
 IS_THAT_A = """

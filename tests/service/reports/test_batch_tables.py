@@ -27,7 +27,7 @@ from service.store.batches import batches
 from service.store.engine import Store
 from service.store.states import JobState
 from sim.errors import UsageError
-from submissions.people import Student
+from submissions.student_identity import Student
 
 GOLDEN = DATA / "tables"
 WORKSHEET = (GOLDEN / "worksheet.csv").read_text("utf-8")

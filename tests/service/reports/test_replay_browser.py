@@ -18,8 +18,8 @@ from replays import long_recording, parting_grade, poisoned
 from service.language import ENGLISH, language_called
 from service.reports.html import replay_page, report
 from service.reports.replay.document import replay_of_grade
+from service.reports.replay.labels import replay_words
 from service.reports.replay.over import parted
-from service.reports.replay.words import replay_words
 from service.reports.view import BEFORE_PUBLICATION, other_trials, student_view
 from sim.floors import floor
 from sim.recording import Recording

@@ -18,12 +18,12 @@ from service.store.batches import intake
 from service.store.engine import Store
 from service.store.grades import results
 from service.store.models import Course
-from service.store.people import credentials, people, webhooks
+from service.store.people import credentials, membership, webhooks
 from service.store.queue import jobs
 from service.store.states import CredentialKind
 from service.store.web_tables import Delivery
 from sim.errors import UsageError
-from submissions.people import Student
+from submissions.student_identity import Student
 
 EVENTS = ["grade.finished", "batch.finished", "grades.published", "appeal.opened"]
 
@@ -152,7 +152,7 @@ def test_of_two_workers_that_end_a_batch_at_once_one_says_so(store: Store) -> No
 
 def test_of_two_requests_with_a_key_one_holds_it(store: Store) -> None:
     with store.transaction() as session:
-        person_id = people.make_instructor(session, "default", Student("grace")).person_id
+        person_id = membership.make_instructor(session, "default", Student("grace")).person_id
         credentials.issue(
             session,
             person_id,

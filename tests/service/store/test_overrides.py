@@ -27,7 +27,7 @@ from service.reports.formats import FORMATS
 from service.reports.formats.json_output import json_document
 from service.reports.view import gradebook_view, staff_view, student_view
 from service.store import audit
-from service.store.batches import batch_table, batches, overview, regrades
+from service.store.batches import batch_table, batches, class_overview, regrades
 from service.store.batches.intake import accept, accept_batch
 from service.store.courses.hidden_names import NAMED, HiddenNames
 from service.store.engine import Store
@@ -340,7 +340,7 @@ def test_who_is_excused_is_out_of_every_statistic(store: Store) -> None:
     _change(store, bob, _excuse(SHAPE), _excuse(ALOUD))
     with store.reading() as session:
         lines = batch_table.table_lines(session, batch.id, (), HiddenNames(frozenset(), b""))
-        (found,) = overview.overview(session, 1, lines, Decimal("0.6"), NAMED)
+        (found,) = class_overview.overview(session, 1, lines, Decimal("0.6"), NAMED)
         accuracies = {line.student: line.accuracy for line in batches.job_lines(session, batch.id)}
     # Ada has 3 of 6, so 4 of 8; Cid 7 of 8.
     statistics = found.statistics

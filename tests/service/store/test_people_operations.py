@@ -19,11 +19,11 @@ from service.settings import Settings
 from service.store import audit
 from service.store.engine import Store
 from service.store.models import Enrolment, Person
-from service.store.people import credentials, people
+from service.store.people import credentials, membership
 from service.store.people.credentials import MOST_TOKENS
-from service.store.people.people import Member
+from service.store.people.membership import Member
 from service.store.states import CredentialKind, Role
-from submissions.people import Student
+from submissions.student_identity import Student
 
 ROOT = Actor("root", operator=True)
 
@@ -35,14 +35,14 @@ def service(service_settings: Settings, store: Store) -> Service:
 
 def instructor(service: Service, course: str, who: str = "grace") -> Member:
     with service.store.transaction() as session:
-        return people.make_instructor(session, course, Student(who))
+        return membership.make_instructor(session, course, Student(who))
 
 
 def test_two_persons_become_one_who_signs_in_anew(service: Service) -> None:
     one, two = instructor(service, "one"), instructor(service, "two")
     secrets = []
     with service.store.transaction() as session:
-        people.make_operator(session, two.person_id)
+        membership.make_operator(session, two.person_id)
         for each in (one, two):
             lifetime = credentials.SESSION_LIFETIME
             secrets.append(credentials.issue(session, each.person_id, CredentialKind.SESSION, lifetime))
@@ -101,5 +101,5 @@ def test_an_operator_removes_an_instructor(service: Service) -> None:
         operations.remove(service, ROOT, one.course_id + 1, one.enrolment_id)
     operations.remove(service, ROOT, one.course_id, one.enrolment_id)
     with service.store.reading() as session:
-        assert [each.person_id for each in people.members(session, one.course_id)] == [two.person_id]
+        assert [each.person_id for each in membership.members(session, one.course_id)] == [two.person_id]
         assert credentials.identify(session, secret, CredentialKind.TOKEN) is None

@@ -11,7 +11,7 @@ from sqlalchemy import update
 import report_builders
 from builders import comparable, echo, grading_request
 from responders.sandbox.meter import JobLimits, Spent
-from service.commands.batch.words import remarks
+from service.commands.batch.batch_summary import remarks
 from service.grading.grade import Cost, Grade
 from service.store import artifacts
 from service.store.batches import batches

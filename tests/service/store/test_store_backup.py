@@ -26,7 +26,7 @@ from service.store.queue import jobs
 from service.store.states import JobState
 from service.store.web_tables import METADATA, Appeal, Comment, Override
 from sim.errors import HostError, UsageError
-from submissions.people import Refusal
+from submissions.student_identity import Refusal
 
 GRADE = replace(report_builders.shape_grade(), sandbox="Landlock 7, seccomp, process limits, policy 0")
 TABLES = METADATA.sorted_tables

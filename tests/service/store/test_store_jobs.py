@@ -26,7 +26,7 @@ from service.store.queue.jobs import Claim, Fenced, Retry
 from service.store.queue.lease_reaper import note_notices, requeue_lost, wanting_notices
 from service.store.queue.scheduling import BATCH_EVERY
 from service.store.states import BatchState, JobState, Lane, PlotState
-from submissions.people import Refusal
+from submissions.student_identity import Refusal
 
 NO_WAIT = Retry(0.0)
 

@@ -32,7 +32,7 @@ from service.store.revision import current_revision, newest_revision, revision_o
 from service.store.states import JobState, Role, Standing
 from service.store.web_tables import METADATA, Credential, LtiCourse, LtiPlatform, OpenAssignment
 from sim.errors import HostError
-from submissions.people import Refusal
+from submissions.student_identity import Refusal
 
 
 def _open(settings: Settings) -> None:

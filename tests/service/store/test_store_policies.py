@@ -24,7 +24,7 @@ from service.store.people.students import Students, course_of
 from service.store.queue import jobs
 from service.store.states import JobState, Lane
 from sim.recording import Verdict
-from submissions.people import Student
+from submissions.student_identity import Student
 
 GRADE = report_builders.faulty_grade()
 DUE = datetime(2026, 11, 30, 17, 0, tzinfo=UTC)

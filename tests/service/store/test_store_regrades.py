@@ -13,7 +13,7 @@ from sqlalchemy import ColumnElement, select, update
 import acting
 import report_builders
 from builders import echo, grading_request
-from service.commands.batch.words import unjudged_words
+from service.commands.batch.batch_summary import unjudged_words
 from service.grading.grade import Grade
 from service.operations.regrades import Published
 from service.store import audit

@@ -41,7 +41,7 @@ from service.store.web_tables import (
 )
 from service.student_export import export_student
 from sim.errors import UsageError
-from submissions.people import Refusal, Student
+from submissions.student_identity import Refusal, Student
 
 NOW = datetime.now(UTC)
 #: What a student is known by; none of it may be left.

@@ -17,7 +17,7 @@ from service.store.states import TryoutState
 from service.store.web_tables import Tryout
 from sim.errors import UsageError
 from submissions.packed import pack_submission
-from submissions.people import Student
+from submissions.student_identity import Student
 
 PACKED = pack_submission(grading_request().submission)
 

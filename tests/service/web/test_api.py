@@ -24,7 +24,7 @@ from service.store.courses import open_assignments
 from service.store.courses.hidden_names import hidden_names_of
 from service.store.courses.versions import freeze
 from service.store.grades import results
-from service.store.people import people
+from service.store.people import membership
 from service.store.people.credentials import identify
 from service.store.queue import jobs
 from service.store.states import CredentialKind
@@ -250,7 +250,7 @@ def test_a_link_is_made_for_nobody_who_is_more_than_a_student_here(web: Web, gra
     member = web.student("ada")
     assert grace.ask("POST", f"/people/{member.enrolment_id}/link").json()["path"].startswith("/sign-in/rml_")
     with web.store.transaction() as session:
-        people.make_operator(session, member.person_id)
+        membership.make_operator(session, member.person_id)
     assert grace.ask("POST", f"/people/{member.enrolment_id}/link").status_code == 422
 
 

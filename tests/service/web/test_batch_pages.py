@@ -29,7 +29,7 @@ from service.store.models import Batch, Enrolment, Job, TrialRow
 from service.store.states import BatchState, JobState, Standing
 from service.version import grader_sha256
 from submissions.assignment.folder import assignment_folder
-from submissions.people import Refusal, Student
+from submissions.student_identity import Refusal, Student
 from web import COURSE, Web, grade_all, submit, words
 from zips import zipped
 

@@ -21,7 +21,7 @@ from service.store.courses import open_assignments
 from service.store.courses.hidden_names import HiddenNames, hidden_names_of
 from service.store.courses.versions import freeze
 from service.store.grades import results
-from service.store.people.people import Member
+from service.store.people.membership import Member
 from service.store.queue import jobs
 from web import COURSE, Web, submit, web_in, words
 from zips import zipped

@@ -24,7 +24,7 @@ from service.lti.launch import CLAIM
 from service.store.batches import intake
 from service.store.grades import results
 from service.store.models import Job
-from service.store.people import lti, people
+from service.store.people import lti, membership
 from service.store.queue import jobs
 from service.store.states import Role
 from service.store.web_tables import LtiCourse, LtiLaunch
@@ -82,18 +82,18 @@ def test_an_instructor_and_then_a_student_come_to_a_course_of_its_own(launched: 
     assert ada.get("/courses/1/platform").status_code == 404
     assert grace.get("/courses/1/platform").status_code == 200
     with web.store.reading() as session:
-        assert [(each.id, each.role) for each in people.members(session, 1)] == [
+        assert [(each.id, each.role) for each in membership.members(session, 1)] == [
             ("ada", Role.STUDENT),
             ("grace", Role.INSTRUCTOR),
         ]
-        assert [course.name for course in people.courses(session)] == ["Robotics"]
+        assert [course.name for course in membership.courses(session)] == ["Robotics"]
     # The same people again, and a course of the same title in another context.
     _launch(web, platform, "grace", INSTRUCTOR)
     _, answer = _launch(web, platform, "grace", INSTRUCTOR, **{f"{CLAIM}context": {"id": "c2", "title": "Robotics"}})
     assert answer.headers["location"] == "/courses/2/batches"
     with web.store.reading() as session:
-        assert [course.name for course in people.courses(session)] == ["Robotics", "Robotics (2)"]
-        (first,), (second,) = ([each for each in people.members(session, n) if each.id == "grace"] for n in (1, 2))
+        assert [course.name for course in membership.courses(session)] == ["Robotics", "Robotics (2)"]
+        (first,), (second,) = ([each for each in membership.members(session, n) if each.id == "grace"] for n in (1, 2))
         assert first.person_id == second.person_id
 
 
@@ -220,7 +220,7 @@ def test_nobody_becomes_somebody_else_by_an_id_that_a_platform_tells(
         assert "Somebody else is called" in refused.text
         assert browser.get("/account").status_code == 303
     with web.store.reading() as session:
-        assert {each.id: each.name for each in people.members(session, 1)}["alan"] == "Alan"
+        assert {each.id: each.name for each in membership.members(session, 1)}["alan"] == "Alan"
 
 
 def test_what_a_platform_lists_wrongly_is_passed_over(launched: tuple[Web, LearningPlatform]) -> None:
@@ -251,7 +251,7 @@ def test_members_are_enrolled_and_published_marks_sent(launched: tuple[Web, Lear
     answer = grace.post("/courses/1/platform/members", data={CSRF_FIELD: word})
     assert "3 of the platform&#39;s members" in answer.text, answer.text
     with web.store.reading() as session:
-        assert [each.name for each in people.members(session, 1)] == ["Bob Example", "Ada Example", "Grace Example"]
+        assert [each.name for each in membership.members(session, 1)] == ["Bob Example", "Ada Example", "Grace Example"]
     requests = [grading_request("ada"), grading_request("unknown")]
     intake.accept_batch(web.store, "b", requests, (), course="Robotics", max_attempts=3)
     while claim := jobs.claim(web.store, "worker", 60):

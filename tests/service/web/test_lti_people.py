@@ -23,14 +23,14 @@ from service.lti.services import Score
 from service.store.batches import intake
 from service.store.engine import Store, now
 from service.store.models import Course, Enrolment, Person
-from service.store.people import credentials, lti, people
+from service.store.people import credentials, lti, membership
 from service.store.people.credentials import Reach
 from service.store.people.lti import CourseLink, Launched, Platform
 from service.store.people.students import Students
 from service.store.states import CredentialKind, Role
 from service.store.web_tables import Credential, LtiCourse, LtiPerson
 from sim.errors import UsageError
-from submissions.people import Student
+from submissions.student_identity import Student
 
 INSTRUCTOR, STUDENT = Role.INSTRUCTOR, Role.STUDENT
 SCORE = Score("ada", Decimal(1), Decimal(1), datetime(2030, 1, 1, tzinfo=UTC))
@@ -84,7 +84,7 @@ def test_a_person_known_from_one_course_takes_nobodys_place_in_another(store: St
             launch(store, platform, "mallory", context="c2", id=id)
     with store.reading() as session:
         assert victim is not None
-        found = {each.id: (each.person_id, each.role) for each in people.members(session, victim.course_id)}
+        found = {each.id: (each.person_id, each.role) for each in membership.members(session, victim.course_id)}
         assert found["victim"] == (victim.person_id, STUDENT)
         assert found["grace"][1] is INSTRUCTOR
     # An id that nobody has is theirs.
@@ -128,9 +128,9 @@ def test_who_has_a_place_keeps_it(store: Store, platform: Platform, who: str) ->
         elif who == "instructs":
             row.role = INSTRUCTOR
         elif who == "operator":
-            people.make_operator(session, row.person_id)
+            membership.make_operator(session, row.person_id)
         elif who == "elsewhere":
-            other = people.make_student(session, "another", Student("ada"))
+            other = membership.make_student(session, "another", Student("ada"))
             session.get_one(Enrolment, other.enrolment_id).person_id = row.person_id
         person_id, role = row.person_id, row.role
     if who == "other platform":
@@ -147,17 +147,17 @@ def test_who_has_a_place_keeps_it(store: Store, platform: Platform, who: str) ->
 def test_an_instructor_on_a_platform_is_no_instructor_of_a_later_course(store: Store, platform: Platform) -> None:
     mallory = launch(store, platform, "mallory", INSTRUCTOR, id="dean")
     with store.transaction() as session:
-        dean = people.make_instructor(session, "Exam", Student("dean"))
+        dean = membership.make_instructor(session, "Exam", Student("dean"))
     assert mallory is not None
     assert dean.person_id != mallory.person_id
     with store.reading() as session:
-        assert [course for course, _ in people.enrolments(session, mallory.person_id)] == ["Robotics"]
+        assert [course for course, _ in membership.enrolments(session, mallory.person_id)] == ["Robotics"]
 
 
 def test_a_platform_makes_no_course_that_is_the_installations_own(store: Store, platform: Platform) -> None:
     launch(store, platform, "root", INSTRUCTOR, title="default")
     with store.reading() as session:
-        assert [each.name for each in people.courses(session)] == ["default (2)"]
+        assert [each.name for each in membership.courses(session)] == ["default (2)"]
 
 
 def test_launches_at_once_make_one_course_and_one_person(store: Store, platform: Platform) -> None:
@@ -165,7 +165,7 @@ def test_launches_at_once_make_one_course_and_one_person(store: Store, platform:
         found = set(pool.map(lambda _: launch(store, platform, "grace", INSTRUCTOR), range(8)))
     assert len(found) == 1
     with store.reading() as session:
-        assert len(people.members(session, 1)) == 1
+        assert len(membership.members(session, 1)) == 1
 
 
 def test_two_deployments_share_no_course(store: Store, platform: Platform) -> None:

@@ -22,7 +22,7 @@ from service.store.courses.policies import PolicyLimits
 from service.store.courses.versions import freeze
 from service.store.grades import results
 from service.store.models import Job
-from service.store.people.people import Member
+from service.store.people.membership import Member
 from service.store.queue import jobs, workers
 from service.store.queue.workers import WorkerDescription
 from service.store.states import JobState

@@ -7,7 +7,7 @@ from starlette.testclient import TestClient
 from builders import grading_request
 from service.store import audit
 from service.store.batches import intake
-from service.store.people import people
+from service.store.people import membership
 from web import COURSE, Web, submit, words
 
 HOME = "/courses/1"
@@ -52,7 +52,7 @@ def test_who_has_submitted_nothing_is_taken_out_of_the_course(web: Web, grace: T
     assert grace.get(mistyped).status_code == 404
     intake.accept(web.store, grading_request("ada"), course=COURSE, max_attempts=3)
     with web.store.reading() as session:
-        ada = f"{HOME}/people/{people.member(session, COURSE, 'ada').enrolment_id}"
+        ada = f"{HOME}/people/{membership.member(session, COURSE, 'ada').enrolment_id}"
     assert f"{ada}/remove" not in grace.get(ada).text
     assert submit(grace, f"{ada}/remove").status_code == 422
     assert submit(grace, f"{HOME}/people/{web.instructor('linus').enrolment_id}/remove").status_code == 404
@@ -63,5 +63,5 @@ def test_no_instructor_makes_a_link_for_another_or_for_who_is_more(web: Web, gra
     assert submit(grace, f"{HOME}/people/{other.enrolment_id}/link").status_code == 404
     ada = web.student()
     with web.store.transaction() as session:
-        people.make_operator(session, ada.person_id)
+        membership.make_operator(session, ada.person_id)
     assert submit(grace, f"{HOME}/people/{ada.enrolment_id}/link").status_code == 422

@@ -18,16 +18,16 @@ from service.operations.context import Actor
 from service.operations.scopes import SCOPES
 from service.store.engine import now
 from service.store.models import Enrolment
-from service.store.people import credentials, lti, people
+from service.store.people import credentials, lti, membership
 from service.store.people.credentials import MOST_SESSIONS, MOST_TOKENS, Reach
-from service.store.people.people import Member
+from service.store.people.membership import Member
 from service.store.people.students import Students
 from service.store.states import CredentialKind, Role
 from service.store.web_tables import LtiCourse, LtiPerson
 from service.web.access import SESSION_COOKIE
 from service.web.page_scopes import scope_of_page
 from sim.errors import UsageError
-from submissions.people import Student
+from submissions.student_identity import Student
 from web import Web, csrf, submit, words
 
 EVERY_SCOPE = tuple(SCOPES)
@@ -36,7 +36,7 @@ EVERY_SCOPE = tuple(SCOPES)
 def also_in(web: Web, member: Member, course: str, role: Role) -> Member:
     """The same person in another course."""
     with web.store.transaction() as session:
-        other = (people.make_student if role is Role.STUDENT else people.make_instructor)(
+        other = (membership.make_student if role is Role.STUDENT else membership.make_instructor)(
             session, course, Student(f"{member.id}-{course}", "Also Ada")
         )
     web.join(member, other)
@@ -82,11 +82,11 @@ def test_an_instructors_link_reaches_one_course_and_one_role(web: Web, grace: Te
     second = sign_in(web, token["authorization"].removeprefix("Bearer "))
     unused = instructors_link(web, grace, ada)
     with web.store.transaction() as session:
-        elsewhere = people.make_student(session, "two", Student("ada"))
-        staff = people.make_instructor(session, "three", Student("ada"))
+        elsewhere = membership.make_student(session, "two", Student("ada"))
+        staff = membership.make_instructor(session, "three", Student("ada"))
         for each in (elsewhere, staff):
             session.get_one(Enrolment, each.enrolment_id).person_id = ada.person_id
-        people.make_operator(session, ada.person_id)
+        membership.make_operator(session, ada.person_id)
     for signed_in in (browser, second, sign_in(web, unused)):
         assert signed_in.get("/courses/1/mine").status_code == 200
         assert signed_in.get("/courses/2/mine").status_code == 404
@@ -107,7 +107,7 @@ def test_links_for_a_whole_course_reach_as_far(web: Web, ada: Member) -> None:
     (made,) = web.browser().post("/api/v1/courses/1/people/links", headers=token).json()["links"]
     browser = sign_in(web, made["path"].rpartition("/")[2])
     with web.store.transaction() as session:
-        other = people.make_student(session, "two", Student("ada"))
+        other = membership.make_student(session, "two", Student("ada"))
         session.get_one(Enrolment, other.enrolment_id).person_id = ada.person_id
     assert browser.get("/courses/1/mine").status_code == 200
     assert browser.get("/courses/2/mine").status_code == 404
@@ -116,7 +116,7 @@ def test_links_for_a_whole_course_reach_as_far(web: Web, ada: Member) -> None:
 def test_a_token_opens_no_browser_that_may_more(web: Web) -> None:
     root = web.operator()
     with web.store.transaction() as session:
-        course = people.make_instructor(session, "A", Student("root"))
+        course = membership.make_instructor(session, "A", Student("root"))
         session.get_one(Enrolment, course.enrolment_id).person_id = root.person_id
     scopes = frozenset({"read", "sign-in"})
     secret = credential(web, root, CredentialKind.TOKEN, course_id=course.course_id, scopes=scopes)
@@ -173,8 +173,8 @@ def test_a_platforms_session_reaches_the_platforms_courses(web: Web) -> None:
     with web.store.transaction() as session:
         urls = ("https://p.example.org/a", "https://p.example.org/t", "https://p.example.org/k")
         platform = lti.register(session, "Moodle", "i", "c", ["1"], *urls)
-        local = people.make_instructor(session, "local", Student("root"))
-        launched = people.make_instructor(session, "launched", Student("root"))
+        local = membership.make_instructor(session, "local", Student("root"))
+        launched = membership.make_instructor(session, "launched", Student("root"))
         for each in (local, launched):
             session.get_one(Enrolment, each.enrolment_id).person_id = member.person_id
         session.add(LtiCourse(platform_id=platform, deployment="1", context="c", course_id=launched.course_id))
@@ -235,7 +235,7 @@ def test_the_loss_of_a_role_ends_what_reaches_the_course(web: Web, how: str) -> 
     linus = web.instructor("linus")
     elsewhere = credential(web, web.student("x", "two"), CredentialKind.TOKEN, scopes=frozenset({"read"}))
     with web.store.transaction() as session:
-        two = people.make_student(session, "two", Student("linus2"))
+        two = membership.make_student(session, "two", Student("linus2"))
         session.get_one(Enrolment, two.enrolment_id).person_id = linus.person_id
     browser, link = web.browser(linus), web.link(linus)
     tokens = {
@@ -244,9 +244,9 @@ def test_the_loss_of_a_role_ends_what_reaches_the_course(web: Web, how: str) -> 
     }
     with web.store.transaction() as session:
         if how == "command":
-            people.make_student(session, "default", Student("linus"))
+            membership.make_student(session, "default", Student("linus"))
         elif how == "platform":
-            people.set_role(session, session.get_one(Enrolment, linus.enrolment_id), Role.STUDENT)
+            membership.set_role(session, session.get_one(Enrolment, linus.enrolment_id), Role.STUDENT)
     if how == "removed":
         root = web.browser(web.operator())
         assert root.get("/operator").status_code == 200
@@ -299,7 +299,7 @@ def test_a_name_is_that_of_its_course(web: Web, grace: TestClient, ada: Member) 
     table = {"file": ("x.csv", b"id,name,email\nada,Renamed,renamed@example.org\n")}
     assert submit(grace, "/courses/1/people/table", files=table).status_code == 303
     with web.store.reading() as session:
-        found = {each.course_id: (each.name, each.email) for _, each in people.enrolments(session, ada.person_id)}
+        found = {each.course_id: (each.name, each.email) for _, each in membership.enrolments(session, ada.person_id)}
     assert found == {1: ("Renamed", "renamed@example.org"), other.course_id: ("Also Ada", "")}
     linus = web.browser(web.instructor("linus", "two"))
     assert "Renamed" not in linus.get(f"/courses/{other.course_id}/people").text
@@ -382,7 +382,7 @@ def test_an_operator_joins_two_whom_the_form_names(web: Web) -> None:
     assert browser.get("/account").status_code == 303
     with web.store.reading() as session:
         person_id = session.get_one(Enrolment, second).person_id
-        assert [course for course, _ in people.enrolments(session, person_id)] == ["one", "two"]
+        assert [course for course, _ in membership.enrolments(session, person_id)] == ["one", "two"]
     assert root.post(f"/operator/people/{second}/join", data=data).status_code == 409
 
 

@@ -15,7 +15,7 @@ from fastapi.routing import iter_route_contexts
 from starlette.testclient import TestClient
 
 from paths import DATA
-from service.store.people.people import Member
+from service.store.people.membership import Member
 from service.web import api_routes, request_bodies
 from service.web.request_bodies import LARGEST_FORM
 from sim.readers.json_text import read_json

@@ -9,12 +9,12 @@ import pytest
 from sqlalchemy import select
 
 from command import robomark
-from service.store.people import credentials, people
+from service.store.people import credentials, membership
 from service.store.states import CredentialKind, Role
 from service.store.web_tables import Credential
 from service.web.access import SESSION_COOKIE
 from sim.errors import UsageError
-from submissions.people import Student
+from submissions.student_identity import Student
 from web import Web, csrf, submit
 
 
@@ -120,9 +120,9 @@ def test_wrong_links_keep_nobody_out(web: Web) -> None:
 
 def test_an_instructor_of_two_courses_is_one_person_once_an_operator_joins_them(web: Web) -> None:
     with web.store.transaction() as session:
-        first = people.make_instructor(session, "one", Student("grace"))
-        second = people.make_instructor(session, "two", Student("grace"))
-        other = people.make_student(session, "two", Student("ada"))
+        first = membership.make_instructor(session, "one", Student("grace"))
+        second = membership.make_instructor(session, "two", Student("grace"))
+        other = membership.make_student(session, "two", Student("ada"))
     assert first.person_id != second.person_id
     assert other.role is Role.STUDENT
     web.join(first, second)

@@ -10,7 +10,7 @@ from sqlalchemy import select
 from starlette.testclient import TestClient
 
 from service.store import audit
-from service.store.people import people
+from service.store.people import membership
 from service.store.web_tables import Credential
 from web import Web, submit
 
@@ -64,7 +64,7 @@ def test_a_whole_course_has_its_links_in_one_table(web: Web, grace: TestClient) 
     members = {who: web.student(who) for who in ("ada", "bob", "=cmd()")}
     elsewhere = web.student("dan")
     with web.store.transaction() as session:
-        people.make_operator(session, elsewhere.person_id)
+        membership.make_operator(session, elsewhere.person_id)
     before = web.link(members["ada"])
     answer = submit(grace, f"{PEOPLE}/links", {"days": "3"})
     assert answer.headers["content-disposition"].startswith("attachment")

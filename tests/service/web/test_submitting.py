@@ -27,7 +27,7 @@ from service.store.courses.versions import freeze
 from service.store.grades import comments
 from service.store.models import Job, SubmissionRow
 from service.store.people import credentials
-from service.store.people.people import Member
+from service.store.people.membership import Member
 from service.store.people.students import course_of
 from service.store.queue import jobs
 from service.store.states import CredentialKind, JobState, Lane

@@ -22,7 +22,7 @@ from service.store.courses.versions import freeze
 from service.store.engine import now
 from service.store.models import Batch, Job
 from service.store.people import webhooks
-from service.store.people.people import Member
+from service.store.people.membership import Member
 from service.store.states import JobState
 from sim.errors import UsageError
 from web import Web, grade_all, submit

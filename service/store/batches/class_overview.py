@@ -19,7 +19,7 @@ from service.store.courses.hidden_names import HiddenNames
 from service.store.grades.marked import marked
 from service.store.models import Enrolment, SubmissionRow
 from service.store.states import JobState, Role
-from submissions.people import Student
+from submissions.student_identity import Student
 
 
 @dataclass(frozen=True, slots=True)

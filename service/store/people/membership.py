@@ -18,7 +18,7 @@ from service.store.states import Role
 from service.store.web_tables import Credential, LtiPerson
 from sim.errors import UsageError
 from submissions.names import shown_name
-from submissions.people import Student
+from submissions.student_identity import Student
 
 
 @dataclass(frozen=True, slots=True)
