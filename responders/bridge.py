@@ -163,7 +163,7 @@ class Bridge:
     def _act(self, acts: Sequence[packed.Act]) -> None:
         drive = self.world.drive
         for kind, number in acts:
-            if type(kind) is packed.Move:
+            if type(kind) is packed.MotorCommand:
                 self._free_act()
                 port, set_point, command = kind
                 wheel = drive.left if port == "outB" else drive.right

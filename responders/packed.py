@@ -25,7 +25,7 @@ class Wait(NamedTuple):
     """So much time is to pass, thirds of a microsecond."""
 
 
-class Move(NamedTuple):
+class MotorCommand(NamedTuple):
     """A motor's set point becomes this (unless it is empty), then a command begins (unless it is None)."""
 
     port: str
@@ -33,7 +33,7 @@ class Move(NamedTuple):
     command: str | None
 
 
-Kind = Read | Wait | Move
+Kind = Read | Wait | MotorCommand
 Act = tuple[Kind, float]
 
 #: What a packet begins with, where a line begins with a brace.
@@ -58,7 +58,7 @@ _KINDS: dict[int, tuple[Kind, float, float, bool]] = {
     _code(_WAIT): (Wait(), 0, MOST_UNITS, True),
     **{_code(_READ, part): (Read(what), 1, 2, True) for part, what in enumerate(SENSORS)},
     **{
-        _code(_MOVE, part, place, number): (Move(port, set_point, command), -LARGEST, LARGEST, False)
+        _code(_MOVE, part, place, number): (MotorCommand(port, set_point, command), -LARGEST, LARGEST, False)
         for (part, port), (place, set_point), (number, command) in itertools.product(
             enumerate(_PORTS), enumerate(_SET_POINTS), enumerate(_COMMANDS)
         )

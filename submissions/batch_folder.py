@@ -18,7 +18,7 @@ from submissions.assignment.definition import Assignment
 from submissions.assignment.folder import catalogue
 from submissions.assignment.reader import find_assignment, find_in_catalogue, read_assignment
 from submissions.bundle import fit_parts, read_submission, submission_of
-from submissions.downloads import IGNORED, StudentFiles, is_one_students, student_files
+from submissions.downloads import IGNORED, DownloadedFiles, is_one_students, student_files
 from submissions.grading_request import GradingRequest
 from submissions.names import LONGEST_NAME, alike, cannot_be_told, shown_name
 from submissions.raw_files import read_listed, shown
@@ -166,7 +166,7 @@ def _one_each(rows: Sequence[_Row], found: Sequence[GradingRequest | str]) -> li
 
 
 def _request(
-    found: StudentFiles, folder: str, asked: Assignment | None, find: Callable[[str], Assignment], student: Student
+    found: DownloadedFiles, folder: str, asked: Assignment | None, find: Callable[[str], Assignment], student: Student
 ) -> GradingRequest:
     length = len(shown_name(student.id))
     if not 0 < length <= LONGEST_NAME:
@@ -180,7 +180,7 @@ def _request(
     return GradingRequest(submission, own, found.source, found.submitted_at, student)
 
 
-def _submission(found: StudentFiles, folder: str, asked: Assignment | None, student: Student) -> Submission:
+def _submission(found: DownloadedFiles, folder: str, asked: Assignment | None, student: Student) -> Submission:
     parts = None if asked is None else asked.parts
     if isinstance(found.files, Path):
         return read_submission(found.files, student=student.id, asked=parts)
@@ -207,7 +207,7 @@ def _roster_assignment(folder: Path, name: str) -> Assignment:
     return read_assignment(path) if path.is_dir() else find_assignment(name)
 
 
-def _found(folder: Path, asked: Assignment | None) -> list[StudentFiles]:
+def _found(folder: Path, asked: Assignment | None) -> list[DownloadedFiles]:
     """What lies there; of several assignments that a platform keeps together, what is for the one asked for."""
     found = student_files(folder)
     parts = [entry.name for entry in folder.iterdir() if entry.name.lower() in _PARTS]

@@ -25,7 +25,7 @@ _NBGRADER, _NBGRADER_TIME = "submitted", "timestamp.txt"
 
 
 @dataclass(frozen=True, slots=True)
-class StudentFiles:
+class DownloadedFiles:
     """What lies there of one student, and who that is as it is written there; with a ``problem`` it cannot be used.
 
     ``files`` is a file or folder, or files by the names that the student gave them.
@@ -40,7 +40,7 @@ class StudentFiles:
     problem: str = ""
 
 
-def student_files(folder: Path) -> list[StudentFiles]:
+def student_files(folder: Path) -> list[DownloadedFiles]:
     """What lies in a folder, a row for each student.
 
     Raises UsageError where the platform's own list of it cannot be read.
@@ -55,7 +55,7 @@ def student_files(folder: Path) -> list[StudentFiles]:
         return list(_nbgrader(entries))
     moodle = {entry: found for entry in entries if (found := _MOODLE.fullmatch(entry.name))}
     plain = [
-        StudentFiles(shown(entry.name), Student(named_by(entry)), entry) for entry in entries if entry not in moodle
+        DownloadedFiles(shown(entry.name), Student(named_by(entry)), entry) for entry in entries if entry not in moodle
     ]
     return [*_moodle(moodle), *plain]
 
@@ -75,7 +75,7 @@ def _visible(folder: Path) -> list[Path]:
     return sorted(entry for entry in folder.iterdir() if not entry.name.startswith(".") and entry.name not in IGNORED)
 
 
-def _moodle(found: Mapping[Path, re.Match[str]]) -> Iterator[StudentFiles]:
+def _moodle(found: Mapping[Path, re.Match[str]]) -> Iterator[DownloadedFiles]:
     """A row for each number: its folder, or the files that begin with it."""
     by_number: dict[str, list[Path]] = {}
     for path, match in found.items():
@@ -93,10 +93,10 @@ def _moodle(found: Mapping[Path, re.Match[str]]) -> Iterator[StudentFiles]:
         # Its own name, so that sentences speak of that; shortened, it would lose the number.
         own_name = folders[0].name if len(folders) == 1 else ""
         source = own_name if own_name == shown(own_name) != "" else f"{shown(names[number])}_{number}_{_SUFFIX}"
-        yield StudentFiles(source, student, folders[0] if len(folders) == 1 else files, number, problem=problem)
+        yield DownloadedFiles(source, student, folders[0] if len(folders) == 1 else files, number, problem=problem)
 
 
-def _gradescope(folder: Path, entries: Sequence[Path]) -> Iterator[StudentFiles]:
+def _gradescope(folder: Path, entries: Sequence[Path]) -> Iterator[DownloadedFiles]:
     """A row for each of those who submitted something together."""
     # Only for who has such a list.
     from submissions.gradescope_list import read_list
@@ -111,7 +111,7 @@ def _gradescope(folder: Path, entries: Sequence[Path]) -> Iterator[StudentFiles]
             problem = f"is in {_GRADESCOPE_LIST} and not beside it, expected a folder of that name."
         when = own.get(":created_at") if isinstance(own, dict) else None
         for student in submitters or [NOBODY]:
-            yield StudentFiles(shown(name), student, folder / name, submitted_at=_moment(when), problem=problem)
+            yield DownloadedFiles(shown(name), student, folder / name, submitted_at=_moment(when), problem=problem)
 
 
 def _submitters(own: object) -> Iterator[Student]:
@@ -148,14 +148,14 @@ def _is_nbgrader(folder: Path, entries: Sequence[Path]) -> bool:
     return bool(inside) and folders_alone and (timed or folder.name == _NBGRADER)
 
 
-def _nbgrader(entries: Sequence[Path]) -> Iterator[StudentFiles]:
+def _nbgrader(entries: Sequence[Path]) -> Iterator[DownloadedFiles]:
     for student in entries:
         for own in _visible(student):
             files = {path.name: path for path in _visible(own) if path.name != _NBGRADER_TIME and not path.is_dir()}
             stamp = own / _NBGRADER_TIME
             when = _beginning(stamp) if stamp.is_file() else ""
             source = shown(f"{student.name}/{own.name}")
-            yield StudentFiles(source, Student(student.name), files, assignment=own.name, submitted_at=_moment(when))
+            yield DownloadedFiles(source, Student(student.name), files, assignment=own.name, submitted_at=_moment(when))
 
 
 def _is_folder(path: Path) -> bool:

@@ -20,7 +20,7 @@ class StrictTable(BaseModel):
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class Entries:
     """Part of the type of a list of fixed length: what its entries are, in words, for who writes too few or many."""
 
     words: str

@@ -14,7 +14,7 @@ from decimal import Decimal
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.guessable import find_guessable_reports
-from service.grading.judging.words import fault_words
+from service.grading.judging.message_parts import fault_words
 from service.grading.statistics import MarkedSubmission, marked_of
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError

@@ -12,7 +12,7 @@ from responders.message_format import JSON
 from service.grading.hint_clues import LONGEST_TEXT, Clues
 from service.grading.hint_rules import RETURNS, where_returned
 from service.grading.hint_texts import Wanted, is_near, where_written
-from service.grading.judging.words import quoted
+from service.grading.judging.message_parts import quoted
 from submissions.submission import Part
 
 _QUOTED = re.compile(r'"([^"]{6,60})"')

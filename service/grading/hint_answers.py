@@ -15,7 +15,7 @@ from service.grading.grade import CriterionResult
 from service.grading.hint_clues import Clues
 from service.grading.hint_code import joined
 from service.grading.hint_rules import RETURNS, where_returned
-from service.grading.judging.words import quoted
+from service.grading.judging.message_parts import quoted
 from sim.readers.json_text import read_json
 from sim.readers.unreadable import Unreadable
 from submissions.criteria.coping import FreshAnswers, Resends

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
 
 from service.grading.grade import CriterionResult, TrialResult
-from service.grading.hint_code import Code, read_code
+from service.grading.hint_code import CodeStatements, read_code
 from service.grading.run_plan import RunPlan
 from sim.errors import UsageError
 from sim.recorded import faults_of, stood_still
@@ -36,7 +36,7 @@ class Listing:
     name: str
     part: Part | None
     lines: tuple[str, ...]
-    code: Code = field(default_factory=Code)
+    code: CodeStatements = field(default_factory=CodeStatements)
 
     def find(self, pattern: re.Pattern[str], start: int = 0) -> int | None:
         """The number, from 1, of the first line after ``start`` that has it."""

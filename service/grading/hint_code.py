@@ -21,7 +21,7 @@ _OPENING, _CLOSING = frozenset("([{"), frozenset(")]}")
 
 
 @dataclass(frozen=True, slots=True)
-class Called:
+class CallInCode:
     """One call in a statement: ``name`` is dotted, ``arguments`` are the tokens of each argument."""
 
     name: str
@@ -71,7 +71,7 @@ class Statement:
         return frozenset(_bound(self.tokens))
 
     @property
-    def calls(self) -> tuple[Called, ...]:
+    def calls(self) -> tuple[CallInCode, ...]:
         """The calls in it, from the left."""
         return tuple(_calls(self.tokens)) if self.keyword not in ("def", "class") else ()
 
@@ -84,7 +84,7 @@ _WITH_BODY = frozenset({"while", "for", "if", "elif", "else", "def", "class", "w
 
 
 @dataclass(frozen=True, slots=True)
-class Code:
+class CodeStatements:
     """The statements of one text, in order."""
 
     statements: tuple[Statement, ...] = ()
@@ -152,7 +152,7 @@ class Code:
         return _as_number(tokens[0], sign)
 
 
-def read_code(lines: Sequence[str]) -> Code:
+def read_code(lines: Sequence[str]) -> CodeStatements:
     """Split a text into statements; what the tokenizer cannot take ends them. Magic lines are left out."""
     text = "\n".join("#" if _MAGIC.match(line) else line for line in lines) + "\n"
     found: list[Statement] = []
@@ -162,7 +162,7 @@ def read_code(lines: Sequence[str]) -> Code:
             open_blocks.pop()
         found.append(replace(each, number=number, parent=open_blocks[-1].number if open_blocks else -1))
         open_blocks.append(found[-1])
-    return Code(tuple(found))
+    return CodeStatements(tuple(found))
 
 
 def result_of(body: Sequence[Statement]) -> str:
@@ -259,14 +259,14 @@ def _targets(tokens: Sequence[str]) -> Iterator[str]:
         )
 
 
-def _calls(tokens: Sequence[str]) -> Iterator[Called]:
+def _calls(tokens: Sequence[str]) -> Iterator[CallInCode]:
     for place, token in enumerate(tokens[:-1]):
         if tokens[place + 1] != "(" or not is_name(token) or token in ("and", "or", "not", "in", "if", "while"):
             continue
         begin = place
         while begin >= 2 and tokens[begin - 1] == "." and is_name(tokens[begin - 2]):
             begin -= 2
-        yield Called("".join(tokens[begin : place + 1]), tuple(_arguments(tokens[place + 2 :])))
+        yield CallInCode("".join(tokens[begin : place + 1]), tuple(_arguments(tokens[place + 2 :])))
 
 
 def _arguments(tokens: Sequence[str]) -> Iterator[tuple[str, ...]]:

@@ -28,7 +28,7 @@ from service.grading.hint_names import (
 )
 from service.grading.hint_rules import RETURNS, where_returned
 from service.grading.hint_syntax import of_syntax
-from service.grading.judging.words import quoted
+from service.grading.judging.message_parts import quoted
 from sim.recorded import faults_of
 from sim.recording import Fault, Verdict
 from submissions.raw_files import shown

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 
 from service.grading.hint_advice import AMOUNTS, MOVES_FOR, PROPERTIES, READINGS
 from service.grading.hint_clues import Clues, Listing, listing_of, place_of
-from service.grading.hint_code import Code, Statement, is_name, joined
+from service.grading.hint_code import CodeStatements, Statement, is_name, joined
 from sim.recorded import faults_of
 from sim.recording import Fault, Verdict
 
@@ -70,7 +70,7 @@ def _reason(fault: Fault, listing: Listing, statement: Statement, clues: Clues) 
     )
 
 
-def _wait_for(loop: Statement, code: Code, fault: Fault) -> str:
+def _wait_for(loop: Statement, code: CodeStatements, fault: Fault) -> str:
     if fault.verdict is Verdict.CPU_LIMIT and fault.who != "responder" and not _waits(loop, code):
         return "Nothing in it waits, so the robot cannot move. Add time.sleep(0.1), or read a sensor, in the loop"
     if fault.who == "responder":
@@ -78,7 +78,7 @@ def _wait_for(loop: Statement, code: Code, fault: Fault) -> str:
     return "Check when its condition becomes false, or end it with break"
 
 
-def too_large_amount(code: Code, statement: Statement, least: float) -> str:
+def too_large_amount(code: CodeStatements, statement: Statement, least: float) -> str:
     """That a call asks for a time or an amount in the wrong unit; empty where it does not."""
     for call in statement.calls:
         known = AMOUNTS.get(call.name.rpartition(".")[2])
@@ -97,7 +97,7 @@ def too_large_amount(code: Code, statement: Statement, least: float) -> str:
     return ""
 
 
-def _endless(loop: Statement, code: Code, listing: Listing, fault: Fault) -> str:
+def _endless(loop: Statement, code: CodeStatements, listing: Listing, fault: Fault) -> str:
     """Why a loop does not end; empty where that is not plain."""
     body = code.body(loop)
     where = listing.at(loop.line)
@@ -175,7 +175,7 @@ def _direction(statement: Statement, name: str) -> str:
 _AWAY = {">": "+", ">=": "+", "<": "-", "<=": "-"}
 
 
-def _read_before(loop: Statement, body: Sequence[Statement], code: Code) -> str:
+def _read_before(loop: Statement, body: Sequence[Statement], code: CodeStatements) -> str:
     """A reading that the loop uses and that was taken only once, before it."""
     if any(_reads(each) for each in body):
         return ""
@@ -204,7 +204,7 @@ def _end_it(body: Sequence[Statement], fault: Fault) -> str:
     return "End it with break, write a condition that reads a sensor, or remove the loop"
 
 
-def without_effect(statement: Statement, code: Code) -> str:
+def without_effect(statement: Statement, code: CodeStatements) -> str:
     """That a statement computes something and keeps nothing; empty where it has an effect."""
     tokens = statement.tokens
     if _has_turned_operator(statement, code):
@@ -216,7 +216,7 @@ def without_effect(statement: Statement, code: Code) -> str:
     return f"{joined(tokens)} has no effect" if plain and tokens[0] not in _STATEMENTS else ""
 
 
-def _has_turned_operator(statement: Statement, code: Code) -> bool:
+def _has_turned_operator(statement: Statement, code: CodeStatements) -> bool:
     """Whether ``count =- 1`` is written so, with these blanks, in a loop, for a variable that has a number before."""
     tokens, columns, name = statement.tokens, statement.columns, statement.target
     if len(tokens) != 4 or not name or name.isupper() or tokens[2] not in ("+", "-"):
@@ -239,7 +239,7 @@ def fix_effect(statement: Statement) -> str:
     return f"Write {tokens[0]} = {joined(tokens)}"
 
 
-def always_true(condition: Sequence[str], code: Code) -> str:
+def always_true(condition: Sequence[str], code: CodeStatements) -> str:
     """Why a comparison of a reading with a number always holds; empty where it may not."""
     place = next((at for at, token in enumerate(condition) if token in ("<", ">", "<=", ">=")), None)
     if place is None or any(token in ("and", "or", "not") for token in condition):
@@ -259,13 +259,13 @@ def always_true(condition: Sequence[str], code: Code) -> str:
     return f"{what} is always true, because {name} {unit}. {better}"
 
 
-def reading_in(tokens: Sequence[str], code: Code) -> str:
+def reading_in(tokens: Sequence[str], code: CodeStatements) -> str:
     """The reading that the one token is, or that the name was assigned; empty where it is neither."""
     name = tokens[-1] if tokens and tokens[-1] in READINGS else _source(tokens, code)
     return name if name in READINGS else ""
 
 
-def _source(tokens: Sequence[str], code: Code) -> str:
+def _source(tokens: Sequence[str], code: CodeStatements) -> str:
     """The last token of what a name was assigned."""
     if len(tokens) != 1:
         return ""
@@ -273,7 +273,7 @@ def _source(tokens: Sequence[str], code: Code) -> str:
     return given.tokens[-1] if given is not None else ""
 
 
-def _unchanged(names: Sequence[str], loop: Statement, code: Code, calls: set[str]) -> str:
+def _unchanged(names: Sequence[str], loop: Statement, code: CodeStatements, calls: set[str]) -> str:
     listed = " and ".join(names[:2])
     change = "does not change" if len(names) == 1 else "do not change"
     for name in names:
@@ -289,6 +289,6 @@ def _reads(statement: Statement) -> bool:
     return any(token in PROPERTIES or token in ("get_clock", "pyState") for token in statement.tokens)
 
 
-def _waits(loop: Statement, code: Code) -> bool:
+def _waits(loop: Statement, code: CodeStatements) -> bool:
     """Whether a loop does what takes simulated time: the state of a motor is read for nothing."""
     return any(token in _WAITS for each in (loop, *code.body(loop)) for token in each.tokens)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 from service.grading.hint_advice import MOVES_FOR, MOVES_ON, PROPERTIES, READINGS
 from service.grading.hint_clues import Clues, Listing
-from service.grading.hint_code import Called, Statement, joined
+from service.grading.hint_code import CallInCode, Statement, joined
 from service.grading.hint_loops import too_large_amount
 from service.grading.hint_structure import DRIVEN, moves, statements_of
 from submissions.criteria import Criterion
@@ -205,7 +205,7 @@ def _asks_straight(criterion: object) -> bool:
     )
 
 
-def _turning(clues: Clues) -> Iterator[tuple[Listing, Statement, Called]]:
+def _turning(clues: Clues) -> Iterator[tuple[Listing, Statement, CallInCode]]:
     """The calls that turn the robot by an amount."""
     for listing, each in statements_of(clues):
         for call in each.calls:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 
 from service.grading.grade import Accuracy, CriterionResult
 from service.grading.hint_clues import Clues
-from service.grading.judging.words import quoted
+from service.grading.judging.message_parts import quoted
 
 _RIGHT = re.compile(r"""["']right["']|\bright(?:_\w*)?im(?:g|age)\w*|\bright_\w+""")
 _LEFT = re.compile(r"""["']left["']|\bleft(?:_\w*)?im(?:g|age)\w*|\bleft_\w+""")

@@ -13,7 +13,7 @@ from service.grading.hint_clues import Clues
 from service.grading.hint_code import LOOPS, Statement, joined
 from service.grading.hint_slips import show_arguments
 from service.grading.hint_structure import moves, statements_of
-from service.grading.judging.words import quoted
+from service.grading.judging.message_parts import quoted
 from sim.recording import Verdict
 from submissions.criteria.logged import Datalog
 from submissions.criteria.motion import Encounters

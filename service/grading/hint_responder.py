@@ -14,7 +14,7 @@ from service.grading.hint_clues import Clues
 from service.grading.hint_code import Statement, joined
 from service.grading.hint_files import of_redefined
 from service.grading.hint_rules import of_answers, where_returned
-from service.grading.judging.words import quoted
+from service.grading.judging.message_parts import quoted
 from submissions.raw_files import shown
 
 _MISSING = "there is no responder: "

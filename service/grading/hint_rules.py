@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from responders.message_format import IMG_DATA, JSON, PY, kind
 from service.grading.hint_clues import Clues, Listing, name_of
-from service.grading.judging.words import quoted
+from service.grading.judging.message_parts import quoted
 from submissions.bundle import meant_as
 from submissions.magic_lines import magic_place
 from submissions.marked_cell import NEARLY_MAGIC

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from service.grading.hint_advice import READINGS
 from service.grading.hint_clues import Clues, Listing
-from service.grading.hint_code import Code, Statement, depths, is_name, joined
+from service.grading.hint_code import CodeStatements, Statement, depths, is_name, joined
 from service.grading.hint_loops import reading_in
 from service.grading.hint_variables import early_step, other_case, removal_from_list, same_side, unreachable_if
 
@@ -117,7 +117,7 @@ def _bare_operand(listing: Listing, statement: Statement) -> str:
     return ""
 
 
-def _is_number(code: Code, name: str) -> bool:
+def _is_number(code: CodeStatements, name: str) -> bool:
     """Whether a name is a reading, or is compared by size elsewhere."""
     if reading_in((name,), code):
         return True

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from responders.message_format import kind
 from service.grading.hint_clues import Clues
-from service.grading.judging.words import quoted
+from service.grading.judging.message_parts import quoted
 from sim.recording import Verdict
 from submissions.criteria import Criterion
 from submissions.criteria.logged import Datalog

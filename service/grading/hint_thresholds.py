@@ -9,7 +9,7 @@ import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from service.grading.hint_clues import Clues, Listing
-from service.grading.hint_code import Code, Statement, is_name, joined
+from service.grading.hint_code import CodeStatements, Statement, is_name, joined
 from service.grading.hint_structure import statements_of
 from service.grading.judging.geometry import Side, positions
 from sim.recording import Floats, Recording
@@ -123,7 +123,7 @@ def _colour_at_end(recording: Recording, side: Side) -> _Colour:
     return [float(part) for part in rgb[-1]]
 
 
-def _wrong_word(code: Code, statement: Statement, end: _Colour, wanted: _Colour) -> str:
+def _wrong_word(code: CodeStatements, statement: Statement, end: _Colour, wanted: _Colour) -> str:
     """That ``and`` or ``or`` is the wrong word; empty where the colours do not prove it."""
     pair = _compared_pair(code, statement)
     if pair is None:
@@ -145,7 +145,7 @@ def _wrong_word(code: Code, statement: Statement, end: _Colour, wanted: _Colour)
 _Comparison = tuple[str, str, float, int]
 
 
-def _compared_pair(code: Code, statement: Statement) -> tuple[str, list[_Comparison], bool] | None:
+def _compared_pair(code: CodeStatements, statement: Statement) -> tuple[str, list[_Comparison], bool] | None:
     """The word between two comparisons of a colour, these, and whether the loop ends where they are true."""
     tokens = statement.condition
     if statement.keyword == "while" and tokens[:2] == ("not", "(") and tokens[-1:] == (")",):
@@ -164,7 +164,7 @@ def _compared_pair(code: Code, statement: Statement) -> tuple[str, list[_Compari
     return (tokens[words[0]], comparisons, stops) if len(comparisons) == 2 else None
 
 
-def _comparison(code: Code, tokens: Sequence[str]) -> _Comparison | None:
+def _comparison(code: CodeStatements, tokens: Sequence[str]) -> _Comparison | None:
     """What is compared, the sign, the number, and which part of the colour it is."""
     place = next((at for at, token in enumerate(tokens) if token in _COMPARE), None)
     if place is None:
@@ -174,7 +174,7 @@ def _comparison(code: Code, tokens: Sequence[str]) -> _Comparison | None:
     return None if number is None or channel is None else (joined(tokens[:place]), tokens[place], number, channel)
 
 
-def _channel(code: Code, tokens: Sequence[str]) -> int | None:
+def _channel(code: CodeStatements, tokens: Sequence[str]) -> int | None:
     """0 to 2 for red, green and blue, read from the sensor or unpacked from ``rgb``."""
     if not tokens:
         return None

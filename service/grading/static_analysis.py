@@ -18,8 +18,8 @@ from responders.trial_spec import ResponderSpec
 from service.grading.grade import TrialResult
 from service.grading.judging.case import StaticAnalysis, as_had_by
 from service.grading.judging.code import calls_of
+from service.grading.judging.message_parts import fault_words
 from service.grading.judging.source_answers import SPEECH, SourceAnswers
-from service.grading.judging.words import fault_words
 from service.grading.run_plan import RunPlan
 from sim.chance import Stream
 from sim.recorded import seconds_at
@@ -39,14 +39,14 @@ _MOST_READ, _MOST_OF_ONE = 1_000_001, 300_001
 _RESPONDERS = ("responder", "*_responder")
 
 
-class Caller(Protocol):
+class FunctionCaller(Protocol):
     """Calls functions inside the sandbox; a runner does."""
 
     def call(self, module: ResponderSpec, calls: Sequence[FunctionCall], seed: int, meter: JobMeter) -> Called:
         """Call a module's functions one after the other in a fresh child, and return what they gave."""
 
 
-def analyse(plan: RunPlan, trials: Sequence[TrialResult], caller: Caller, meter: JobMeter) -> StaticAnalysis:
+def analyse(plan: RunPlan, trials: Sequence[TrialResult], caller: FunctionCaller, meter: JobMeter) -> StaticAnalysis:
     """Everything that the criteria ask for beside the recordings. Raises HostError when the machine fails."""
     assignment = plan.assignment
     answers: dict[str, SourceAnswers] = {}
@@ -103,7 +103,7 @@ def plain_trial(trial: TrialResult) -> dict[str, Any]:
     }
 
 
-def _answers(criterion: SourceRules, plan: RunPlan, caller: Caller, meter: JobMeter) -> SourceAnswers:
+def _answers(criterion: SourceRules, plan: RunPlan, caller: FunctionCaller, meter: JobMeter) -> SourceAnswers:
     entries = _entries(plan.assignment) if criterion.part == "responder" else ()
     asked = {
         "uses": criterion.uses,
@@ -158,13 +158,15 @@ def _entries(assignment: Assignment) -> Iterator[str]:
             yield from {criterion.function, *(call.function for call in criterion.calls)} - {""}
 
 
-def _called(criterion: Functions, functions: ResponderSpec, seed: int, caller: Caller, meter: JobMeter) -> Called:
+def _called(
+    criterion: Functions, functions: ResponderSpec, seed: int, caller: FunctionCaller, meter: JobMeter
+) -> Called:
     own = Stream(seed, f"calls {criterion.id}").integer(0) >> 1
     return caller.call(functions, calls_of(criterion), own, meter)
 
 
 def _check(
-    criterion: PythonCheck, trial: TrialResult, assignment: Assignment, caller: Caller, meter: JobMeter
+    criterion: PythonCheck, trial: TrialResult, assignment: Assignment, caller: FunctionCaller, meter: JobMeter
 ) -> Returned:
     limits = assignment.limits
     check = ResponderSpec(

@@ -16,7 +16,7 @@ import numpy as np
 from responders.sandbox.meter import JobMeter
 from responders.training import Images, Named, TrainingSpec
 from service.grading.grade import TrialResult
-from service.grading.judging.collecting import Pair, pairs
+from service.grading.judging.collecting import ImagePair, pairs
 from service.grading.judging.label_patches import grey_image
 from service.grading.run_plan import RunPlan
 from service.grading.trial_runner import TrialRunner
@@ -88,19 +88,19 @@ def _nothing_learnt(images: int, plan: RunPlan) -> Fault:
     return Fault(0.0, Verdict.PROGRAM_ERROR, "program", sentence, hint=_COLLECT)
 
 
-def _collected(result: TrialResult) -> list[Pair]:
+def _collected(result: TrialResult) -> list[ImagePair]:
     """A trial's images, logged and sent, in the order in which they were taken."""
     found = [*pairs(result.recording, "log"), *pairs(result.recording, "sent")]
     return sorted(found, key=lambda pair: pair.image.tick)
 
 
-def _arrays(found: Sequence[Pair], training: Training) -> Images:
+def _arrays(found: Sequence[ImagePair], training: Training) -> Images:
     side = _SIDE[training.image]
     images = [grey_image(pair.image, focus=training.image == "focus") for pair in found]
     return np.stack(images) if images else np.empty((0, side, side), np.uint8)
 
 
-def _answered(recording: Recording, asked: Sequence[Pair], names: Iterator[str | None], gave: Named) -> Recording:
+def _answered(recording: Recording, asked: Sequence[ImagePair], names: Iterator[str | None], gave: Named) -> Recording:
     """The recording with each image as a message of the robot's and each name as its answer."""
     messages: list[Message] = []
     images: list[Image] = []

@@ -46,14 +46,14 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class InCourse:
+class FoundInCourse:
     """The id of a batch or a grade, and the course that it belongs to."""
 
     course_id: int
     id: str
 
 
-def find(service: Service, actor: Actor, start: str) -> InCourse:
+def find(service: Service, actor: Actor, start: str) -> FoundInCourse:
     """The batch of any course whose id begins with ``start``, for operators.
 
     Raises:
@@ -62,10 +62,10 @@ def find(service: Service, actor: Actor, start: str) -> InCourse:
     check_operator(actor)
     with service.store.reading() as session:
         row = existing_batch(session, batches.find_batch(session, start))
-        return InCourse(row.course_id, row.id)
+        return FoundInCourse(row.course_id, row.id)
 
 
-def find_grade(service: Service, actor: Actor, start: str) -> InCourse:
+def find_grade(service: Service, actor: Actor, start: str) -> FoundInCourse:
     """The grade of any course whose id begins with ``start``, for operators.
 
     Raises:
@@ -74,7 +74,7 @@ def find_grade(service: Service, actor: Actor, start: str) -> InCourse:
     check_operator(actor)
     with service.store.reading() as session:
         row = session.get_one(Job, batches.find_job(session, start))
-        return InCourse(session.get_one(Enrolment, row.enrolment_id).course_id, row.id)
+        return FoundInCourse(session.get_one(Enrolment, row.enrolment_id).course_id, row.id)
 
 
 @dataclass(frozen=True, slots=True)

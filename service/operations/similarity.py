@@ -17,7 +17,7 @@ from service.store.states import Role
 
 
 @dataclass(frozen=True, slots=True)
-class SimilarityView:
+class ComparedBatch:
     """A batch, the compared submissions, and the similar ones by assignment; None where too many to compare at once.
 
     ``source`` reads the text of a file by assignment, student and name.
@@ -29,7 +29,7 @@ class SimilarityView:
     source: Callable[[str, str, str], str]
 
 
-def show_similar(service: Service, actor: Actor, course_id: int, batch_id: str) -> SimilarityView:
+def show_similar(service: Service, actor: Actor, course_id: int, batch_id: str) -> ComparedBatch:
     """Compare the newest submissions of the whole course for the assignments of a batch. Raises NotFound."""
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
@@ -39,7 +39,7 @@ def show_similar(service: Service, actor: Actor, course_id: int, batch_id: str) 
         assignments = sorted({each.assignment for each in batches.job_lines(session, batch_id)})
         lines = tuple(batches.course_lines(session, course_id, assignments, hidden))
     found = tuple(similarities(service.store, lines)) if len(lines) <= MOST_AT_ONCE else None
-    return SimilarityView(line, lines, found, SourceTexts(service.store, lines).of)
+    return ComparedBatch(line, lines, found, SourceTexts(service.store, lines).of)
 
 
 def list_similar(service: Service, actor: Actor, course_id: int, batch_id: str) -> tuple[Similarity, ...]:
@@ -58,7 +58,7 @@ def list_similar(service: Service, actor: Actor, course_id: int, batch_id: str) 
 
 def show_similar_in_batch(
     service: Service, actor: Actor, course_id: int, batch_id: str, given: Path | None = None
-) -> SimilarityView:
+) -> ComparedBatch:
     """Compare the submissions of one batch alone, however many, without the code in ``given``.
 
     Raises:
@@ -72,4 +72,4 @@ def show_similar_in_batch(
         line = batches.batch(session, batch_id)
         lines = tuple(batches.job_lines(session, batch_id, hidden))
     found = tuple(similarities(service.store, lines, given))
-    return SimilarityView(line, lines, found, SourceTexts(service.store, lines).of)
+    return ComparedBatch(line, lines, found, SourceTexts(service.store, lines).of)

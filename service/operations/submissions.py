@@ -33,7 +33,7 @@ class LacksPart(Invalid):
 
 
 @dataclass(frozen=True, slots=True)
-class SubmitRequest:
+class SendRequest:
     """Files for an assignment; ``even_in_part`` also where one of two parts is missing."""
 
     assignment: str
@@ -80,7 +80,7 @@ def sending(service: Service, actor: Actor, course_id: int, assignment: str) -> 
         return Sending(course, enrolment.id, Student(enrolment.written), opened, found)
 
 
-def submit(service: Service, actor: Actor, course_id: int, request: SubmitRequest) -> Accepted:
+def submit(service: Service, actor: Actor, course_id: int, request: SendRequest) -> Accepted:
     """Accept a student's files for an assignment, and notify the workers.
 
     Raises:

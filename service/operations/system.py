@@ -12,7 +12,7 @@ from service.store.queue import dead_letters, tryouts, workers
 from service.store.queue.dead_letters import DeadLetter
 from service.store.queue.metrics import ServiceMetrics, collect
 from service.store.queue.tryouts import TryoutLane
-from service.store.queue.workers import InQuarantine, Seen
+from service.store.queue.workers import InQuarantine, WorkerLine
 from service.version import GRADER_VERSION
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def show(service: Service, actor: Actor) -> SystemView:
         )
 
 
-def list_workers(service: Service, actor: Actor) -> list[tuple[Seen, InQuarantine | None]]:
+def list_workers(service: Service, actor: Actor) -> list[tuple[WorkerLine, InQuarantine | None]]:
     """The known workers by name, each with its quarantine if it is in one. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from service.grading.grade import CriterionResult, Grade, Shown, TrialResult, unjudged_notes
-from service.grading.judging.words import shown_words
+from service.grading.judging.message_parts import shown_words
 from service.grading.statistics import marks_out_of_all
 from service.language import ENGLISH, Language
 from service.reports.words import by_hand_words

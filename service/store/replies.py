@@ -22,7 +22,7 @@ _BEGUN = 0
 
 
 @dataclass(frozen=True, slots=True)
-class Reply:
+class KeptReply:
     """An answer that was given."""
 
     request_sha256: str
@@ -35,7 +35,7 @@ class InProgress(Exception):
 
 
 @retry_conflicts
-def begin(store: Store, credential_id: str, key: str) -> Reply | None:
+def begin(store: Store, credential_id: str, key: str) -> KeptReply | None:
     """What was answered to this key; None where it is new, and is held from now on. Raises InProgress."""
     mine = (IdempotentReply.credential_id == credential_id, IdempotentReply.key == key)
     with store.transaction() as session:
@@ -49,11 +49,11 @@ def begin(store: Store, credential_id: str, key: str) -> Reply | None:
         row = session.scalars(select(IdempotentReply).where(*mine)).one()
         if row.status == _BEGUN:
             raise InProgress
-        return Reply(row.request_sha256, row.status, row.body)
+        return KeptReply(row.request_sha256, row.status, row.body)
 
 
 @retry_conflicts
-def keep(store: Store, credential_id: str, key: str, reply: Reply) -> None:
+def keep(store: Store, credential_id: str, key: str, reply: KeptReply) -> None:
     """Write down what was answered."""
     mine = (IdempotentReply.credential_id == credential_id, IdempotentReply.key == key)
     values = {"request_sha256": reply.request_sha256, "status": reply.status, "body": reply.body}

@@ -25,7 +25,7 @@ from starlette.types import Message, Receive
 
 from service.store import replies
 from service.store.people.credentials import Identity
-from service.store.replies import InProgress, Reply
+from service.store.replies import InProgress, KeptReply
 from service.web.api_access import caller_of
 from service.web.context import WebContext
 from sim.readers.json_text import read_json
@@ -156,7 +156,7 @@ async def _once(request: Request, key: str, run: Callable[[Request], Awaitable[R
     except BaseException:
         await run_in_threadpool(replies.forget, *mine)
         raise
-    reply = Reply(await hashed.whole(), answer.status_code, bytes(answer.body))
+    reply = KeptReply(await hashed.whole(), answer.status_code, bytes(answer.body))
     try:
         await run_in_threadpool(replies.keep, *mine, reply)
     except SQLAlchemyError as error:

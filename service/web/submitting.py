@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 from service.operations import submissions, test_runs
 from service.operations.context import Actor
-from service.operations.submissions import Accepted, SubmitRequest
+from service.operations.submissions import Accepted, SendRequest
 from service.web.context import WebContext
 from submissions.raw_files import SentFile
 
 
-def submit(context: WebContext, actor: Actor, course_id: int, request: SubmitRequest) -> Accepted:
+def submit(context: WebContext, actor: Actor, course_id: int, request: SendRequest) -> Accepted:
     """Submit files. Raises HTTPException 429 where they come too often, and as ``submissions.submit`` does."""
     submissions.sending(context.service, actor, course_id, request.assignment)
     context.limits.submissions.spend(str(actor.person_id))

@@ -19,7 +19,7 @@ from sim.floors import HEIGHT, OBSTACLE_PRESETS, WIDTH
 from sim.motion import Rectangle
 from sim.robot import ROBOTS
 from submissions.nearest import did_you_mean, listed
-from submissions.strict_table import Shape, StrictTable
+from submissions.strict_table import Entries, StrictTable
 from submissions.sweep import CONDITIONS
 
 T = TypeVar("T", bound=BaseModel)
@@ -47,7 +47,7 @@ class WorldTable(StrictTable):
 
     background: str = "Empty_Map"
     labels: bool = True
-    obstacles: tuple[Annotated[Rectangle, Shape("[x, y, width, height]")], ...] = ()
+    obstacles: tuple[Annotated[Rectangle, Entries("[x, y, width, height]")], ...] = ()
     robot: str = "Default_Robot"
     robots: Literal[1, 2] = 1
     solid: bool = False
@@ -104,7 +104,7 @@ class ChannelTable(StrictTable):
     """What becomes of messages on their way: delays in seconds, shares as probabilities, an infrared link in mm."""
 
     link: Literal["cable", "infrared", "between robots"] = "cable"
-    beacon: Annotated[tuple[float, float], Shape("[x, y]")] | None = None
+    beacon: Annotated[tuple[float, float], Entries("[x, y]")] | None = None
     range: float = Field(default=600.0, gt=0, le=5000)
     facing: float = Field(default=90.0, gt=0, le=360)
     blocked_by: Literal["obstacles", "nothing"] = "obstacles"
@@ -155,15 +155,17 @@ class ScenarioTable(StrictTable):
 
     id: str = Slug
     title: str = Field(default="", max_length=200)
-    poses: tuple[Annotated[tuple[float, float, float], Shape("[x, y, heading]")], ...] = Field(default=(), min_length=1)
-    second_poses: tuple[Annotated[tuple[float, float, float], Shape("[x, y, heading]")], ...] = ()
+    poses: tuple[Annotated[tuple[float, float, float], Entries("[x, y, heading]")], ...] = Field(
+        default=(), min_length=1
+    )
+    second_poses: tuple[Annotated[tuple[float, float, float], Entries("[x, y, heading]")], ...] = ()
     choose: Literal["each", "random", "shuffled"] = "each"
     trials: int = Field(default=1, ge=1, le=1000)
     seconds: float = Field(default=60.0, gt=0, le=3600)
     light_noise: Levels = Field(default=(0.0,), min_length=1)
     motor_noise: Levels = Field(default=(0.0,), min_length=1)
     channel: ChannelTable = ChannelTable()
-    start_jitter: Annotated[tuple[float, float, float], Shape("[mm in x, mm in y, degrees]")] = (0.0, 0.0, 0.0)
+    start_jitter: Annotated[tuple[float, float, float], Entries("[mm in x, mm in y, degrees]")] = (0.0, 0.0, 0.0)
     sweep: SweepTable = SweepTable()
     visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible"
 
@@ -360,15 +362,15 @@ def _shape(schema: type[BaseModel], path: tuple[str | int, ...]) -> str:
     for key in path:
         field = _fields(schema).get(str(key))
         if field is not None:
-            shape = next((each for each in field.metadata if isinstance(each, Shape)), None) or _shape_in(
+            shape = next((each for each in field.metadata if isinstance(each, Entries)), None) or _shape_in(
                 field.annotation
             )
             schema = _table_in(field.annotation) or schema
     return f", expected {shape.words}" if shape else ", expected another number of them"
 
 
-def _shape_in(annotation: object) -> Shape | None:
-    if isinstance(annotation, Shape):
+def _shape_in(annotation: object) -> Entries | None:
+    if isinstance(annotation, Entries):
         return annotation
     return next((found for part in get_args(annotation) if (found := _shape_in(part))), None)
 

@@ -12,10 +12,10 @@ from typing import Annotated
 from sim.errors import UsageError
 from sim.readers.csv_text import read_rows
 from sim.readers.unreadable import Unreadable
-from submissions.strict_table import Shape
+from submissions.strict_table import Entries
 
 #: x, y (mm) and what is there.
-LabelledPlace = Annotated[tuple[float, float, str], Shape("[x, y, label]")]
+LabelledPlace = Annotated[tuple[float, float, str], Entries("[x, y, label]")]
 _MOST_PLACES = 10_000
 _MOST_CALLS = 1000
 

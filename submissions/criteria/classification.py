@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 from pydantic import model_validator
 
 from submissions.criteria.recognition import Recognition
-from submissions.strict_table import Shape
+from submissions.strict_table import Entries
 
 
 class Classification(Recognition):
@@ -24,7 +24,7 @@ class Classification(Recognition):
     """
 
     check: Literal["classification"]
-    steps: tuple[Annotated[tuple[float, float], Shape("[accuracy, marks]")], ...] = ()
+    steps: tuple[Annotated[tuple[float, float], Entries("[accuracy, marks]")], ...] = ()
 
     @model_validator(mode="after")
     def _steps_fit(self) -> Self:

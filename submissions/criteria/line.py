@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from submissions.criteria.common import Criterion, Texts
 from submissions.criteria.places import LineToFollow, Part, Range
-from submissions.strict_table import Shape
+from submissions.strict_table import Entries
 
 
 class Follows(Criterion):
@@ -52,7 +52,7 @@ class Laps(Criterion):
     check: Literal["laps"]
     measures: ClassVar[Texts] = ("lap time", "laps", "farthest off", "part of a lap")
     line: LineToFollow
-    start_line: Annotated[tuple[float, float, float, float], Shape("[x1, y1, x2, y2]")]
+    start_line: Annotated[tuple[float, float, float, float], Entries("[x1, y1, x2, y2]")]
     laps: int = Field(default=1, ge=1)
     within: float = Field(default=60.0, gt=0)
     progress: float = Field(default=0.995, gt=0, le=1)

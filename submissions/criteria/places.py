@@ -12,12 +12,12 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from sim.floors.centrelines import centrelines
-from submissions.strict_table import Shape, StrictTable
+from submissions.strict_table import Entries, StrictTable
 
 #: The part of the robot whose way is looked at: the middle of its axle, what it drew, or a light sensor.
 Part = Literal["robot", "pen", "left_light", "right_light"]
 
-Point = Annotated[tuple[float, float], Shape("[x, y]")]
+Point = Annotated[tuple[float, float], Entries("[x, y]")]
 
 
 def _ordered(value: tuple[float, float]) -> tuple[float, float]:
@@ -33,9 +33,9 @@ def _with_room(zone: tuple[float, float, float, float]) -> tuple[float, float, f
 
 
 #: Least and most; both belong to it, and something must.
-Range = Annotated[tuple[float, float], AfterValidator(_ordered), Shape("[least, most]")]
+Range = Annotated[tuple[float, float], AfterValidator(_ordered), Entries("[least, most]")]
 #: mm; something must have room in it.
-Zone = Annotated[tuple[float, float, float, float], AfterValidator(_with_room), Shape("[left, bottom, right, top]")]
+Zone = Annotated[tuple[float, float, float, float], AfterValidator(_with_room), Entries("[left, bottom, right, top]")]
 
 
 class Area(StrictTable):
@@ -45,10 +45,10 @@ class Area(StrictTable):
     """
 
     name: str = Field(default="", max_length=80)
-    rectangle: Annotated[tuple[float, float, float, float], Shape("[left, bottom, right, top]")] | None = None
-    circle: Annotated[tuple[float, float, float], Shape("[x, y, radius]")] | None = None
+    rectangle: Annotated[tuple[float, float, float, float], Entries("[left, bottom, right, top]")] | None = None
+    circle: Annotated[tuple[float, float, float], Entries("[x, y, radius]")] | None = None
     polygon: tuple[Point, ...] | None = None  # corners
-    bar: Annotated[tuple[float, float, float, float, float], Shape("[x1, y1, x2, y2, radius]")] | None = None
+    bar: Annotated[tuple[float, float, float, float, float], Entries("[x1, y1, x2, y2, radius]")] | None = None
     outside: bool = False
 
     @model_validator(mode="after")
@@ -99,9 +99,9 @@ class LineToFollow(StrictTable):
     on: str | None = None
     points: tuple[Point, ...] | None = None
     ellipse: (
-        Annotated[tuple[float, float, float, float], Shape("[x, y, horizontal radius, vertical radius]")] | None
+        Annotated[tuple[float, float, float, float], Entries("[x, y, horizontal radius, vertical radius]")] | None
     ) = None
-    arc: Annotated[tuple[float, float], Shape("[from, to]")] = (0.0, 360.0)
+    arc: Annotated[tuple[float, float], Entries("[from, to]")] = (0.0, 360.0)
     closed: bool = False
     name: str = Field(default="the line", max_length=80)
 

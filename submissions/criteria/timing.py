@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from submissions.criteria.common import Criterion, Misfit, Surroundings, Texts
 from submissions.criteria.places import Range
 from submissions.nearest import did_you_mean, listed
-from submissions.strict_table import Shape
+from submissions.strict_table import Entries
 
 
 class Timing(Criterion):
@@ -41,7 +41,7 @@ class Ranking(Criterion):
     check: Literal["ranking"]
     of: str = Field(min_length=1, max_length=80)
     measure: str = Field(min_length=1, max_length=60)
-    steps: tuple[Annotated[tuple[float, float], Shape("[figure, share]")], ...] = Field(min_length=1)
+    steps: tuple[Annotated[tuple[float, float], Entries("[figure, share]")], ...] = Field(min_length=1)
     highest: bool = False
     over: Literal["share", "all", "mean", "median", "worst"] = "mean"
 

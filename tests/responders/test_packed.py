@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from responders import packed
-from responders.packed import Move, Read, Wait
+from responders.packed import MotorCommand, Read, Wait
 from responders.wire import MOST, MOST_UNITS, WireError
 from running import run_program
 from service.grading.trial_runner import TrialRunner
@@ -28,8 +28,8 @@ def test_acts_come_in_order_with_the_number_of_their_packet() -> None:
     assert packed.read_header(data) == (len(data), 7)
     assert packed.acts_of(data) == [
         (Read("right"), 2),
-        (Move("outB", "speed_sp", "run-forever"), -25.5),
-        (Move("outC", "", "reset"), 0),
+        (MotorCommand("outB", "speed_sp", "run-forever"), -25.5),
+        (MotorCommand("outC", "", "reset"), 0),
         (Wait(), 100_000),
     ]
 
@@ -82,7 +82,7 @@ def test_any_bytes_are_acts_or_refused(data: bytes) -> None:
                 assert (what in SENSORS, times in (1, 2)) == (True, True)
             case Wait(), units:
                 assert (units % 1, 0 <= units <= MOST_UNITS) == (0, True)
-            case Move(port, _, _), value:
+            case MotorCommand(port, _, _), value:
                 assert (port in ("outB", "outC"), math.isfinite(value)) == (True, True)
             case _:
                 pytest.fail(f"no act: {act}")

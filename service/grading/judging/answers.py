@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from responders.message_format import JSON, parsed_answer
-from service.grading.judging.words import fault_words
+from service.grading.judging.message_parts import fault_words
 from sim.recording import Fault, Message, Recording
 
 

@@ -17,9 +17,9 @@ from service.grading.judging.answers import NOTHING, as_text, at_path, parsed
 from service.grading.judging.case import Case
 from service.grading.judging.judges import by_trial, judges_case, once
 from service.grading.judging.marks import in_steps
+from service.grading.judging.message_parts import fault_words, quoted
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.source_answers import SPEECH, SourceAnswers
-from service.grading.judging.words import fault_words, quoted
 from sim.errors import AssignmentError
 from submissions.criteria.code import CONSTRUCTS, ExpectedCall, Functions, PythonCheck, SourceRules, flags_in
 from submissions.magics import Flags

@@ -15,8 +15,8 @@ from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import footprint_at, part_at
 from service.grading.judging.judges import judges
 from service.grading.judging.label_patches import GREYS, decoded
+from service.grading.judging.message_parts import quoted
 from service.grading.judging.outcome import Outcome, failed, passed
-from service.grading.judging.words import quoted
 from sim.floors import label_names
 from sim.recorded import floor_of, pose_after, seconds_at
 from sim.recording import Image, Recording
@@ -26,7 +26,7 @@ _PART_FOR_THE_REST = Fraction(1, 2)
 
 
 @dataclass(frozen=True, slots=True)
-class Pair:
+class ImagePair:
     """A left and a right image of the same moment, what the left one shows, and what the right one's grey says."""
 
     image: Image
@@ -72,7 +72,7 @@ def judge_collects(criterion: Collects, trial: TrialResult) -> Outcome:
     return failed(f"{wrong}.", where.t if where else None, where.pose if where else None, reached, measures)
 
 
-def _different(found: Sequence[Pair], recording: Recording) -> list[Pair]:
+def _different(found: Sequence[ImagePair], recording: Recording) -> list[ImagePair]:
     """The pairs whose left image is of another window of the floor, and not the same, as that of any before."""
     known: set[object] = set()
     fresh = []
@@ -85,11 +85,11 @@ def _different(found: Sequence[Pair], recording: Recording) -> list[Pair]:
     return fresh
 
 
-def pairs(recording: Recording, source: str, light_noise: float = 0.0) -> list[Pair]:
+def pairs(recording: Recording, source: str, light_noise: float = 0.0) -> list[ImagePair]:
     """The pairs of images that a recording has: those logged (``log``) or those sent as ``IMG_DATA`` (``sent``)."""
     images = recording.images if source == "sent" else tuple(_logged(recording))
     greys = GREYS.get(recording.background, {})
-    return [Pair(image, _truth(recording, image), decoded(image, greys, light_noise)) for image in images]
+    return [ImagePair(image, _truth(recording, image), decoded(image, greys, light_noise)) for image in images]
 
 
 def _logged(recording: Recording) -> Iterator[Image]:
@@ -119,7 +119,7 @@ def _checks(
     criterion: Collects,
     classes: Sequence[str],
     counts: Counter[str | None],
-    found: Sequence[Pair],
+    found: Sequence[ImagePair],
     usable: int,
     repeated: int,
 ) -> Iterator[tuple[bool, str]]:

@@ -15,9 +15,10 @@ from service.grading.grade import Measure, TrialResult
 from service.grading.judging.answers import NOTHING, as_text, at_path, parsed
 from service.grading.judging.judges import judges
 from service.grading.judging.losses import by_chance, loss_words, out_of_reach
+from service.grading.judging.message_parts import quoted
 from service.grading.judging.outcome import Outcome, cut, failed, passed
+from service.grading.judging.text_tokens import words_of
 from service.grading.judging.texts import conditions, meets
-from service.grading.judging.words import quoted, words_of
 from sim.recorded import pose_at
 from sim.recording import Line, Message, Recording, Verdict
 from submissions.criteria.coping import FreshAnswers, InReach, Resends

@@ -16,9 +16,9 @@ import numpy as np
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import pen_down, place_at, positions, stretches, travel
 from service.grading.judging.judges import judges
+from service.grading.judging.message_parts import listed
 from service.grading.judging.moves import straight
 from service.grading.judging.outcome import Outcome, failed, passed
-from service.grading.judging.words import listed
 from sim.recording import Floats, Recording
 from submissions.criteria.drawing import Drawing
 

@@ -12,8 +12,8 @@ import numpy as np
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import distance_to
 from service.grading.judging.judges import judges
+from service.grading.judging.message_parts import fault_words, quoted
 from service.grading.judging.outcome import Outcome, cut, failed, passed
-from service.grading.judging.words import fault_words, quoted
 from sim.recorded import pose_at
 from sim.recording import Fault, Recording, Verdict
 from submissions.criteria.ending import EndPose, Finishes, SinceEvent

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
-from service.grading.judging.words import Token, tokens_of, words_of
+from service.grading.judging.text_tokens import Token, tokens_of, words_of
 
 Entry = float | str
 Row = tuple[Entry, ...]

@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 from service.grading.grade import CriterionResult, Evidence, Shown, TrialResult
 from service.grading.judging.case import Case, Indexed, has_hidden
 from service.grading.judging.marks import earned, in_steps, share_of
+from service.grading.judging.message_parts import early_end, place_words, shown_words
 from service.grading.judging.outcome import Outcome
-from service.grading.judging.words import early_end, place_words, shown_words
 from submissions.criteria import Criterion
 
 C = TypeVar("C", bound=Criterion)

@@ -13,7 +13,7 @@ from itertools import product
 from typing import Literal
 
 from service.grading.judging.geometry import Side, part_at
-from service.grading.judging.words import listed
+from service.grading.judging.message_parts import listed
 from sim.recording import Image, Recording
 
 How = Literal["first", "any", "majority"]

@@ -30,9 +30,10 @@ from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, 
 from service.grading.judging.case import Indexed
 from service.grading.judging.geometry import Side
 from service.grading.judging.marks import earned
+from service.grading.judging.message_parts import early_end, place_words, quoted, shown_words
 from service.grading.judging.patterns import Sample, by_pattern
+from service.grading.judging.text_tokens import LabelFinder
 from service.grading.judging.truths import NO_IMAGE, missing_truth, nameable, shown_in
-from service.grading.judging.words import LabelFinder, early_end, place_words, quoted, shown_words
 from sim.recording import Image, Line, Message, Recording, Verdict
 from submissions.assignment.definition import Assignment
 from submissions.criteria.recognition import Recognition

@@ -16,9 +16,9 @@ from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, 
 from service.grading.judging.asking import VALUE, Pair, pair_of
 from service.grading.judging.judges import judges
 from service.grading.judging.losses import by_chance, loss_words, out_of_reach
+from service.grading.judging.message_parts import listed, quoted
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.texts import conditions, meets, same_text
-from service.grading.judging.words import listed, quoted
 from sim.recorded import pose_at
 from sim.recording import Message
 from submissions.criteria.replies import Replies, right_answers

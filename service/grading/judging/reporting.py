@@ -13,10 +13,11 @@ from service.grading.grade import Measure, TrialResult
 from service.grading.judging.entries import Entry, Report, Row, are_alike, is_near, suits
 from service.grading.judging.geometry import in_zone, part_at, part_at_time, zone_words
 from service.grading.judging.judges import judges
+from service.grading.judging.message_parts import listed, quoted
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.precision import Strays, tempered
 from service.grading.judging.readings import INSTRUMENTS, were_read
-from service.grading.judging.words import Token, find_words, listed, quoted, tokens_of, words_of
+from service.grading.judging.text_tokens import Token, find_words, tokens_of, words_of
 from sim.floors import label_names
 from sim.recorded import floor_of, pose_at
 from sim.recording import Line, Recording

@@ -10,9 +10,10 @@ from fractions import Fraction
 
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.judges import judges
+from service.grading.judging.message_parts import listed, quoted
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.precision import Strays, tempered
-from service.grading.judging.words import listed, quoted, spoken_until, words_of
+from service.grading.judging.text_tokens import spoken_until, words_of
 from sim.recorded import pose_at
 from sim.recording import Line, Recording
 from submissions.criteria.sequence import WordSequence

@@ -16,9 +16,10 @@ from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, 
 from service.grading.judging.asking import pair_of
 from service.grading.judging.judges import judges
 from service.grading.judging.losses import by_chance, loss_words, out_of_reach
+from service.grading.judging.message_parts import listed, quoted
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.precision import Strays, tempered
-from service.grading.judging.words import find_words, listed, quoted, words_of
+from service.grading.judging.text_tokens import find_words, words_of
 from sim.recorded import pose_at
 from sim.recording import Line, Message, Recording
 from submissions.criteria.expressions import found_in

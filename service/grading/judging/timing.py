@@ -13,7 +13,7 @@ from service.grading.grade import CriterionResult, Evidence, Measure, TrialResul
 from service.grading.judging.case import Case
 from service.grading.judging.judges import by_trial, judges, judges_case
 from service.grading.judging.outcome import Outcome, failed, passed
-from service.grading.judging.words import spoken_until
+from service.grading.judging.text_tokens import spoken_until
 from sim.recorded import seconds_at
 from sim.recording import Recording
 from submissions.criteria.timing import Ranking, Timing

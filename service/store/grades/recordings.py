@@ -29,7 +29,7 @@ _Bytes = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class StoredRecording:
     """A recording as it is stored: whole, or without what was too large."""
 
     recording: Recording
@@ -41,7 +41,7 @@ def cap_for(trials: int) -> int:
     return max(SMALLEST_CAP, GRADE_BYTES // max(1, trials))
 
 
-def keep(recording: Recording, cap: int) -> Kept:
+def keep(recording: Recording, cap: int) -> StoredRecording:
     """The recording within ``cap`` bytes; what does not fit is left out, and a note says so.
 
     Left out first are images and all but the first texts of each kind, then every text, then the ticks; the
@@ -55,7 +55,7 @@ def keep(recording: Recording, cap: int) -> Kept:
             recording = replace(recording, partner=trim(recording.partner))
         recording = trim(recording)
         data = to_bytes(recording)
-    return Kept(recording, data)
+    return StoredRecording(recording, data)
 
 
 def to_bytes(recording: Recording) -> bytes:

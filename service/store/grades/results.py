@@ -43,7 +43,7 @@ _RECORDING = "application/x-robomark-recording"
 
 
 @dataclass(frozen=True, slots=True)
-class Prepared:
+class PreparedGrade:
     """A grade made ready for its transaction, so that compressing keeps no lock waiting."""
 
     grade: Grade
@@ -51,7 +51,7 @@ class Prepared:
     predictions: list[list[dict[str, Any]]]  # a list a criterion
 
 
-def prepare(grade: Grade) -> Prepared:
+def prepare(grade: Grade) -> PreparedGrade:
     """Compress the recordings and point the predictions at their images."""
     from service.store.grades import recordings
 
@@ -67,10 +67,10 @@ def prepare(grade: Grade) -> Prepared:
         ]
         for result in grade.criteria
     ]
-    return Prepared(grade, files, predictions)
+    return PreparedGrade(grade, files, predictions)
 
 
-def insert(session: Session, job_id: str, prepared: Prepared, at: datetime) -> None:
+def insert(session: Session, job_id: str, prepared: PreparedGrade, at: datetime) -> None:
     """Write the rows of a grade; those of an earlier grading of the same job go."""
     grade = prepared.grade
     session.execute(delete(TrialRow).where(TrialRow.job_id == job_id))

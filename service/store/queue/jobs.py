@@ -182,7 +182,7 @@ def heartbeat(store: Store, claim: Claim, lease_seconds: float, progress: float)
 def finish(
     store: Store,
     claim: Claim,
-    prepared: results.Prepared,
+    prepared: results.PreparedGrade,
     graded_at: datetime,
     trials_at: datetime | None = None,
 ) -> None:

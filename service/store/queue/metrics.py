@@ -43,7 +43,7 @@ class ServiceMetrics:
     surprises: int  # trials in which our own code stumbled over what a child sent
     plots: Mapping[PlotState, int]
     paused_batches: int
-    workers: Sequence[workers.Seen]
+    workers: Sequence[workers.WorkerLine]
     silent_seconds: Mapping[str, float]  # by worker, since it was last heard of
     quarantined: int
     times: Mapping[str, Sequence[float]]  # seconds by span, sorted

@@ -32,7 +32,7 @@ class WorkerDescription:
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class WorkerLine:
     """A worker, and when it was last heard of."""
 
     worker: WorkerDescription
@@ -73,12 +73,12 @@ def forget(store: Store, name: str) -> None:
         session.execute(delete(Heartbeat).where(Heartbeat.worker == name))
 
 
-def known_workers(session: Session) -> list[Seen]:
+def known_workers(session: Session) -> list[WorkerLine]:
     """All workers that are written down, by name."""
     at = now(session)
     rows = session.scalars(select(Heartbeat).order_by(Heartbeat.worker))
     return [
-        Seen(
+        WorkerLine(
             WorkerDescription(
                 row.worker, row.host, row.concurrency, row.grader_version, row.sandbox, row.problem or ""
             ),

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from service.operations import own_views
 from service.operations.own_views import SubmissionView
-from service.operations.submissions import SubmitRequest
+from service.operations.submissions import SendRequest
 from service.operations.types import JobState, Role
 from service.web.access import RowNumber
 from service.web.api.grades import HTML, REPLAY, ZIP, grade_answer, replay_answer, report_answer
@@ -194,7 +194,7 @@ def submit_one(
     assignment: Annotated[str, Query(min_length=1, max_length=100, examples=["shape-recognition"])],
 ) -> SubmissionShape:
     """Submit: a robot program, a responder, a notebook, or a zip with them; each a part `files` of the form."""
-    accepted = submit(context, here.acting, here.course_id, SubmitRequest(assignment, sent, even_in_part=True))
+    accepted = submit(context, here.acting, here.course_id, SendRequest(assignment, sent, even_in_part=True))
     return _shown(own_views.show_submission(context.service, here.acting, here.course_id, accepted.submission_id))
 
 

@@ -17,7 +17,7 @@ from starlette.exceptions import HTTPException
 from service.operations import own_views
 from service.operations.errors import NotFound
 from service.operations.own_work import OwnSubmission
-from service.operations.submissions import LacksPart, SubmitRequest
+from service.operations.submissions import LacksPart, SendRequest
 from service.operations.types import Role
 from service.reports.readable import flowing
 from service.web.access import InCourse, Studying
@@ -79,7 +79,7 @@ def submit_own(
     """Take in what was chosen and typed, and go where it is waited for."""
     sheet = own_views.show_sheet(context.service, here.acting, here.course_id, assignment)
     try:
-        asked = SubmitRequest(assignment, sent_files(sheet, files, texts), even_in_part)
+        asked = SendRequest(assignment, sent_files(sheet, files, texts), even_in_part)
         accepted = submit(context, here.acting, here.course_id, asked)
     except NotFound:
         raise

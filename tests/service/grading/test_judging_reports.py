@@ -18,7 +18,7 @@ from driving import driven, rest, spin, straight
 from judging import START, criterion, judged
 from service.grading.grade import TrialResult
 from service.grading.judging.judge import judge
-from service.grading.judging.words import tokens_of, words_of
+from service.grading.judging.text_tokens import tokens_of, words_of
 from sim.floors import floor
 from sim.recording import Datum, Fault, Line, Message, Pose, Recording, Ticks, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec

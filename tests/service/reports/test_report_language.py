@@ -15,7 +15,7 @@ import pytest
 from replays import data_of, island_of
 from report_builders import astray_grade, faulty_grade, hidden_grade, line_follower_grade, shape_grade, swept_grade
 from service.grading.grade import Grade
-from service.grading.judging.words import shown_words
+from service.grading.judging.message_parts import shown_words
 from service.language import Language, language_called
 from service.message_catalogue import messages
 from service.reports.html import report

@@ -171,8 +171,8 @@ def test_of_two_requests_with_a_key_one_holds_it(store: Store) -> None:
 
     with ThreadPoolExecutor(4) as pool:
         assert sorted(pool.map(begin, range(4))) == ["holds it", "waits", "waits", "waits"]
-    replies.keep(store, token.id, "k", replies.Reply("a" * 64, 201, b"{}"))
-    assert replies.begin(store, token.id, "k") == replies.Reply("a" * 64, 201, b"{}")
+    replies.keep(store, token.id, "k", replies.KeptReply("a" * 64, 201, b"{}"))
+    assert replies.begin(store, token.id, "k") == replies.KeptReply("a" * 64, 201, b"{}")
 
 
 def test_what_waits_for_a_revoked_webhook_is_not_sent(store: Store) -> None:

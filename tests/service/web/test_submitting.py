@@ -18,7 +18,7 @@ from builders import PROGRAM, echo
 from report_builders import faulty_grade
 from service.operations.context import Actor
 from service.operations.errors import NotFound
-from service.operations.submissions import SubmitRequest
+from service.operations.submissions import SendRequest
 from service.store.batches import intake
 from service.store.batches.intake import Accepted
 from service.store.courses import open_assignments, policies
@@ -71,7 +71,7 @@ def _actor(web: Web, member: Member) -> Actor:
 
 def _submit(web: Web, member: Member, *files: tuple[str, bytes | str]) -> Accepted:
     sent = [SentFile(name, BytesIO(data.encode() if isinstance(data, str) else data)) for name, data in files]
-    return submit(web.app.state.context, _actor(web, member), 1, SubmitRequest(echo().id, sent))
+    return submit(web.app.state.context, _actor(web, member), 1, SendRequest(echo().id, sent))
 
 
 def _zip(*entries: tuple[str, str]) -> bytes:
@@ -148,7 +148,7 @@ def test_only_what_is_open_takes_submissions(web: Web, ada: Member) -> None:
     with web.store.transaction() as session:
         open_assignments.open_for_students(session, 1, echo().id)
     with pytest.raises(NotFound):
-        submit(web.app.state.context, _actor(web, ada), 1, SubmitRequest("no-such", []))
+        submit(web.app.state.context, _actor(web, ada), 1, SendRequest("no-such", []))
 
 
 def test_nobody_submits_without_end(web: Web, ada: Member) -> None:

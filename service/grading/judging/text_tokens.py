@@ -1,7 +1,4 @@
-"""Texts taken apart for comparing, and sentences put together for students: quotes, places, why a run ended early.
-
-What went wrong is said by the modules of the families.
-"""
+"""Texts taken apart for comparing: words, numbers, labels, and when an utterance has been spoken."""
 
 from __future__ import annotations
 
@@ -10,10 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from service.grading.grade import TrialResult
-from service.grading.judging.outcome import Outcome, cut
-from sim.recording import Fault, Line, Verdict
-from submissions.sweep import CONDITIONS
+from sim.recording import Line
 
 _SMALL = [
     "zero",
@@ -90,66 +84,6 @@ def spoken_until(lines: Sequence[Line]) -> list[float]:
         begin = max(line.t, ends[-1] if ends else 0.0)
         ends.append(begin + len(line.text.split()) * 60 / 130)
     return ends
-
-
-_LONGEST_QUOTE = 80
-
-
-def quoted(text: str) -> str:
-    """A text of the student's in a sentence: one line, shortened."""
-    line = " ".join(text.split())
-    return f'"{line}"' if len(line) <= _LONGEST_QUOTE else f'"{line[: _LONGEST_QUOTE - 3]}..."'
-
-
-def listed(texts: tuple[str, ...], word: str = "and") -> str:
-    """``"a", "b" and "c"``."""
-    quotes = [quoted(text) for text in texts]
-    return quotes[0] if len(quotes) == 1 else f"{', '.join(quotes[:-1])} {word} {quotes[-1]}"
-
-
-def fault_words(fault: Fault) -> str:
-    """``NameError: name 'x' is not defined (line 3)``."""
-    where = f" ({fault.place})" if fault.place else ""
-    return f"{fault.message.rstrip('.')}{where}"
-
-
-def place_words(trial: TrialResult, t: float | None) -> str:
-    """``In scenario line, from (100, 800) facing 0°, with light noise 32, at 3.00 s``."""
-    start = trial.recording.start
-    x, y, heading = (f"{round(value, 1):g}" for value in (start.x, start.y, start.heading))
-    words = [f"In scenario {trial.scenario}, from ({x}, {y}) facing {heading}°"]
-    if trial.light_noise:
-        words.append(f"with light noise {trial.light_noise:g}")
-    if trial.motor_noise:
-        words.append(f"with motor noise {trial.motor_noise:g}")
-    for condition, level in trial.sweep:
-        if condition in ("loss", "delay") and level:
-            about = CONDITIONS[condition]
-            words.append(f"with a {about.words} of {level:g}" + (f" {about.unit}" if condition == "delay" else ""))
-    if t is not None:
-        words.append(f"at {t:.2f} s")
-    return ", ".join(words)
-
-
-def shown_words(message: str) -> str:
-    """What is told of visible trials, for a criterion that has others as well; the same whatever happened in those."""
-    return (
-        f"{message} Trials that are not shown are marked as well."
-        if message
-        else "Marked in trials that are not shown."
-    )
-
-
-def early_end(trial: TrialResult, outcome: Outcome | None = None) -> str:
-    """Why the run ended before its time, unless the outcome tells already."""
-    fault = cut(trial.recording)
-    if fault is None or (outcome is not None and fault_words(fault) in outcome.message):
-        return ""
-    if fault.verdict is Verdict.TIME_LIMIT:
-        if outcome is not None and "still running" in outcome.message:
-            return ""
-        return f" The program was still running when the time was up, at {fault.t:g} s."
-    return f" The run ended early, at {fault.t:.2f} s."
 
 
 class LabelFinder:
