@@ -23,6 +23,8 @@ from service.reports.plots.models import draw_evaluation_confusion, draw_misread
 from service.reports.plots.plot import DPI
 from service.reports.plots.style import WIDTH
 
+pytestmark = pytest.mark.fast
+
 
 @pytest.fixture(scope="module")
 def evaluation() -> Evaluation:

@@ -12,6 +12,8 @@ from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import SECOND, Verdict
 
+pytestmark = pytest.mark.fast
+
 ECHO = "def responder(text):\n    return 'JSON::{\"heard\": \"' + text[4:] + '\"}'\n"
 LISTEN = "import time, ev3dev2_glue as glue\n"
 

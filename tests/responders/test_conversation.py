@@ -12,6 +12,8 @@ from responders.link import Cable
 from sim.recording import SECOND, TICK, Fault, Verdict
 from sim.world import Chain
 
+pytestmark = pytest.mark.fast
+
 DELAY = SECOND // 10
 
 

@@ -22,6 +22,8 @@ from models import weights_bytes
 from paths import DATA, ROOT
 from sim import floors
 
+pytestmark = pytest.mark.fast
+
 KIT = ROOT / "responders" / "kit"
 LITE = DATA / "tensorflow_lite"
 KIT_MODULES = ("nbev3devsim.load_nbev3devwidget", "nn_tools.sensor_data", "nn_tools.network_views")

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 from responders import wire
 
+pytestmark = pytest.mark.fast
+
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),

@@ -14,6 +14,8 @@ from PIL import Image
 from sim import floors
 from sim.errors import UsageError
 
+pytestmark = pytest.mark.fast
+
 #: Known of the original.
 ORIGINAL = {
     "Coloured_bands": "616569809051c5cd",

@@ -8,6 +8,8 @@ from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Pose, Verdict
 
+pytestmark = pytest.mark.fast
+
 #: An expression, and what printing it shows, for a robot at (520, 900) over Simple_Shapes unless noted.
 VALUES = [
     ("get_clock()", "0"),

@@ -17,6 +17,8 @@ from sim.recording import Pose
 from sim.robot import robot
 from sim.world import Chain, Noise, World
 
+pytestmark = pytest.mark.fast
+
 GOLDEN: dict[str, list[dict[str, Any]]] = tomllib.loads((DATA / "original_simulator.toml").read_text())
 
 

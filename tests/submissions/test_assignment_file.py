@@ -23,6 +23,8 @@ from submissions.assignment.toml_lines import find_lines, line_of
 from submissions.criteria.classification import Classification
 from submissions.criteria.ending import Finishes
 
+pytestmark = pytest.mark.fast
+
 HEAD = 'id = "a"\ntitle = "A"\n'
 SCENARIO = '[[scenario]]\nid = "s"\nposes = [[100, 800, 0]]\n'
 INFRARED = 'channel = {{ link = "infrared", beacon = {} }}\n'

@@ -23,6 +23,8 @@ from submissions.packed import pack_submission, unpack_submission
 from submissions.raw_files import MAX_FILE_BYTES, MAX_FILES, unzip
 from submissions.submission import Submission
 
+pytestmark = pytest.mark.fast
+
 PROGRAM = 'say("hello")\n'
 RESPONDER = "def responder(text):\n    return text\n"
 BOTH: dict[str, str | bytes] = {"robot.py": PROGRAM, "responder.py": RESPONDER}

@@ -11,6 +11,8 @@ from service.grading.judging.judge import JUDGES
 from submissions.assignment.schema import TableProblem, read_table
 from submissions.criteria import SCHEMAS
 
+pytestmark = pytest.mark.fast
+
 AREA = {"rectangle": [0, 0, 10, 10]}
 
 

@@ -8,6 +8,8 @@ from sim.errors import UsageError
 from sim.recording import Pose
 from submissions.magics import Flags, Setup, Simulator, parse_flags, parse_magic, setup, split_program, without_magic
 
+pytestmark = pytest.mark.fast
+
 #: Every flag of the original's magics (robolab section 8), but for --help and --previewcode.
 LETTERS = {
     "s": "sim",

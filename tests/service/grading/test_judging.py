@@ -10,6 +10,8 @@ from judging import criterion, judged, lines, recorded, talk
 from service.grading.judging.answers import NOTHING, at_path, parsed, same_value
 from sim.recording import Fault, Message, Pose, Verdict
 
+pytestmark = pytest.mark.fast
+
 
 def fault(verdict: Verdict, who: Any = "program", t: float = 2.0, line: int | None = 7) -> Fault:
     return Fault(t, verdict, who, "NameError: name 'x' is not defined", line)

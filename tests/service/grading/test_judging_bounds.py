@@ -36,6 +36,8 @@ from submissions.criteria import SCHEMAS
 from submissions.criteria.expressions import found_in, usable
 from submissions.submission import Submission
 
+pytestmark = pytest.mark.fast
+
 #: What one text can hold at most that comes over the wire, in characters.
 _LONG = 60_000
 _TEXTS: Mapping[str, Sequence[str]] = {

@@ -11,6 +11,8 @@ from judging import criterion, judged, recorded
 from service.grading.grade import CriterionResult
 from sim.recording import Fault, Line, LossReason, Message, Recording, Verdict
 
+pytestmark = pytest.mark.fast
+
 
 def asked(t: float, text: str, lost: LossReason = "", **more: Any) -> Message:
     arrives = None if lost else t

@@ -15,6 +15,8 @@ from sim.errors import HostError
 from sim.recording import Image, Line, Pose, Recording, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 
+pytestmark = pytest.mark.fast
+
 SQUARE, DIAMOND = "square", "diamond"
 
 

@@ -15,6 +15,8 @@ from service.grading.judging.drawing import between, legs_of
 from service.grading.judging.moves import moves_of
 from sim.recording import Pose
 
+pytestmark = pytest.mark.fast
+
 WHITE, BLACK = (255, 255, 255), (0, 0, 0)
 
 

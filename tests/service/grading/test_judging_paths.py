@@ -23,6 +23,8 @@ from sim.recording import Pose, Touch
 from submissions.criteria.line import Laps
 from submissions.criteria.places import Area, LineToFollow
 
+pytestmark = pytest.mark.fast
+
 coordinates = st.floats(-500, 500, allow_nan=False).map(lambda value: round(value, 3))
 points = st.tuples(coordinates, coordinates)
 

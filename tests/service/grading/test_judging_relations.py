@@ -18,6 +18,8 @@ from submissions.assignment.examples import examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 
+pytestmark = pytest.mark.fast
+
 NEARER = {"of": "speed", "to": "ultrasonic", "changes": 50}
 
 

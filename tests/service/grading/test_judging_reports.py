@@ -23,6 +23,8 @@ from sim.floors import floor
 from sim.recording import Datum, Fault, Line, Message, Pose, Recording, Ticks, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 
+pytestmark = pytest.mark.fast
+
 
 def recorded(seconds: float = 3.0, rgb: Sequence[int] = (255, 255, 255), **parts: Any) -> Recording:
     """A run along x at 30 mm a second, the left sensor over ``rgb`` and the right one over white."""

@@ -39,6 +39,8 @@ from submissions.criteria.classification import Classification
 from submissions.submission import Submission
 from submissions.sweep import Sweep
 
+pytestmark = pytest.mark.fast
+
 HEAD = """
 id = "a"
 title = "A"

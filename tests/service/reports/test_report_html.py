@@ -18,6 +18,8 @@ from service.reports.replay.document import replay_of_grade
 from service.reports.view import staff_view, student_view
 from sim.recording import Fault, Verdict
 
+pytestmark = pytest.mark.fast
+
 
 @pytest.fixture(scope="module")
 def hostile() -> tuple[str, Reader]:

@@ -27,6 +27,8 @@ from service.reports.view import View, gradebook_view, staff_view, student_view,
 from service.reports.words import verdict_words
 from sim.recording import Verdict
 
+pytestmark = pytest.mark.fast
+
 
 def test_json_has_exactly_the_keys_of_the_schema() -> None:
     document = json.loads(json_text(staff_view(build.shape_grade())))

@@ -24,6 +24,8 @@ from service.store.states import BatchState, JobState, Lane
 from sim.errors import UsageError
 from submissions.grading_request import GradingRequest
 
+pytestmark = pytest.mark.fast
+
 OTHER = "print('other')\n"
 
 

@@ -19,6 +19,8 @@ from sim.recording import COLUMNS, Line, Message, Recording, Ticks
 from submissions.assignment.folder import catalogue
 from submissions.assignment.reader import find_assignment
 
+pytestmark = pytest.mark.fast
+
 GRADES = {
     "line-follower": report_builders.line_follower_grade,
     "shapes": report_builders.shape_grade,

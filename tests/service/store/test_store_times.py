@@ -5,6 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
+import pytest
 from sqlalchemy import update
 
 import report_builders
@@ -20,6 +21,8 @@ from service.store.queue import jobs, metrics, workers
 from service.store.queue.jobs import Retry
 from service.store.queue.lease_reaper import requeue_lost, wanting_notices
 from service.store.states import JobState, Lane
+
+pytestmark = pytest.mark.fast
 
 HOUR = timedelta(hours=1)
 NO_WAIT = Retry(0.0)
