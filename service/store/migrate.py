@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from sqlalchemy import Engine, text
 from sqlalchemy.engine import Connection
 
-from service.store import recorded_schema
+from service.store import new_database
 from service.store.revision import newest_revision, revision_of
 from sim.errors import HostError
 
@@ -49,8 +49,8 @@ def upgrade(engine: Engine) -> None:
             connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _LOCK})
         if revision_of(connection) == newest_revision():
             return
-        if recorded_schema.can_be_laid(connection):
-            recorded_schema.lay(connection, newest_revision())
+        if new_database.can_be_laid(connection):
+            new_database.lay(connection, newest_revision())
         else:
             migrate(connection)
 

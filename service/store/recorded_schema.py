@@ -1,38 +1,19 @@
-"""The tables of a new SQLite database, as the migrations make them one after another, laid at once from a record.
+"""Writes down the tables that the migrations make, for new databases: ``python -m service.store.recorded_schema``.
 
-It is only a shortcut: what the tables are the migrations decide. ``python -m service.store.recorded_schema`` writes
-down anew what they make, for whoever adds one.
+Run it after adding a migration; ``new_database.py`` lays the tables from the record.
 """
 
 from __future__ import annotations
 
-import secrets
 import tempfile
-from datetime import UTC, datetime
-from pathlib import Path
 
-from sqlalchemy import insert, inspect, select
+from sqlalchemy import select
 from sqlalchemy.engine import Connection
 
-_FILE = Path(__file__).with_name("migrations") / "schema.sql"
-#: Between statements; none has an empty line in it.
-_BETWEEN = ";\n\n"
-
-
-def can_be_laid(connection: Connection) -> bool:
-    """Whether this is a SQLite database with nothing in it."""
-    return connection.dialect.name == "sqlite" and not inspect(connection).get_table_names()
-
-
-def lay(connection: Connection, revision: str) -> None:
-    """Make the tables of ``revision``, the newest, and what the migrations put into them."""
-    from service.store.models import Installation
-
-    for statement in _FILE.read_text(encoding="utf-8").split(_BETWEEN):
-        connection.exec_driver_sql(statement)
-    connection.exec_driver_sql("INSERT INTO alembic_version VALUES (?)", (revision,))
-    made = {"id": 1, "secret": secrets.token_hex(32), "made_at": datetime.now(UTC)}
-    connection.execute(insert(Installation).values(made))
+from service.store.engine import open_engine
+from service.store.migrate import migrate
+from service.store.models import SchemaCompatibility
+from service.store.new_database import BETWEEN, RECORD
 
 
 def statements_of(connection: Connection) -> list[str]:
@@ -43,10 +24,6 @@ def statements_of(connection: Connection) -> list[str]:
 
 def write_schema() -> None:
     """Write down what the migrations of this checkout make."""
-    from service.store.engine import open_engine
-    from service.store.migrate import migrate
-    from service.store.models import SchemaCompatibility
-
     with tempfile.TemporaryDirectory() as folder:
         engine = open_engine(f"sqlite:///{folder}/new.db")
         with engine.begin() as connection:
@@ -54,7 +31,7 @@ def write_schema() -> None:
             oldest = connection.scalar(select(SchemaCompatibility.oldest_compatible))
             compatibility = f"INSERT INTO {SchemaCompatibility.__tablename__} VALUES (1, '{oldest}')"
             statements = [*statements_of(connection), compatibility]
-            _FILE.write_text(_BETWEEN.join(statements) + "\n", encoding="utf-8")
+            RECORD.write_text(BETWEEN.join(statements) + "\n", encoding="utf-8")
         engine.dispose()
 
 

@@ -19,7 +19,7 @@ from builders import accept_one, upgraded_by_newer_release
 from command import FORKING
 from first_release import lay_first_release
 from service.settings import Settings
-from service.store import artifacts, recorded_schema
+from service.store import artifacts, new_database
 from service.store.backup import back_up, restore
 from service.store.batches import batches, intake
 from service.store.courses import open_assignments
@@ -28,6 +28,7 @@ from service.store.grades import results
 from service.store.migrate import configuration, migrate
 from service.store.models import Artifact, Batch, CriterionResultRow, Enrolment, Job, Person, TrialRow
 from service.store.queue import jobs
+from service.store.recorded_schema import statements_of
 from service.store.revision import current_revision, newest_revision, revision_of, schema_state
 from service.store.states import JobState, Role, Standing
 from service.store.web_tables import METADATA, Credential, LtiCourse, LtiPlatform, OpenAssignment
@@ -60,16 +61,16 @@ def _lines_of(statement: str) -> list[str]:
 
 def test_a_new_database_is_what_the_migrations_make(tmp_path: Path) -> None:
     told = []
-    for name, lay in (("laid", partial(recorded_schema.lay, revision=newest_revision())), ("migrated", migrate)):
+    for name, lay in (("laid", partial(new_database.lay, revision=newest_revision())), ("migrated", migrate)):
         engine = open_engine(f"sqlite:///{tmp_path / name}.db")
         with engine.begin() as connection:
-            assert recorded_schema.can_be_laid(connection)
+            assert new_database.can_be_laid(connection)
             lay(connection)
-            schema = [_lines_of(statement) for statement in recorded_schema.statements_of(connection)]
+            schema = [_lines_of(statement) for statement in statements_of(connection)]
             rows = {table.name: connection.execute(select(table)).mappings().all() for table in METADATA.sorted_tables}
             (installation,) = rows.pop("installation")
             told.append((schema, rows, len(installation["secret"]), revision_of(connection)))
-            assert not recorded_schema.can_be_laid(connection)
+            assert not new_database.can_be_laid(connection)
         engine.dispose()
     assert told[0] == told[1], "python -m service.store.recorded_schema writes down anew what the migrations make"
 
