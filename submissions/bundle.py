@@ -7,10 +7,9 @@ assignment's business.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -18,18 +17,14 @@ from typing import TYPE_CHECKING
 from responders.code import Code
 from sim.errors import UsageError
 from sim.sentences import Sentence, listed
-from submissions.agent_files import with_agents
-from submissions.assignment.second_robot import SECOND_PROGRAM
-from submissions.compiled import is_compiled
-from submissions.file_kinds import advice_on_kind
-from submissions.marked_cell import LAST, marked_site, sites
+from submissions.file_kinds import advice_on_kind, advice_on_names, is_compiled
+from submissions.marked_run import named_run, runs_of
 from submissions.meta import META, read_meta, run_of, text_of
 from submissions.names import LONGEST_NAME, shown_name
 from submissions.notebook import is_script, read_notebook, read_script
 from submissions.raw_files import RawFiles, read_folder, read_single_file, read_zip, shown
-from submissions.run_choice import asked_site
 from submissions.source_text import decode_source
-from submissions.submission import PART_FILES, Notebook, Part, Submission
+from submissions.submission import PART_FILES, SECOND_PROGRAM, Notebook, Part, Submission, agent_of
 
 if TYPE_CHECKING:
     from submissions.assignment.definition import Parts
@@ -47,6 +42,7 @@ _LOOKS_LIKE_RESPONDER = re.compile(
     r"|^[ \t]*roboSim\.pyresponder[ \t]*=",
     re.MULTILINE,
 )
+_WRITEFILE = re.compile(r"\s*%%(?:writefile|file)[ \t]+(?P<name>[A-Za-z0-9_.]+)[ \t]*\n")
 UNNAMED = "unnamed"
 
 
@@ -110,7 +106,7 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
     where = where or submission.student
     if submission.notebook is not None:
         return _fit_notebook(submission, submission.notebook, asked, where)
-    submission = with_agents(submission, asked, where)
+    submission = _with_agents(submission, asked, where)
     notes = list(submission.notes)
     parts: dict[Part, Code | None] = {"program": submission.program, "responder": submission.responder}
     givers: dict[Part, str] = {"program": asked.program, "responder": asked.responder}
@@ -135,7 +131,7 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
             where=where,
             names=listed(files),
             expected=listed(needed),
-            renamed=_renamed(missing, submission.files),
+            renamed=advice_on_names(missing, submission.files),
         )
     for part in missing:
         others = [shown(name) for name in submission.files if name.lower().endswith(".py")]
@@ -176,15 +172,13 @@ def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, wher
         alone = dataclasses.replace(submission, notebook=None, notes=(*submission.notes, note))
         return fit_parts(alone, asked, where=where)
     if asked.program == "student":
-        marked_site(notebook, asked.cell)
-        if submission.run is not None and asked.cell == LAST:
-            asked_site(notebook, submission.run)
+        named_run(notebook, asked.cell, submission.run)
     files, notes = dict(submission.files), list(submission.notes)
     for source in (submission.program, submission.responder):
         if source is not None:
             files[source.name] = source.text.encode("utf-8", "surrogatepass")
             notes.append(f"{shown(source.name)} lies beside the notebook; the notebook is what is run.")
-    if asked.program != "student" and sites(notebook):
+    if asked.program != "student" and runs_of(notebook):
         notes.append(f"{shown(notebook.name)}: the assignment brings the robot program that is marked.")
     alone = dataclasses.replace(
         submission,
@@ -193,7 +187,62 @@ def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, wher
         files=MappingProxyType(dict(sorted(files.items()))),
         notes=tuple(notes),
     )
-    return with_agents(alone, asked, where)
+    return _with_agents(alone, asked, where)
+
+
+def _with_agents(submission: Submission, asked: Parts, where: str) -> Submission:
+    """The submission with each agent among its files, whatever it was taken for.
+
+    A notebook can bring an agent in a cell that begins with ``%%writefile``. Raises UsageError if one is missing.
+    """
+    if not asked.agents:
+        return submission
+    program, responder = submission.program, submission.responder
+    files, notes = dict(submission.files), list(submission.notes)
+    for part in (program, responder):
+        if part is not None and agent_of(part.name, asked.agents):
+            files[part.name] = part.text.encode("utf-8", "surrogatepass")
+            notes = [note for note in notes if not note.startswith(f"{shown(part.name)} was taken for")]
+            program = None if part is program else program
+            responder = None if part is responder else responder
+    for name in [
+        each for each in files if asked.agents.get(agent_of(each, asked.agents) or "", "student") != "student"
+    ]:
+        del files[name]
+        notes.append(f"{shown(name)} was left out: the assignment brings that agent itself.")
+    if submission.notebook is not None:
+        files = _written_by_cells(submission.notebook, asked.agents) | files
+    there = {agent_of(name, asked.agents) for name in files}
+    missing = [f"{name}.py" for name, who in asked.agents.items() if who == "student" and name not in there]
+    if missing and submission.notebook is not None:
+        raise UsageError(
+            "%(where)s: has no %(missing)s; put each agent in a file beside the notebook, or in a cell that begins "
+            "with %%%%writefile %(first)s.",
+            where=where,
+            missing=listed(missing),
+            first=missing[0],
+        )
+    if missing:
+        raise UsageError(
+            "%(where)s: has no %(missing)s, expected a file for each agent.", where=where, missing=listed(missing)
+        )
+    return dataclasses.replace(
+        submission,
+        program=program,
+        responder=responder,
+        files=MappingProxyType(dict(sorted(files.items()))),
+        notes=tuple(notes),
+    )
+
+
+def _written_by_cells(notebook: Notebook, agents: Mapping[str, str]) -> dict[str, bytes]:
+    """The agents of the student that cells of the notebook write to files of their own."""
+    written = {}
+    for cell in notebook.cells:
+        match = _WRITEFILE.match(cell.source)
+        if match is not None and agents.get(agent_of(match["name"], agents) or "") == "student":
+            written[match["name"]] = cell.source[match.end() :].encode("utf-8", "surrogatepass")
+    return written
 
 
 def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submission:
@@ -314,7 +363,7 @@ def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alo
     found_names = ", ".join(shown(name) for name in sorted(files)[:5])
     advice = advice_on_kind(sorted(files))
     instead = Sentence("; %(advice)s", {"advice": advice}) if advice is not None else ""
-    renamed = _renamed(PART_FILES, files) or instead
+    renamed = advice_on_names(PART_FILES, files) or instead
     raise UsageError(
         "%(where)s: has no robot.py or responder.py (found %(found)s), expected one or both%(renamed)s.",
         where=where,
@@ -323,30 +372,10 @@ def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alo
     )
 
 
-def meant_as(part: Part, names: Iterable[str]) -> str:
-    """The file that is called nearly as the part has to be; empty if none is."""
-    word = PART_FILES[part].removesuffix(".py")
-    texts = ((name, name.lower().removesuffix(".txt")) for name in sorted(names) if name != SECOND_PROGRAM)
-    stems = {name: text.removesuffix(".py") for name, text in texts if text.endswith(".py") or text == word}
-    near = difflib.get_close_matches(word, stems.values(), 1, 0.75)
-    return next((name for name, stem in stems.items() if word in stem or stem in near), "")
+def _looks_like(data: bytes, name: str) -> Part:
+    text = decode_source(data, shown(name)).text
+    return "responder" if _LOOKS_LIKE_RESPONDER.search(text) else "program"
 
 
 def _needed(file: str, what: Sentence) -> Sentence:
     return Sentence("%(file)s (%(what)s)", {"file": file, "what": what})
-
-
-def _renamed(missing: Iterable[Part], files: Iterable[str]) -> str | Sentence:
-    """What is to be called otherwise, of the files that are there."""
-    found = {part: meant_as(part, files) for part in missing}
-    renamed = [
-        Sentence("%(name)s to %(part)s", {"name": shown(name), "part": PART_FILES[part]})
-        for part, name in found.items()
-        if name
-    ]
-    return Sentence("; rename %(files)s", {"files": listed(renamed)}) if renamed else ""
-
-
-def _looks_like(data: bytes, name: str) -> Part:
-    text = decode_source(data, shown(name)).text
-    return "responder" if _LOOKS_LIKE_RESPONDER.search(text) else "program"

@@ -12,7 +12,7 @@ from typing import cast
 from sim.errors import UsageError
 from submissions.diagram import Diagram, DiagramKind
 from submissions.diagram_text import read_diagram
-from submissions.magic_lines import magic_place
+from submissions.source_text import magic_place
 from submissions.submission import Notebook
 
 MOST_DIAGRAMS = 20

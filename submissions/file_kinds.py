@@ -1,16 +1,21 @@
-"""Kinds of files that students submit in place of a program, by their suffix: what each is, and what to do instead.
+"""Files that are no part of a submission: other kinds than a program, other names than a part's, compiled code.
 
-Only names are looked at, never what is in a file.
+Each has a sentence on what to submit instead.
 """
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable, Mapping
+from io import BytesIO
 from pathlib import PurePosixPath
 from types import MappingProxyType
 
-from sim.sentences import Sentence
+from sim.readers.unreadable import Unreadable
+from sim.readers.zip_archive import is_zip, open_zip
+from sim.sentences import Sentence, listed
 from submissions.raw_files import shown
+from submissions.submission import PART_FILES, SECOND_PROGRAM, Part
 
 _COPY = Sentence("copy the text of the program into a file called robot.py, and submit that file")
 _SAVE = Sentence("submit the notebook itself, the .ipynb file: in Jupyter choose File, Download")
@@ -42,6 +47,12 @@ _KINDS: Mapping[str, tuple[Sentence, Sentence]] = MappingProxyType(
     }
 )
 
+_COMPILED = (".pyc", ".pyo", ".pyd", ".so", ".egg", ".whl")
+_MODULES = (".py", *_COMPILED)
+_ELF = b"\x7fELF"
+#: The entries of an archive that are read; zipfile makes an object of each.
+_MOST_ENTRIES = 2000
+
 
 def advice_on_kind(names: Iterable[str]) -> Sentence | None:
     """What to submit in place of the first file whose kind is known to be no program; None where none is."""
@@ -51,3 +62,42 @@ def advice_on_kind(names: Iterable[str]) -> Sentence | None:
             values = {"name": shown(name), "kind": known[0], "advice": known[1]}
             return Sentence("%(name)s is %(kind)s, not a program: %(advice)s", values)
     return None
+
+
+def meant_as(part: Part, names: Iterable[str]) -> str:
+    """The file that is called nearly as the part has to be; empty if none is."""
+    word = PART_FILES[part].removesuffix(".py")
+    texts = ((name, name.lower().removesuffix(".txt")) for name in sorted(names) if name != SECOND_PROGRAM)
+    stems = {name: text.removesuffix(".py") for name, text in texts if text.endswith(".py") or text == word}
+    near = difflib.get_close_matches(word, stems.values(), 1, 0.75)
+    return next((name for name, stem in stems.items() if word in stem or stem in near), "")
+
+
+def advice_on_names(missing: Iterable[Part], files: Iterable[str]) -> str | Sentence:
+    """Return which of the files to rename to the missing parts; empty if none has a similar name."""
+    found = {part: meant_as(part, files) for part in missing}
+    renamed = [
+        Sentence("%(name)s to %(part)s", {"name": shown(name), "part": PART_FILES[part]})
+        for part, name in found.items()
+        if name
+    ]
+    return Sentence("; rename %(files)s", {"files": listed(renamed)}) if renamed else ""
+
+
+def is_compiled(name: str, data: bytes) -> bool:
+    """Return whether a file is code that nobody can read: a compiled module, a library, an archive of modules.
+
+    Python would import it from the folder like any module. Model files, archives of arrays among them, are none.
+    """
+    return name.lower().endswith(_COMPILED) or data.startswith(_ELF) or _has_modules(data)
+
+
+def _has_modules(data: bytes) -> bool:
+    """Whether it is an archive, however it begins, from which Python could import; one that is too large may be."""
+    if not is_zip(BytesIO(data)):
+        return False
+    try:
+        with open_zip(BytesIO(data), _MOST_ENTRIES) as archive:
+            return any(entry.lower().endswith(_MODULES) for entry in archive.namelist())
+    except Unreadable:
+        return True

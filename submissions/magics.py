@@ -14,8 +14,8 @@ from sim.errors import UsageError
 from sim.floors import OBSTACLE_PRESETS, names, start_of
 from sim.recording import Pose
 from sim.robot import WIDENED, usual_robot
-from submissions.magic_lines import PREAMBLES, Preamble, magic_place
 from submissions.nearest import did_you_mean
+from submissions.source_text import PREAMBLES, Preamble, magic_place
 
 _X_MOST, _Y_MOST, _ANGLE_MOST = 2362, 1143, 360
 _LIGHT_NOISE_MOST, _MOTOR_NOISE_MOST = 128, 500
@@ -107,15 +107,18 @@ def split_program(text: str) -> tuple[Flags, str]:
     place = magic_place(text)
     if place is None:
         return Flags(), text
-    return parse_magic(text.split("\n")[place].lstrip("\ufeff").strip(), place + 1), without_magic(text)
+    return parse_magic(text.split("\n")[place].lstrip("\ufeff").strip(), place + 1), _without(place, text)
 
 
 def without_magic(text: str) -> str:
     """The program with its magic line as an empty comment, so that every other line keeps its number."""
-    lines = text.split("\n")
     place = magic_place(text)
-    if place is not None:
-        lines[: place + 1] = ["#" if line.lstrip("\ufeff \t").startswith("%") else line for line in lines[: place + 1]]
+    return text if place is None else _without(place, text)
+
+
+def _without(place: int, text: str) -> str:
+    lines = text.split("\n")
+    lines[: place + 1] = ["#" if line.lstrip("\ufeff \t").startswith("%") else line for line in lines[: place + 1]]
     return "\n".join(lines)
 
 

@@ -18,8 +18,7 @@ from sim.readers.json_text import JSONDecodeError, read_json
 from sim.readers.python_source import parse_module
 from sim.readers.unreadable import TooMany, Unreadable
 from sim.sentences import Sentence
-from submissions.magic_lines import is_program_magic
-from submissions.source_text import MAX_SOURCE_BYTES
+from submissions.source_text import MAX_SOURCE_BYTES, is_program_magic
 from submissions.submission import Cell, Notebook
 
 MAX_CELLS = 5000

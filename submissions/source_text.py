@@ -1,14 +1,19 @@
-"""From the bytes of a Python file, in whatever encoding it was saved, to its text.
+"""The text of a Python file: how its bytes are decoded, its magic line, and the modules that it can import.
 
-Whether the text is Python is for the interpreter to say, inside the sandbox; here it only becomes readable.
+Whether the text is Python is for the interpreter to say, inside the sandbox. The flags of a magic are parsed in
+``magics.py``, which needs the floors and therefore numpy.
 """
 
 from __future__ import annotations
 
 import codecs
 import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
 
+from responders.sandbox.inside.cell_source import WRAPPERS
 from sim.errors import UsageError
 
 MAX_SOURCE_BYTES = 1024 * 1024
@@ -21,9 +26,19 @@ _TEXT_ENCODINGS = re.compile(
     r"utf-8|ascii|iso8859-\d+|cp\d+|koi8-[rut]|mac-\w+|big5|gbk|gb18030|gb2312|shift_jis|euc_\w+"
 )
 
-
 _RICH_TEXT = rb"{\rtf"
 _NOTEBOOK_KEYS = (b'"cells"', b'"nbformat"')
+
+Preamble = Literal["none", "imports", "preloaded"]
+#: The magics that begin a robot program, and the names that each defines for it.
+PREAMBLES: Mapping[str, Preamble] = MappingProxyType(
+    {"sim_magic": "none", "sim_magic_imports": "imports", "sim_magic_preloaded": "preloaded"}
+)
+
+_IMPORTING = re.compile(r"^.*import.*$", re.MULTILINE)
+_WORD = re.compile(r"[^\W\d]\w*")
+#: The modules of one program, characters; as much as one file may have.
+_MOST_TEXT = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,3 +114,66 @@ def _cookie(data: bytes) -> str | None:
         if not _BLANK.match(line.rstrip(b"\r")):
             return None
     return None
+
+
+def magic_place(text: str) -> int | None:
+    """The index of the first line that is neither blank nor a comment, if it is a magic; of wrappers the last."""
+    found = None
+    for place, line in enumerate(text.split("\n")):
+        stripped = line.lstrip("\ufeff").strip()
+        if not stripped or stripped.startswith("#"):
+            continue
+        if not stripped.startswith("%"):
+            return found
+        found = place
+        if not stripped.startswith("%%") or magic_name(stripped) not in WRAPPERS:
+            return place
+    return found
+
+
+def is_program_magic(line: str) -> bool:
+    """Whether a line makes its cell a robot program, as ``%%sim_magic`` does and ``%sim_magic`` does not."""
+    stripped = line.lstrip("\ufeff").strip()
+    return stripped.startswith("%%") and magic_name(stripped) in PREAMBLES
+
+
+def magic_name(magic: str) -> str:
+    """Return the name of a magic, without its percent signs and flags."""
+    return (magic.split(maxsplit=1) or [""])[0].lstrip("%")
+
+
+def modules_of(text: str, read: Callable[[str], bytes | None]) -> Mapping[str, str]:
+    """Return the modules that a text can import, and those that they can, by their names.
+
+    A text can import only what it names on a line with an import, so these are also all that rules about its code
+    read. ``read`` gives a file's bytes by its name, or None. One that is no text, or too much with the others, is left
+    out.
+    """
+    found: dict[str, str] = {}
+    looked: set[str] = set()
+    left = _MOST_TEXT
+    waiting = [text]
+    while waiting:
+        for name in sorted(_named(waiting.pop()) - looked):
+            looked.add(name)
+            module = _module(name, read)
+            if module is not None and len(module) <= left:
+                left -= len(module)
+                found[name] = module
+                waiting.append(module)
+    return found
+
+
+def _named(text: str) -> set[str]:
+    lines = _IMPORTING.findall(text.replace("\\\n", " "))
+    return {name for line in lines for name in _WORD.findall(line)}
+
+
+def _module(name: str, read: Callable[[str], bytes | None]) -> str | None:
+    data = read(f"{name}.py")
+    if data is None:
+        return None
+    try:
+        return decode_source(data, f"{name}.py").text
+    except UsageError:
+        return None

@@ -5,17 +5,24 @@ Plain data; reading archives and folders is ``bundle.py``, deciding what to do w
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import MappingProxyType
 from typing import Literal
 
 from responders.code import Code
+from sim.errors import UsageError
+from submissions.raw_files import shown
+from submissions.source_text import decode_source
 
 Part = Literal["program", "responder"]
 #: What the file of each part is called.
 PART_FILES: Mapping[Part, str] = MappingProxyType({"program": "robot.py", "responder": "responder.py"})
+#: The file with the second robot's program; it lies among the files beside the parts.
+SECOND_PROGRAM = "robot2.py"
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +48,7 @@ class Notebook:
     raw_responders: tuple[str, ...] = field(default=(), compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Submission:
     """One submission. ``files`` are what lies beside the sources, by flat name; a notebook stands for both sources."""
 
@@ -53,6 +60,31 @@ class Submission:
     notes: tuple[str, ...] = ()  # what was ignored, stepped into or renamed while reading
     notebook: Notebook | None = None
     run: str | None = None  # of the notebook: the number or the tag of the one to be marked, where anybody says so
+
+    @cached_property
+    def python_files(self) -> Mapping[str, Code]:
+        """The Python files among ``files`` that can be read, by name: modules, agents, the second robot's program."""
+        found: dict[str, Code] = {}
+        for name, data in self.files.items():
+            if name.lower().endswith(".py"):
+                with contextlib.suppress(UsageError):
+                    found[name] = _decoded(name, data)
+        return MappingProxyType(found)
+
+    def code(self, name: str) -> Code | None:
+        """The file of this name among ``files``. Raises UsageError if it is no text."""
+        if name not in self.files:
+            return None
+        return self.python_files.get(name) or _decoded(name, self.files[name])
+
+    def agent(self, agent: str) -> Code | None:
+        """The file of this agent: ``parser.py`` is that of ``parser``. Raises UsageError if it is no text."""
+        return next((self.code(name) for name in self.files if agent_of(name, (agent,))), None)
+
+    def files_without(self, agents: Iterable[str]) -> Mapping[str, bytes]:
+        """The files but for those of these agents, which no other process can read."""
+        agents = tuple(agents)
+        return {name: data for name, data in self.files.items() if not agent_of(name, agents)}
 
     @property
     def sha256(self) -> str:
@@ -87,3 +119,12 @@ class Submission:
                 yield "run", self.run
         for name in sorted(self.files):
             yield "file", name, self.files[name]
+
+
+def agent_of(file: str, agents: Iterable[str]) -> str | None:
+    """The one of these agents that a file has the program of."""
+    return next((name for name in agents if file.lower() == f"{name}.py"), None)
+
+
+def _decoded(name: str, data: bytes) -> Code:
+    return Code(name, decode_source(data, shown(name)).text)

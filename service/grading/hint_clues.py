@@ -5,23 +5,20 @@ Student code is split into tokens and searched here, and never parsed, so that n
 
 from __future__ import annotations
 
-import contextlib
 import re
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.hint_code import CodeStatements, read_code
 from service.grading.run_plan import RunPlan
-from sim.errors import UsageError
 from sim.recorded import faults_of, stood_still
 from sim.recording import Fault, Message, Recording
-from submissions.assignment.second_robot import SECOND_PROGRAM, second_program_of
 from submissions.criteria import Criterion
-from submissions.magic_lines import is_program_magic, magic_place
 from submissions.raw_files import shown
-from submissions.source_text import decode_source
-from submissions.submission import PART_FILES, Part, Submission
+from submissions.source_text import is_program_magic, magic_place
+from submissions.submission import PART_FILES, SECOND_PROGRAM, Part, Submission
 
 _MOST_LINES, _LONGEST_LINE = 5000, 300
 _MOST_TEXTS, LONGEST_TEXT = 400, 300
@@ -29,7 +26,7 @@ _MOST_BESIDE = 20
 _QUEUE = re.compile("pyState")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Listing:
     """One text of the student's: a file, or a cell of a notebook, which is nobody's part."""
 
@@ -37,6 +34,16 @@ class Listing:
     part: Part | None
     lines: tuple[str, ...]
     code: CodeStatements = field(default_factory=CodeStatements)
+
+    @cached_property
+    def magic_place(self) -> int | None:
+        """The index of its magic line."""
+        return magic_place("\n".join(self.lines))
+
+    @property
+    def runs_robot(self) -> bool:
+        """Whether it is a cell with a robot program."""
+        return self.magic_place is not None and is_program_magic(self.lines[self.magic_place])
 
     def find(self, pattern: re.Pattern[str], start: int = 0) -> int | None:
         """The number, from 1, of the first line after ``start`` that has it."""
@@ -83,7 +90,7 @@ class Clues:
     @property
     def programs(self) -> Iterator[Listing]:
         """The texts that are robot programs: files, and cells that begin with a magic of the simulator."""
-        return (each for each in self.listings if each.part == "program" or (each.part is None and _runs_robot(each)))
+        return (each for each in self.listings if each.part == "program" or (each.part is None and each.runs_robot))
 
     @property
     def responders(self) -> Iterator[Listing]:
@@ -212,7 +219,7 @@ def _listings(submission: Submission, robots: int) -> Iterator[Listing]:
         yield _listing("robot.py", "program", submission.program.text)
     if submission.responder is not None:
         yield _listing("responder.py", "responder", submission.responder.text)
-    second = second_program_of(submission) if robots == 2 else None
+    second = submission.code(SECOND_PROGRAM) if robots == 2 else None
     if second is not None:
         yield _listing(SECOND_PROGRAM, "program", second.text)
     for cell in submission.notebook.cells if submission.notebook is not None else ():
@@ -221,18 +228,13 @@ def _listings(submission: Submission, robots: int) -> Iterator[Listing]:
 
 def _beside(submission: Submission) -> Iterator[Listing]:
     for name in [each for each in sorted(submission.files) if each.endswith(".py")][:_MOST_BESIDE]:
-        with contextlib.suppress(UsageError):
-            yield _listing(name, None, decode_source(submission.files[name], name).text)
+        if name in submission.python_files:
+            yield _listing(name, None, submission.python_files[name].text)
 
 
 def _listing(name: str, part: Part | None, text: str) -> Listing:
     lines = tuple(line[:_LONGEST_LINE].rstrip("\r") for line in text.split("\n", _MOST_LINES)[:_MOST_LINES])
     return Listing(name, part, lines, read_code(lines))
-
-
-def _runs_robot(cell: Listing) -> bool:
-    place = magic_place("\n".join(cell.lines))
-    return place is not None and is_program_magic(cell.lines[place])
 
 
 def _different(texts: Iterator[str]) -> tuple[str, ...]:

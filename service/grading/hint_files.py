@@ -17,7 +17,6 @@ from submissions.assignment.folder import assignment_folder, catalogue
 from submissions.criteria.code import SourceRules
 from submissions.criteria.drawing import Drawing
 from submissions.criteria.point import Circuits
-from submissions.magic_lines import magic_place
 
 _RESPONDER = re.compile(r"^def (?:\w+_)?responder\(")
 _ROBOT = re.compile(
@@ -82,7 +81,7 @@ def of_ignored_magic(clues: Clues) -> Iterator[str]:
     if not clues.ignored_magic or not (draws or asks):
         return
     for listing in clues.programs:
-        place = magic_place("\n".join(listing.lines))
+        place = listing.magic_place
         if place is not None and (clues.marked_cell is None or listing.name == f"cell {clues.marked_cell}"):
             why = clues.ignored_magic.partition(": ")[2] or clues.ignored_magic
             cut = _CUT_VALUE.search(f"{why}\n{listing.lines[place]}")

@@ -12,9 +12,8 @@ from collections.abc import Iterator
 from responders.message_format import IMG_DATA, JSON, PY, kind
 from service.grading.hint_clues import Clues, Listing, name_of
 from service.grading.judging.message_parts import quoted
-from submissions.bundle import meant_as
-from submissions.magic_lines import magic_place
-from submissions.marked_cell import NEARLY_MAGIC
+from submissions.file_kinds import meant_as
+from submissions.marked_run import NEARLY_MAGIC
 from submissions.raw_files import shown
 from submissions.submission import PART_FILES
 
@@ -61,7 +60,7 @@ def of_magics(clues: Clues) -> Iterator[str]:
         lines = [fault.line for fault in faulty if name_of(fault) == listing.name]
         if not lines:
             continue
-        place = magic_place("\n".join(listing.lines))
+        place = listing.magic_place
         for number, line in enumerate(listing.lines, 1):
             if place == number - 1 and listing.part == "program":
                 continue

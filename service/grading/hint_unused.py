@@ -17,7 +17,6 @@ from submissions.criteria.code import SourceRules
 from submissions.criteria.collecting import Collects
 from submissions.criteria.logged import Datalog
 from submissions.criteria.stopping import StopOn
-from submissions.magic_lines import magic_place
 
 _OPERATORS = frozenset("+-*/")
 _PAIRS = frozenset({"MoveTank", "MoveSteering"})
@@ -75,7 +74,7 @@ def of_swallowed_flags(clues: Clues) -> Iterator[str]:
     told = [each.message for each in clues.results for one in clues.lost if one.id == each.id and _is_source(one)]
     missing = {flag for message in told for flag in _MISSING_FLAG.findall(message)}
     for listing in clues.programs if missing else ():
-        place = magic_place("\n".join(listing.lines))
+        place = listing.magic_place
         found = _VALUED_FLAG.search(listing.lines[place]) if place is not None else None
         if place is None or found is None or not missing & set(found[3]):
             continue

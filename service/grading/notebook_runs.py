@@ -19,9 +19,9 @@ from sim.floors import floor
 from sim.recording import TICK, Recording
 from sim.robot import robot
 from sim.world import Noise
-from submissions.helper_modules import modules_of
 from submissions.magics import Flags, Setup, Simulator, parse_flags
-from submissions.marked_cell import Site
+from submissions.marked_run import Site
+from submissions.source_text import modules_of
 
 #: What ``%sim_magic --refresh`` puts in the place of the program.
 _REFRESHED = "print('Refreshing simulator...')"

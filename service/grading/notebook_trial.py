@@ -18,8 +18,7 @@ from service.grading.trial_runner import TrialRunner
 from sim.motion import Rectangle
 from sim.recording import Fault, Recording, Verdict
 from submissions.magics import Flags, Setup
-from submissions.marked_cell import Site
-from submissions.run_choice import RunChoice
+from submissions.marked_run import RunChoice, Site
 
 
 @dataclass(frozen=True, slots=True)

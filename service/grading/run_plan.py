@@ -21,19 +21,17 @@ from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from sim.motion import Rectangle
 from sim.recording import Recording
-from submissions.agent_files import code_of, without_agents
 from submissions.assignment.definition import Assignment
-from submissions.assignment.second_robot import SAME, SECOND_PROGRAM, second_program_of
+from submissions.assignment.second_robot import SAME
 from submissions.bundle import missing_part
 from submissions.criteria.code import SourceRules
 from submissions.diagram_cells import diagrams_in
-from submissions.helper_modules import modules_of
 from submissions.magics import Flags, setup, split_program, without_magic
-from submissions.marked_cell import program_of
+from submissions.marked_run import RunChoice, choose_run
 from submissions.plain_cells import python_of
-from submissions.run_choice import RunChoice, choose_run
 from submissions.seeds import PUBLIC, Secret, child_seed, world_seed
-from submissions.submission import Notebook, Part, Submission
+from submissions.source_text import modules_of
+from submissions.submission import SECOND_PROGRAM, Notebook, Part, Submission
 
 _MEGABYTE = 1 << 20
 _IGNORED = "the program's magic line is ignored"
@@ -196,8 +194,7 @@ def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignm
         flags, text, notes = _flags(assignment.given_parts[asked.program], assignment)
         return _executed(submission, notebook, assignment, Code(asked.program, text), flags, notes)
     choice = choose_run(notebook, assignment, submission.run)
-    site = choice.site
-    cell = program_of(notebook, site)
+    site, cell = choice.site, choice.run.program
     flags, text, notes = _flags(cell.source if cell is not None else "", assignment)
     if asked.responder == "student":
         # A line that cannot be read is told by its execution, which may come to another cell.
@@ -287,7 +284,7 @@ def _with_second_program(plan: RunPlan, submission: Submission) -> RunPlan:
         raise UsageError(f"{assignment.id} has two robots, which no notebook can answer, expected robot.py")
     if who == SAME:
         return replace(plan, second_program=plan.program, second_flags=plan.flags, collaborative=True)
-    code = _part("second robot program", SECOND_PROGRAM, who, second_program_of(submission), assignment)
+    code = _part("second robot program", SECOND_PROGRAM, who, submission.code(SECOND_PROGRAM), assignment)
     assert code is not None
     flags, text, notes = _flags(code.text, assignment)
     program = _program(Code(code.name, text), flags, _files(submission, assignment, who), assignment)
@@ -328,7 +325,7 @@ def _files(submission: Submission, assignment: Assignment, who: str) -> Mapping[
 
     What the assignment brings imports none of the submission's code.
     """
-    submitted = without_agents(submission.files, assignment.parts.agents)
+    submitted = submission.files_without(assignment.parts.agents)
     own = (each for each in submitted.items() if who == "student" or not each[0].endswith(".py"))
     return {**assignment.given, **dict(own)}
 
@@ -338,7 +335,7 @@ def _agents(submission: Submission, assignment: Assignment) -> dict[str, AgentSp
     agents = {}
     for name, who in assignment.parts.agents.items():
         given = who != "student"
-        code = Code(who, assignment.given_parts[who]) if given else code_of(name, submission.files)
+        code = Code(who, assignment.given_parts[who]) if given else submission.agent(name)
         spec = _responder(code, assignment.given if given else _files(submission, assignment, who), assignment)
         if spec is None:
             raise UsageError(f"the submission has no agent {name}; {assignment.id} asks for {name}.py")

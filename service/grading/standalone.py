@@ -25,11 +25,10 @@ from sim.floors import Floor, floor, floor_from_image, names
 from sim.recording import TICK, Recording
 from sim.robot import robot
 from sim.world import Noise
-from submissions.helper_modules import modules_of
 from submissions.magics import Flags, Setup, setup, split_program
-from submissions.marked_cell import sites
+from submissions.marked_run import runs_of
 from submissions.notebook import is_script, read_notebook, read_script
-from submissions.source_text import decode_source
+from submissions.source_text import decode_source, modules_of
 from submissions.submission import Notebook
 
 _IMAGES = (".png", ".jpg", ".jpeg")
@@ -196,11 +195,11 @@ def run_notebook(
         )
         return PlannedRun(spec, wanted.obstacles, notes=(*own.notes, *wanted.notes))
 
-    found = sites(notebook)
+    runs = runs_of(notebook)
     unmarked = UnmarkedRuns(
         limits.program, limits.output_bytes, options.seconds, options.seed, files, options.tick, options.sheet_number
     )
-    planner = NotebookRuns(found[-1] if found else None, last_run, unmarked, PlannedRun())
+    planner = NotebookRuns(runs[-1].site if runs else None, last_run, unmarked, PlannedRun())
     cells = tuple(cell.source for cell in notebook.cells)
     spec = NotebookSpec(notebook.name, cells, files, limits.responder, limits.output_bytes, options.seed)
     return runner.execute_notebook(spec, planner, limits.meter())

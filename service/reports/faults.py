@@ -18,11 +18,8 @@ from service.reports.words import trial_words
 from sim.errors import UsageError
 from sim.recorded import faults_of
 from sim.recording import Fault, Verdict
-from submissions.agent_files import code_of
-from submissions.assignment.second_robot import second_program_of
-from submissions.magic_lines import magic_place
-from submissions.source_text import decode_source
-from submissions.submission import PART_FILES, Submission
+from submissions.source_text import magic_place
+from submissions.submission import PART_FILES, SECOND_PROGRAM, Submission
 
 _WHERE: Mapping[str, str] = MappingProxyType(
     {
@@ -123,10 +120,10 @@ def _source(fault: Fault, submission: Submission | None) -> Code | None:
         cells = {cell.number: cell.source for cell in submission.notebook.cells}
         return Code(submission.notebook.name, cells.get(fault.cell, ""))
     if fault.agent:
-        return code_of(fault.agent, submission.files)
+        return submission.agent(fault.agent)
     parts = {"program": submission.program, "responder": submission.responder}
     if fault.who == "second program":
-        parts[fault.who] = second_program_of(submission)
+        parts[fault.who] = submission.code(SECOND_PROGRAM)
     return parts.get(fault.who)
 
 
@@ -141,9 +138,8 @@ def source_called(name: str, submission: Submission) -> Code | None:
 
 def _beside(file: str, submission: Submission) -> Code | None:
     """A process has named the file, so it may be any, or none."""
-    data = submission.files.get(file)
     with contextlib.suppress(UsageError):
-        return None if data is None else Code(file, decode_source(data, file).text)
+        return submission.code(file)
     return None
 
 

@@ -28,7 +28,7 @@ def sources_of(submission: Submission) -> Mapping[str, str]:
             found[part.name] = part.text
     if submission.notebook is not None:
         found[submission.notebook.name] = "\n\n".join(cell.source for cell in submission.notebook.cells)
-    found |= {name: text for name, text in _python_in(submission.files) if name not in found}
+    found |= {name: code.text for name, code in submission.python_files.items() if name not in found}
     return dict(list(found.items())[:MOST_FILES])
 
 

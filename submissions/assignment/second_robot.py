@@ -8,10 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from responders.code import Code
 from sim.recording import Pose
-from submissions.source_text import decode_source
-from submissions.submission import Submission
 
 if TYPE_CHECKING:
     from submissions.assignment.problems import Problems
@@ -20,17 +17,6 @@ if TYPE_CHECKING:
 
 #: As ``second_program``: what runs on the first robot runs on the second as well.
 SAME = "same"
-#: The file of a submission with the second robot's program.
-SECOND_PROGRAM = "robot2.py"
-
-
-def second_program_of(submission: Submission) -> Code | None:
-    """The student's program for the second robot, which lies among the files beside the first one's.
-
-    Raises UsageError where it cannot be read.
-    """
-    data = submission.files.get(SECOND_PROGRAM)
-    return None if data is None else Code(SECOND_PROGRAM, decode_source(data, SECOND_PROGRAM).text)
 
 
 def check_robots(document: Mapping[str, object], world: WorldTable, parts: PartsTable, problems: Problems) -> None:

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 from submissions.assignment.definition import Assignment
-from submissions.assignment.second_robot import SECOND_PROGRAM
-from submissions.submission import PART_FILES
+from submissions.submission import PART_FILES, SECOND_PROGRAM
 
 
 @dataclass(frozen=True, slots=True)

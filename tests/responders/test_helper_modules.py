@@ -15,7 +15,7 @@ from service.reports.faults import fault_groups
 from sim.recording import Fault, Verdict
 from submissions.assignment.reader import read_assignment
 from submissions.bundle import read_submission
-from submissions.helper_modules import modules_of
+from submissions.source_text import modules_of
 
 TOML = """
 id = "talk"

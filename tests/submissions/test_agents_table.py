@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from sim.errors import AssignmentError, UsageError
-from submissions.agent_files import code_of, without_agents
 from submissions.assignment.definition import Parts
 from submissions.assignment.reader import read_assignment
 from submissions.bundle import read_submission
@@ -113,10 +112,10 @@ def test_the_files_of_agents_are_no_parts(names: tuple[str, str], tmp_path: Path
     assert submission.program is None
     assert submission.responder is not None
     assert submission.responder.text == RESPONDER
-    parser = code_of("parser", submission.files)
+    parser = submission.agent("parser")
     assert parser is not None
     assert (parser.name, parser.text) == (names[1], PARSER)
-    assert without_agents(submission.files, ASKED.agents) == {}
+    assert submission.files_without(ASKED.agents) == {}
     assert unpack_submission(pack_submission(submission)).sha256 == submission.sha256
     assert not any("robot program" in note for note in submission.notes)
 

@@ -12,8 +12,8 @@ from notebook_builder import notebook
 from sim.errors import UsageError
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import fit_parts, read_submission
+from submissions.marked_run import RunChoice, choose_run
 from submissions.packed import pack_submission, unpack_submission
-from submissions.run_choice import RunChoice, choose_run
 from submissions.submission import Submission
 
 ANSWER = "def responder(text):\n    return text"

@@ -1,0 +1,296 @@
+"""Where a notebook starts robot programs, and which of these runs is marked.
+
+Decided by reading, before anything is run. ``[parts] cell`` of the assignment names the run; where it leaves the choice
+open, it is the run that the submission asks for, else the last that fits.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from responders.sandbox.inside.cell_source import WRAPPERS, cell_magic
+from sim.errors import UsageError
+from sim.readers.python_source import parse_module
+from sim.readers.unreadable import Unreadable
+from sim.sentences import Sentence
+from submissions.assignment.definition import Assignment
+from submissions.magics import parse_flags, parse_magic, without_magic
+from submissions.notebook import as_code_cell
+from submissions.raw_files import shown
+from submissions.source_text import is_program_magic, magic_place
+from submissions.submission import Cell, Notebook
+
+LAST = "last"
+_TAG = "tag:"
+
+_LINE = re.compile(
+    r"""(?:%sim_magic[ \t]+|\.run_line_magic\([ \t]*['"]sim_magic['"][ \t]*,[ \t]*f?['"])(?P<flags>.*)"""
+)
+_AUTORUN = re.compile(r"(?:^|\s)(?:-[A-Za-z]*R|--auto)")
+_EXPANDED = re.compile(r"[{$]")
+#: A line that was to begin a robot program.
+NEARLY_MAGIC = re.compile(r"[ \t\ufeff]*%*[ \t]?sim_?ma\w*(?:[ \t]+-|[ \t]*\r?$)")
+#: Its percent signs and its name, also where blanks are between them.
+_BEGIN = re.compile(r"%*[ \t]?sim_?ma\w*")
+_CALL = re.compile(r"""\.run_cell_magic\([ \t]*['"]sim_magic""")
+
+_SENDS = ("PY::", "IMG_DATA")
+#: A test of a sensor: how many statements it has, and characters, at most.
+_TEST_STATEMENTS, _TEST_LENGTH = 2, 300
+_MOST_SHOWN = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """A line of a cell (both counted from 1) from which a robot program is loaded or started."""
+
+    cell: int
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A run of the notebook, counted from 1.
+
+    ``program`` is the cell with its robot program: its own, or the last one loaded before it. ``floor`` is named by the
+    last ``-b`` at or above the site; None where none is, or where it follows from running.
+    """
+
+    number: int
+    site: Site
+    program: Cell | None
+    begins: bool  # the site is the first line of the program
+    floor: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class RunChoice:
+    """The run that is marked, as far as can be read.
+
+    ``others`` take its place, in this order, where no cell comes to it, unless this is the ``only`` one that was asked
+    for; ``notes`` tell of the choice if there was one.
+    """
+
+    run: Run
+    only: bool
+    others: tuple[Site, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def site(self) -> Site:
+        """Where the run starts."""
+        return self.run.site
+
+
+@functools.lru_cache(maxsize=4)
+def runs_of(notebook: Notebook) -> tuple[Run, ...]:
+    """Every run, from the top: cells that begin with ``%%sim_magic...``, and lines that start their program again.
+
+    Kept for the notebooks that were read last: intake checks the run that grading marks.
+    """
+    found: list[Run] = []
+    program: Cell | None = None
+    floor: str | None = None
+    for cell in notebook.cells:
+        begin = _program_line(cell)
+        program = program if begin is None else cell
+        again = begin is None and _may_start_again(cell)
+        for number, line in enumerate(cell.source.split("\n"), 1):
+            flags = _LINE.search(line)
+            floor = _floor(line, flags, number == begin) or floor
+            if number == begin or (again and _starts_again(line, flags)):
+                known = None if floor is None or _EXPANDED.search(floor) else floor
+                found.append(Run(len(found) + 1, Site(cell.number, number), program, number == begin, known))
+    return tuple(found)
+
+
+def choose_run(notebook: Notebook, assignment: Assignment, asked: str | None) -> RunChoice:
+    """The run that the assignment names; where it names none, the one ``asked`` for, else the last that fits.
+
+    Raises UsageError where there is no such run.
+    """
+    marked = named_run(notebook, assignment.parts.cell, asked)
+    if assignment.parts.cell != LAST:
+        named = f"run = {asked} is not used: the assignment says which run is marked"
+        return RunChoice(marked, True, notes=(named,) if asked is not None else ())
+    runs = runs_of(notebook)
+    misfits = {run: tuple(_misfits(run, assignment)) for run in runs}
+    if asked is not None:
+        return RunChoice(marked, True, notes=_choice_notes(misfits, marked, f"as run = {asked} asks"))
+    best, *others = sorted(runs, key=lambda run: (len(misfits[run]), -run.number))
+    why = "the last that fits" if not misfits[best] else f"which fits best, though {', '.join(misfits[best])}"
+    return RunChoice(best, False, tuple(run.site for run in others), _choice_notes(misfits, best, why))
+
+
+def named_run(notebook: Notebook, which: str, asked: str | None = None) -> Run:
+    """The run that ``which`` means: ``last``, ``tag:NAME``, or the number of a robot program, from 1.
+
+    ``last`` leaves the choice to the submission: ``asked`` is the number of a run, or a tag.
+
+    Raises UsageError with what the notebook has instead where there is no such run.
+    """
+    runs = runs_of(notebook)
+    if not runs:
+        raise UsageError(
+            "%(name)s: has no robot program, expected a cell that begins with %%%%sim_magic_preloaded%(near)s.",
+            name=notebook.name,
+            near=_near_miss(notebook),
+        )
+    if which == LAST and asked is not None:
+        return _asked_run(notebook, runs, asked)
+    if which == LAST:
+        return runs[-1]
+    if not which.isdecimal():
+        return _tagged(notebook, runs, which.removeprefix(_TAG))
+    number, programs = int(which), [run for run in runs if run.begins]
+    if number > len(programs):
+        raise UsageError(
+            "%(name)s: has %(count)s, expected at least %(number)s: number %(number)s is marked.",
+            name=notebook.name,
+            count=_count(len(programs)),
+            number=number,
+        )
+    return programs[number - 1]
+
+
+def _asked_run(notebook: Notebook, runs: Sequence[Run], asked: str) -> Run:
+    if not asked.isdecimal():
+        return _tagged(notebook, runs, asked.removeprefix(_TAG))
+    if not 1 <= int(asked) <= len(runs):
+        raise UsageError(
+            "%(name)s: has no run %(asked)s, expected a number from 1 to %(most)s, or a tag.",
+            name=notebook.name,
+            asked=asked,
+            most=len(runs),
+        )
+    return runs[int(asked) - 1]
+
+
+def _tagged(notebook: Notebook, runs: Sequence[Run], tag: str) -> Run:
+    tagged = [cell.number for cell in notebook.cells if tag in cell.tags]
+    if not tagged:
+        raise UsageError(
+            '%(name)s: has no cell with the tag "%(tag)s", expected it on the cell with the robot program; '
+            "it is lost when a notebook is saved as .py.",
+            name=notebook.name,
+            tag=tag,
+        )
+    found = [run for run in runs if run.site.cell in tagged]
+    if not found:
+        raise UsageError(
+            '%(name)s: cell %(cell)s has the tag "%(tag)s" but runs no robot, expected '
+            "%%%%sim_magic_preloaded as its first line.",
+            name=notebook.name,
+            cell=tagged[-1],
+            tag=tag,
+        )
+    return found[-1]
+
+
+def _choice_notes(misfits: dict[Run, tuple[str, ...]], marked: Run, why: str) -> tuple[str, ...]:
+    if len(misfits) < 2:
+        return ()
+    others = [_other_run(run, found) for run, found in misfits.items() if run != marked]
+    more = f" and {len(others) - _MOST_SHOWN} more" if len(others) > _MOST_SHOWN else ""
+    return (
+        f"that is run {marked.number} of {len(misfits)}, {why}; the others are {', '.join(others[:_MOST_SHOWN])}{more}",
+        "another run is marked with --run NUMBER, or with run = NUMBER in submission.toml",
+    )
+
+
+def _other_run(run: Run, misfits: Sequence[str]) -> str:
+    why = f": {misfits[0]}" if misfits else ""
+    return f"run {run.number} (cell {run.site.cell}{why})"
+
+
+def _misfits(run: Run, assignment: Assignment) -> Iterator[str]:
+    """Why a run does not fit the assignment."""
+    world, answered = assignment.world, assignment.parts.responder != "none"
+    text = run.program.source if run.program is not None else ""
+    if world.image is None and run.floor is not None and run.floor != world.background:
+        yield f"its floor is {run.floor[:40]}"
+    sends = any(word in text for word in _SENDS)
+    if answered and not sends:
+        yield "it sends nothing to the responder"
+    if not (answered and sends) and _is_test(without_magic(text)):
+        yield "it only prints"
+
+
+def _is_test(text: str) -> bool:
+    """Whether a program is one or two statements that call nothing but ``print``."""
+    code = text.strip("# \n")
+    if len(code) > _TEST_LENGTH:
+        return False
+    try:
+        nodes = list(ast.walk(parse_module(code)))
+    except (SyntaxError, Unreadable):
+        return False
+    statements = [node for node in nodes if isinstance(node, ast.stmt)]
+    called = [ast.unparse(node.func) for node in nodes if isinstance(node, ast.Call)]
+    return len(statements) <= _TEST_STATEMENTS and set(called) <= {"print"}
+
+
+def _program_line(cell: Cell) -> int | None:
+    """The line, from 1, of the magic that makes the cell a robot program."""
+    place = magic_place(cell.source)
+    if place is None or not is_program_magic(cell.source.split("\n")[place]):
+        return None
+    return place + 1
+
+
+def _may_start_again(cell: Cell) -> bool:
+    """Whether a cell that is no robot program is run as Python, so that its lines can start one."""
+    magic = cell_magic(cell.source)
+    return magic is None or magic.name in WRAPPERS
+
+
+def _starts_again(line: str, flags: re.Match[str] | None) -> bool:
+    return bool(_CALL.search(line) or (flags and _AUTORUN.search(flags["flags"])))
+
+
+def _floor(line: str, again: re.Match[str] | None, begins: bool) -> str | None:
+    """The background that a magic's line names."""
+    try:
+        if begins:
+            flags = parse_magic(line.lstrip("\ufeff").strip())
+        elif again:
+            flags = parse_flags("sim_magic", re.split(r"""['"]""", again["flags"])[0])
+        else:
+            return None
+    except UsageError:
+        return None
+    return flags.values.get("b")
+
+
+def _near_miss(notebook: Notebook) -> str | Sentence:
+    """A line that is nearly a program's magic, or is one in the wrong place, such as a Markdown cell."""
+    for place in notebook.markdown_programs:
+        return Sentence("; %(near)s", {"near": as_code_cell(place)})
+    for cell in notebook.cells:
+        for number, line in enumerate(cell.source.split("\n"), 1):
+            begin = _BEGIN.search(line[:200]) if NEARLY_MAGIC.match(line[:200]) else None
+            if begin is not None:
+                values = {"line": number, "cell": cell.number, "word": shown(begin[0]), "why": _why_not(line)}
+                return Sentence("; line %(line)s of cell %(cell)s has %(word)s, %(why)s", values)
+    return ""
+
+
+def _why_not(line: str) -> Sentence:
+    """Why a line that is nearly a program's magic begins no program."""
+    if is_program_magic(line):
+        return Sentence("below other code: make it the first line")
+    if is_program_magic(f"%{line.lstrip()}"):
+        return Sentence("with one %(sign)s: write two", {"sign": "%"})
+    if is_program_magic(re.sub(r"^%%\s+", "%%", line.strip())):
+        return Sentence("with a blank after %(signs)s: delete the blank", {"signs": "%%"})
+    return Sentence("another word")
+
+
+def _count(number: int) -> Sentence:
+    if number == 1:
+        return Sentence("1 robot program")
+    return Sentence("%(count)s robot programs", {"count": number})
