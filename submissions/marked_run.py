@@ -19,8 +19,7 @@ from sim.readers.unreadable import Unreadable
 from sim.sentences import Sentence
 from submissions.assignment.definition import Assignment
 from submissions.magics import parse_flags, parse_magic, without_magic
-from submissions.notebook import as_code_cell
-from submissions.raw_files import shown
+from submissions.notebook import near_program
 from submissions.source_text import is_program_magic, magic_place
 from submissions.submission import Cell, Notebook
 
@@ -32,10 +31,6 @@ _LINE = re.compile(
 )
 _AUTORUN = re.compile(r"(?:^|\s)(?:-[A-Za-z]*R|--auto)")
 _EXPANDED = re.compile(r"[{$]")
-#: A line that was to begin a robot program.
-NEARLY_MAGIC = re.compile(r"[ \t\ufeff]*%*[ \t]?sim_?ma\w*(?:[ \t]+-|[ \t]*\r?$)")
-#: Its percent signs and its name, also where blanks are between them.
-_BEGIN = re.compile(r"%*[ \t]?sim_?ma\w*")
 _CALL = re.compile(r"""\.run_cell_magic\([ \t]*['"]sim_magic""")
 
 _SENDS = ("PY::", "IMG_DATA")
@@ -98,11 +93,12 @@ def runs_of(notebook: Notebook) -> tuple[Run, ...]:
     for cell in notebook.cells:
         begin = _program_line(cell)
         program = program if begin is None else cell
-        again = begin is None and _may_start_again(cell)
+        magic = cell_magic(cell.source)
+        is_python = begin is None and (magic is None or magic.name in WRAPPERS)
         for number, line in enumerate(cell.source.split("\n"), 1):
             flags = _LINE.search(line)
             floor = _floor(line, flags, number == begin) or floor
-            if number == begin or (again and _starts_again(line, flags)):
+            if number == begin or (is_python and _starts_again(line, flags)):
                 known = None if floor is None or _EXPANDED.search(floor) else floor
                 found.append(Run(len(found) + 1, Site(cell.number, number), program, number == begin, known))
     return tuple(found)
@@ -138,7 +134,7 @@ def named_run(notebook: Notebook, which: str, asked: str | None = None) -> Run:
         raise UsageError(
             "%(name)s: has no robot program, expected a cell that begins with %%%%sim_magic_preloaded%(near)s.",
             name=notebook.name,
-            near=_near_miss(notebook),
+            near=near_program(notebook),
         )
     if which == LAST and asked is not None:
         return _asked_run(notebook, runs, asked)
@@ -242,12 +238,6 @@ def _program_line(cell: Cell) -> int | None:
     return place + 1
 
 
-def _may_start_again(cell: Cell) -> bool:
-    """Whether a cell that is no robot program is run as Python, so that its lines can start one."""
-    magic = cell_magic(cell.source)
-    return magic is None or magic.name in WRAPPERS
-
-
 def _starts_again(line: str, flags: re.Match[str] | None) -> bool:
     return bool(_CALL.search(line) or (flags and _AUTORUN.search(flags["flags"])))
 
@@ -264,30 +254,6 @@ def _floor(line: str, again: re.Match[str] | None, begins: bool) -> str | None:
     except UsageError:
         return None
     return flags.values.get("b")
-
-
-def _near_miss(notebook: Notebook) -> str | Sentence:
-    """A line that is nearly a program's magic, or is one in the wrong place, such as a Markdown cell."""
-    for place in notebook.markdown_programs:
-        return Sentence("; %(near)s", {"near": as_code_cell(place)})
-    for cell in notebook.cells:
-        for number, line in enumerate(cell.source.split("\n"), 1):
-            begin = _BEGIN.search(line[:200]) if NEARLY_MAGIC.match(line[:200]) else None
-            if begin is not None:
-                values = {"line": number, "cell": cell.number, "word": shown(begin[0]), "why": _why_not(line)}
-                return Sentence("; line %(line)s of cell %(cell)s has %(word)s, %(why)s", values)
-    return ""
-
-
-def _why_not(line: str) -> Sentence:
-    """Why a line that is nearly a program's magic begins no program."""
-    if is_program_magic(line):
-        return Sentence("below other code: make it the first line")
-    if is_program_magic(f"%{line.lstrip()}"):
-        return Sentence("with one %(sign)s: write two", {"sign": "%"})
-    if is_program_magic(re.sub(r"^%%\s+", "%%", line.strip())):
-        return Sentence("with a blank after %(signs)s: delete the blank", {"signs": "%%"})
-    return Sentence("another word")
 
 
 def _count(number: int) -> Sentence:

@@ -1,6 +1,6 @@
 """Jupyter notebooks as submissions: the code cells of an .ipynb, or of the .py file that nbconvert makes of one.
 
-Only read here, never run; which cell is marked is decided in ``marked_cell.py``.
+Only read here, never run; which run is marked is decided in ``marked_run.py``.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from sim.readers.json_text import JSONDecodeError, read_json
 from sim.readers.python_source import parse_module
 from sim.readers.unreadable import TooMany, Unreadable
 from sim.sentences import Sentence
+from submissions.raw_files import shown
 from submissions.source_text import MAX_SOURCE_BYTES, is_program_magic
 from submissions.submission import Cell, Notebook
 
@@ -28,6 +29,10 @@ _MAX_NOTES = 10
 _MAX_LOOKED_AT = 20  # lines of a Markdown cell
 
 _SCRIPT = re.compile(r"^[ \t]*get_ipython\(\)\.run_(?:cell|line)_magic\([ \t]*['\"]sim_magic", re.MULTILINE)
+#: A line that was to begin a robot program.
+NEARLY_MAGIC = re.compile(r"[ \t\ufeff]*%*[ \t]?sim_?ma\w*(?:[ \t]+-|[ \t]*\r?$)")
+#: Its percent signs and its name, also where blanks are between them.
+_BEGIN = re.compile(r"%*[ \t]?sim_?ma\w*")
 _RESPONDER = re.compile(r"^def (?:\w+_)?responder\([^\n]{0,100}", re.MULTILINE)
 _MOST_RAW = 3
 _MARKER = re.compile(r"^#[ \t]*In[ \t]*\[[ \t\d*]*\]:?[ \t]*$")
@@ -71,12 +76,36 @@ def read_notebook(data: bytes, name: str) -> ReadNotebook:
     return ReadNotebook(_checked(found), tuple(notes))
 
 
-def as_code_cell(place: int) -> Sentence:
+def _as_code_cell(place: int) -> Sentence:
     """That the robot program in a Markdown cell is no code, and what to do about it."""
     return Sentence(
         "cell %(place)s from the top has a robot program, but is a Markdown cell. Change it to a code cell",
         {"place": place},
     )
+
+
+def near_program(notebook: Notebook) -> str | Sentence:
+    """A line that is nearly a program's magic, or is one in the wrong place, such as a Markdown cell."""
+    for place in notebook.markdown_programs:
+        return Sentence("; %(near)s", {"near": _as_code_cell(place)})
+    for cell in notebook.cells:
+        for number, line in enumerate(cell.source.split("\n"), 1):
+            begin = _BEGIN.search(line[:200]) if NEARLY_MAGIC.match(line[:200]) else None
+            if begin is not None:
+                values = {"line": number, "cell": cell.number, "word": shown(begin[0]), "why": _why_not(line)}
+                return Sentence("; line %(line)s of cell %(cell)s has %(word)s, %(why)s", values)
+    return ""
+
+
+def _why_not(line: str) -> Sentence:
+    """Why a line that is nearly a program's magic begins no program."""
+    if is_program_magic(line):
+        return Sentence("below other code: make it the first line")
+    if is_program_magic(f"%{line.lstrip()}"):
+        return Sentence("with one %(sign)s: write two", {"sign": "%"})
+    if is_program_magic(re.sub(r"^%%\s+", "%%", line.strip())):
+        return Sentence("with a blank after %(signs)s: delete the blank", {"signs": "%%"})
+    return Sentence("another word")
 
 
 def is_script(text: str) -> bool:
@@ -224,7 +253,7 @@ def _checked(notebook: Notebook) -> Notebook:
     name, cells = notebook.name, notebook.cells
     if not cells and notebook.markdown_programs:
         raise UsageError(
-            "%(name)s: has no code cells; %(near)s.", name=name, near=as_code_cell(notebook.markdown_programs[0])
+            "%(name)s: has no code cells; %(near)s.", name=name, near=_as_code_cell(notebook.markdown_programs[0])
         )
     if not cells:
         raise UsageError("%(name)s: has no code cells, expected a notebook with Python code.", name=name)

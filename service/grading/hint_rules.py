@@ -13,7 +13,7 @@ from responders.message_format import IMG_DATA, JSON, PY, kind
 from service.grading.hint_clues import Clues, Listing, name_of
 from service.grading.judging.message_parts import quoted
 from submissions.file_kinds import meant_as
-from submissions.marked_run import NEARLY_MAGIC
+from submissions.notebook import NEARLY_MAGIC
 from submissions.raw_files import shown
 from submissions.submission import PART_FILES
 

@@ -123,12 +123,16 @@ def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PU
     else:
         plan = _of_files(submission, assignment)
     plan = replace(plan, agents=MappingProxyType(_agents(submission, assignment)))
-    seed = child_seed(world_seed(secret, assignment.id), submission.sha256)
     plan = _watched(plan)
     if assignment.world.robots == 2:
         plan = _with_second_program(plan, submission)
-    plan = replace(plan, notes=(*plan.notes, *diagrams_in(notebook).problems))
-    return replace(plan, own_files=submission.files, submission=submission.sha256, child_seed=seed)
+    return replace(
+        plan,
+        own_files=submission.files,
+        notes=(*plan.notes, *diagrams_in(notebook).problems),
+        submission=submission.sha256,
+        child_seed=child_seed(world_seed(secret, assignment.id), submission.sha256),
+    )
 
 
 def _watched(plan: RunPlan) -> RunPlan:
