@@ -19,12 +19,22 @@ from sim.errors import UsageError
 from sim.sentences import Sentence, listed
 from submissions.file_kinds import advice_on_kind, advice_on_names, is_compiled
 from submissions.marked_run import named_run, runs_of
-from submissions.meta import META, read_meta, run_of, text_of
 from submissions.names import LONGEST_NAME, shown_name
 from submissions.notebook import is_script, read_notebook, read_script
 from submissions.raw_files import RawFiles, read_folder, read_single_file, read_zip, shown
 from submissions.source_text import decode_source
-from submissions.submission import PART_FILES, SECOND_PROGRAM, Notebook, Part, Submission, agent_of
+from submissions.submission import (
+    META,
+    PART_FILES,
+    SECOND_PROGRAM,
+    Notebook,
+    Part,
+    Submission,
+    agent_of,
+    read_meta,
+    run_of,
+    text_of,
+)
 
 if TYPE_CHECKING:
     from submissions.assignment.definition import Parts

@@ -12,10 +12,9 @@ from responders.code import Code
 from sim.errors import UsageError
 from sim.readers.unreadable import Unreadable
 from sim.readers.zip_archive import entry_chunks, open_zip
-from submissions.meta import META, parse_meta, run_of
 from submissions.notebook import pack_notebook, read_notebook
 from submissions.raw_files import MAX_FILES
-from submissions.submission import PART_FILES, Part, Submission
+from submissions.submission import META, PART_FILES, Part, Submission, parse_meta, run_of
 
 _KEPT = "the kept submission"
 _PACKED_NOTEBOOK = "notebook.ipynb"

@@ -80,7 +80,8 @@ def grade(
     watch = _Watch(observe or _nobody, len(trials))
     meter = JobMeter(_limits_of_job(assignment, sum(map(_is_visible, trials))), watch.heartbeat)
     results = _run_trials(plan, trials, runner, meter, watch)
-    results = with_models_answers(results, plan, runner, meter)
+    if assignment.training is not None:
+        results = with_models_answers(results, plan, assignment.training, runner, meter)
     analysis = analyse(plan, results, runner, meter)
     criteria = judge_within(bounds_for(results), assignment, tuple(results), analysis, meter.heartbeat)
     return Grade(

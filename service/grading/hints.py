@@ -1,15 +1,17 @@
 """What probably went wrong, in sentences that quote it, with its line, and say what was expected.
 
 A pure function of the submission, what happened in the trials that its student may see, and what is asked. No mark
-depends on it, and where nothing that is shown is missing it says nothing.
+depends on it. Where nothing that is shown is missing it says only what was accepted although the description asks for
+something else: other words, or missing keys.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 
+from responders.message_format import JSON
 from service.grading.grade import CriterionResult, TrialResult
-from service.grading.hint_accepted import accepted_differences
 from service.grading.hint_answers import (
     of_image_command,
     of_missing_key,
@@ -19,7 +21,7 @@ from service.grading.hint_answers import (
     of_text_numbers,
 )
 from service.grading.hint_braces import of_braces
-from service.grading.hint_clues import Clues, clues_of
+from service.grading.hint_clues import LONGEST_TEXT, Clues, clues_of
 from service.grading.hint_errors import of_cell_errors, of_errors, of_other_cell_errors
 from service.grading.hint_files import of_ignored_magic, of_redefined, of_several_programs, of_starter, of_swapped_parts
 from service.grading.hint_formulas import of_division, of_gain, of_gyro_direction, of_radius, of_reversed_distance
@@ -55,6 +57,7 @@ from service.grading.hint_responder import (
     of_unreadable_answers,
 )
 from service.grading.hint_rules import (
+    RETURNS,
     of_answers,
     of_empty_parts,
     of_image_log,
@@ -63,6 +66,7 @@ from service.grading.hint_rules import (
     of_messages,
     of_missing_files,
     of_quoted_names,
+    where_returned,
 )
 from service.grading.hint_signatures import of_signatures
 from service.grading.hint_slips import of_short_list, of_slips
@@ -85,7 +89,7 @@ from service.grading.hint_structure import (
     of_uncalled,
     of_unindented,
 )
-from service.grading.hint_texts import of_sent_texts, of_texts, of_unlogged, of_unspoken
+from service.grading.hint_texts import Wanted, is_near, of_sent_texts, of_texts, of_unlogged, of_unspoken, where_written
 from service.grading.hint_thresholds import of_joined_colours, of_thresholds
 from service.grading.hint_timing import of_overlapping_speech, of_seldom_looks, of_short_waits
 from service.grading.hint_unused import (
@@ -98,8 +102,9 @@ from service.grading.hint_unused import (
     of_unread,
 )
 from service.grading.judging.bounded import sentences_within
+from service.grading.judging.message_parts import quoted
 from service.grading.run_plan import RunPlan
-from submissions.submission import Submission
+from submissions.submission import Part, Submission
 
 _MOST = 5
 Rule = Callable[[Clues], Iterator[str]]
@@ -191,6 +196,9 @@ _OF_RESULTS: Sequence[Rule] = (
     of_single_round,
     of_unread,
 )
+_QUOTED = re.compile(r'"([^"]{6,60})"')
+_KEY = re.compile(r'"(\w+)"\s*:')
+_VARIES = re.compile(r"\d|[{}<>:]")
 
 
 def hints_for(
@@ -232,3 +240,52 @@ def near_misses(clues: Clues) -> tuple[str, ...]:
 
 def _found(rules: Sequence[Rule], clues: Clues) -> tuple[str, ...]:
     return tuple(sentence for rule in rules for sentence in rule(clues))
+
+
+def accepted_differences(clues: Clues) -> tuple[str, ...]:
+    """One sentence on words and one on keys that are not those of the description; none where they are."""
+    task = " ".join(clues.task.split())
+    return (*_other_words(task, clues), *_missing_keys(task, clues))
+
+
+def _other_words(task: str, clues: Clues) -> Iterator[str]:
+    texts: Sequence[tuple[Part, str, Sequence[str]]] = (
+        ("program", "says", clues.spoken),
+        ("program", "prints", clues.printed),
+        ("responder", "answers", clues.answers),
+    )
+    for asked in _QUOTED.findall(task):
+        begin = asked.partition("...")[0].strip()
+        if len(begin.split()) < 2 or _VARIES.search(begin):
+            continue
+        wanted = Wanted(begin, "contains")
+        if any(wanted.is_met_by(text, ignore_case=True) for _, _, found in texts for text in found):
+            continue
+        for part, verb, found in texts:
+            near = next((text for text in found if is_near(wanted, text)), None)
+            if near is not None:
+                where = where_written(clues, part, near)
+                yield f"{where} {verb} {quoted(near)}; the assignment asks for {quoted(begin)}"
+                return
+
+
+def _missing_keys(task: str, clues: Clues) -> Iterator[str]:
+    asked = list(dict.fromkeys(key for form in _forms(task) for key in _KEY.findall(form)))
+    answers = [text for text in clues.answers if text.startswith(JSON) and len(text) < LONGEST_TEXT]
+    given = {key for text in answers for key in _KEY.findall(text)}
+    missing = [key for key in asked if key not in given]
+    if missing and given:
+        where = where_returned(answers[0], clues, RETURNS)
+        keys = " and ".join(map(quoted, missing[:3]))
+        yield f"{where}: the answer is {quoted(answers[0])}, without {keys}, which the assignment asks for"
+
+
+def _forms(task: str) -> Iterator[str]:
+    """Each object that stands after ``JSON::``, to its last bracket."""
+    for piece in task.split(JSON)[1:]:
+        depth = 0
+        for place, letter in enumerate(piece):
+            depth += (letter == "{") - (letter == "}")
+            if depth == 0:
+                yield piece[: place + 1]
+                break

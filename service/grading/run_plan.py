@@ -22,7 +22,7 @@ from sim.errors import UsageError
 from sim.motion import Rectangle
 from sim.recording import Recording
 from submissions.assignment.definition import Assignment
-from submissions.assignment.second_robot import SAME
+from submissions.assignment.other_parts import SAME
 from submissions.bundle import missing_part
 from submissions.criteria.code import SourceRules
 from submissions.diagram_cells import diagrams_in

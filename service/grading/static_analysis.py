@@ -16,8 +16,8 @@ from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from responders.trial_spec import ResponderSpec
 from service.grading.grade import TrialResult
-from service.grading.judging.case import StaticAnalysis, as_had_by
 from service.grading.judging.code import calls_of
+from service.grading.judging.judges import StaticAnalysis, as_had_by
 from service.grading.judging.message_parts import fault_words
 from service.grading.judging.source_answers import SPEECH, SourceAnswers
 from service.grading.run_plan import RunPlan

@@ -30,16 +30,16 @@ _SIDE = {"focus": 14, "whole": 20}
 
 
 def with_models_answers(
-    results: Sequence[TrialResult], plan: RunPlan, runner: TrialRunner, meter: JobMeter
+    results: list[TrialResult], plan: RunPlan, training: Training, runner: TrialRunner, meter: JobMeter
 ) -> list[TrialResult]:
-    """The trials; where the assignment trains, those that are tested on with the model's answers to their images.
+    """The trials; those that are tested on with the model's answers to their images.
 
     What goes wrong in training or naming is a fault of every trial that is tested on. Raises HostError when the
     machine fails, and whatever the meter's heartbeat raises.
     """
-    training, trainer = plan.assignment.training, plan.functions
-    if training is None or trainer is None or not results:
-        return list(results)
+    trainer = plan.functions
+    if trainer is None or not results:
+        return results
     learnt = [pair for result in results if result.scenario in training.scenarios for pair in _collected(result)]
     known = [(pair, pair.truth) for pair in learnt if pair.truth is not None]
     asked = [index for index, result in enumerate(results) if result.scenario not in training.scenarios]

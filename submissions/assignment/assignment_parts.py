@@ -20,10 +20,11 @@ from sim.floors import HEIGHT, WIDTH, Floor, floor, floor_from_image, label_name
 from sim.motion import gap
 from sim.recording import Pose
 from sim.robot import usual_robot
-from submissions.assignment.agents import read_agents
 from submissions.assignment.criterion_parts import check_given, read_criteria, sources_of
 from submissions.assignment.definition import Assignment, Limits, Parts, Scenario, Training, WorldSpec
-from submissions.assignment.problems import Problems
+from submissions.assignment.other_parts import SAME, check_robots, read_agents, second_poses_of
+from submissions.assignment.problems import Path as Place
+from submissions.assignment.problems import Problems, checked_table, no_double, tables_of, texts_in
 from submissions.assignment.schema import (
     HeadTable,
     LimitsTable,
@@ -32,10 +33,7 @@ from submissions.assignment.schema import (
     TrainingTable,
     WorldTable,
 )
-from submissions.assignment.second_robot import SAME, check_robots, second_poses_of
-from submissions.assignment.toml_lines import Path as Place
 from submissions.criteria.common import Surroundings
-from submissions.document import checked_table, no_double, tables_of, texts_in
 from submissions.nearest import did_you_mean, listed
 from submissions.source_text import decode_source
 from submissions.sweep import Sweep

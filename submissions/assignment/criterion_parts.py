@@ -11,11 +11,10 @@ from dataclasses import replace
 from typing import Any
 
 from sim.errors import UsageError
-from submissions.assignment.problems import Problems
-from submissions.assignment.toml_lines import Path as Place
+from submissions.assignment.problems import Path as Place
+from submissions.assignment.problems import Problems, checked_table, list_of_tables, no_double, tables_of, texts_in
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.criteria.common import HOLDS_ANSWERS, NOT_EMPTY, Misfit, Surroundings
-from submissions.document import checked_table, list_of_tables, no_double, tables_of, texts_in
 from submissions.nearest import did_you_mean, listed
 from submissions.source_text import decode_source
 

@@ -18,10 +18,9 @@ from pydantic import BeforeValidator, Field, ValidationError
 from sim.errors import UsageError
 from sim.recording import Verdict
 from submissions.assignment.folder import assignment_folder
-from submissions.assignment.problems import AssignmentProblems, Problems
+from submissions.assignment.problems import AssignmentProblems, Problems, find_lines
 from submissions.assignment.reader import find_assignment, parse
 from submissions.assignment.schema import Slug, problem_of
-from submissions.assignment.toml_lines import find_lines
 from submissions.bundle import read_submission, submission_of
 from submissions.raw_files import RawFiles, read_folder
 from submissions.strict_table import StrictTable

@@ -17,8 +17,7 @@ from sim.readers.unreadable import Unreadable
 from submissions.assignment.assignment_parts import build_assignment
 from submissions.assignment.definition import Assignment
 from submissions.assignment.folder import FILE_NAME, assignment_folder, catalogue
-from submissions.assignment.problems import AssignmentProblems, Problems
-from submissions.assignment.toml_lines import find_lines
+from submissions.assignment.problems import AssignmentProblems, Problems, find_lines
 from submissions.nearest import did_you_mean
 
 #: What lies in an assignment's folder beside what it is marked by: it may change without changing a mark.

@@ -17,9 +17,8 @@ from sim.floors import HEIGHT, WIDTH
 from sim.recording import Pose
 from submissions.assignment.assignment_parts import build_assignment
 from submissions.assignment.folder import assignment_folder, catalogue
-from submissions.assignment.problems import AssignmentProblems, Problems
+from submissions.assignment.problems import AssignmentProblems, Problems, find_lines, line_of
 from submissions.assignment.reader import find_assignment, read_assignment
-from submissions.assignment.toml_lines import find_lines, line_of
 from submissions.criteria.classification import Classification
 from submissions.criteria.ending import Finishes
 

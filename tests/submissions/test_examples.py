@@ -27,9 +27,8 @@ from service.grading import (
 from service.grading.example_check import check_examples
 from service.grading.grade import CriterionResult, Grade, TrialResult
 from service.grading.grader import grade
-from service.grading.hint_accepted import accepted_differences
 from service.grading.hint_clues import clues_of
-from service.grading.hints import Rule, near_misses
+from service.grading.hints import Rule, accepted_differences, near_misses
 from service.grading.run_plan import RunPlan
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError

@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from sim.errors import AssignmentError
 from sim.recording import Pose
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
-from submissions.assignment.problems import AssignmentProblems
+from submissions.assignment.problems import AssignmentProblems, find_lines
 from submissions.assignment.reader import find_assignment, read_assignment
-from submissions.assignment.toml_lines import find_lines
 from submissions.sweep import Sweep
 
 _HEAD = 'id = "a"\ntitle = "A"\n'

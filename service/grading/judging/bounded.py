@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from service.grading.grade import CriterionResult, TrialResult
-from service.grading.judging.case import Case, StaticAnalysis
 from service.grading.judging.judge import in_turn, judge_one, refuse_spoilt
+from service.grading.judging.judges import Case, StaticAnalysis
 from sim.errors import HostError, RobomarkError
 from sim.recording import Image
 from submissions.assignment.definition import Assignment

@@ -8,9 +8,8 @@ from __future__ import annotations
 from fractions import Fraction
 
 from service.grading.grade import CriterionResult
-from service.grading.judging.case import Case, Indexed, has_hidden
-from service.grading.judging.judges import judges_case
-from service.grading.judging.marks import in_steps, share_of_accuracy, share_of_steps
+from service.grading.judging.judges import Case, Indexed, has_hidden, judges_case
+from service.grading.judging.outcome import in_steps, share_of_accuracy, share_of_steps
 from service.grading.judging.recognition import Classified, classify, pooled, recognised
 from service.grading.judging.sweeps import curves_of
 from submissions.criteria.classification import Classification

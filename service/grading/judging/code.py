@@ -14,11 +14,9 @@ from typing import Any
 from responders.function_calls import Called, FunctionCall, Returned, no_function
 from service.grading.grade import CriterionResult, Measure, TrialResult
 from service.grading.judging.answers import NOTHING, as_text, at_path, parsed
-from service.grading.judging.case import Case
-from service.grading.judging.judges import by_trial, judges_case, once
-from service.grading.judging.marks import in_steps
+from service.grading.judging.judges import Case, by_trial, judges_case, once
 from service.grading.judging.message_parts import fault_words, quoted
-from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.outcome import Outcome, failed, in_steps, passed
 from service.grading.judging.source_answers import SPEECH, SourceAnswers
 from sim.errors import AssignmentError
 from submissions.criteria.code import CONSTRUCTS, ExpectedCall, Functions, PythonCheck, SourceRules, flags_in

@@ -10,8 +10,7 @@ from importlib import import_module
 from types import MappingProxyType
 
 from service.grading.grade import CriterionResult, TrialResult
-from service.grading.judging.case import Case, StaticAnalysis
-from service.grading.judging.judges import Judge, once
+from service.grading.judging.judges import Case, Judge, StaticAnalysis, once
 from service.grading.judging.outcome import failed
 from sim.errors import HostError
 from sim.recording import Verdict

@@ -1,17 +1,24 @@
-"""How one criterion fared in one trial, and what kept a program from ending by itself.
+"""How one criterion fared in one trial, what kept a program from ending by itself, and what outcomes are worth.
 
-Plain data; who passes is decided in the modules of the families, what it is worth in ``marks.py``.
+Who passes is decided in the modules of the families. Marks are exact fractions until the one rounding at the end.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import ROUND_HALF_UP, Decimal
 from fractions import Fraction
+from typing import Literal
 
 from service.grading.grade import Measure
 from sim.recording import Fault, Pose, Recording, Verdict
 
 _SHORT_OF_ALL = Fraction(99, 100)
+Over = Literal["share", "all", "mean", "median", "worst"]
+
+_CENT = Decimal("0.01")
+_STEPS = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,3 +68,65 @@ def cut(recording: Recording) -> Fault | None:
     if recording.verdict in (Verdict.FINISHED, Verdict.RESPONDER_ERROR, Verdict.PROTOCOL_ERROR) or recording.faults:
         return None
     return Fault(recording.end_t, recording.verdict, "program", str(recording.verdict).replace("_", " "))
+
+
+def earned(marks: Decimal, share: Fraction) -> Decimal:
+    """``share`` (0 to 1) of ``marks``, rounded half up to two places, never above ``marks``."""
+    exact = Fraction(marks) * min(max(share, Fraction(0)), Fraction(1))
+    # Scaled to whole cents first, so that no decimal expansion is cut off before the rounding.
+    cents = exact * 100
+    whole = (2 * cents.numerator + cents.denominator) // (2 * cents.denominator)
+    return min(Decimal(whole).scaleb(-2), marks).quantize(_CENT, rounding=ROUND_HALF_UP)
+
+
+def share_of(outcomes: Sequence[Outcome], over: Over) -> Fraction:
+    """What part of a criterion's marks these trials are worth, as ``over`` says; 0 without trials."""
+    if not outcomes:
+        return Fraction(0)
+    passes = sum(outcome.passed for outcome in outcomes)
+    scores = sorted(outcome.score for outcome in outcomes)
+    count = len(scores)
+    match over:
+        case "share":
+            return Fraction(passes, count)
+        case "all":
+            return Fraction(passes == count)
+        case "mean":
+            return sum(scores, Fraction(0)) / count
+        case "median":
+            return (scores[(count - 1) // 2] + scores[count // 2]) / 2
+        case "worst":
+            return scores[0]
+
+
+def in_steps(share: Fraction) -> Fraction:
+    """``share`` rounded to steps of 5 %; one below 1 stays below 1.
+
+    Of trials that are not shown no more is told, so that marks don't give away what a program counted there.
+    """
+    if share >= 1:
+        return share
+    return min(Fraction((2 * share * _STEPS + 1) // 2, _STEPS), Fraction(_STEPS - 1, _STEPS))
+
+
+def share_of_accuracy(right: int, count: int, at_least: float | None, over: Over) -> Fraction:
+    """What part of a classification's marks ``right`` of ``count`` answers are worth.
+
+    All from ``at_least`` on (all right if None); below it nothing with ``all``, else in proportion.
+    """
+    if not count:
+        return Fraction(0)
+    accuracy = Fraction(right, count)
+    # The decimal that the instructor wrote, not its nearest binary fraction: 9 of 10 is at least 0.9.
+    enough = Fraction(1) if at_least is None else Fraction(str(at_least))
+    if accuracy >= enough:
+        return Fraction(1)
+    return Fraction(0) if over == "all" else accuracy / enough
+
+
+def share_of_steps(right: int, count: int, steps: Sequence[tuple[float, float]], marks: Decimal) -> Fraction:
+    """What part of ``marks`` the last of the ``steps`` (accuracy, marks) is worth that ``right`` of ``count`` reach."""
+    if not count or not marks:
+        return Fraction(0)
+    reached = [worth for accuracy, worth in steps if Fraction(right, count) >= Fraction(str(accuracy))]
+    return Fraction(str(reached[-1])) / Fraction(marks) if reached else Fraction(0)

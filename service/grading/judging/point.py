@@ -12,9 +12,8 @@ from fractions import Fraction
 import numpy as np
 
 from service.grading.grade import CriterionResult, Measure, TrialResult
-from service.grading.judging.case import Case, Indexed
 from service.grading.judging.geometry import headings, place_at, positions, stretches, to_segment
-from service.grading.judging.judges import by_trial, judges, judges_case, summary
+from service.grading.judging.judges import Case, Indexed, by_trial, judges, judges_case, summary
 from service.grading.judging.outcome import Outcome, failed, passed
 from sim.recording import Floats, Recording
 from submissions.criteria.point import Circuits, Closest, Spread

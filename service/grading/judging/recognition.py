@@ -27,10 +27,10 @@ from service.grading.grade import (
     TrialResult,
 )
 from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
-from service.grading.judging.case import Indexed
 from service.grading.judging.geometry import Side
-from service.grading.judging.marks import earned
+from service.grading.judging.judges import Indexed
 from service.grading.judging.message_parts import early_end, place_words, quoted, shown_words
+from service.grading.judging.outcome import earned
 from service.grading.judging.patterns import Sample, by_pattern
 from service.grading.judging.text_tokens import LabelFinder
 from service.grading.judging.truths import NO_IMAGE, missing_truth, nameable, shown_in

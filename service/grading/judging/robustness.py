@@ -9,9 +9,8 @@ from dataclasses import replace
 from fractions import Fraction
 
 from service.grading.grade import AccuracyCurve, CriterionResult
-from service.grading.judging.case import Case, Indexed, has_hidden
-from service.grading.judging.judges import judges_case
-from service.grading.judging.marks import in_steps
+from service.grading.judging.judges import Case, Indexed, has_hidden, judges_case
+from service.grading.judging.outcome import in_steps
 from service.grading.judging.recognition import classify, pooled, recognised
 from service.grading.judging.sweeps import area, curve_along, curves_of, levels_along, part_above, range_above
 from submissions.criteria.robustness import Robustness

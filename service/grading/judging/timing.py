@@ -10,8 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from service.grading.grade import CriterionResult, Evidence, Measure, TrialResult
-from service.grading.judging.case import Case
-from service.grading.judging.judges import by_trial, judges, judges_case
+from service.grading.judging.judges import Case, by_trial, judges, judges_case
 from service.grading.judging.outcome import Outcome, failed, passed
 from service.grading.judging.text_tokens import spoken_until
 from sim.recorded import seconds_at

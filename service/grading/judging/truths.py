@@ -9,8 +9,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from service.grading.grade import TrialResult
-from service.grading.judging.case import Indexed
 from service.grading.judging.geometry import part_at
+from service.grading.judging.judges import Indexed
 from service.grading.judging.label_patches import CODES, GREYS, decoded
 from sim.floors import label_names
 from sim.recorded import floor_of

@@ -11,24 +11,49 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from service.grading.grade import CriterionResult, Prediction, TrialResult
 from service.language import ENGLISH, Language
 from service.reports.crossing import befell_in_full, note_words
 from service.reports.faults import place_words
 from service.reports.readable import message_words, number, one_line, readable
-from service.reports.replay.columns import told_columns
 from service.reports.replay.sources import Place, Sources
 from service.reports.robots import PARTNER_OF, answering, robots_of
 from service.reports.words import trial_words, verdict_words
 from sim.recorded import pose_at, printed_alone, robot_of
-from sim.recording import SECOND, Image, Pose, Recording, Verdict
+from sim.recording import COLUMNS, SECOND, Image, Pose, Recording, Ticks, Verdict
 from sim.robot import LightSensor
 
 #: Of each kind of thing that can happen, in one trial.
 _MOST = 2000
 _MOST_IMAGES = 1000
 _LONGEST_TEXT, _MOST_LINES = 600, 12
+#: Steps in one unit of a column; a canvas shows nothing smaller.
+_FINE = frozenset({"x", "y", "heading"})
+_STEPS_OF_FINE, _STEPS = 100, 10
+
+
+def told_columns(ticks: Ticks) -> dict[str, dict[str, Any]]:
+    """Every column of which anything is known, by the name that readers are told."""
+    told = {}
+    for each in COLUMNS:
+        values = np.asarray(getattr(ticks, each.told_as), np.float64).reshape(len(ticks), each.width)
+        if len(ticks) and np.isfinite(values).any():
+            per = _STEPS_OF_FINE if each.name in _FINE else _STEPS
+            told[each.told_as] = {"unit": each.unit, "per": per, "added": [_added(part, per) for part in values.T]}
+    return told
+
+
+def _added(values: NDArray[np.float64], per: int) -> list[int | None]:
+    """What each value adds to the one before it, the first to nought; None where there is no value."""
+    known = np.isfinite(values)
+    steps = np.rint(np.where(known, values, 0) * per).astype(np.int64)
+    added: list[int | None] = [None] * len(values)
+    differences = np.diff(steps[known], prepend=0).tolist()
+    for place, difference in zip(np.flatnonzero(known).tolist(), differences, strict=True):
+        added[place] = difference
+    return added
 
 
 def trial_data(

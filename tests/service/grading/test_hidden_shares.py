@@ -16,7 +16,7 @@ from judging import START, criterion, recorded, talk
 from report_builders import row_of
 from service.grading.grade import Grade, TrialResult
 from service.grading.judging.judge import judge
-from service.grading.judging.marks import in_steps
+from service.grading.judging.outcome import in_steps
 from service.reports.formats.gradescope import gradescope_text
 from service.reports.formats.json_output import json_text
 from service.reports.formats.moodle import moodle_csv

@@ -24,8 +24,8 @@ from service.grading.grade import CriterionResult, TrialResult
 from service.grading.grader import grade
 from service.grading.judging import bounded
 from service.grading.judging.bounded import Bounds, bounds_for, judge_within
-from service.grading.judging.case import StaticAnalysis
 from service.grading.judging.judge import judge, judge_one
+from service.grading.judging.judges import StaticAnalysis
 from service.grading.trial_runner import TrialRunner
 from service.reports.plots.sequence import MOST_CALL_STEPS, Gap, conversation
 from sim.errors import Cancelled, HostError

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from judging import criterion, judged, recorded, talk
 from service.grading.judging.answers import same_value
-from service.grading.judging.marks import Over, earned, share_of, share_of_accuracy
-from service.grading.judging.outcome import Outcome
+from service.grading.judging.outcome import Outcome, Over, earned, share_of, share_of_accuracy
 
 outcomes = st.lists(
     st.one_of(

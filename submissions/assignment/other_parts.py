@@ -1,0 +1,113 @@
+"""The parts of an assignment beside robot program and responder: the ``[agents]`` table, and a second robot.
+
+What a single table may hold is ``schema.py``; the rest of what has to fit together is ``assignment_parts.py``.
+"""
+
+from __future__ import annotations
+
+import builtins
+import keyword
+import re
+from collections.abc import Mapping
+
+from sim.errors import UsageError
+from sim.recording import Pose
+from submissions.assignment.problems import Path as Place
+from submissions.assignment.problems import Problems, list_of_tables
+from submissions.assignment.schema import PartsTable, ScenarioTable, WorldTable
+from submissions.source_text import decode_source
+
+#: As ``second_program``: what runs on the first robot runs on the second as well.
+SAME = "same"
+_MOST = 8
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
+#: What a responder has under these names already, or a report calls otherwise.
+_TAKEN = frozenset({"robot", "program", "responder", "bridge", "host", "assignment", "msg", "eds"})
+
+
+def read_agents(
+    document: Mapping[str, object], parts: PartsTable | None, files: Mapping[str, bytes], problems: Problems
+) -> tuple[Mapping[str, str], Mapping[str, str]]:
+    """Who gives each agent, by name, and the texts of the files given here; what is wrong goes into ``problems``."""
+    table = document.get("agents", {})
+    if not isinstance(table, dict):
+        problems.add(("agents",), 'agents is no table, expected [agents] and lines like parser = "student"')
+        return {}, {}
+    if table and parts is not None:
+        _check_parts(table, parts, problems)
+    givers: dict[str, str] = {}
+    sources: dict[str, str] = {}
+    for name, who in sorted(table.items()):
+        place = ("agents", name)
+        if not _NAME.fullmatch(name) or name in _TAKEN or keyword.iskeyword(name) or hasattr(builtins, name):
+            problems.add(place, f'"{name[:60]}" cannot be the name of an agent, expected one like parser or logger')
+        elif who != "student" and (not isinstance(who, str) or who not in files or not who.endswith(".py")):
+            shown = f'"{who[:60]}"' if isinstance(who, str) else "no text"
+            problems.add(place, f'{name} is {shown}, expected "student" or a .py file beside this file')
+        else:
+            givers[name] = who
+            if who != "student":
+                sources |= _source(who, files, place, problems)
+    return givers, sources
+
+
+def _check_parts(table: Mapping[str, object], parts: PartsTable, problems: Problems) -> None:
+    if len(table) > _MOST:
+        problems.add(("agents",), f"agents has {len(table)} names, expected at most {_MOST}")
+    if parts.responder == "none" or parts.program == "none":
+        problems.add(("agents",), "agents are there and no robot with a responder, expected both in [parts]")
+    elif "student" not in (parts.program, parts.responder):
+        problems.add(
+            ("agents",), 'agents are there and neither robot.py nor responder.py is "student", expected one of them'
+        )
+
+
+def _source(name: str, files: Mapping[str, bytes], place: tuple[str, str], problems: Problems) -> dict[str, str]:
+    try:
+        return {name: decode_source(files[name], name).text}
+    except UsageError as error:
+        problems.add(place, str(error).rstrip("."))
+        return {}
+
+
+def check_robots(document: Mapping[str, object], world: WorldTable, parts: PartsTable, problems: Problems) -> None:
+    """Each robot has a program and a place to start from, and nobody has those of a robot that is not there."""
+    scenarios = list(list_of_tables(document.get("scenario")))
+    linked = world.robots == 2 and parts.responder == "none"
+    for number, raw in enumerate(scenarios):
+        channel = raw.get("channel")
+        link = channel.get("link") if isinstance(channel, dict) else None
+        if link == "between robots" and not linked:
+            sentence = 'link is "between robots", expected robots = 2 in world and responder = "none" in parts with it'
+            problems.add(("scenario", number, "channel", "link"), sentence)
+        if link == "infrared" and linked:
+            sentence = 'link is "infrared", to a beacon, but the robots talk to each other, expected "between robots"'
+            problems.add(("scenario", number, "channel", "link"), sentence)
+    if world.robots == 1:
+        if "second_program" in parts.model_fields_set:
+            problems.add(("parts", "second_program"), "second_program is given, expected robots = 2 in world with it")
+        for number, raw in enumerate(scenarios):
+            if "second_poses" in raw:
+                sentence = "second_poses is given, expected robots = 2 in world with it"
+                problems.add(("scenario", number, "second_poses"), sentence)
+        return
+    if "agents" in document:
+        problems.add(("world", "robots"), "robots is 2, but agents are asked for one robot alone, expected robots = 1")
+    if "training" in document:
+        problems.add(("world", "robots"), "robots is 2, but what is trained answers no robot, expected robots = 1")
+    for number, raw in enumerate(scenarios):
+        if "second_poses" not in raw:
+            problems.add(("scenario", number), "second_poses is missing, expected where the second robot starts")
+
+
+def second_poses_of(table: ScenarioTable, poses: int, place: Place, problems: Problems) -> tuple[Pose, ...]:
+    """Where the second robot starts for each pose of the first; one is meant for all."""
+    found = tuple(Pose(*pose) for pose in table.second_poses)
+    if len(found) == 1:
+        return found * poses
+    if found and len(found) != poses:
+        problems.add(
+            (*place, "second_poses"), f"second_poses has {len(found)} poses, expected one, or {poses} as poses has"
+        )
+        return ()
+    return found
