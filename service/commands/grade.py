@@ -8,9 +8,7 @@ from typing import Annotated
 import typer
 
 from service.commands.channel_flags import ChannelFlags
-from service.commands.format_option import format_option
-from service.commands.language_option import LanguageOption
-from service.commands.option_groups import with_option_groups
+from service.commands.options import LanguageOption, format_option, with_option_groups
 from service.commands.shown import wants_json
 from service.language import SOURCE
 

@@ -10,8 +10,7 @@ from typing import Annotated
 import typer
 
 from service.commands.channel_flags import ChannelFlags
-from service.commands.film_option import FilmOption
-from service.commands.option_groups import with_option_groups
+from service.commands.options import FilmOption, with_option_groups
 from sim.errors import UsageError
 
 

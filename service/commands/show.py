@@ -9,8 +9,7 @@ import typer
 from sqlalchemy.orm import Session
 
 from service.commands.batch.batch_summary import remarks
-from service.commands.film_option import FilmOption
-from service.commands.language_option import LanguageOption
+from service.commands.options import FilmOption, LanguageOption
 from service.commands.shown import document, note, tell
 from service.home import for_the_user
 from service.language import SOURCE, language_called

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from service.commands.batch.control import BatchId
-from service.commands.format_option import format_option
+from service.commands.options import format_option
 from service.commands.shown import wants_json
 
 

@@ -1,12 +1,63 @@
-"""Lets commands take groups of options: a dataclass each, whose fields are options of the command."""
+"""Options that several commands share, and groups of options: a dataclass each, whose fields are options."""
 
 from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
-from typing import Any, get_type_hints
+from pathlib import Path
+from typing import Annotated, Any, get_type_hints
+
+import typer
+
+from service.language import SOURCE, languages
+from sim.errors import UsageError
+
+
+def format_option(words: str, names: Callable[[], Iterable[str]]) -> Any:
+    """An option that takes one of ``names``, which are asked for when it is given: the formats take long to load."""
+
+    def checked(name: str) -> str:
+        known = tuple(names())
+        if name not in known:
+            raise typer.BadParameter(f"{name!r} is not one of {', '.join(map(repr, known))}")
+        return name
+
+    def completed(start: str) -> list[str]:
+        return [name for name in names() if name.startswith(start)]
+
+    return typer.Option("--format", help=words, metavar="FORMAT", callback=checked, autocompletion=completed)
+
+
+def _known_language(code: str) -> str:
+    # English needs no catalogue, and to find out which others there are takes long to load.
+    if code != SOURCE and code not in languages():
+        raise typer.BadParameter(f"{code!r} is not one of {', '.join(map(repr, languages()))}")
+    return code
+
+
+LanguageOption = Annotated[
+    str,
+    typer.Option(
+        "--language",
+        metavar="CODE",
+        callback=_known_language,
+        autocompletion=lambda: list(languages()),
+        help="The language of reports and replays, as de; what is printed stays English.",
+    ),
+]
+
+
+def _is_gif(path: Path | None) -> Path | None:
+    if path is not None and path.suffix.lower() != ".gif":
+        raise UsageError(f"--film {path}: expected a name that ends in .gif")
+    return path
+
+
+FilmOption = Annotated[
+    Path | None, typer.Option("--film", callback=_is_gif, help="Write a film of one trial to this file, a GIF.")
+]
 
 
 def with_option_groups(command: Callable[..., None]) -> Callable[..., None]:
