@@ -43,8 +43,8 @@ def may_need_libraries(text: str, files: Mapping[str, bytes]) -> bool:
         texts = (text, *(data.decode() for data in modules.values()))
     except UnicodeDecodeError:
         return True
-    own = frozenset(modules)
-    return any(_leads_away(each, own) for each in texts)
+    known = {*modules, *BESIDE, *_LOADED}
+    return any((imported := _imports(each)) is None or not known.issuperset(imported) for each in texts)
 
 
 def notebook_source(cells: tuple[str, ...]) -> str:
@@ -53,18 +53,18 @@ def notebook_source(cells: tuple[str, ...]) -> str:
 
 
 @functools.lru_cache(maxsize=64)
-def _leads_away(text: str, own: frozenset[str]) -> bool:
+def _imports(text: str) -> frozenset[str] | None:
+    """Return all that a text imports; None where that cannot be known. Parses a text once, whoever has it."""
     if len(text) > _MOST_READ:
-        return True
+        return None
     try:
         nodes = list(ast.walk(parse_module(text)))
     except (SyntaxError, Unreadable):
         # The error may be all there is to it, but then it costs little.
-        return True
-    known = own.union(BESIDE, _LOADED)
-    imported = chain.from_iterable(map(_imported, nodes))
-    named = chain.from_iterable(map(_named, nodes))
-    return not known.issuperset(imported) or any(map(_LEADING_AWAY.fullmatch, named))
+        return None
+    if any(map(_LEADING_AWAY.fullmatch, chain.from_iterable(map(_named, nodes)))):
+        return None
+    return frozenset(chain.from_iterable(map(_imported, nodes)))
 
 
 def _imported(node: ast.AST) -> Iterator[str]:

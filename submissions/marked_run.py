@@ -216,6 +216,7 @@ def _misfits(run: Run, assignment: Assignment) -> Iterator[str]:
         yield "it only prints"
 
 
+@functools.lru_cache(maxsize=64)
 def _is_test(text: str) -> bool:
     """Whether a program is one or two statements that call nothing but ``print``."""
     code = text.strip("# \n")
