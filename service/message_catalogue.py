@@ -40,15 +40,13 @@ _RAISED = [
 _RAISED_OF_FILES = [
     (f"{name}.py", "python")
     for name in (
-        "agent_files",
         "bundle",
         "file_kinds",
-        "marked_cell",
-        "meta",
+        "marked_run",
         "notebook",
         "raw_files",
-        "run_choice",
         "source_text",
+        "submission",
     )
 ]
 _KEYWORDS = {"_": None, "translatable": None, "say": None, "gettext": None, "ngettext": (1, 2), "counted": (1, 2)}

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from service.commands.channel_flags import ChannelFlags
-from service.commands.options import LanguageOption, format_option, with_option_groups
+from service.commands.options import ChannelFlags, LanguageOption, format_option, with_option_groups
 from service.commands.shown import wants_json
 from service.language import SOURCE
 

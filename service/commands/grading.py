@@ -14,7 +14,7 @@ from pathlib import Path
 
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.zygote import FULL, NONE
-from service.commands.channel_flags import changed
+from service.commands.options import changed
 from service.commands.shown import note, show
 from service.commands.unsafe import warn_of_no_sandbox
 from service.grading.grade import Grade

@@ -9,8 +9,7 @@ from typing import Annotated
 
 import typer
 
-from service.commands.channel_flags import ChannelFlags
-from service.commands.options import FilmOption, with_option_groups
+from service.commands.options import ChannelFlags, FilmOption, with_option_groups
 from sim.errors import UsageError
 
 

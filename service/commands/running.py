@@ -13,7 +13,7 @@ from responders.notebook_executor import ExecutedNotebook
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.running_child import ChildLimits
 from responders.sandbox.zygote import FULL, NONE
-from service.commands.channel_flags import ChannelFlags, changed
+from service.commands.options import ChannelFlags, changed
 from service.commands.run import Conditions, Kept, MagicFlags, Tick
 from service.commands.shown import document, note, tell
 from service.commands.unsafe import warn_of_no_sandbox

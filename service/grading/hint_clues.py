@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence, Set
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from service.grading.grade import CriterionResult, TrialResult
@@ -33,7 +33,11 @@ class Listing:
     name: str
     part: Part | None
     lines: tuple[str, ...]
-    code: CodeStatements = field(default_factory=CodeStatements)
+
+    @cached_property
+    def code(self) -> CodeStatements:
+        """Its statements; split into tokens when a hint first looks at them."""
+        return read_code(self.lines)
 
     @cached_property
     def magic_place(self) -> int | None:
@@ -234,7 +238,7 @@ def _beside(submission: Submission) -> Iterator[Listing]:
 
 def _listing(name: str, part: Part | None, text: str) -> Listing:
     lines = tuple(line[:_LONGEST_LINE].rstrip("\r") for line in text.split("\n", _MOST_LINES)[:_MOST_LINES])
-    return Listing(name, part, lines, read_code(lines))
+    return Listing(name, part, lines)
 
 
 def _different(texts: Iterator[str]) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ import pytest
 from command import robomark
 from replays import data_of
 from responders.channel import Channel
-from service.commands.channel_flags import ChannelFlags, changed
+from service.commands.options import ChannelFlags, changed
 from submissions.assignment.examples import examples
 
 ECHO = examples("json-queue") / "reference"

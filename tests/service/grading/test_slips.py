@@ -10,14 +10,13 @@ import pytest
 
 from paths import ROOT
 from service.grading.hint_clues import Listing
-from service.grading.hint_code import read_code
 from service.grading.hint_loops import without_effect
 from service.grading.hint_slips import slips_in
 
 
 def listing(text: str, name: str = "robot.py") -> Listing:
     lines = tuple(text.split("\n"))
-    return Listing(name, "program", lines, read_code(lines))
+    return Listing(name, "program", lines)
 
 
 def sources() -> Iterator[tuple[str, str]]:
