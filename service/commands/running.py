@@ -22,11 +22,11 @@ from service.grading.standalone import (
     ProgramFile,
     RunLimits,
     RunOptions,
-    find_notebook,
     find_responder,
     own_floor,
     read_files_beside,
     read_program,
+    read_runnable,
     run_notebook,
     run_program,
 )
@@ -63,14 +63,14 @@ def run_file(
     options = _options(magic, conditions, channel)
     if unsafe:
         warn_of_no_sandbox()
-    notebook, notes = find_notebook(path)
-    for each in notes:
-        note(f"note: {each}")
+    read = read_runnable(path)
     with TrialRunner(Sandboxes(NONE if unsafe else FULL)) as runner:
-        if notebook is None:
-            _run_program(path, options, conditions, kept, runner)
+        if isinstance(read, ProgramFile):
+            _run_program(read, options, conditions, kept, runner)
         else:
-            _run_notebook(path, notebook, options, conditions, kept, runner)
+            for each in read.notes:
+                note(f"note: {each}")
+            _run_notebook(path, read.notebook, options, conditions, kept, runner)
 
 
 def _options(magic: MagicFlags, conditions: Conditions, channel: ChannelFlags) -> RunOptions:
@@ -108,11 +108,13 @@ def _run_notebook(
         _keep(kept, executed.runs[-1].recording, path.name, options, sources_of_cells(notebook))
 
 
-def _run_program(path: Path, options: RunOptions, conditions: Conditions, kept: Kept, runner: TrialRunner) -> None:
+def _run_program(
+    program: ProgramFile, options: RunOptions, conditions: Conditions, kept: Kept, runner: TrialRunner
+) -> None:
     if kept.diagrams is not None:
-        raise UsageError(f"{path.name} is not a notebook and draws no diagrams; leave --diagrams out")
+        raise UsageError(f"{program.path.name} is not a notebook and draws no diagrams; leave --diagrams out")
     ran = run_program(
-        read_program(path),
+        program,
         options,
         runner,
         responder=None if conditions.responder is None else find_responder(conditions.responder, options.limits),
@@ -127,15 +129,15 @@ def _run_program(path: Path, options: RunOptions, conditions: Conditions, kept: 
     if ran.over is not None and kept.over is not None:
         others = OtherTrials(kept.over.name, {0: _as_trial(ran.over, options.seed)})
     answering = None if ran.spec.responder is None else ran.spec.responder.code
-    _keep(kept, ran.recording, path.name, options, sources_of_files(ran.spec.program.code, answering), others)
+    _keep(kept, ran.recording, program.path.name, options, sources_of_files(ran.spec.program.code, answering), others)
 
 
 def _other_program(path: Path) -> ProgramFile:
     """A program that is run in the first one's world, whatever its own first line says of one."""
-    notebook, _ = find_notebook(path)
-    if notebook is not None:
+    read = read_runnable(path)
+    if not isinstance(read, ProgramFile):
         raise UsageError(f"--over {path.name} is a notebook, expected a robot program")
-    return read_program(path)
+    return read
 
 
 def _keep(

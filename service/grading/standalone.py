@@ -27,7 +27,7 @@ from sim.robot import robot
 from sim.world import Noise
 from submissions.magics import Flags, Setup, setup, split_program
 from submissions.marked_run import runs_of
-from submissions.notebook import is_script, read_notebook, read_script
+from submissions.notebook import ReadNotebook, is_script, read_notebook, read_script
 from submissions.source_text import decode_source, modules_of
 from submissions.submission import Notebook
 
@@ -101,20 +101,15 @@ class ProgramRun:
 
 def read_program(path: Path) -> ProgramFile:
     """The robot program in a file. Raises UsageError where it cannot be read, or its magic line is wrong."""
-    text = _source(path)
-    try:
-        return ProgramFile(path, *split_program(text))
-    except UsageError as error:
-        raise UsageError(f"{path.name}: {error}") from None
+    return _program_file(path, _source(path))
 
 
-def find_notebook(path: Path) -> tuple[Notebook | None, tuple[str, ...]]:
-    """The notebook in a file, or that nbconvert has made a file of, with notes on it; None if it is a program."""
+def read_runnable(path: Path) -> ReadNotebook | ProgramFile:
+    """The notebook in a file, or that nbconvert has made a file of, else the robot program. Raises UsageError."""
     if path.suffix.lower() == ".ipynb":
-        read = read_notebook(read_file(path), path.name)
-        return read.notebook, tuple(read.notes)
+        return read_notebook(read_file(path), path.name)
     text = _source(path)
-    return (read_script(text, path.name) if is_script(text) else None), ()
+    return ReadNotebook(read_script(text, path.name)) if is_script(text) else _program_file(path, text)
 
 
 def find_responder(given: str, limits: RunLimits) -> ResponderSpec:
@@ -273,6 +268,13 @@ def _modules_beside(path: Path, text: str) -> Mapping[str, str]:
         return beside.read_bytes()
 
     return modules_of(text, read)
+
+
+def _program_file(path: Path, text: str) -> ProgramFile:
+    try:
+        return ProgramFile(path, *split_program(text))
+    except UsageError as error:
+        raise UsageError(f"{path.name}: {error}") from None
 
 
 def _source(path: Path) -> str:
