@@ -52,7 +52,7 @@ _RAISED_OF_FILES = [
 _KEYWORDS = {"_": None, "translatable": None, "say": None, "gettext": None, "ngettext": (1, 2), "counted": (1, 2)}
 _KEYWORDS |= {"Sentence": None}
 _RAISING = {"Sentence": None, "UsageError": None, "LacksPart": None, "MarksChanged": None, "StudentsKnowAnother": None}
-_RAISING |= {"NotFound": None, "Forbidden": None, "Conflict": None, "Invalid": None}
+_RAISING |= {"NotFound": None, "Forbidden": None, "Conflict": None, "Invalid": None, "UnknownPlatform": None}
 _OPTIONS = {pattern: {"silent": "false", "trimmed": "true"} for pattern, kind in _METHODS if kind == "jinja2"}
 
 

@@ -316,7 +316,7 @@ CREATE TABLE credential (
 	created_at DATETIME NOT NULL, 
 	expires_at DATETIME NOT NULL, 
 	used_at DATETIME, 
-	revoked_at DATETIME, role VARCHAR(16), platform_id INTEGER CONSTRAINT fk_credential_platform_id_lti_platform REFERENCES lti_platform (id), 
+	revoked_at DATETIME, role VARCHAR(16), platform_id INTEGER CONSTRAINT fk_credential_platform_id_lti_platform REFERENCES lti_platform (id), token_id VARCHAR(12) CONSTRAINT fk_credential_token_id_credential REFERENCES credential (id), 
 	CONSTRAINT pk_credential PRIMARY KEY (id), 
 	CONSTRAINT fk_credential_course_id_course FOREIGN KEY(course_id) REFERENCES course (id), 
 	CONSTRAINT fk_credential_person_id_person FOREIGN KEY(person_id) REFERENCES person (id), 
@@ -510,5 +510,7 @@ CREATE TABLE schema_compatibility (
 	oldest_compatible VARCHAR(32) NOT NULL, 
 	CONSTRAINT pk_schema_compatibility PRIMARY KEY (id)
 );
+
+CREATE INDEX ix_credential_token_id ON credential (token_id);
 
 INSERT INTO schema_compatibility VALUES (1, '0017')

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
-from sqlalchemy import ColumnElement, delete, func, or_, select, update
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, delete, exists, func, or_, select, update
+from sqlalchemy.orm import Session, aliased
 
 from service.store.engine import now
 from service.store.ids import new_id
@@ -64,6 +64,14 @@ class Identity:
 
 
 @dataclass(frozen=True, slots=True)
+class NewSession:
+    """The secret of a new session of a browser, and how long it lasts."""
+
+    secret: str
+    lifetime: timedelta = SESSION_LIFETIME
+
+
+@dataclass(frozen=True, slots=True)
 class LinkOwner:
     """Whom a link that counts would sign in, and how long yet."""
 
@@ -94,12 +102,19 @@ def issue(
     *,
     name: str = "",
     reach: Reach = EVERYWHERE,
+    token: Credential | None = None,
 ) -> str:
-    """Issue a new secret for this person, and delete credentials that expired long ago."""
+    """Issue a new secret for this person, and delete credentials that expired long ago.
+
+    A session that is started with a ``token`` ends with it.
+    """
     at = now(session)
     _forget_expired(session, at)
     secret = _PREFIXES[kind] + secrets.token_urlsafe(32)
-    session.add(_row(person_id, kind, secret, at, at + lifetime, name=name, **_columns(reach)))
+    expires_at, token_id = at + lifetime, None
+    if token is not None:
+        expires_at, token_id = min(expires_at, token.expires_at), token.id
+    session.add(_row(person_id, kind, secret, at, expires_at, name=name, token_id=token_id, **_columns(reach)))
     session.flush()
     if kind is not CredentialKind.LINK:
         _note_sign_in(session, person_id, at)
@@ -174,7 +189,7 @@ def owner(session: Session, link: str) -> LinkOwner | None:
     return LinkOwner(row.person_id, person_name(session, row.person_id, row.course_id), row.expires_at)
 
 
-def redeem(session: Session, link: str) -> str | None:
+def redeem(session: Session, link: str) -> NewSession | None:
     """Exchange a link for a new session that reaches as far. None if the link is not valid."""
     row = _valid(session, link, CredentialKind.LINK)
     if row is None:
@@ -183,7 +198,16 @@ def redeem(session: Session, link: str) -> str | None:
     taken = update(Credential).where(Credential.id == row.id, Credential.used_at.is_(None)).values(used_at=at)
     if session.execute(taken).rowcount != 1:  # type: ignore[attr-defined]
         return None
-    return issue(session, row.person_id, CredentialKind.SESSION, SESSION_LIFETIME, reach=_reach(row))
+    return NewSession(issue(session, row.person_id, CredentialKind.SESSION, SESSION_LIFETIME, reach=_reach(row)))
+
+
+def start_session(session: Session, token: str) -> NewSession | None:
+    """A session that reaches as far as a token, and ends with it. None if the token may not sign a browser in."""
+    row = _valid(session, token, CredentialKind.TOKEN)
+    if row is None or "sign-in" not in row.scopes:
+        return None
+    kind, lifetime = CredentialKind.SESSION, min(SESSION_LIFETIME, row.expires_at - now(session))
+    return NewSession(issue(session, row.person_id, kind, lifetime, reach=_reach(row), token=row), lifetime)
 
 
 def identify(session: Session, secret: str, kind: CredentialKind) -> Identity | None:
@@ -297,7 +321,9 @@ def _within(reach: Reach) -> list[ColumnElement[bool]]:
 
 def _counts(at: datetime) -> tuple[ColumnElement[bool], ...]:
     is_unused = or_(Credential.kind != CredentialKind.LINK, Credential.used_at.is_(None))
-    return Credential.revoked_at.is_(None), Credential.expires_at > at, is_unused
+    token = aliased(Credential)
+    has_lost_token = exists().where(token.id == Credential.token_id, token.revoked_at.is_not(None))
+    return Credential.revoked_at.is_(None), Credential.expires_at > at, is_unused, ~has_lost_token
 
 
 def _note_sign_in(session: Session, person_id: int, at: datetime) -> None:
@@ -314,10 +340,8 @@ def _end_oldest_sessions(session: Session, person_id: int, at: datetime) -> None
 def _valid(session: Session, secret: str, kind: CredentialKind) -> Credential | None:
     if not secret.startswith(_PREFIXES[kind]) or len(secret) > 100:
         return None
-    row = session.scalar(select(Credential).where(Credential.sha256 == _sha256(secret), Credential.kind == kind))
-    if row is None or row.revoked_at is not None or row.expires_at <= now(session):
-        return None
-    return None if kind is CredentialKind.LINK and row.used_at is not None else row
+    mine = (Credential.sha256 == _sha256(secret), Credential.kind == kind)
+    return session.scalar(select(Credential).where(*mine, *_counts(now(session))))
 
 
 def _row(

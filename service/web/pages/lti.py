@@ -12,12 +12,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Form, Query, Request
 from fastapi.responses import RedirectResponse, Response
 
-from service.lti import launch
-from service.lti.keys import public_keys, signing_key
-from service.store import audit
-from service.store.people import credentials, lti
-from service.store.people.credentials import SESSION_LIFETIME, Reach
-from service.store.states import CredentialKind
+from service.operations import launches
+from service.operations.launches import LaunchRequest, UnknownPlatform
 from service.web.context import Context, WebContext
 from service.web.pages.home import course_path
 from service.web.pages.sign_in import inside, set_session
@@ -34,9 +30,7 @@ Text = Annotated[str, Form(max_length=_LONGEST)]
 @cross_site_router.get("/lti/keys")
 def keys(context: Context) -> dict[str, Any]:
     """The public halves of our keys."""
-    with context.store.transaction() as session:
-        signing_key(session)
-        return public_keys(session)
+    return launches.list_keys(context.service)
 
 
 @cross_site_router.get("/lti/login")
@@ -82,33 +76,10 @@ def end_launch(
     began_here = request.cookies.get(_STATE_COOKIE, "")
     if not began_here or not hmac.compare_digest(began_here.encode(), state.encode()):
         raise UsageError("this launch was begun in another browser, or too long ago; open the link in the course again")
-    with context.store.transaction() as session:
-        pending = lti.take_launch(session, state)
-    if pending is None:
-        raise UsageError("this launch was begun too long ago, or used already; open the link in the course again")
-    told = launch.read_launch(pending, id_token)
-    with context.store.transaction() as session:
-        launched = lti.meet(
-            session,
-            pending.platform,
-            told.deployment,
-            told.context,
-            told.course_title,
-            told.subject,
-            told.student,
-            told.role,
-            told.members_url,
-            told.lineitems_url,
-        )
-        if launched is None:
-            raise UsageError("no instructor has opened Robomark from this course yet; ask yours to do it first")
-        # A platform vouches for people in its own courses only.
-        reach = Reach(platform_id=pending.platform.id)
-        secret = credentials.issue(session, launched.person_id, CredentialKind.SESSION, SESSION_LIFETIME, reach=reach)
-        audit.note(session, f"platform {pending.platform.name}", "launch", "person", str(launched.person_id))
-    target = pending.target if pending.target != "/" else course_path(launched.course_id, launched.role)
+    done = launches.complete(context.service, state, id_token)
+    target = done.target if done.target != "/" else course_path(done.launched.course_id, done.launched.role)
     answer = RedirectResponse(target, 303)
-    set_session(answer, context, secret)
+    set_session(answer, context, done.session)
     answer.delete_cookie(_STATE_COOKIE, path="/lti", secure=True, httponly=True, samesite="none")
     return answer
 
@@ -123,16 +94,13 @@ def _begin(
     client_id: str,
 ) -> Response:
     start = context.settings.public_url or str(request.base_url).rstrip("/")
-    with context.store.reading() as session:
-        platform = lti.find_platform(session, issuer, client_id or None)
-    if platform is None:
-        context.limits.unknown_platforms.spend("" if request.client is None else request.client.host)
-        raise UsageError(f"no platform {issuer[:100]!r} with this client is registered here")
     # Only a path of ours: whoever makes the link does not choose another site.
     path = inside(target.removeprefix(start)) if target.startswith(f"{start}/") else "/"
-    with context.store.transaction() as session:
-        state, nonce = lti.begin_launch(session, platform, path)
-    where = launch.authorization_address(platform, f"{start}/lti/launch", login_hint, message_hint, state, nonce)
-    answer = RedirectResponse(where, 303)
-    answer.set_cookie(_STATE_COOKIE, state, max_age=600, path="/lti", httponly=True, samesite="none", secure=True)
+    try:
+        begun = launches.begin(context.service, LaunchRequest(issuer, client_id, login_hint, message_hint, start, path))
+    except UnknownPlatform:
+        context.limits.unknown_platforms.spend("" if request.client is None else request.client.host)
+        raise
+    answer = RedirectResponse(begun.authorization_address, 303)
+    answer.set_cookie(_STATE_COOKIE, begun.state, max_age=600, path="/lti", httponly=True, samesite="none", secure=True)
     return answer

@@ -10,9 +10,8 @@ from fastapi.responses import RedirectResponse, Response
 from starlette.exceptions import HTTPException
 
 from service.language import languages, translatable
-from service.store.people import credentials
-from service.store.people.credentials import SESSION_LIFETIME
-from service.store.states import CredentialKind
+from service.operations import sign_in as operations
+from service.operations.sign_in import NewSession
 from service.web.access import SESSION_COOKIE, MaybeReader, SignedIn
 from service.web.context import Context, WebContext
 from service.web.language import COOKIE as LANGUAGE_COOKIE
@@ -32,8 +31,7 @@ def sign_in_page(request: Request, reader: MaybeReader, target: Annotated[str, Q
 @router.get("/sign-in/{link}")
 def link_page(request: Request, reader: MaybeReader, context: Context, link: str) -> Response:
     """Where a personal link leads; it counts only when the button is pressed, for mail programs look into links."""
-    with context.store.reading() as session:
-        owner = credentials.owner(session, link)
+    owner = operations.show_link(context.service, link)
     if owner is None:
         # Only what fails is counted: a right link counts, however many wrong ones came from the same address.
         context.limits.failed_sign_ins.spend(_address(request))
@@ -53,29 +51,19 @@ def sign_in(
     """Exchange a link's secret, or a token, for a session of this browser."""
     # A whole link may have been pasted.
     secret = secret.strip().rstrip("/").rpartition("/")[2]
-    with context.store.transaction() as session:
-        opened = credentials.redeem(session, secret)
-        if opened is None:
-            identity = credentials.identify(session, secret, CredentialKind.TOKEN)
-            # The browser may do no more than the token.
-            if identity is not None and "sign-in" in identity.reach.scopes:
-                kind, reach = CredentialKind.SESSION, identity.reach
-                opened = credentials.issue(session, identity.person_id, kind, SESSION_LIFETIME, reach=reach)
-        if opened is not None and reader is not None:
-            credentials.revoke(session, reader.identity.credential_id, reader.identity.person_id)
-    if opened is None:
+    started = operations.sign_in(context.service, None if reader is None else reader.acting, secret)
+    if started is None:
         context.limits.failed_sign_ins.spend(_address(request))
         return page(request, reader, "sign_in.html", status_code=403, target=inside(target), refused=_REFUSED)
     answer = RedirectResponse(inside(target), 303)
-    set_session(answer, context, opened)
+    set_session(answer, context, started)
     return answer
 
 
 @router.post("/sign-out")
 def sign_out(reader: SignedIn, context: Context) -> Response:
     """End the session of this browser."""
-    with context.store.transaction() as session:
-        credentials.revoke(session, reader.identity.credential_id, reader.identity.person_id)
+    operations.sign_out(context.service, reader.acting)
     answer = RedirectResponse("/sign-in", 303)
     answer.delete_cookie(SESSION_COOKIE, path="/")
     return answer
@@ -95,11 +83,11 @@ def choose_language(
     return answer
 
 
-def set_session(answer: Response, context: WebContext, secret: str) -> None:
-    """Sign a browser in with the answer."""
-    seconds = int(SESSION_LIFETIME.total_seconds())
+def set_session(answer: Response, context: WebContext, started: NewSession) -> None:
+    """Sign a browser in with the answer, for as long as the session lasts."""
+    seconds, secure = int(started.lifetime.total_seconds()), _secure(context)
     answer.set_cookie(
-        SESSION_COOKIE, secret, max_age=seconds, path="/", httponly=True, samesite="lax", secure=_secure(context)
+        SESSION_COOKIE, started.secret, max_age=seconds, path="/", httponly=True, samesite="lax", secure=secure
     )
 
 

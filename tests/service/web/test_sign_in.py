@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import timedelta
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from sqlalchemy import select
 
 from command import robomark
 from service.store.people import credentials, membership
+from service.store.people.membership import Member
 from service.store.states import CredentialKind, Role
 from service.store.web_tables import Credential
 from service.web.access import SESSION_COOKIE
@@ -82,6 +84,38 @@ def test_a_token_becomes_a_browser_only_where_it_may(web: Web) -> None:
     for scopes, status in ((("read", "submit"), 403), (("sign-in",), 303)):
         secret = web.token(ada, *scopes)["authorization"].removeprefix("Bearer ")
         assert web.browser().post("/sign-in", data={"secret": secret}).status_code == status
+
+
+def _token_for(web: Web, member: Member, lifetime: timedelta) -> str:
+    reach = credentials.Reach(scopes=frozenset({"sign-in"}))
+    with web.store.transaction() as session:
+        return credentials.issue(session, member.person_id, CredentialKind.TOKEN, lifetime, reach=reach)
+
+
+def test_a_session_started_with_a_token_lasts_no_longer_than_the_token(web: Web) -> None:
+    ada, browser = web.student(), web.browser()
+    token = _token_for(web, ada, timedelta(minutes=10))
+    answer = browser.post("/sign-in", data={"secret": token})
+    with web.store.reading() as session:
+        ends = dict(session.execute(select(Credential.kind, Credential.expires_at)).all())
+    assert timedelta(0) <= ends[CredentialKind.TOKEN] - ends[CredentialKind.SESSION] < timedelta(minutes=1)
+    max_age = re.search(r"Max-Age=(\d+)", answer.headers["set-cookie"])
+    assert max_age is not None
+    assert int(max_age[1]) <= 600
+
+
+def test_a_session_ends_with_the_token_it_was_started_with(web: Web) -> None:
+    ada, browser, other = web.student(), web.browser(), web.browser()
+    first, second = (_token_for(web, ada, timedelta(days=30)) for _ in range(2))
+    assert browser.post("/sign-in", data={"secret": first}).status_code == 303
+    assert other.post("/sign-in", data={"secret": second}).status_code == 303
+    with web.store.transaction() as session:
+        identity = credentials.identify(session, first, CredentialKind.TOKEN)
+        assert identity is not None
+        credentials.revoke(session, identity.credential_id, ada.person_id)
+        assert len(credentials.of_person(session, ada.person_id)) == 2
+    assert browser.get("/account").status_code == 303
+    assert other.get("/account").status_code == 200
 
 
 def test_what_has_ended_counts_no_more(web: Web) -> None:

@@ -62,9 +62,9 @@ def ada(web: Web) -> Member:
 
 def _actor(web: Web, member: Member) -> Actor:
     with web.store.transaction() as session:
-        found = credentials.identify(
-            session, credentials.redeem(session, web.link(member)) or "", CredentialKind.SESSION
-        )
+        started = credentials.redeem(session, web.link(member))
+        assert started is not None
+        found = credentials.identify(session, started.secret, CredentialKind.SESSION)
     assert found is not None
     return actor_from(found)
 

@@ -1,0 +1,106 @@
+"""Launches from learning platforms by LTI 1.3: begun by the platform, completed with its signed identity token."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from service.lti import launch
+from service.lti.keys import public_keys, signing_key
+from service.operations.context import Service
+from service.operations.errors import Invalid
+from service.store import audit
+from service.store.people import credentials, lti
+from service.store.people.credentials import SESSION_LIFETIME, NewSession, Reach
+from service.store.people.lti import Launched
+from service.store.states import CredentialKind
+
+
+@dataclass(frozen=True, slots=True)
+class LaunchRequest:
+    """The parameters with which a platform begins a launch."""
+
+    issuer: str
+    client_id: str  # empty where the platform does not send it
+    login_hint: str
+    message_hint: str
+    address: str  # of this installation
+    target: str  # the path to open after the launch
+
+
+@dataclass(frozen=True, slots=True)
+class BegunLaunch:
+    """The state of a launch, which its end has to repeat, and the platform's address to send the browser to."""
+
+    state: str
+    authorization_address: str
+
+
+@dataclass(frozen=True, slots=True)
+class CompletedLaunch:
+    """A session for the person of a launch, the course and role that it is for, and the path to open."""
+
+    session: NewSession
+    launched: Launched
+    target: str
+
+
+class UnknownPlatform(Invalid):
+    """The issuer and the client are those of no registered platform."""
+
+
+def list_keys(service: Service) -> dict[str, Any]:
+    """The JSON Web Key Set of this installation; a key is created where there is none."""
+    with service.store.transaction() as session:
+        signing_key(session)
+        return public_keys(session)
+
+
+def begin(service: Service, request: LaunchRequest) -> BegunLaunch:
+    """Begin a launch. Raises UnknownPlatform."""
+    with service.store.reading() as session:
+        platform = lti.find_platform(session, request.issuer, request.client_id or None)
+    if platform is None:
+        raise UnknownPlatform(
+            "no platform %(issuer)s with this client is registered here", issuer=repr(request.issuer[:100])
+        )
+    with service.store.transaction() as session:
+        state, nonce = lti.begin_launch(session, platform, request.target)
+    back = f"{request.address}/lti/launch"
+    where = launch.authorization_address(platform, back, request.login_hint, request.message_hint, state, nonce)
+    return BegunLaunch(state, where)
+
+
+def complete(service: Service, state: str, id_token: str) -> CompletedLaunch:
+    """Sign in the person whom a platform vouches for, and enrol them in the course that they come from.
+
+    Raises:
+        Invalid: the launch is too old or was completed already, or a student comes before any instructor.
+        UsageError: the token cannot be trusted, or the person's id is somebody else's.
+        PlatformError: the platform's keys cannot be fetched.
+    """
+    with service.store.transaction() as session:
+        pending = lti.take_launch(session, state)
+    if pending is None:
+        raise Invalid("this launch was begun too long ago, or used already; open the link in the course again")
+    told = launch.read_launch(pending, id_token)
+    with service.store.transaction() as session:
+        launched = lti.meet(
+            session,
+            pending.platform,
+            told.deployment,
+            told.context,
+            told.course_title,
+            told.subject,
+            told.student,
+            told.role,
+            told.members_url,
+            told.lineitems_url,
+        )
+        if launched is None:
+            raise Invalid("no instructor has opened Robomark from this course yet; ask yours to do it first")
+        # A platform vouches for people in its own courses only.
+        kind, reach = CredentialKind.SESSION, Reach(platform_id=pending.platform.id)
+        secret = credentials.issue(session, launched.person_id, kind, SESSION_LIFETIME, reach=reach)
+        audit.note(session, f"platform {pending.platform.name}", "launch", "person", str(launched.person_id))
+    return CompletedLaunch(NewSession(secret), launched, pending.target)
