@@ -11,43 +11,32 @@ from typing import Annotated
 
 import typer
 
+from service.commands.operating import operating
 from service.commands.shown import document, note, tell
+from service.operations import database, privacy
 from service.settings import load_settings
-from service.store import audit
-from service.store.backup import back_up, restore
-from service.store.engine import open_engine, open_store
-from service.store.purge import purge
-from service.store.revision import newest_revision
 from sim.errors import UsageError
 from submissions.roster import moment
 
 
 def upgrade_tables() -> None:
     """Bring the tables up to this release; every command does it when it starts."""
-    open_store(load_settings()).close()
-    document(revision=newest_revision())
-    tell(f"the database is at revision {newest_revision()}")
+    revision = database.upgrade(load_settings())
+    document(revision=revision)
+    tell(f"the database is at revision {revision}")
 
 
 def backup_database(file: Annotated[Path, typer.Argument(help="The copy to make; it must not exist.")]) -> None:
     """Copy the database while it is in use: a SQLite file that can be opened as it is, and is for you alone."""
-    settings = load_settings()
-    engine = open_engine(settings.database)
-    if engine.dialect.name == "sqlite" and not Path(str(engine.url.database)).exists():
-        raise UsageError(f"there is no database yet at {engine.url.database}")
-    try:
-        back_up(engine, file)
-    finally:
-        engine.dispose()
-    document(file=file, bytes=file.stat().st_size)
-    tell(f"{file}: {file.stat().st_size} bytes")
+    size = database.back_up(load_settings(), file)
+    document(file=file, bytes=size)
+    tell(f"{file}: {size} bytes")
 
 
 def restore_database(file: Annotated[Path, typer.Argument(help="What db backup made.")]) -> None:
     """Bring a backup into a database in which nothing was submitted yet, SQLite or PostgreSQL."""
-    with open_store(load_settings()) as store:
-        restore(file, store.engine)
-        where = store.engine.url.render_as_string(hide_password=True)
+    with operating() as (service, actor):
+        where = database.restore(service, actor, file)
     document(database=where, file=file)
     tell(f"{where} has what {file} has")
 
@@ -68,11 +57,10 @@ def purge_database(
     if archive is not None and for_good:
         raise UsageError("--archive keeps a copy and --for-good keeps none; name one of them")
     only_count = archive is None and not for_good
-    with open_store(load_settings()) as store:
+    with operating() as (service, actor):
         if archive is not None:
-            back_up(store.engine, archive)
-            note(f"{archive}: {archive.stat().st_size} bytes")
-        gone = purge(store, earliest_kept, audit.this_user(), only_count=only_count)
+            note(f"{archive}: {privacy.archive(service, actor, archive)} bytes")
+        gone = (database.count_old if only_count else database.remove_old)(service, actor, earliest_kept)
     counted = f"{gone.submissions} submissions, {gone.grades} grades, {gone.students} students"
     document(removed=not only_count, archive=archive, **asdict(gone))
     tell(f"{counted} would go; --archive FILE or --for-good removes them" if only_count else f"removed: {counted}")

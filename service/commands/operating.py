@@ -10,22 +10,19 @@ from typing import TYPE_CHECKING
 from service.settings import Settings, load_settings
 
 if TYPE_CHECKING:
-    from service.operations.context import Actor, Service
+    from service.operations.context import Actor, Service, Store
+    from service.operations.types import Lane
     from service.queue.notifier import Notifier
-    from service.store.engine import Store
-    from service.store.states import Lane
 
 
 @contextmanager
 def operating() -> Iterator[tuple[Service, Actor]]:
     """The installation, open meanwhile, and the user of this command as its operator."""
-    from service.operations.context import Actor, Service
-    from service.store import audit
-    from service.store.engine import open_store
+    from service.operations.context import Service, machine_operator, open_store
 
     settings = load_settings()
     with open_store(settings) as store:
-        yield Service(settings, store, _LateNotifier(settings, store)), Actor(audit.this_user(), operator=True)
+        yield Service(settings, store, _LateNotifier(settings, store)), machine_operator()
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,24 +11,20 @@ import time
 from contextlib import ExitStack
 
 import structlog
-from sqlalchemy.exc import SQLAlchemyError
 
 from responders.sandbox import control_group
 from responders.sandbox.manager import Sandboxes
+from service.commands.operating import operating
+from service.operations import database, sign_in_links
+from service.operations.context import Actor, Service
+from service.operations.database_errors import DatabaseError
 from service.queue.logs import announce, configure_logging
 from service.queue.supervisor import Supervisor, alone_in
 from service.settings import Settings, load_settings
-from service.store import audit
-from service.store.engine import Store, open_store
-from service.store.people import credentials, membership
-from service.store.people.credentials import LINK_LIFETIME
-from service.store.people.students import DEFAULT_COURSE
-from service.store.states import CredentialKind
 from service.web.listening import address, check_reach, listen
 from service.web.server import serve_on
-from sim.errors import HostError, RobomarkError, UsageError
+from sim.errors import HostError, RobomarkError
 from sim.processes import leave_current_folder
-from submissions.student_identity import Student
 
 _log = structlog.get_logger(__name__)
 _LOOK_SECONDS = 0.5
@@ -54,11 +50,11 @@ def bring_up(workers: int, host: str, port: int, *, serve: bool) -> None:
         with Sandboxes() as sandboxes:
             # Here the reason can be said; a worker that refuses would only be seen to end.
             sandboxes.check()
-        store = held.enter_context(open_store(settings))
+        service, actor = held.enter_context(operating())
         try:
             if listening is not None:
-                link = f"; {_told_link(settings, _first_link(settings, store, address(listening)))}"
-            _keep_up(settings, store, Supervisor(settings, store, workers, listening), where + link)
+                link = f"; {_told_link(settings, _first_link(service, actor, address(listening)))}"
+            _keep_up(settings, Supervisor(settings, service.store, workers, listening), where + link)
         except KeyboardInterrupt:
             return
 
@@ -68,7 +64,7 @@ def answer(host: str, port: int) -> None:
     settings = load_settings()
     configure_logging(settings.log_level)
     check_reach(host, settings)
-    open_store(settings).close()
+    database.upgrade(settings)
     with listen(host, port) as listening:
         announce("serve.answers", f"robomark answers on {address(listening)}; Ctrl-C ends it")
         try:
@@ -77,7 +73,7 @@ def answer(host: str, port: int) -> None:
             return
 
 
-def _keep_up(settings: Settings, store: Store, service: Supervisor, where: str) -> None:
+def _keep_up(settings: Settings, service: Supervisor, where: str) -> None:
     with service:
         try:
             service.ensure()
@@ -106,18 +102,10 @@ def _told_link(settings: Settings, link: str) -> str:
     return f"sign in by the link in {path}"
 
 
-def _first_link(settings: Settings, store: Store, listening_at: str) -> str:
-    """A link that signs in, once, whoever brings the service up: an instructor of the first course, and operator."""
-    account = audit.this_user().partition("@")[0]
-    with store.transaction() as session:
-        try:
-            member = membership.make_instructor(session, DEFAULT_COURSE, Student(account))
-        except UsageError:
-            # A student is called like the account.
-            member = membership.make_instructor(session, DEFAULT_COURSE, Student(f"operator {account}"))
-        membership.make_operator(session, member.person_id)
-        secret = credentials.issue(session, member.person_id, CredentialKind.LINK, LINK_LIFETIME)
-    return f"{settings.public_url or listening_at}/sign-in/{secret}"
+def _first_link(service: Service, actor: Actor, listening_at: str) -> str:
+    """A link that signs whoever brings the service up in, once, as an instructor and operator."""
+    secret = sign_in_links.make_own_link(service, actor)
+    return f"{service.settings.public_url or listening_at}/sign-in/{secret}"
 
 
 def _until_ready(service: Supervisor) -> None:
@@ -132,5 +120,5 @@ def _ensure(service: Supervisor) -> None:
     """Once up, nothing but Ctrl-C ends it: what cannot be started now is tried again."""
     try:
         service.ensure()
-    except (RobomarkError, SQLAlchemyError, OSError) as error:
+    except (RobomarkError, DatabaseError, OSError) as error:
         _log.warning("up.not_whole", error=str(error))

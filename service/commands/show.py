@@ -6,18 +6,17 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from sqlalchemy.orm import Session
 
 from service.commands.batch.batch_summary import remarks
+from service.commands.operating import operating
 from service.commands.options import FilmOption, LanguageOption
 from service.commands.shown import document, note, tell
 from service.home import for_the_user
 from service.language import SOURCE, language_called
-from service.settings import load_settings
-from service.store.batches import batches
-from service.store.batches.batches import JobLine
-from service.store.engine import open_store
-from service.store.states import JobState
+from service.operations import stored_grades
+from service.operations.context import Actor, Service
+from service.operations.stored_grades import JobLine
+from service.operations.types import JobState
 from sim.errors import UsageError
 
 #: No id begins so: none has an o.
@@ -52,10 +51,9 @@ def show(
         raise UsageError("--over lays trials over those of a replay; expected --replay or --output too")
     if trial is not None and film is None:
         raise UsageError("--trial says which trial a film shows; expected --film too")
-    with open_store(load_settings()) as store:
-        with store.reading() as session:
-            line = batches.job_line(session, batches.find_job(session, grade))
-            others = None if over is None else batches.job_line(session, _over(session, over, line))
+    with operating() as (service, actor):
+        line = stored_grades.find(service, actor, grade)
+        others = None if over is None else _over(service, actor, over, line)
         if line.state is not JobState.DONE:
             document(job=line, grade=None)
             tell(_not_graded(line))
@@ -64,12 +62,9 @@ def show(
         from service.reports.formats.json_output import json_document
         from service.reports.formats.text import plain_text
         from service.reports.view import staff_view
-        from service.store.batches import intake
-        from service.store.grades import results
 
-        with store.reading() as session:
-            told = staff_view(results.load_words(session, line.id))
-            submission = intake.load_submission(session, line.id)
+        words, submission = stored_grades.load_words(service, actor, line.id)
+        told = staff_view(words)
         document(job=line, grade=json_document(told, submission))
         tell(plain_text(told, submission).rstrip("\n"))
         by = f"graded by {line.worker}" if line.copied_from is None else "not run"
@@ -80,18 +75,17 @@ def show(
         from service.report_files import write_grade_film, write_grade_replay, write_report
         from service.reports.written import file_stem
 
-        with store.reading() as session:
-            graded = results.load(session, line.id)
+        graded = stored_grades.load(service, actor, line.id)
         spoken = language_called(language)
         if replay is not None:
-            write_grade_replay(store, line, graded, replay, others, spoken)
+            write_grade_replay(service.store, line, graded, replay, others, spoken)
             note(f"replay: {replay}")
         if film is not None:
-            write_grade_film(store, line, graded, film, trial)
+            write_grade_film(service.store, line, graded, film, trial)
             note(f"film: {film}")
         if output is None:
             return
-        written = write_report(store, line, graded, output, file_stem(line.student), others, spoken)
+        written = write_report(service.store, line, graded, output, file_stem(line.student), others, spoken)
         note(f"report: {written.path}")
         for name, data in written.plots.items():
             path = output / f"{line.id}-plot-{name}.png"
@@ -100,8 +94,10 @@ def show(
             note(f"plot: {path}")
 
 
-def _over(session: Session, over: str, line: JobLine) -> str:
-    return batches.job_before(session, line.id) if over == _BEFORE else batches.find_job(session, over)
+def _over(service: Service, actor: Actor, over: str, line: JobLine) -> JobLine:
+    if over == _BEFORE:
+        return stored_grades.find_previous(service, actor, line.id)
+    return stored_grades.find(service, actor, over)
 
 
 def _not_graded(line: JobLine) -> str:

@@ -6,16 +6,13 @@ import itertools
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 
+from service.commands.operating import operating
 from service.commands.shown import document, note, show, table, tell
 from service.grading.grade import Grade, TrialResult
 from service.grading.grader import grade as grade_submission
 from service.grading.trial_runner import TrialRunner
-from service.settings import load_settings
-from service.store.batches import batches, intake
-from service.store.engine import open_store
-from service.store.grades import results
-from service.store.installation import secret_of
-from service.store.models import Job
+from service.operations import stored_grades
+from service.operations.stored_grades import Grading
 from service.version import GRADER_VERSION, grader_sha256
 from sim.errors import HostError
 from sim.recording import Recording, Verdict
@@ -39,34 +36,30 @@ _CUT = frozenset({Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verd
 
 def verify_grade(grade: str) -> None:
     """Run the grading with this id again. Raises HostError if anything differs that must not."""
-    with open_store(load_settings()) as store:
-        own = secret_of(store)
-        with store.reading() as session:
-            job = session.get_one(Job, batches.find_job(session, grade))
-            stored = results.load_graded(session, job.id)
-            grading_request = intake.load_grading_request(session, job.id)
-    secret = _secret_of(job, own)
+    with operating() as (service, actor):
+        grading = stored_grades.load_grading(service, actor, grade)
+    stored, grading_request, secret = grading.grade, grading.request, _secret_of(grading)
     again = _grade_again(grading_request, secret)
     rows = list(zip(stored.trials, again.trials, strict=False))
     marks = _compare_marks(stored, again, rows, grading_request.assignment.criteria)
     cause = _cause_of(rows, marks, again, grading_request, secret)
     same = len(stored.trials) == len(again.trials) and "differs" not in (*marks, *itertools.starmap(_compared, rows))
-    document(**_told(job.id, stored, again, rows), same=same, cause=cause)
+    document(**_told(grading.job_id, stored, again, rows), same=same, cause=cause)
     compared = table("scenario", "trial", "stored", "again", "")
     for before, after in rows:
         hashes = (before.recording.sha256[:16], after.recording.sha256[:16])
         compared.add_row(before.scenario, str(before.index), *hashes, _compared(before, after))
     show(compared)
     tell(f"marks: {stored.marks} stored, {again.marks} again")
-    if job.grader_sha256 != grader_sha256():
+    if grading.grader_sha256 != grader_sha256():
         note(f"graded by Robomark {stored.grader_version}, again by {GRADER_VERSION}; their code or libraries differ")
     for result, compared_marks in zip(stored.criteria, marks, strict=False):
         if compared_marks != "same":
             note(f"the marks of {result.title} differ ({compared_marks})")
     if not same:
         reason = f": {_REASONS[cause]}" if cause else ""
-        raise HostError(f"grade {job.id} is not what grading it again gives{reason}")
-    tell(f"grade {job.id} is what grading it again gives")
+        raise HostError(f"grade {grading.job_id} is not what grading it again gives{reason}")
+    tell(f"grade {grading.job_id} is what grading it again gives")
 
 
 def _grade_again(request: GradingRequest, secret: Secret, earlier: int = 0) -> Grade:
@@ -120,14 +113,15 @@ def _told(job_id: str, stored: Grade, again: Grade, rows: Sequence[Row]) -> dict
     }
 
 
-def _secret_of(job: Job, own: Secret) -> Secret:
+def _secret_of(grading: Grading) -> Secret:
     """The secret that the grade was given with. Raises HostError when it is not the one that is at hand."""
-    if job.secret_sha256 is None:
+    own, needed = grading.own_secret, grading.secret_sha256
+    if needed is None:
         note("graded before this installation had a secret: again in the worlds of then")
         return PUBLIC
-    if job.secret_sha256 != own.sha256:
+    if needed != own.sha256:
         raise HostError(
-            f"grade {job.id} cannot be verified with this secret: its worlds are of {name_of(job.secret_sha256)}, "
+            f"grade {grading.job_id} cannot be verified with this secret: its worlds are of {name_of(needed)}, "
             f"and the secret here is {own.name}; set ROBOMARK_SECRET to the one that it was graded with"
         )
     note(f"secret: {own.name}")

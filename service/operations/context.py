@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from service.settings import Settings
-from service.store.engine import Store
+from service.store import audit
+from service.store.engine import Store as Store
+from service.store.engine import open_store as open_store
 from service.store.people.credentials import EVERYWHERE, Reach
 from service.store.states import Lane, Role
 
@@ -53,3 +55,8 @@ class Actor:
     def is_machine(self) -> bool:
         """Whether this is a command on the machine itself, which may do what every role may."""
         return self.operator and self.person_id is None
+
+
+def machine_operator() -> Actor:
+    """The operator that a command on the machine itself acts as: the account that runs it."""
+    return Actor(audit.this_user(), operator=True)

@@ -8,11 +8,12 @@ from sqlalchemy import select
 
 from service.operations.context import Actor, Service
 from service.operations.errors import Forbidden, Invalid
-from service.operations.lookup import check_operator, course_named
+from service.operations.lookup import check_operator, course_for, course_named
 from service.operations.people import check_lengths
 from service.operations.sign_in_links import make_link
 from service.store import audit
 from service.store.engine import now
+from service.store.grades import appeals
 from service.store.models import Course
 from service.store.people import membership
 from service.store.people.membership import CourseLine as CourseLine
@@ -57,6 +58,15 @@ class OwnCourse:
     role: Role
 
 
+@dataclass(frozen=True, slots=True)
+class TaughtCourse:
+    """A course as its instructors see it on every page of it."""
+
+    id: int
+    name: str
+    open_appeals: int
+
+
 def find(service: Service, actor: Actor, name: str) -> int:
     """The id of the course of this name. The default course is created where an installation has none yet.
 
@@ -68,6 +78,19 @@ def find(service: Service, actor: Actor, name: str) -> int:
             return course_named(session, actor, name).id
     with service.store.transaction() as session:
         return course_of(session, name, now(session))
+
+
+def show_own(service: Service, actor: Actor, course_id: int, role: Role) -> OwnCourse:
+    """A course in which the actor has this role. Raises NotFound."""
+    with service.store.reading() as session:
+        return OwnCourse(course_id, course_for(session, actor, course_id, role).name, role)
+
+
+def show_taught(service: Service, actor: Actor, course_id: int) -> TaughtCourse:
+    """A course that the actor instructs. Raises NotFound."""
+    with service.store.reading() as session:
+        row = course_for(session, actor, course_id, Role.INSTRUCTOR)
+        return TaughtCourse(row.id, row.name, appeals.waiting(session, row.id))
 
 
 def list_own(service: Service, actor: Actor) -> list[OwnCourse]:

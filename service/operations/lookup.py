@@ -9,7 +9,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.operations.context import Actor, Service
-from service.operations.errors import NotFound
+from service.operations.errors import Forbidden, NotFound
 from service.store.courses.hidden_names import NAMED, HiddenNames, hidden_names_of
 from service.store.models import Batch, Course, Enrolment, Job, SubmissionRow
 from service.store.states import Role
@@ -19,6 +19,12 @@ def check_operator(actor: Actor) -> None:
     """Raise NotFound unless the actor runs the installation."""
     if not actor.operator:
         raise _nothing()
+
+
+def check_machine(actor: Actor) -> None:
+    """Raise Forbidden unless the actor is a command on the machine itself."""
+    if not actor.is_machine:
+        raise Forbidden("only a command on the machine itself does this")
 
 
 def course_for(session: Session, actor: Actor, course_id: int, *roles: Role) -> Course:

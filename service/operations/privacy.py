@@ -7,8 +7,8 @@ from datetime import timedelta
 from pathlib import Path
 
 from service.operations.context import Actor, Service
-from service.operations.errors import Forbidden, Invalid
-from service.operations.lookup import course_for, own_enrolment, student_in
+from service.operations.errors import Invalid
+from service.operations.lookup import check_machine, course_for, own_enrolment, student_in
 from service.store import purge as purging
 from service.store.backup import back_up
 from service.store.courses import open_assignments
@@ -73,7 +73,7 @@ def archive(service: Service, actor: Actor, file: Path) -> int:
 
     Raises Forbidden for anybody but commands, UsageError where the file exists, HostError where it cannot be written.
     """
-    _check_machine(actor)
+    check_machine(actor)
     back_up(service.store.engine, file)
     return file.stat().st_size
 
@@ -83,15 +83,10 @@ def purge(service: Service, actor: Actor, course_id: int, request: PurgeRequest)
 
     Raises Forbidden for anybody but commands, NotFound, and Invalid for a number of days that is out of range.
     """
-    _check_machine(actor)
+    check_machine(actor)
     if not 1 <= request.older_than_days <= _MOST_DAYS:
         raise Invalid("the age has to be from 1 to %(most)s days", most=_MOST_DAYS)
     with service.store.reading() as session:
         course_for(session, actor, course_id)
         before = now(session) - timedelta(days=request.older_than_days)
     return purging.purge(service.store, before, actor.name, course_id=course_id, only_count=request.only_count)
-
-
-def _check_machine(actor: Actor) -> None:
-    if not actor.is_machine:
-        raise Forbidden("only a command on the machine itself does this")

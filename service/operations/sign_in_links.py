@@ -12,14 +12,16 @@ from sqlalchemy.orm import Session
 
 from service.operations.context import Actor, Service
 from service.operations.errors import Invalid
-from service.operations.lookup import check_operator, course_for, student_in
+from service.operations.lookup import check_machine, check_operator, course_for, student_in
 from service.store import audit
 from service.store.engine import now
 from service.store.people import credentials, membership
 from service.store.people.credentials import EVERYWHERE, LINK_LIFETIME, Reach
 from service.store.people.membership import Member
+from service.store.people.students import DEFAULT_COURSE
 from service.store.states import Role
 from sim.errors import UsageError
+from submissions.student_identity import Student
 
 #: How long links for a whole course last, which are passed on by other means.
 DAYS, MOST_DAYS = 7, 30
@@ -76,6 +78,23 @@ def make_students_link(service: Service, actor: Actor, course_id: int, enrolment
         if membership.is_more_than(session, row):
             raise UsageError(f"this person {_ELSEWHERE}")
         return make_link(session, actor, row.person_id, word=word, reach=_reach(course_id))
+
+
+def make_own_link(service: Service, actor: Actor) -> str:
+    """The secret of a new link for whoever runs a command here: an instructor of the default course, and operator.
+
+    The account is their id. Raises Forbidden for anybody but commands.
+    """
+    check_machine(actor)
+    account = actor.name.partition("@")[0]
+    with service.store.transaction() as session:
+        try:
+            member = membership.make_instructor(session, DEFAULT_COURSE, Student(account))
+        except UsageError:
+            # A student has the account's name as their id.
+            member = membership.make_instructor(session, DEFAULT_COURSE, Student(f"operator {account}"))
+        membership.make_operator(session, member.person_id)
+        return make_link(session, actor, member.person_id)
 
 
 def make_members_link(service: Service, actor: Actor, course: str, who: str) -> tuple[Member, str]:

@@ -10,7 +10,9 @@ from service.operations.context import Actor, Service
 from service.operations.lookup import check_operator
 from service.store.queue import dead_letters, tryouts, workers
 from service.store.queue.dead_letters import DeadLetter
-from service.store.queue.metrics import ServiceMetrics, collect
+from service.store.queue.metrics import ServiceMetrics as ServiceMetrics
+from service.store.queue.metrics import collect
+from service.store.queue.metrics import quantile as quantile
 from service.store.queue.tryouts import TryoutLane
 from service.store.queue.workers import InQuarantine, WorkerLine
 from service.version import GRADER_VERSION
@@ -48,6 +50,12 @@ def show(service: Service, actor: Actor) -> SystemView:
             dead_letters.count(session),
             tryouts.lane(session),
         )
+
+
+def collect_metrics(service: Service) -> ServiceMetrics:
+    """The metrics of the whole service at one moment, which name no person and are for anybody."""
+    with service.store.reading() as session:
+        return collect(session)
 
 
 def list_workers(service: Service, actor: Actor) -> list[tuple[WorkerLine, InQuarantine | None]]:

@@ -7,6 +7,7 @@ from service.store.states import BatchState as BatchState
 from service.store.states import CredentialKind as CredentialKind
 from service.store.states import JobState as JobState
 from service.store.states import Lane as Lane
+from service.store.states import PlotState as PlotState
 from service.store.states import Role as Role
 from service.store.states import Standing as Standing
 from service.store.states import TryoutState as TryoutState

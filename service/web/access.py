@@ -12,16 +12,13 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 from fastapi import Depends, Form, Path, Query, Request
-from sqlalchemy.orm import Session
 from starlette.exceptions import HTTPException
 
 from service.language import translatable
+from service.operations import courses, sign_in
 from service.operations.context import Actor
-from service.store.grades import appeals
-from service.store.models import Course
-from service.store.people import credentials
-from service.store.people.credentials import Identity
-from service.store.states import CredentialKind, Role
+from service.operations.sign_in import Identity
+from service.operations.types import CredentialKind, Role
 from service.web.context import Context
 from service.web.page_scopes import scope_of_page
 from sim.errors import RobomarkError
@@ -114,8 +111,7 @@ def reader_of(request: Request, context: Context) -> Reader | None:
     secret = request.cookies.get(SESSION_COOKIE, "")
     if not secret:
         return None
-    with context.store.reading() as session:
-        identity = credentials.identify(session, secret, CredentialKind.SESSION)
+    identity = sign_in.identify(context.service, secret, CredentialKind.SESSION)
     return None if identity is None else Reader(identity, csrf_word(secret), _following(secret, b"robomark links"))
 
 
@@ -170,24 +166,14 @@ def nothing_here() -> HTTPException:
     return HTTPException(404, translatable("There is nothing here, or nothing that you may see."))
 
 
-def course_of_role(session: Session, identity: Identity, course_id: int, role: Role) -> Course:
-    """The course, where somebody has this role in it; what it raises tells nobody whether it exists."""
-    found = session.get(Course, course_id)
-    if found is None or identity.roles.get(course_id) is not role:
-        raise nothing_here()
-    return found
-
-
 def _instructing(course_id: RowNumber, reader: SignedIn, context: Context) -> InCourse:
-    with context.store.reading() as session:
-        course = course_of_role(session, reader.identity, course_id, Role.INSTRUCTOR)
-        return InCourse(reader, course.id, course.name, appeals.waiting(session, course.id))
+    course = courses.show_taught(context.service, reader.acting, course_id)
+    return InCourse(reader, course.id, course.name, course.open_appeals)
 
 
 def _studying(course_id: RowNumber, reader: SignedIn, context: Context) -> InCourse:
-    with context.store.reading() as session:
-        course = course_of_role(session, reader.identity, course_id, Role.STUDENT)
-        return InCourse(reader, course.id, course.name)
+    course = courses.show_own(context.service, reader.acting, course_id, Role.STUDENT)
+    return InCourse(reader, course.id, course.name)
 
 
 def _operating(reader: SignedIn) -> Reader:

@@ -11,12 +11,12 @@ from fastapi.security import HTTPBearer
 from fastapi.security.utils import get_authorization_scheme_param
 from starlette.exceptions import HTTPException
 
+from service.operations import courses, sign_in
 from service.operations.context import Actor
 from service.operations.scopes import SCOPES
-from service.store.people import credentials
-from service.store.people.credentials import Identity
-from service.store.states import CredentialKind, Role
-from service.web.access import RowNumber, SignInNeeded, actor_from, actor_of, course_of_role, nothing_here
+from service.operations.sign_in import Identity
+from service.operations.types import CredentialKind, Role
+from service.web.access import RowNumber, SignInNeeded, actor_from, actor_of, nothing_here
 from service.web.context import Context
 
 #: Says in the description of the API how to sign in; who it is, is found below.
@@ -63,13 +63,11 @@ def caller_of(request: Request, context: Context) -> Caller:
     scheme, secret = get_authorization_scheme_param(request.headers.get("authorization"))
     if scheme.lower() != "bearer" or not secret:
         raise SignInNeeded("a token is needed")
-    with context.store.reading() as session:
-        identity = credentials.identify(session, secret, CredentialKind.TOKEN)
+    identity = sign_in.identify(context.service, secret, CredentialKind.TOKEN)
     if identity is None:
         raise SignInNeeded("the token does not count")
     context.limits.api_calls.spend(identity.credential_id)
-    with context.store.transaction() as session:
-        credentials.note_use(session, identity.credential_id)
+    sign_in.note_use(context.service, identity)
     return Caller(identity)
 
 
@@ -97,8 +95,7 @@ def in_course(role: Role, scope: str) -> Callable[[int, Caller, Context], Caller
     scoped = with_scope(scope)
 
     def caller_in_course(course_id: RowNumber, caller: Called, context: Context) -> CallerInCourse:
-        with context.store.reading() as session:
-            course = course_of_role(session, caller.identity, course_id, role)
+        course = courses.show_own(context.service, caller.acting, course_id, role)
         return CallerInCourse(scoped(caller), course.id)
 
     return caller_in_course

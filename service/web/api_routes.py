@@ -19,13 +19,13 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, Field
-from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive
 
-from service.store import replies
-from service.store.people.credentials import Identity
-from service.store.replies import InProgress, KeptReply
+from service.operations import replies
+from service.operations.database_errors import DatabaseError
+from service.operations.replies import InProgress, KeptReply
+from service.operations.sign_in import Identity
 from service.web.api_access import caller_of
 from service.web.context import WebContext
 from sim.readers.json_text import read_json
@@ -138,7 +138,7 @@ async def _once(request: Request, key: str, run: Callable[[Request], Awaitable[R
     context: WebContext = request.app.state.context
     caller = await run_in_threadpool(caller_of, request, context)
     # A reply is that to the caller's role: with another one the request is a new one, and is refused or done as such.
-    mine = (context.store, caller.identity.credential_id, f"{_standing(request, caller.identity)} {key}")
+    mine = (context.service, caller.acting, f"{_standing(request, caller.identity)} {key}")
     hashed = _Hashed(request)
     try:
         known = await run_in_threadpool(replies.begin, *mine)
@@ -159,7 +159,7 @@ async def _once(request: Request, key: str, run: Callable[[Request], Awaitable[R
     reply = KeptReply(await hashed.whole(), answer.status_code, bytes(answer.body))
     try:
         await run_in_threadpool(replies.keep, *mine, reply)
-    except SQLAlchemyError as error:
+    except DatabaseError as error:
         # It is done: whoever asked is answered so, and a repetition is refused until the key expires.
         _log.error("web.reply_not_kept", path=request.url.path, error=str(error))
     return answer

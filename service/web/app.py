@@ -13,15 +13,15 @@ from functools import cache, partial
 from fastapi import APIRouter, Depends, FastAPI
 from fastapi.responses import JSONResponse, PlainTextResponse, Response
 from prometheus_client import CONTENT_TYPE_LATEST
-from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 
 from service.doctor import examine_service
 from service.language import translatable
+from service.operations.context import Service, Store
+from service.operations.database_errors import DatabaseError
 from service.queue.celery_app import make_celery
 from service.queue.notifier import Notifier
 from service.settings import Settings
-from service.store.engine import Store
 from service.version import GRADER_VERSION
 from service.web import api, pages
 from service.web.access import same_site
@@ -49,11 +49,12 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
     app.router.redirect_slashes = False
     calls = settings.api_calls_per_minute
     limits = RateLimits(api_calls=RateLimit(round(calls), calls), page_calls=RateLimit(round(calls), calls))
-    app.state.context = WebContext(settings, store, Notifier(make_celery(settings), store, settings), limits)
+    service = Service(settings, store, Notifier(make_celery(settings), store, settings))
+    app.state.context = WebContext(service, limits)
     app.add_middleware(BodyGate)
     app.add_middleware(Guarded, public_url=settings.public_url, probe_hosts=settings.probe_hosts)
     add_error_pages(app)
-    _add_probes(app, settings, store)
+    _add_probes(app, service)
 
     @app.get("/static/{name}", include_in_schema=False)
     def static(name: str) -> Response:
@@ -83,7 +84,7 @@ def _pages_and_api() -> APIRouter:
     return all_routes
 
 
-def _add_probes(app: FastAPI, settings: Settings, store: Store) -> None:
+def _add_probes(app: FastAPI, service: Service) -> None:
     @app.get("/health/live", include_in_schema=False)
     def live() -> JSONResponse:
         """This process answers; nothing else is looked at."""
@@ -92,7 +93,7 @@ def _add_probes(app: FastAPI, settings: Settings, store: Store) -> None:
     @app.get("/health/ready", include_in_schema=False)
     def ready() -> JSONResponse:
         """Whether submissions would be graded now: 200, or 503 with what is not well."""
-        findings = examine_service(settings, store)
+        findings = examine_service(service.settings, service.store)
         is_ready = all(finding.well for finding in findings)
         checks = {finding.what: {"well": finding.well, "sentence": finding.sentence} for finding in findings}
         return JSONResponse({"ready": is_ready, "checks": checks}, status_code=200 if is_ready else 503)
@@ -101,6 +102,6 @@ def _add_probes(app: FastAPI, settings: Settings, store: Store) -> None:
     def metrics() -> Response:
         """The metrics of the whole service, for Prometheus."""
         try:
-            return Response(metrics_text(store), media_type=CONTENT_TYPE_LATEST)
-        except SQLAlchemyError:
+            return Response(metrics_text(service), media_type=CONTENT_TYPE_LATEST)
+        except DatabaseError:
             return PlainTextResponse("the database does not answer\n", status_code=503)

@@ -1,4 +1,4 @@
-"""What every page and every answer of the API works with: the settings, the database, and the queue's notifier."""
+"""What every page and every answer of the API works with: the service, and the limits of this web server."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ from typing import Annotated
 from fastapi import Depends, Request
 
 from service.operations.context import Service
-from service.queue.notifier import Notifier
 from service.settings import Settings
-from service.store.engine import Store
 from service.web.rate_limits import RateLimits
 
 
@@ -19,17 +17,15 @@ from service.web.rate_limits import RateLimits
 class WebContext:
     """One web server's."""
 
-    settings: Settings
-    store: Store
-    notifier: Notifier
+    service: Service
     limits: RateLimits
     #: Held by whoever unpacks a batch: one at a time.
     unpacking: BoundedSemaphore = field(default_factory=BoundedSemaphore)
 
     @property
-    def service(self) -> Service:
-        """The part of it that operations take."""
-        return Service(self.settings, self.store, self.notifier)
+    def settings(self) -> Settings:
+        """Those of the service."""
+        return self.service.settings
 
 
 def _context(request: Request) -> WebContext:

@@ -11,14 +11,12 @@ import structlog
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import RedirectResponse, Response
-from sqlalchemy.exc import DisconnectionError, InterfaceError, OperationalError, SQLAlchemyError
-from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from starlette.exceptions import HTTPException
 
 from service.language import ENGLISH, Language
 from service.lti.fetching import PlatformError
+from service.operations.database_errors import DatabaseError, DatabaseFailure, classify
 from service.operations.errors import Conflict, Forbidden, NotFound
-from service.store.engine import is_conflict, is_overtaken
 from service.web.access import SignInNeeded, reader_of
 from service.web.language import language_of
 from service.web.problems import API, problem
@@ -46,10 +44,6 @@ _NO_DATABASE_CHANGING = Sentence(
 _CONFLICT = Sentence(
     "Somebody else changed the same thing at the same moment. Load the page again to see it, then try again."
 )
-#: What is raised where the database cannot be reached, is busy for too long, or stops.
-_AWAY = (OperationalError, InterfaceError, DisconnectionError, PoolTimeoutError)
-#: Class of SQLSTATE of values that PostgreSQL cannot store; its driver raises the same error for a lost connection.
-_PROGRAM_LIMIT = "54"
 
 
 def add_error_pages(app: FastAPI) -> None:
@@ -60,7 +54,7 @@ def add_error_pages(app: FastAPI) -> None:
     app.add_exception_handler(UsageError, _usage)
     app.add_exception_handler(PlatformError, _platform)
     app.add_exception_handler(HostError, _host)
-    app.add_exception_handler(SQLAlchemyError, _database)
+    app.add_exception_handler(DatabaseError, _database)
     app.add_exception_handler(Exception, _surprise)
 
 
@@ -106,19 +100,15 @@ async def _platform(request: Request, error: Exception) -> Response:
 
 
 async def _database(request: Request, error: Exception) -> Response:
-    if is_conflict(error) or is_overtaken(error):
+    failure = classify(error)
+    if failure is DatabaseFailure.CONFLICT:
         _log.warning("web.conflict", path=request.url.path, exc_info=error)
         return answer(request, 409, _CONFLICT)
-    if not _is_away(error):
+    if failure is DatabaseFailure.UNEXPECTED:
         _log.error("web.surprise", path=request.url.path, exc_info=error)
         return answer(request, 500, _OURS)
     _log.error("web.no_database", path=request.url.path, error=str(error))
     return answer(request, 503, _NO_DATABASE if request.method in ("GET", "HEAD") else _NO_DATABASE_CHANGING)
-
-
-def _is_away(error: Exception) -> bool:
-    exceeds_limit = str(getattr(getattr(error, "orig", None), "sqlstate", None)).startswith(_PROGRAM_LIMIT)
-    return isinstance(error, _AWAY) and not exceeds_limit
 
 
 async def _surprise(request: Request, error: Exception) -> Response:
@@ -138,7 +128,7 @@ def answer(
         return problem(status, sentence, headers)
     try:
         reader = reader_of(request, request.app.state.context)
-    except (RobomarkError, SQLAlchemyError):
+    except (RobomarkError, DatabaseError):
         reader = None
     shown = page(request, reader, "error.html", status_code=status, status=status, sentence=sentence)
     shown.headers.update(headers or {})

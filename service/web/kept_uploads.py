@@ -5,7 +5,6 @@ What of it would be taken in is ``batch_uploads.py``'s to say. A sender has a fe
 
 from __future__ import annotations
 
-import json
 import secrets
 import shutil
 import time
@@ -14,9 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from service.store.codec import decode, encode
+from pydantic import TypeAdapter
+
 from sim.errors import UsageError
-from sim.readers.json_text import read_json
 from submissions.raw_files import SentFile, shown
 from submissions.student_identity import Refusal
 
@@ -57,6 +56,9 @@ class KeptUpload:
     refusals: tuple[Refusal, ...] = ()
 
 
+_NOTES = TypeAdapter(KeptUpload)
+
+
 class KeptUploads:
     """The uploads in one home."""
 
@@ -88,7 +90,7 @@ class KeptUploads:
 
     def write(self, upload: KeptUpload) -> None:
         """Note what is known of an upload."""
-        (self._folder / upload.id / _NOTE).write_text(json.dumps(encode(upload)), encoding="utf-8")
+        (self._folder / upload.id / _NOTE).write_bytes(_NOTES.dump_json(upload))
 
     def find(self, upload_id: str, person_id: int, course_id: int) -> KeptUpload | None:
         """An upload of this sender to this course; None where there is none, or not any more."""
@@ -138,8 +140,8 @@ class KeptUploads:
 
     def _read(self, upload_id: str) -> KeptUpload | None:
         try:
-            return decode(KeptUpload, read_json((self._folder / upload_id / _NOTE).read_text(encoding="utf-8")))
-        except (OSError, ValueError, TypeError):
+            return _NOTES.validate_json((self._folder / upload_id / _NOTE).read_bytes())
+        except (OSError, ValueError):
             return None
 
     def _remove_begun(self, path: Path) -> None:

@@ -11,9 +11,10 @@ from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from service.store.engine import Store
-from service.store.queue.metrics import ServiceMetrics, collect, quantile
-from service.store.states import JobState, Lane, PlotState
+from service.operations import system
+from service.operations.context import Service
+from service.operations.system import ServiceMetrics, quantile
+from service.operations.types import JobState, Lane, PlotState
 from service.version import GRADER_VERSION
 
 _QUANTILES = (0.5, 0.95, 0.99)
@@ -21,20 +22,19 @@ _UNFINISHED = (JobState.QUEUED, JobState.RUNNING)
 _ENDED = (JobState.DONE, JobState.DEAD, JobState.CANCELLED)
 
 
-def metrics_text(store: Store) -> bytes:
+def metrics_text(service: Service) -> bytes:
     """All metrics in Prometheus's text format."""
     registry = CollectorRegistry(auto_describe=False)
-    registry.register(_Figures(store))
+    registry.register(_Figures(service))
     return generate_latest(registry)
 
 
 class _Figures(Collector):
-    def __init__(self, store: Store) -> None:
-        self._store = store
+    def __init__(self, service: Service) -> None:
+        self._service = service
 
     def collect(self) -> Iterable[Metric]:
-        with self._store.reading() as session:
-            metrics = collect(session)
+        metrics = system.collect_metrics(self._service)
         yield from _queue(metrics)
         yield from _endings(metrics)
         yield from _workers(metrics)

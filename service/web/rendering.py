@@ -16,10 +16,10 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from service.language import Language, languages
+from service.operations.batch_views import superseded_by
+from service.operations.types import Role
 from service.reports.html import report_script, report_style
 from service.reports.readable import number, readable
-from service.store.queue.jobs import superseded_by
-from service.store.states import Role
 from service.web.access import Reader
 from service.web.language import language_of
 from service.web.moments import zone_now, zone_of

@@ -20,9 +20,9 @@ from starlette.exceptions import HTTPException
 from starlette.routing import compile_path
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.store.people import credentials
-from service.store.people.credentials import Identity
-from service.store.states import CredentialKind, Role
+from service.operations import sign_in
+from service.operations.sign_in import Identity
+from service.operations.types import CredentialKind, Role
 from service.web.access import SESSION_COOKIE, SignInNeeded, nothing_here
 from service.web.context import WebContext
 from service.web.problems import API
@@ -133,8 +133,7 @@ def _identity(request: Request) -> Identity | None:
         secret, kind = request.cookies.get(SESSION_COOKIE, ""), CredentialKind.SESSION
     if not secret:
         return None
-    with context.store.reading() as session:
-        return credentials.identify(session, secret, kind)
+    return sign_in.identify(context.service, secret, kind)
 
 
 def _check_length(headers: Headers, most: int) -> None:

@@ -12,14 +12,14 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from service.home import keep_private, open_home
+from service.operations.context import open_store
 from service.outside import ALL_OTHERS, NO_OTHERS
 from service.queue.broker import broker_url
 from service.queue.logs import configure_logging
 from service.settings import Settings, load_settings
-from service.store.engine import open_store
 from service.web.app import make_app
 from service.web.temporary_files import own_temporary_folder
-from service.web.webhook_sender import WebhookSender
+from service.webhook_sender import WebhookSender
 from sim.processes import leave_current_folder
 
 

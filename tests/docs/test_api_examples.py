@@ -8,7 +8,7 @@ from pathlib import Path
 
 from paths import ROOT
 from service.operations.scopes import SCOPES
-from service.web.webhook_sender import signature
+from service.webhook_sender import signature
 from web import web_in
 
 DOCUMENT = (ROOT / "docs" / "api.md").read_text()

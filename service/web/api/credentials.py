@@ -10,7 +10,7 @@ from fastapi.responses import Response
 from pydantic import Field
 
 from service.operations import credentials
-from service.store.states import CredentialKind
+from service.operations.types import CredentialKind
 from service.web.access import RowName, actor_from
 from service.web.api.shapes import Shape, like
 from service.web.api_access import Caller, with_scope

@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.store.states import BatchState, JobState, Role, Standing
+from service.operations.types import BatchState, JobState, Role, Standing
 
 
 class Shape(BaseModel):

@@ -380,7 +380,8 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], Seen
             home = tmp_path_factory.mktemp(interface)
             with web_in(home) as web:
                 notices = Notices()
-                web.app.state.context = replace(web.app.state.context, notifier=notices)
+                context = web.app.state.context
+                web.app.state.context = replace(context, service=replace(context.service, notifier=notices))
                 patch.setenv("ROBOMARK_HOME", str(home))
                 patch.setattr(operating, "_LateNotifier", lambda _settings, _store, to=notices: to)
                 driver = Driver(web, make_world(web), notices, home / "made")

@@ -11,9 +11,12 @@ from sqlalchemy import select, update
 
 import acting
 import report_builders
+from acting import service_on
 from builders import accept_one, grading_request
 from naming import is_named
-from service.store import ids, outbox, replies
+from service.operations import replies
+from service.operations.context import Actor
+from service.store import ids, outbox
 from service.store.batches import intake
 from service.store.engine import Store
 from service.store.grades import results
@@ -162,17 +165,18 @@ def test_of_two_requests_with_a_key_one_holds_it(store: Store) -> None:
             reach=credentials.Reach(scopes=frozenset({"read"})),
         )
         (token,) = credentials.of_person(session, person_id)
+    asked = (service_on(store), Actor("grace", person_id, credential_id=token.id), "k")
 
     def begin(_: int) -> str:
         try:
-            return "holds it" if replies.begin(store, token.id, "k") is None else "answered"
+            return "holds it" if replies.begin(*asked) is None else "answered"
         except replies.InProgress:
             return "waits"
 
     with ThreadPoolExecutor(4) as pool:
         assert sorted(pool.map(begin, range(4))) == ["holds it", "waits", "waits", "waits"]
-    replies.keep(store, token.id, "k", replies.KeptReply("a" * 64, 201, b"{}"))
-    assert replies.begin(store, token.id, "k") == replies.KeptReply("a" * 64, 201, b"{}")
+    replies.keep(*asked, replies.KeptReply("a" * 64, 201, b"{}"))
+    assert replies.begin(*asked) == replies.KeptReply("a" * 64, 201, b"{}")
 
 
 def test_what_waits_for_a_revoked_webhook_is_not_sent(store: Store) -> None:

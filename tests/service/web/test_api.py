@@ -18,7 +18,7 @@ from starlette.testclient import TestClient
 
 import report_builders
 from builders import echo, grading_request
-from service.store import replies
+from service.operations import replies
 from service.store.batches import intake
 from service.store.courses import open_assignments
 from service.store.courses.hidden_names import hidden_names_of
@@ -28,6 +28,7 @@ from service.store.people import membership
 from service.store.people.credentials import identify
 from service.store.queue import jobs
 from service.store.states import CredentialKind
+from service.web.access import actor_from
 from service.web.api_uploads import LARGEST_BATCH
 from web import COURSE, Web, submit, web_in
 
@@ -131,7 +132,7 @@ def test_of_two_requests_at_once_the_second_is_told_to_wait(web: Web, grace: Pro
         identity = identify(session, grace.token["authorization"].removeprefix("Bearer "), CredentialKind.TOKEN)
     assert identity is not None
     # A key is one of the caller in their role.
-    assert replies.begin(web.store, identity.credential_id, "instructor k") is None
+    assert replies.begin(web.app.state.context.service, actor_from(identity), "instructor k") is None
     answer = grace.ask("POST", "/people", {"idempotency-key": "k"}, json={"students": [{"id": "cyd"}]})
     assert (answer.status_code, answer.headers["retry-after"]) == (409, "5")
 

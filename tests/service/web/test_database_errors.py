@@ -13,8 +13,8 @@ from sqlalchemy.orm.exc import StaleDataError
 from structlog.testing import capture_logs
 
 from builders import PROGRAM, echo
+from service.operations import replies
 from service.queue import notifier
-from service.store import replies
 from service.store.courses import open_assignments
 from service.store.courses.versions import freeze
 from service.store.models import SubmissionRow

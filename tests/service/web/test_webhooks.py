@@ -17,7 +17,7 @@ from service.store import outbox
 from service.store.engine import Store, now
 from service.store.models import Course
 from service.store.people import webhooks
-from service.web.webhook_sender import send_due
+from service.webhook_sender import send_due
 
 
 @dataclass

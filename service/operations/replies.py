@@ -1,6 +1,6 @@
-"""What was answered to requests that had a key, so that the same again is answered the same and changes nothing.
+"""Replies to requests with a key, so that a repeated request gets the same reply and changes nothing.
 
-Which requests have keys, and what they are alike in, is the web's to say.
+The interface decides which requests have keys, and when two are the same.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ from datetime import timedelta
 
 from sqlalchemy import delete, select, update
 
-from service.store.engine import Store, now, retry_conflicts
+from service.operations.context import Actor, Service
+from service.store.engine import now, retry_conflicts
 from service.store.inserting import insert_if_new
 from service.store.web_tables import IdempotentReply
 
@@ -35,15 +36,15 @@ class InProgress(Exception):
 
 
 @retry_conflicts
-def begin(store: Store, credential_id: str, key: str) -> KeptReply | None:
+def begin(service: Service, actor: Actor, key: str) -> KeptReply | None:
     """What was answered to this key; None where it is new, and is held from now on. Raises InProgress."""
-    mine = (IdempotentReply.credential_id == credential_id, IdempotentReply.key == key)
-    with store.transaction() as session:
+    mine = (IdempotentReply.credential_id == actor.credential_id, IdempotentReply.key == key)
+    with service.store.transaction() as session:
         at = now(session)
         session.execute(delete(IdempotentReply).where(IdempotentReply.made_at < at - KEPT))
         abandoned = (IdempotentReply.status == _BEGUN, IdempotentReply.made_at < at - _ABANDONED)
         session.execute(delete(IdempotentReply).where(*mine, *abandoned))
-        held = {"credential_id": credential_id, "key": key, "request_sha256": "", "status": _BEGUN, "body": b""}
+        held = {"credential_id": actor.credential_id, "key": key, "request_sha256": "", "status": _BEGUN, "body": b""}
         if insert_if_new(session, IdempotentReply, **held, made_at=at):
             return None
         row = session.scalars(select(IdempotentReply).where(*mine)).one()
@@ -53,17 +54,17 @@ def begin(store: Store, credential_id: str, key: str) -> KeptReply | None:
 
 
 @retry_conflicts
-def keep(store: Store, credential_id: str, key: str, reply: KeptReply) -> None:
+def keep(service: Service, actor: Actor, key: str, reply: KeptReply) -> None:
     """Write down what was answered."""
-    mine = (IdempotentReply.credential_id == credential_id, IdempotentReply.key == key)
+    mine = (IdempotentReply.credential_id == actor.credential_id, IdempotentReply.key == key)
     values = {"request_sha256": reply.request_sha256, "status": reply.status, "body": reply.body}
-    with store.transaction() as session:
+    with service.store.transaction() as session:
         session.execute(update(IdempotentReply).where(*mine).values(**values))
 
 
 @retry_conflicts
-def forget(store: Store, credential_id: str, key: str) -> None:
+def forget(service: Service, actor: Actor, key: str) -> None:
     """Nothing came of the request, so the key is free again."""
-    mine = (IdempotentReply.credential_id == credential_id, IdempotentReply.key == key)
-    with store.transaction() as session:
+    mine = (IdempotentReply.credential_id == actor.credential_id, IdempotentReply.key == key)
+    with service.store.transaction() as session:
         session.execute(delete(IdempotentReply).where(*mine))
