@@ -50,11 +50,6 @@ class Reader:
     link_key: bytes = field(repr=False)  # what the links that they make for others follow from
 
     @property
-    def actor(self) -> str:
-        """Who is written down for what they do."""
-        return actor_of(self.identity)
-
-    @property
     def acting(self) -> Actor:
         """The reader as operations know them."""
         return actor_from(self.identity)
@@ -70,11 +65,6 @@ class InCourse:
     appeals: int = 0  # that wait for an instructor's answer
 
     @property
-    def actor(self) -> str:
-        """Who is written down for what they do."""
-        return self.reader.actor
-
-    @property
     def acting(self) -> Actor:
         """The reader as operations know them."""
         return self.reader.acting
@@ -83,18 +73,13 @@ class InCourse:
 def actor_from(identity: Identity) -> Actor:
     """The actor that operations know a signed-in person as."""
     return Actor(
-        actor_of(identity),
+        f"{identity.name} (person {identity.person_id})",
         identity.person_id,
         identity.operator,
         identity.roles,
         identity.reach,
         identity.credential_id,
     )
-
-
-def actor_of(identity: Identity) -> str:
-    """Who is written down for what somebody does by the web or the API."""
-    return f"{identity.name} (person {identity.person_id})"
 
 
 def csrf_word(session_secret: str) -> str:

@@ -16,7 +16,7 @@ from service.operations.context import Actor
 from service.operations.scopes import SCOPES
 from service.operations.sign_in import Identity
 from service.operations.types import CredentialKind, Role
-from service.web.access import RowNumber, SignInNeeded, actor_from, actor_of, nothing_here
+from service.web.access import RowNumber, SignInNeeded, actor_from, nothing_here
 from service.web.context import Context
 
 #: Says in the description of the API how to sign in; who it is, is found below.
@@ -30,11 +30,6 @@ class Caller:
     identity: Identity
 
     @property
-    def actor(self) -> str:
-        """Who is written down for what they do."""
-        return actor_of(self.identity)
-
-    @property
     def acting(self) -> Actor:
         """The caller as operations know them."""
         return actor_from(self.identity)
@@ -46,11 +41,6 @@ class CallerInCourse:
 
     caller: Caller
     course_id: int
-
-    @property
-    def actor(self) -> str:
-        """Who is written down for what they do."""
-        return self.caller.actor
 
     @property
     def acting(self) -> Actor:
