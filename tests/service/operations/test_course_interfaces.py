@@ -15,7 +15,21 @@ from starlette.testclient import TestClient
 
 from builders import echo
 from service.command_line import load_command
-from service.operations import assignments, courses, people, platforms, policies, privacy, sign_in_links, webhooks
+from service.operations import (
+    assignments,
+    courses,
+    database,
+    launches,
+    people,
+    platforms,
+    policies,
+    privacy,
+    replies,
+    sign_in,
+    sign_in_links,
+    stored_grades,
+    webhooks,
+)
 from service.store.courses import open_assignments
 from service.store.courses.versions import freeze
 from service.store.models import Audit, Base, Course, Enrolment, Extension, Person, Policy
@@ -217,6 +231,20 @@ ELSEWHERE = {
     "platforms.enrol_members": "test_lti.py, where there is a platform",
     "platforms.pass_back": "test_lti.py, where there is a platform",
     "sign_in_links.make_link": "a part of other operations",
+    "sign_in_links.make_own_link": "the command that brings the service up",
+    "sign_in.identify": "test_reach.py; pages and API, before anything else",
+    "sign_in.note_use": "test_reach.py; the API",
+    "sign_in.sign_in": "test_sign_in.py; the page",
+    "sign_in.sign_out": "test_sign_in.py; the page",
+    "launches.begin": "test_lti.py; learning platforms",
+    "launches.complete": "test_lti.py; learning platforms",
+    "database.upgrade": "the command",
+    "database.back_up": "the command",
+    "database.restore": "the command",
+    "database.remove_old": "the command",
+    "replies.begin": "test_api.py; the API",
+    "replies.keep": "test_api.py; the API",
+    "replies.forget": "test_api.py; the API",
     "webhooks.create": "the API",
     "webhooks.revoke": "the API",
     "privacy.archive": "the command",
@@ -224,8 +252,11 @@ ELSEWHERE = {
     "privacy.export_own": "the API",
 }
 #: How functions begin that change nothing.
-READING = ("list_", "show_", "find", "search_", "export_student", "show", "check_")
-ROOMS = (assignments, courses, people, platforms, policies, privacy, sign_in_links, webhooks)
+READING = ("list_", "show_", "find", "search_", "export_student", "show", "check_", "count_", "load")
+ROOMS = (
+    assignments, courses, database, launches, people, platforms, policies, privacy, replies, sign_in, sign_in_links,
+    stored_grades, webhooks,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
