@@ -233,7 +233,7 @@ ELSEWHERE = {
     "sign_in_links.make_link": "a part of other operations",
     "sign_in_links.make_own_link": "the command that brings the service up",
     "sign_in.identify": "test_reach.py; pages and API, before anything else",
-    "sign_in.note_use": "test_reach.py; the API",
+    "sign_in.note_use": "the API",
     "sign_in.sign_in": "test_sign_in.py; the page",
     "sign_in.sign_out": "test_sign_in.py; the page",
     "launches.begin": "test_lti.py; learning platforms",
