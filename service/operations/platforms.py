@@ -15,22 +15,9 @@ from service.store.courses.open_assignments import CourseAssignment
 from service.store.people import lti
 from service.store.people.lti import LONGEST_REGISTERED as LONGEST_REGISTERED
 from service.store.people.lti import CourseLink, Platform
+from service.store.people.lti import Registration as Registration
 from service.store.states import Role
 from sim.errors import UsageError
-
-
-@dataclass(frozen=True, slots=True)
-class PlatformRequest:
-    """A platform to register, or to change where its issuer and client are those of a registered one."""
-
-    name: str
-    issuer: str
-    client_id: str
-    deployments: tuple[str, ...]
-    authorization_url: str
-    token_url: str
-    keys_url: str
-    service_origins: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +43,7 @@ def list_platforms(service: Service, actor: Actor) -> list[Platform]:
         return lti.platforms(session)
 
 
-def register(service: Service, actor: Actor, request: PlatformRequest) -> list[Platform]:
+def register(service: Service, actor: Actor, request: Registration) -> list[Platform]:
     """Register a platform, or change the one of the same issuer and client; returns all that are registered then.
 
     Raises NotFound for anybody but operators, Invalid without a name or a deployment, and UsageError for an address or
@@ -68,17 +55,7 @@ def register(service: Service, actor: Actor, request: PlatformRequest) -> list[P
     if not request.deployments:
         raise Invalid("a platform needs the id of a deployment")
     with service.store.transaction() as session:
-        platform_id = lti.register(
-            session,
-            request.name,
-            request.issuer,
-            request.client_id,
-            request.deployments,
-            request.authorization_url,
-            request.token_url,
-            request.keys_url,
-            request.service_origins,
-        )
+        platform_id = lti.register(session, request)
         audit.note(session, actor.name, "register", "lti_platform", str(platform_id), issuer=request.issuer)
         return lti.platforms(session)
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
+
+from sqlalchemy.orm import Session
 
 from service.operations.batches import assignment_named
 from service.operations.context import Actor, Service
@@ -79,10 +81,7 @@ def publish(service: Service, actor: Actor, course_id: int, batch_id: str, *, an
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         batch_in(session, course_id, batch_id)
         done = publishing.publish(session, batch_id, actor=actor.name, anyway=anyway)
-        audit.note(session, actor.name, "publish", "batch", batch_id, **_logged_counts(done))
-        if done.published:
-            outbox.grades_published(session, course_id, batch=batch_id, published=done.published)
-        return done
+        return _record(session, actor, course_id, "batch", batch_id, done)
 
 
 @retry_conflicts
@@ -95,10 +94,7 @@ def publish_one(service: Service, actor: Actor, course_id: int, job_id: str, *, 
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         job_in(session, course_id, job_id)
         done = publishing.publish_one(session, job_id, actor=actor.name, anyway=anyway)
-        audit.note(session, actor.name, "publish", "job", job_id, **_logged_counts(done))
-        if done.published:
-            outbox.grades_published(session, course_id, grade=job_id, published=done.published)
-        return done
+        return _record(session, actor, course_id, "job", job_id, done)
 
 
 def preview(service: Service, actor: Actor, course_id: int, batch_id: str) -> Publication:
@@ -156,5 +152,13 @@ def _frozen(service: Service, actor: Actor, course_id: int, assignment: Assignme
     return freeze(assignment)
 
 
-def _logged_counts(done: Published) -> dict[str, int]:
-    return {name: count for name, count in asdict(done).items() if count or name in ("published", "replaced")}
+def _record(
+    session: Session, actor: Actor, course_id: int, subject: Literal["batch", "job"], subject_id: str, done: Published
+) -> Published:
+    """Note a publication in the activity log, and tell the course's webhooks if it released a grade."""
+    counts = {name: count for name, count in asdict(done).items() if count or name in ("published", "replaced")}
+    audit.note(session, actor.name, "publish", subject, subject_id, **counts)
+    if done.published:
+        named = {"batch" if subject == "batch" else "grade": subject_id}
+        outbox.grades_published(session, course_id, **named, published=done.published)
+    return done

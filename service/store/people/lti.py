@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import timedelta
 from urllib.parse import urlsplit
 
@@ -39,10 +38,12 @@ MOST_PENDING = 10_000
 
 
 @dataclass(frozen=True, slots=True)
-class Platform:
-    """A learning platform, as its administrator registered Robomark there."""
+class Registration:
+    """What is registered of a learning platform. Its issuer and client id together identify it.
 
-    id: int
+    ``service_origins`` are the origins, beside those of the three addresses, that may be asked for members and marks.
+    """
+
     name: str
     issuer: str
     client_id: str
@@ -51,6 +52,13 @@ class Platform:
     token_url: str
     keys_url: str
     service_origins: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Platform(Registration):
+    """A registered learning platform."""
+
+    id: int = field(kw_only=True)
 
     def may_be_asked(self, url: str) -> bool:
         """Whether an operator registered the origin of this address, with the platform's own or beside them."""
@@ -99,46 +107,35 @@ def origin_of(url: str) -> str | None:
     return f"{parts.scheme}://{host}:{port}"
 
 
-def register(
-    session: Session,
-    name: str,
-    issuer: str,
-    client_id: str,
-    deployments: Iterable[str],
-    authorization_url: str,
-    token_url: str,
-    keys_url: str,
-    service_origins: Iterable[str] = (),
-) -> int:
+def register(session: Session, asked: Registration) -> int:
     """Register a platform, or change the one of the same issuer and client; returns its id.
-
-    ``service_origins`` are where else the platform's services may be asked for members and marks.
 
     Raises UsageError for an address without a host or that does not begin with https:// or http://, and for an id that
     is too long.
     """
-    for kind, value in (("issuer", issuer), ("client", client_id)):
+    for kind, value in (("issuer", asked.issuer), ("client", asked.client_id)):
         if len(value) > LONGEST_REGISTERED:
             raise UsageError(f"the platform's {kind} is longer than {LONGEST_REGISTERED} characters")
-    deployments = sorted(deployments)
+    deployments = sorted(asked.deployments)
     for deployment in deployments:
         _check_id("deployment", deployment)
-    origins = {origin_of(each): each for each in service_origins}
+    origins = {origin_of(each): each for each in asked.service_origins}
     if None in origins:
         raise UsageError(f"the service address is {origins[None]!r}, expected one like https://platform.example.org")
-    for what, url in (("login", authorization_url), ("token", token_url), ("keys", keys_url)):
+    for what, url in (("login", asked.authorization_url), ("token", asked.token_url), ("keys", asked.keys_url)):
         if not url.startswith(("https://", "http://")) or origin_of(url) is None:
             raise UsageError(f"the {what} address is {url!r}, expected one like https://platform.example.org/path")
     values = {
-        "name": name,
+        "name": asked.name,
         "deployments": deployments,
-        "authorization_url": authorization_url,
-        "token_url": token_url,
-        "keys_url": keys_url,
+        "authorization_url": asked.authorization_url,
+        "token_url": asked.token_url,
+        "keys_url": asked.keys_url,
         "service_origins": sorted(filter(None, origins)),
     }
-    insert_if_new(session, LtiPlatform, issuer=issuer, client_id=client_id, created_at=now(session), **values)
-    same = (LtiPlatform.issuer == issuer, LtiPlatform.client_id == client_id)
+    identity = {"issuer": asked.issuer, "client_id": asked.client_id}
+    insert_if_new(session, LtiPlatform, created_at=now(session), **identity, **values)
+    same = (LtiPlatform.issuer == asked.issuer, LtiPlatform.client_id == asked.client_id)
     row = session.scalars(select(LtiPlatform).where(*same).with_for_update(key_share=True)).one()
     for column, setting in values.items():
         setattr(row, column, setting)
@@ -370,7 +367,6 @@ def _new_course(session: Session, title: str) -> int:
 
 def _platform(row: LtiPlatform) -> Platform:
     return Platform(
-        row.id,
         row.name,
         row.issuer,
         row.client_id,
@@ -379,6 +375,7 @@ def _platform(row: LtiPlatform) -> Platform:
         row.token_url,
         row.keys_url,
         tuple(row.service_origins),
+        id=row.id,
     )
 
 

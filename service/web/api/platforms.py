@@ -8,7 +8,7 @@ from fastapi import Depends
 from pydantic import BaseModel, Field
 
 from service.operations import platforms
-from service.operations.platforms import PlatformRequest
+from service.operations.platforms import Registration
 from service.operations.types import Role
 from service.web.api.shapes import Shape, like
 from service.web.api_access import Caller, CallerInCourse, in_course, operating
@@ -117,7 +117,7 @@ def list_platforms(operator: OperatorReads, context: Context) -> Listed[Platform
 def register(operator: OperatorManages, context: Context, asked: PlatformAsked) -> Listed[PlatformShape]:
     """Register a platform, or change one of the same issuer and client; all that are registered then."""
     lists = {"deployments": tuple(asked.deployments), "service_origins": tuple(asked.service_origins)}
-    request = PlatformRequest(**(asked.model_dump() | lists))
+    request = Registration(**(asked.model_dump() | lists))
     found = platforms.register(context.service, operator.acting, request)
     return Listed(items=[PlatformShape.model_validate(each) for each in found])
 

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Form, Request
 from fastapi.responses import RedirectResponse, Response
 
 from service.operations import platforms as operations
-from service.operations.platforms import PlatformRequest
+from service.operations.platforms import Registration
 from service.web.access import Instructing, Operating
 from service.web.context import Context
 from service.web.rendering import page
@@ -42,7 +42,7 @@ def register(
     """Register a platform, or change one of the same issuer and client."""
     listed, origins = (each.replace(",", " ").split() for each in (deployments, service_origins))
     addresses = (authorization_url, token_url, keys_url)
-    asked = PlatformRequest(name, issuer, client_id, tuple(listed), *addresses, tuple(origins))
+    asked = Registration(name, issuer, client_id, tuple(listed), *addresses, tuple(origins))
     operations.register(context.service, reader.acting, asked)
     return RedirectResponse("/operator/platforms", 303)
 

@@ -31,6 +31,7 @@ from service.store.engine import Store, is_conflict, retry_conflicts
 from service.store.grades import appeals, overrides, results
 from service.store.models import Base, Extension, Job, Policy
 from service.store.people import lti
+from service.store.people.lti import Registration
 from service.store.queue import jobs, lease_reaper, self_tests, tryouts
 from service.store.queue.jobs import Retry
 from service.store.states import JobState, Lane, Standing
@@ -221,8 +222,8 @@ def _extend(session: Session) -> None:
 
 
 def _register(session: Session) -> None:
-    urls = [f"https://platform.example.org/{name}" for name in ("auth", "token", "keys")]
-    lti.register(session, "Moodle", "https://platform.example.org", "c", ["1"], *urls)
+    site = "https://platform.example.org"
+    lti.register(session, Registration("Moodle", site, "c", ("1",), f"{site}/auth", f"{site}/token", f"{site}/keys"))
 
 
 @pytest.mark.long

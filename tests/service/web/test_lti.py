@@ -25,6 +25,7 @@ from service.store.batches import intake
 from service.store.grades import results
 from service.store.models import Job
 from service.store.people import lti, membership
+from service.store.people.lti import Registration
 from service.store.queue import jobs
 from service.store.states import Role
 from service.store.web_tables import LtiCourse, LtiLaunch
@@ -40,7 +41,7 @@ def launched(tmp_path: Path) -> Iterator[tuple[Web, LearningPlatform]]:
     with learning_platform() as platform, web_in(tmp_path) as web:
         urls = (f"{platform.url}/auth?x=1", f"{platform.url}/token", f"{platform.url}/keys")
         with web.store.transaction() as session:
-            lti.register(session, "Moodle", ISSUER, CLIENT, ["1"], *urls)
+            lti.register(session, Registration("Moodle", ISSUER, CLIENT, ("1",), *urls))
         yield web, platform
 
 

@@ -25,7 +25,7 @@ from service.store.engine import Store, now
 from service.store.models import Course, Enrolment, Person
 from service.store.people import credentials, lti, membership
 from service.store.people.credentials import Reach
-from service.store.people.lti import CourseLink, Launched, Platform
+from service.store.people.lti import CourseLink, Launched, Platform, Registration
 from service.store.people.students import Students
 from service.store.states import CredentialKind, Role
 from service.store.web_tables import Credential, LtiCourse, LtiPerson
@@ -44,7 +44,7 @@ def platform(store: Store) -> Platform:
 
 def register(store: Store, *origins: str, name: str = "Moodle") -> Platform:
     with store.transaction() as session:
-        lti.register(session, name, f"https://{name}.example.org", "c", ["1", "2"], *URLS, origins)
+        lti.register(session, Registration(name, f"https://{name}.example.org", "c", ("1", "2"), *URLS, origins))
         return next(each for each in lti.platforms(session) if each.name == name)
 
 
@@ -200,7 +200,7 @@ def test_long_ids_are_refused_and_never_cut(store: Store, platform: Platform, ki
         with pytest.raises(UsageError, match=f"{kind} id is longer than 250 characters"):
             launch(store, platform, role=INSTRUCTOR, **{**names, kind: "x" * 250 + end})
     with pytest.raises(UsageError, match="deployment id is longer"), store.transaction() as session:
-        lti.register(session, "n", "i", "c", ["x" * 251], *URLS)
+        lti.register(session, Registration("n", "i", "c", ("x" * 251,), *URLS))
 
 
 @pytest.mark.parametrize("which", [0, 1])
@@ -209,17 +209,17 @@ def test_an_issuer_and_a_client_fit_into_an_index(store: Store, which: int) -> N
     longest = ["".join(chr(chance.randrange(0x10400, 0x1F9FF)) for _ in range(255)) for _ in range(2)]
     longer = [each + "x" * (number == which) for number, each in enumerate(longest)]
     with store.transaction() as session:
-        lti.register(session, "n", longest[0], longest[1], ["1"], *URLS)
+        lti.register(session, Registration("n", longest[0], longest[1], ("1",), *URLS))
     with pytest.raises(UsageError, match="longer than 255 characters"), store.transaction() as session:
-        lti.register(session, "n", longer[0], longer[1], ["1"], *URLS)
+        lti.register(session, Registration("n", longer[0], longer[1], ("1",), *URLS))
 
 
 @pytest.mark.parametrize("which", range(3))
 @pytest.mark.parametrize("address", ["https://", "http:///auth", "https://me@platform.example.org/", "ftp://a:21/"])
 def test_every_address_of_a_platform_has_an_origin(store: Store, which: int, address: str) -> None:
-    urls = [address if number == which else url for number, url in enumerate(URLS)]
+    first, second, third = (address if number == which else url for number, url in enumerate(URLS))
     with pytest.raises(UsageError, match="address is"), store.transaction() as session:
-        lti.register(session, "n", "i", "c", ["1"], *urls)
+        lti.register(session, Registration("n", "i", "c", ("1",), first, second, third))
 
 
 def test_long_ids_of_people_stay_apart(store: Store, platform: Platform) -> None:

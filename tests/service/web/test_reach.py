@@ -20,6 +20,7 @@ from service.store.engine import now
 from service.store.models import Enrolment
 from service.store.people import credentials, lti, membership
 from service.store.people.credentials import MOST_SESSIONS, MOST_TOKENS, Reach
+from service.store.people.lti import Registration
 from service.store.people.membership import Member
 from service.store.people.students import Students
 from service.store.states import CredentialKind, Role
@@ -172,7 +173,7 @@ def test_a_platforms_session_reaches_the_platforms_courses(web: Web) -> None:
     member = web.operator()
     with web.store.transaction() as session:
         urls = ("https://p.example.org/a", "https://p.example.org/t", "https://p.example.org/k")
-        platform = lti.register(session, "Moodle", "i", "c", ["1"], *urls)
+        platform = lti.register(session, Registration("Moodle", "i", "c", ("1",), *urls))
         local = membership.make_instructor(session, "local", Student("root"))
         launched = membership.make_instructor(session, "launched", Student("root"))
         for each in (local, launched):
@@ -349,7 +350,7 @@ def test_an_operator_signs_somebody_out(web: Web, ada: Member) -> None:
 def test_a_released_place_is_the_next_launchs(web: Web, grace: TestClient) -> None:
     with web.store.transaction() as session:
         urls = ("https://p.example.org/a", "https://p.example.org/t", "https://p.example.org/k")
-        lti.register(session, "Moodle", "i", "c", ["1"], *urls)
+        lti.register(session, Registration("Moodle", "i", "c", ("1",), *urls))
         (platform,) = lti.platforms(session)
         student = Students(session, 1).enrol(Student("ada"), now(session))
         person_id = session.get_one(Enrolment, student).person_id
@@ -412,7 +413,7 @@ def test_who_is_not_joined(web: Web, case: str) -> None:
     if case == "a platform's person":
         with web.store.transaction() as session:
             urls = ("https://p.example.org/a", "https://p.example.org/t", "https://p.example.org/k")
-            platform = lti.register(session, "Moodle", "i", "c", ["1"], *urls)
+            platform = lti.register(session, Registration("Moodle", "i", "c", ("1",), *urls))
             session.add(LtiPerson(platform_id=platform, subject="s", person_id=second.person_id))
     path = f"/api/v1/operator/people/{first.enrolment_id}/join"
     answer = web.browser().post(path, headers=headers, json={"other": other})
