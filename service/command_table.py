@@ -48,6 +48,9 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
                 "regrade": Command("batch.regrade:regrade", "Grade a batch again."),
                 "publish": Command("batch.regrade:publish", "Let the newest grades stand, and release them."),
                 "publish-one": Command("batch.regrade:publish_one", "The same for one submission."),
+                "publish-preview": Command("batch.regrade:preview_publication", "Show what publishing would do."),
+                "regrade-one": Command("batch.regrade:regrade_one", "Grade one submission again."),
+                "grade-over-limit": Command("batch.regrade:grade_over_limit", "Grade one that is over a limit."),
             },
         ),
         "assignments": CommandGroup(
@@ -94,6 +97,7 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
         "course": CommandGroup(
             "Say when and how often students may submit.",
             {
+                "list": Command("course:list_courses", "List the courses."),
                 "policy": Command("course:policy", "Say what holds for all, or show it."),
                 "extend": Command("course:extend", "Allow one student more time or attempts."),
                 "enrol": Command("course:enrol", "Enrol students before they submit."),
@@ -101,6 +105,8 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
                 "open": Command("course:open_assignment", "Let students submit to it on the web."),
                 "close": Command("course:close_assignment", "Let nobody submit to it any more."),
                 "remove": Command("course:remove_assignment", "Take out one that no student has been shown."),
+                "hide-names": Command("course:hide_names", "Hide the students' names of an assignment."),
+                "show-names": Command("course:show_names", "Show the students' names of an assignment."),
                 "export-student": Command("privacy:export_student", "Write all there is of a student."),
                 "delete-student": Command("privacy:delete_student", "Remove all there is of a student."),
                 "purge": Command("privacy:purge_course", "Remove what is old."),
@@ -111,11 +117,30 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
             {
                 "add": Command("user:add", "Add an instructor, an operator or a student."),
                 "link": Command("user:link", "Print a link that signs somebody in once."),
+                "links": Command("user:links", "Print a sign-in link for each student of a course."),
                 "token": Command("user:token", "Print a token for programs."),
                 "list": Command("user:list_people", "List who is in a course."),
                 "sign-out": Command("user:sign_out", "End somebody's links, sessions and tokens."),
                 "remove": Command("user:remove", "Remove somebody from a course."),
                 "join": Command("user:join", "Make one person of two in different courses."),
+            },
+        ),
+        "webhook": CommandGroup(
+            "Send events of a course to other programs.",
+            {
+                "add": Command("webhooks:add", "Add a webhook."),
+                "list": Command("webhooks:list_webhooks", "List the webhooks of a course."),
+                "remove": Command("webhooks:remove", "Remove a webhook."),
+                "deliveries": Command("webhooks:list_deliveries", "List the newest deliveries."),
+            },
+        ),
+        "platform": CommandGroup(
+            "Connect Robomark to learning platforms.",
+            {
+                "add": Command("platforms:add", "Register a learning platform."),
+                "list": Command("platforms:list_platforms", "List the registered platforms."),
+                "enrol": Command("platforms:enrol_members", "Enrol a platform's members in a course."),
+                "send-marks": Command("platforms:send_marks", "Send published marks to a platform."),
             },
         ),
         "up": Command("up:up", "Bring up broker, workers and web server.", serves=True),

@@ -128,6 +128,38 @@ def remove_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> Non
     tell(f"{assignment} is in the course no more")
 
 
+def hide_names(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
+    """Hide the students' names of an assignment from all who mark it."""
+    _set_names(assignment, course, hidden=True)
+
+
+def show_names(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
+    """Show the students' names of an assignment to all who mark it."""
+    _set_names(assignment, course, hidden=False)
+
+
+def list_courses() -> None:
+    """List the courses of this installation."""
+    with operating() as (service, actor):
+        found = courses.list_courses(service, actor)
+    document(courses=found)
+    if not found:
+        tell("there is no course yet")
+        return
+    listed = table("name", "instructors", "students", right=("instructors", "students"))
+    for each in found:
+        listed.add_row(each.name, str(each.instructors), str(each.students))
+    show(listed)
+
+
+def _set_names(assignment: str, course: str, *, hidden: bool) -> None:
+    with operating() as (service, actor):
+        course_id = courses.find(service, actor, course)
+        assignments.hide_names(service, actor, course_id, assignment, hidden=hidden)
+    document(assignment=assignment, names_hidden=hidden)
+    tell(f"{assignment}: names are {'hidden' if hidden else 'shown'}")
+
+
 def _tell_state(line: CourseAssignment) -> None:
     document(
         assignment=line.assignment,

@@ -52,6 +52,41 @@ def link(who: Id, course: Course = DEFAULT_COURSE) -> None:
     _tell_link(service.settings, member.id, secret)
 
 
+def links(
+    course: Course = DEFAULT_COURSE,
+    days: Annotated[
+        int, typer.Option(min=1, max=sign_in_links.MOST_DAYS, help="The links expire after so many days.")
+    ] = sign_in_links.DAYS,
+) -> None:
+    """Print a new sign-in link for each student of a course, in place of earlier ones."""
+    with operating() as (service, actor):
+        made = sign_in_links.make_links(service, actor, courses.find(service, actor, course), days)
+    public = service.settings.public_url
+    lines = [
+        {
+            "id": each.student.id,
+            "name": each.student.name,
+            "email": each.student.email,
+            "path": each.secret and f"/sign-in/{each.secret}",
+            "url": each.secret and public and f"{public}/sign-in/{each.secret}",
+            "expires_at": each.expires_at,
+            "reason": each.reason,
+        }
+        for each in made
+    ]
+    document(links=lines)
+    if not lines:
+        tell("the course has no students")
+        return
+    listed = table("id", "name", "address", "link")
+    for line in lines:
+        link = line["url"] or line["path"] or line["reason"]
+        listed.add_row(*(str(each) for each in (line["id"], line["name"], line["email"], link)))
+    show(listed)
+    if not public:
+        note("the links follow the address that robomark up or serve prints")
+
+
 def token(
     who: Id,
     scopes: Annotated[list[str], typer.Option("--scope", help="What it may do: read, submit, mark, manage.")],

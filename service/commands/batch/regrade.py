@@ -1,4 +1,4 @@
-"""``robomark batch regrade`` and ``publish``: grade a batch again, see what changes and why, let it stand."""
+"""``robomark batch regrade``, ``publish`` and those of one grade: grade again, see what changes, let it stand."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from sim.errors import HostError
 if TYPE_CHECKING:
     from service.operations.regrades import Published, Regraded
     from submissions.assignment.definition import Assignment
+
+GradeId = Annotated[str, typer.Argument(help="The grade's id, or the beginning of it.")]
 
 
 def regrade(
@@ -76,7 +78,7 @@ def publish(
 
 
 def publish_one(
-    grade: Annotated[str, typer.Argument(help="The grade's id, or the beginning of it.")],
+    grade: GradeId,
     anyway: Annotated[
         bool, typer.Option("--anyway", help="Also where a criterion could not be judged: it gives no marks.")
     ] = False,
@@ -92,6 +94,49 @@ def publish_one(
     _tell_published(f"grade {found.id}", done)
 
 
+def regrade_one(
+    grade: GradeId,
+    assignment: Annotated[
+        str | None, typer.Option("-a", "--assignment", help="The changed assignment: its id or its folder.")
+    ] = None,
+) -> None:
+    """Grade the submission of one grade again; the old grade stands until you publish."""
+    from service.operations import batches
+    from service.operations import regrades as operations
+
+    changed = _assignment(assignment)
+    with operating() as (service, actor):
+        found = batches.find_grade(service, actor, grade)
+        job = operations.regrade_one(service, actor, found.course_id, found.id, changed)
+    document(grade=found.id, job=job)
+    tell(f"grade {found.id}: queued to be graded again as {job}")
+    note(f"to let the new grade stand: robomark batch publish-one {job}")
+
+
+def grade_over_limit(grade: GradeId) -> None:
+    """Grade a submission that was put aside because it is over a limit."""
+    from service.operations import batches
+    from service.operations import regrades as operations
+
+    with operating() as (service, actor):
+        found = batches.find_grade(service, actor, grade)
+        operations.grade_over_limit(service, actor, found.course_id, found.id)
+    document(grade=found.id)
+    tell(f"grade {found.id} is queued")
+
+
+def preview_publication(batch: BatchId) -> None:
+    """Show what publishing a batch would do now, and change nothing."""
+    from service.operations import batches
+    from service.operations import regrades as operations
+
+    with operating() as (service, actor):
+        found = batches.find(service, actor, batch)
+        would = operations.preview(service, actor, found.course_id, found.id)
+    document(batch=found.id, publication=would.counts, students=would.students)
+    tell(f"batch {found.id}, {would.students} students: {_counted(would.counts, 'to publish')}")
+
+
 def _assignment(name: str | None) -> Assignment | str:
     """The id of an assignment of the course or the catalogue, or the assignment in a folder of this machine."""
     from submissions.assignment.folder import catalogue
@@ -103,6 +148,11 @@ def _assignment(name: str | None) -> Assignment | str:
 
 
 def _tell_published(of_what: str, done: Published) -> None:
+    tell(f"{of_what}: {_counted(done, 'published')}")
+
+
+def _counted(done: Published, verb: str) -> str:
+    """How many grades are published, and how many are left for which reason."""
     left = [
         f"{count} {what}"
         for count, what in (
@@ -114,7 +164,7 @@ def _tell_published(of_what: str, done: Published) -> None:
         if count
     ]
     replaced = f", {done.replaced} of them regrades" if done.replaced else ""
-    tell(f"{of_what}: {done.published} grades published{replaced}{'; left: ' if left else ''}{', '.join(left)}")
+    return f"{done.published} grades {verb}{replaced}{'; left: ' if left else ''}{', '.join(left)}"
 
 
 def _left_out(made: Regraded) -> str:

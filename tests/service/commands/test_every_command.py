@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from sqlalchemy import select
 
 from builders import echo, grading_request
 from command import robomark
@@ -30,8 +31,11 @@ from service.store.engine import now, open_store
 from service.store.grades import appeals, comments, overrides, results
 from service.store.installation import secret_of
 from service.store.models import Job
+from service.store.outbox import WebhookEvent
+from service.store.people import webhooks
 from service.store.people.membership import make_instructor
 from service.store.queue import jobs
+from service.store.states import JobState
 from submissions.assignment.examples import examples
 from submissions.student_identity import Refusal, Student
 
@@ -58,6 +62,9 @@ SHOWING = {
     "batch regrade BATCH": "batch regraded",
     "batch publish BATCH": "batch published",
     "batch publish-one GRADE": "grade published",
+    "batch publish-preview BATCH": "batch publication students",
+    "batch regrade-one GRADE": "grade job",
+    "batch grade-over-limit OVER": "grade",
     "batch overview BATCH": "batch classes missing refusals",
     "assignments list": "assignments",
     "assignments show echo-responder": (
@@ -77,6 +84,9 @@ SHOWING = {
     "mark history GRADE": "grade criteria comments history",
     "appeals list": "appeals",
     "appeals answer 1 yes": "appeal",
+    "course list": "courses",
+    "course hide-names echo-responder": "assignment names_hidden",
+    "course show-names echo-responder": "assignment names_hidden",
     "course policy": "policies",
     "course extend ada -a echo-responder --more-attempts 1": "student assignment due more_attempts",
     "course enrol people.csv": "students",
@@ -89,11 +99,21 @@ SHOWING = {
     "course purge --older-than 9000": "removed archive submissions grades students",
     "user add grace --name Grace": "id path url",
     "user link ada": "id path url",
+    "user links": "links",
     "user token ada --scope read": "id token scopes days",
     "user list": "people",
     "user sign-out ada": "id ended",
     "user join linus --same-as tess --of other": "id course same_as of",
     "user remove linus": "id course",
+    "webhook add https://hooks.example.org/ --event batch.finished": "webhook secret",
+    "webhook list": "webhooks",
+    "webhook remove HOOK": "webhook",
+    "webhook deliveries": "deliveries",
+    (
+        "platform add Moodle --issuer https://m.example.org --client x --deployment 1 --login-url https://m.example.org/l"
+        " --token-url https://m.example.org/t --keys-url https://m.example.org/k"
+    ): "platform",
+    "platform list": "platforms",
     "db upgrade": "revision",
     "db backup copy.db": "file bytes",
     "db purge --before 2020-01-01": "removed archive submissions grades students",
@@ -111,8 +131,12 @@ LONG = {
     "batch submit new -a echo-responder --wait": "batch queued known refusals jobs statistics report",
     "demo -o demo": "batch queued known refusals jobs statistics report",
 }
-#: Have the format ``json`` for their document, verify what was really graded, need an empty database, or a minute.
-_ELSEWHERE = {("grade",), ("batch", "export"), ("verify",), ("db", "restore"), ("models", "train")}
+#: Have the format ``json`` for their document, verify what was really graded, need an empty database, a minute, or a
+#: learning platform that answers.
+_ELSEWHERE = {
+    *{("grade",), ("batch", "export"), ("verify",), ("db", "restore"), ("models", "train")},
+    *{("platform", "enrol"), ("platform", "send-marks")},
+}
 _CASES = [
     *(pytest.param(line, keys, id=line) for line, keys in SHOWING.items()),
     *(pytest.param(line, keys, id=line, marks=pytest.mark.long) for line, keys in LONG.items()),
@@ -176,7 +200,10 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]
             overrides.set_marks(session, grades[0], "names-the-right-shape", Decimal(6), "seen again", "staff")
             comments.comment(session, grades[0], "", "Well done.", "staff")
             appeals.ask(session, session.get_one(Job, grades[0]).submission_id, "Why?")
-    return folder, {"BATCH": batch.id, "GRADE": grades[0]}
+            (waiting,) = session.scalars(select(Job.id).where(Job.state == JobState.QUEUED))
+            jobs.put_aside(session, waiting, now(session))
+            hook, _ = webhooks.create(session, 1, "https://hooks.example.org/", [WebhookEvent.BATCH_FINISHED])
+    return folder, {"BATCH": batch.id, "GRADE": grades[0], "OVER": waiting, "HOOK": hook.id}
 
 
 @pytest.mark.parametrize(("line", "keys"), _CASES)

@@ -1,0 +1,82 @@
+"""``robomark platform``: learning platforms, the members that are fetched from them and the marks that are sent."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from service.commands.operating import operating
+from service.commands.shown import document, note, show, table, tell
+from service.operations import courses
+from service.operations.courses import DEFAULT_COURSE
+
+Course = Annotated[str, typer.Option(help="A course that the platform launches.")]
+
+
+def add(
+    name: Annotated[str, typer.Argument(help="The name that is shown for the platform.")],
+    issuer: Annotated[str, typer.Option(help="The platform's issuer, for example https://moodle.example.org.")],
+    client_id: Annotated[str, typer.Option("--client", help="The client id that the platform gave to Robomark.")],
+    deployments: Annotated[list[str], typer.Option("--deployment", help="A deployment id; give it once for each.")],
+    authorization_url: Annotated[str, typer.Option("--login-url", help="The address of its logins.")],
+    token_url: Annotated[str, typer.Option("--token-url", help="The address of its access tokens.")],
+    keys_url: Annotated[str, typer.Option("--keys-url", help="The address of its public keys.")],
+    service_origins: Annotated[
+        list[str] | None,
+        typer.Option("--service", help="Another address of its services; give it once for each."),
+    ] = None,
+) -> None:
+    """Register a learning platform, or change the one of the same issuer and client id."""
+    from service.operations import platforms
+
+    origins = tuple(service_origins or ())
+    asked = platforms.Registration(
+        name, issuer, client_id, tuple(deployments), authorization_url, token_url, keys_url, origins
+    )
+    with operating() as (service, actor):
+        registered = platforms.register(service, actor, asked)
+    found = next(each for each in registered if (each.issuer, each.client_id) == (issuer, client_id))
+    document(platform=found)
+    tell(f"platform {found.name} is registered for {found.issuer}")
+
+
+def list_platforms() -> None:
+    """List the registered learning platforms."""
+    from service.operations import platforms
+
+    with operating() as (service, actor):
+        found = platforms.list_platforms(service, actor)
+    document(platforms=found)
+    if not found:
+        tell("no learning platform is registered")
+        return
+    listed = table("name", "issuer", "client", "deployments")
+    for each in found:
+        listed.add_row(each.name, each.issuer, each.client_id, ", ".join(each.deployments))
+    show(listed)
+
+
+def enrol_members(course: Course = DEFAULT_COURSE) -> None:
+    """Enrol all members that the platform has in a course."""
+    from service.operations import platforms
+
+    with operating() as (service, actor):
+        enrolled = platforms.enrol_members(service, actor, courses.find(service, actor, course))
+    document(members=enrolled.members, refused=enrolled.refused)
+    tell(f"{enrolled.members} of the platform's members are in {course}")
+    for reason in enrolled.refused:
+        note(f"not enrolled: {reason}")
+
+
+def send_marks(
+    assignment: Annotated[str, typer.Argument(help="The assignment's id in the course.")],
+    course: Course = DEFAULT_COURSE,
+) -> None:
+    """Send the published marks of an assignment to the platform's gradebook."""
+    from service.operations import platforms
+
+    with operating() as (service, actor):
+        sent = platforms.pass_back(service, actor, courses.find(service, actor, course), assignment)
+    document(assignment=assignment, sent=sent)
+    tell(f"{assignment}: {sent} published marks sent")

@@ -1,0 +1,103 @@
+"""``robomark webhook``: addresses that are told of events in a course, and the deliveries to them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from service.commands.operating import operating
+from service.commands.shown import document, note, show, table, tell
+from service.operations import courses
+from service.operations.courses import DEFAULT_COURSE
+from sim.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from service.operations.webhooks import WebhookEvent
+
+Course = Annotated[str, typer.Option(help="The course.")]
+
+
+def add(
+    url: Annotated[str, typer.Argument(help="The address, for example https://hooks.example.org/robomark.")],
+    events: Annotated[
+        list[str],
+        typer.Option(
+            "--event", help="grade.finished, batch.finished, grades.published or appeal.opened; give it once for each."
+        ),
+    ],
+    course: Course = DEFAULT_COURSE,
+) -> None:
+    """Add a webhook to a course, and print the secret that its deliveries are signed with."""
+    from service.operations import webhooks
+
+    chosen = _events(events)
+    with operating() as (service, actor):
+        line, secret = webhooks.create(service, actor, courses.find(service, actor, course), url, chosen)
+    document(webhook=line, secret=secret)
+    tell(secret)
+    note(f"webhook {line.id} is added; its secret is not shown again")
+
+
+def list_webhooks(course: Course = DEFAULT_COURSE) -> None:
+    """List the webhooks of a course, the oldest first."""
+    from service.operations import webhooks
+
+    with operating() as (service, actor):
+        found = webhooks.list_webhooks(service, actor, courses.find(service, actor, course))
+    document(webhooks=found)
+    if not found:
+        tell("the course has no webhooks")
+        return
+    listed = table("id", "created", "events", "address")
+    for each in found:
+        created = each.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
+        listed.add_row(each.id, created, ", ".join(each.events), each.url)
+    show(listed)
+
+
+def remove(
+    webhook: Annotated[str, typer.Argument(help="The webhook's id, as robomark webhook list shows it.")],
+    course: Course = DEFAULT_COURSE,
+) -> None:
+    """Remove a webhook, with the deliveries that wait for it."""
+    from service.operations import webhooks
+
+    with operating() as (service, actor):
+        webhooks.revoke(service, actor, courses.find(service, actor, course), webhook)
+    document(webhook=webhook)
+    tell(f"webhook {webhook} is removed")
+
+
+def list_deliveries(
+    course: Course = DEFAULT_COURSE,
+    limit: Annotated[int, typer.Option(min=1, max=1000, help="The most deliveries to list.")] = 50,
+) -> None:
+    """List the newest deliveries to the webhooks of a course."""
+    from service.operations import webhooks
+
+    with operating() as (service, actor):
+        found = webhooks.list_deliveries(service, actor, courses.find(service, actor, course), limit)
+    document(deliveries=found)
+    if not found:
+        tell("no deliveries")
+        return
+    listed = table("made", "webhook", "event", "attempts", "delivered", "error", right=("attempts",))
+    for each in found:
+        made, delivered = (
+            "" if at is None else at.astimezone().strftime("%Y-%m-%d %H:%M") for at in (each.made_at, each.delivered_at)
+        )
+        listed.add_row(made, each.webhook_id, each.event, str(each.attempts), delivered, each.error or "")
+    show(listed)
+
+
+def _events(names: Sequence[str]) -> list[WebhookEvent]:
+    from service.operations.webhooks import WebhookEvent
+
+    known = [event.value for event in WebhookEvent]
+    for name in names:
+        if name not in known:
+            raise UsageError(f"--event is {name!r}, expected one of {', '.join(known)}")
+    return [WebhookEvent(name) for name in names]
