@@ -6,7 +6,7 @@ PYTHON := $(shell for p in python3.11 python3; do "$$p" -c 'import sys, venv, en
 # What is imported is compiled once and kept, also for who has that switched off: tests start thousands of processes.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup demo test test-fast browser test-long test-all lint format bench bench-quick pictures lock wheel image clean
+.PHONY: setup demo test test-fast browser test-long test-all lint format bench bench-quick pictures lock wheel image release release-check clean
 
 setup: $(VENV)/.ready
 
@@ -73,6 +73,14 @@ CONTAINERS := $(shell which docker podman 2>/dev/null | head -n 1)
 
 image: wheel
 	$(CONTAINERS) build -f deploy/Dockerfile -t robomark .
+
+# Checks, builds and tags the version in pyproject.toml; with docker or podman also makes the image. See deploy/release.py.
+release: setup
+	$(BIN)/python deploy/release.py
+
+# The same without the tag and the image.
+release-check: setup
+	$(BIN)/python deploy/release.py --dry-run
 
 # Needs uv; the lock files name no package index. The second is for images: what grading needs or may use, and nothing for tests.
 LOCK := uv pip compile --quiet --generate-hashes --no-emit-index-url --no-header --python-version 3.11 pyproject.toml

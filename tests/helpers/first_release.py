@@ -1,6 +1,7 @@
-"""A database as the first release left it, with data: kept as SQLite's SQL, laid out on either engine.
+"""Databases as earlier releases left them, with data: kept as SQLite's SQL, laid out on either engine.
 
-Of its five jobs two have a grade, one was superseded, one is dead and one waits; made by that release itself.
+Each was made by the release itself. Of the first one's five jobs two have a grade, one was superseded, one is dead and
+one waits. That of 0.2.0 also has published grades, a batch of regrades, a policy and an extension.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import sqlite3
 from pathlib import Path
 
 from alembic import command
-from sqlalchemy import Column, Engine, Integer, MetaData, Table, create_engine, insert, inspect, select, text
+from sqlalchemy import Column, Engine, Integer, MetaData, Table, create_engine, delete, insert, inspect, select, text
 
 from paths import DATA
 from service.store.columns import SafeText
@@ -17,29 +18,38 @@ from service.store.engine import open_engine
 from service.store.migrate import configuration
 from service.store.web_tables import METADATA
 
-REVISION = "0002"
+#: The file and the revision of each.
+_FIRST, _SECOND = ("first_release.sql", "0002"), ("release_0_2_0.sql", "0008")
 #: What columns of then are called today.
 _TODAY = {"nudged_at": "notified_at", "walls": "sandbox", "sights": "predictions", "problems": "refusals"}
 #: What columns that are gone kept.
 _GONE = {"name": SafeText(), "email": SafeText()}
-_SQL = DATA / "first_release.sql"
 
 
 def lay_first_release(url: str, folder: Path) -> Engine:
     """The tables and rows of the first release in the empty database at ``url``; ``folder`` is for a copy."""
+    return _lay(url, folder, *_FIRST)
+
+
+def lay_release_0_2_0(url: str, folder: Path) -> Engine:
+    """The same of release 0.2.0."""
+    return _lay(url, folder, *_SECOND)
+
+
+def _lay(url: str, folder: Path, sql: str, revision: str) -> Engine:
     engine = open_engine(url)
     file = Path(engine.url.database or "") if engine.dialect.name == "sqlite" else folder / "first.db"
     connection = sqlite3.connect(file)
-    connection.executescript(_SQL.read_text(encoding="utf-8"))
+    connection.executescript((DATA / sql).read_text(encoding="utf-8"))
     connection.close()
     if engine.dialect.name != "sqlite":
-        _copy(file, engine)
+        _copy(file, engine, revision)
     return engine
 
 
-def _copy(file: Path, engine: Engine) -> None:
+def _copy(file: Path, engine: Engine, revision: str) -> None:
     with engine.begin() as connection:
-        command.upgrade(configuration(connection), REVISION)
+        command.upgrade(configuration(connection), revision)
     source = create_engine(f"sqlite:///{file}")
     names = set(inspect(source).get_table_names())
     with source.connect() as old, engine.begin() as new:
@@ -53,6 +63,8 @@ def _copy(file: Path, engine: Engine) -> None:
             table = Table(today.name, MetaData(), *columns)
             rows = [dict(row._mapping) for row in old.execute(select(table))]
             if rows:
+                # The migrations make the row of the installation.
+                new.execute(delete(table))
                 new.execute(insert(table), rows)
             if rows and isinstance(today.c["id"].type, Integer):
                 last = f"(SELECT max(id) FROM {today.name})"

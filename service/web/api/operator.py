@@ -61,7 +61,7 @@ class ServiceShape(Shape):
     paused_batches: int
 
     model_config = like(
-        version="0.2.0",
+        version="0.3.0",
         ready=True,
         lanes=[{"lane": "batch", "queued": 12, "running": 2, "oldest_seconds": 3.5}],
         findings=[{"what": "database", "well": True, "sentence": "answers"}],
@@ -90,7 +90,7 @@ class WorkerShape(Shape):
         name="worker@host",
         host="host",
         concurrency=2,
-        grader_version="0.2.0",
+        grader_version="0.3.0",
         sandbox="user namespace, Landlock, seccomp",
         started_at="2026-11-02T09:00:00Z",
         seen_at="2026-11-02T10:00:00Z",

@@ -14,15 +14,16 @@ from alembic import command
 from alembic.script import ScriptDirectory
 from sqlalchemy import func, insert, inspect, select, text
 
+import acting
 import report_builders
 from builders import accept_one, upgraded_by_newer_release
 from command import FORKING
-from first_release import lay_first_release
+from first_release import lay_first_release, lay_release_0_2_0
 from service.settings import Settings
 from service.store import artifacts, new_database
 from service.store.backup import back_up, restore
 from service.store.batches import batches, intake
-from service.store.courses import open_assignments
+from service.store.courses import open_assignments, policies
 from service.store.engine import Store, open_engine, open_store
 from service.store.grades import results
 from service.store.migrate import configuration, migrate
@@ -165,6 +166,42 @@ def test_a_database_of_the_first_release_is_upgraded_with_its_data(service_setti
         assert waiting is not None
         jobs.finish(store, waiting, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
         assert accept_one(store, "ada").attempt == 3
+
+
+def test_a_database_of_release_0_2_0_is_upgraded_with_its_data(service_settings: Settings, tmp_path: Path) -> None:
+    engine = lay_release_0_2_0(service_settings.database, tmp_path)
+    assert current_revision(engine) == "0008"
+    engine.dispose()
+    with open_store(service_settings) as store:
+        with store.engine.begin() as connection:
+            command.check(configuration(connection))
+        with store.reading() as session:
+            found = session.execute(select(Job.state, Job.standing, func.count()).group_by(Job.state, Job.standing))
+            assert {(state, standing): count for state, standing, count in found} == {
+                (JobState.DONE, Standing.STANDS): 2,
+                (JobState.DONE, Standing.PROPOSED): 1,
+                (JobState.DEAD, Standing.STANDS): 1,
+                (JobState.QUEUED, Standing.STANDS): 3,
+                (JobState.QUEUED, Standing.PROPOSED): 2,
+            }
+            assert session.scalar(select(func.count()).where(Job.published_at.is_not(None))) == 2
+            (batch,) = session.scalars(select(Batch.id).where(Batch.name == "class"))
+            assert batches.batch(session, batch).refusals == (Refusal("odd.txt", "is odd."),)
+            published = [line for line in batches.job_lines(session, batch) if line.marks is not None]
+            assert sorted(line.marks for line in published if line.marks is not None) == [Decimal(0), Decimal(8)]
+            for line in published:
+                assert results.load(session, line.id).marks == line.marks
+            limits = policies.policies(session, 1)["echo-responder"]
+            assert (limits.late_days, limits.attempts, limits.cool_down_seconds) == (2, 1, 60.0)
+            ada = session.scalars(select(Enrolment.id).where(Enrolment.student == "ada")).one()
+            assert policies.limits(session, ada, "echo-responder").attempts == 3
+            names = session.scalars(select(Enrolment.student).order_by(Enrolment.id)).all()
+            assert set(names) == {"ada", "Bob 🤖", "cyd", "dan"}
+        # The regrades of then are graded, published and added to by the new release.
+        while claim := jobs.claim(store, "worker", 60):
+            jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+        acting.publish(store, batch, anyway=True)
+        assert accept_one(store, "eve").attempt == 1
 
 
 def test_what_the_first_tables_called_superseded_is_cancelled(service_settings: Settings, tmp_path: Path) -> None:
