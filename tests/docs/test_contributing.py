@@ -12,10 +12,11 @@ from pathlib import Path
 import pytest
 
 from paths import ROOT
+from service.store.revision import newest_revision
 
 ROOMS = ("sim", "models", "responders", "submissions", "service")
 DIFFS = dict(
-    re.findall(r"^### An? ([a-z ]+):.*?\n```diff\n(.*?)```", (ROOT / "CONTRIBUTING.md").read_text(), re.M | re.S)
+    re.findall(r"^### An? ([a-z, ]+):.*?\n```diff\n(.*?)```", (ROOT / "CONTRIBUTING.md").read_text(), re.M | re.S)
 )
 #: What holds in the tree that has it, by what is added.
 TRIED = {
@@ -58,7 +59,56 @@ assert [line.text for line in recording.printed] == ["60"], recording.faults
 from models.tasks import tasks
 assert "square" in tasks()
 """,
+    "page, a route, a command": """
+import os, tempfile
+from pathlib import Path
+from sqlalchemy import select
+from service.command_line import load_command
+from service.settings import Settings
+from service.store.engine import now, open_store
+from service.store.models import Audit, Batch, Course
+from service.web.app import make_app
+home = Path(tempfile.mkdtemp()) / "home"
+os.environ["ROBOMARK_HOME"] = str(home)
+with open_store(Settings(home=home)) as store:
+    with store.transaction() as session:
+        session.add(Course(id=1, name="default", created_at=now(session)))
+        session.flush()
+        session.add(Batch(id="0123456789ab", course_id=1, name="week one", created_at=now(session)))
+    load_command("batch", "rename").main(["0123456789ab", "week two"], standalone_mode=False)
+    with store.reading() as session:
+        assert session.get_one(Batch, "0123456789ab").name == "week two"
+        assert session.scalars(select(Audit.action)).all() == ["rename"]
+    app = make_app(Settings(home=home), store)
+    path = "/courses/{course_id}/batches/{batch_id}"
+    assert "put" in app.openapi()["paths"]["/api/v1" + path + "/name"]
+    assert app.url_path_for("rename", course_id=1, batch_id="0123456789ab") == "/courses/1/batches/0123456789ab/rename"
+""",
+    "table and its migration": """
+import tempfile
+from alembic import command
+from service.settings import Settings
+from service.store import recorded_schema
+from service.store.engine import open_engine, open_store
+from service.store.migrate import configuration, migrate
+from service.store.web_tables import METADATA
+assert "batch_note" in METADATA.tables
+recorded_schema.write_schema()
+engine = open_engine(f"sqlite:///{tempfile.mkdtemp()}/new.db")
+with engine.begin() as connection:
+    migrate(connection)
+with engine.begin() as connection:
+    command.check(configuration(connection))
+""",
+    "setting": """
+import os
+from service.settings import load_settings
+os.environ["ROBOMARK_WEBHOOK_SECONDS"] = "2.5"
+assert load_settings().webhook_seconds == 2.5
+""",
 }
+#: The migration of the example, and the one before it; the tree may have more of them.
+_NEXT, _NEWEST = "0018", "0017"
 
 
 def test_each_thing_has_an_example() -> None:
@@ -72,7 +122,7 @@ def test_an_example_can_be_added_so(added: str, tmp_path: Path) -> None:
     applied = subprocess.run(
         ["git", "apply", "--unidiff-zero", "-"],
         cwd=tmp_path,
-        input=DIFFS[added],
+        input=_renumbered(DIFFS[added]),
         text=True,
         capture_output=True,
         check=False,
@@ -87,3 +137,9 @@ def test_an_example_can_be_added_so(added: str, tmp_path: Path) -> None:
         check=False,
     )
     assert tried.returncode == 0, tried.stderr
+
+
+def _renumbered(diff: str) -> str:
+    """The diff with its migration after the newest one of the tree."""
+    newest = newest_revision()
+    return diff.replace(_NEXT, f"{int(newest) + 1:04d}").replace(_NEWEST, newest)
