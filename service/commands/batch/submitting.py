@@ -25,11 +25,14 @@ from service.operations.batches import AlreadySubmitted, SubmitRequest, Submitte
 from service.operations.context import Actor, Service
 from service.operations.types import JobState
 from sim.errors import Cancelled, HostError, UsageError
-from submissions.batch_folder import read_batch
+from submissions.assignment.folder import catalogue
+from submissions.assignment.reader import find_assignment
+from submissions.batch_folder import read_batch_for
 from submissions.student_identity import Refusal, read_people
 
 if TYPE_CHECKING:
     from service.grading.statistics import AssignmentStatistics
+    from submissions.assignment.definition import Assignment
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,11 +92,12 @@ def submit_to(services: Services, service: Service, actor: Actor, asked: BatchTo
 
 def _submit(service: Service, actor: Actor, asked: BatchToSubmit) -> SubmittedBatch:
     """Take in what can be read, and say what was new of it."""
-    checked = read_batch(asked.path, asked.assignment, None if asked.people is None else read_people(asked.people))
+    course_id = operations.course_of_batches(service, actor, asked.course)
+    assignment = _assignment(service, actor, course_id, asked.assignment)
+    checked = read_batch_for(asked.path, assignment, None if asked.people is None else read_people(asked.people))
     _show_refusals(checked.refusals)
     if not checked.grading_requests:
         raise UsageError(f"{asked.path}: none of {len(checked.refusals)} submissions can be taken in")
-    course_id = operations.course_of_batches(service, actor, asked.course)
     done = operations.submit(service, actor, course_id, SubmitRequest(asked.path.name, checked, asked.again))
     _show_refusals(done.refused_now)
     if done.known:
@@ -113,6 +117,15 @@ def _submit(service: Service, actor: Actor, asked: BatchToSubmit) -> SubmittedBa
             for_staff.add_row(job.student, job.staff_only)
         show(for_staff)
     return done
+
+
+def _assignment(service: Service, actor: Actor, course_id: int, name: str | None) -> Assignment | None:
+    """The assignment in a folder of this machine, otherwise as the course has it, otherwise the catalogue's."""
+    if name is None:
+        return None
+    if Path(name).exists() and name not in catalogue():
+        return find_assignment(name)
+    return operations.assignment_for(service, actor, course_id, name)
 
 
 def _accepted_keys(done: SubmittedBatch) -> dict[str, object]:

@@ -1,0 +1,268 @@
+"""Runs one operation by page, API and command, each from the same database, and tells what each left behind.
+
+A row of the table in ``operation_table/`` is an operation with a request for each interface.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import shlex
+import sqlite3
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager, redirect_stdout
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+from typer.exceptions import TyperException
+
+from acting import Notices
+from service.command_line import load_command
+from service.commands import operating
+from service.store.ids import ALPHABET, LENGTH
+from service.web.rate_limits import RateLimits
+from sim.errors import RobomarkError
+from web import Web, csrf, web_in
+
+Prepare = Callable[[Web], dict[str, str]]
+
+INTERFACES = ("page", "api", "command")
+#: Of rows: who did it, secrets, and the size of what is packed, in which times are.
+_UNEQUAL = frozenset({"actor", "published_by", "sha256", "secret", "size"})
+_TIME = re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d:\d\d(\.\d+)?(\+00:00)?")
+_ID = re.compile(rf"(?<![A-Za-z0-9])[{ALPHABET}]{{{LENGTH}}}(?![A-Za-z0-9])")
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One request by each interface that has the operation.
+
+    ``page`` is a path and a form (of a row that ``says`` something, a query), ``api`` a method, a path and what is
+    sent, ``command`` a line. ``{names}`` in them are those of the ``state`` that the request begins with. ``alone``
+    says why an interface is missing. ``refused`` is the status of HTTP and a sentence that each interface says, empty
+    where one of them refuses to read the value and says so in its own words.
+    """
+
+    operation: Callable[..., object]
+    page: tuple[str, Mapping[str, Any]] | None = None
+    api: tuple[str, str, Any] | None = None
+    command: str = ""
+    alone: str = ""
+    who: str = "grace"
+    state: str = "course"
+    refused: tuple[int, str] | None = None
+    files: Mapping[str, str | bytes] = field(default_factory=dict)
+    then: str = ""  # what of the page that answers is posted to
+    says: tuple[str, ...] = ()  # what each interface answers, of operations that only read
+
+    @property
+    def interfaces(self) -> tuple[str, ...]:
+        """Those that have the operation."""
+        return tuple(each for each in INTERFACES if getattr(self, each))
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """What an operation leaves behind by one interface, without times, new ids, secrets and who asked."""
+
+    accepted: bool
+    rows: tuple[str, ...]
+    notices: tuple[tuple[str, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What the interface answers: the status of HTTP, 0 or 2 of commands, and the text."""
+
+    status: int
+    text: str
+
+    @property
+    def is_accepted(self) -> bool:
+        """Whether the operation was carried out."""
+        return self.status in (0, 200, 201, 204, 303)
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """A database as requests find it, the names of what is in it, and its rows."""
+
+    data: bytes
+    values: Mapping[str, str]
+    rows: Mapping[str, frozenset[tuple[Any, ...]]]
+    columns: Mapping[str, list[str]]
+    ids: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Installation:
+    """One web server with its home, and the databases that it is given."""
+
+    web: Web
+    folder: Path
+    notices: Notices
+    browsers: Mapping[str, tuple[TestClient, str]]
+    tokens: Mapping[str, Mapping[str, str]]
+    prepares: Mapping[str, Prepare]
+    snapshots: dict[str, Snapshot]
+
+    def run(self, row: Row, interface: str) -> tuple[Answer, Left]:
+        """Carry out a row by one interface, from its state."""
+        snapshot = self._restored(row.state)
+        self.notices.sent.clear()
+        self.web.app.state.context = replace(self.web.app.state.context, limits=RateLimits())
+        answer: Answer = getattr(self, f"_by_{interface}")(row, snapshot.values)
+        notices = tuple(each for each in self.notices.sent if each[1])
+        return answer, Left(answer.is_accepted, self._changed(snapshot), notices)
+
+    def command(self, line: str, state: str = "course") -> Answer:
+        """What a command answers, from a state."""
+        return self._command(line, self._restored(state).values)
+
+    def _by_page(self, row: Row, values: Mapping[str, str]) -> Answer:
+        assert row.page is not None
+        browser, word = self.browsers[row.who]
+        path, form = _filled(row.page, values)
+        if row.says:
+            answer = browser.get(_here("", path), params=form)
+        else:
+            answer = browser.post(_here("", path), data=form | {"csrf": word}, files=_parts(row.files) or None)
+        if row.then and answer.status_code == 303:
+            answer = browser.post(f"{answer.headers['location']}{row.then}", data={"csrf": word})
+        return Answer(answer.status_code, answer.text)
+
+    def _by_api(self, row: Row, values: Mapping[str, str]) -> Answer:
+        assert row.api is not None
+        method, path, sent = _filled(row.api, values)
+        options: dict[str, Any] = {"headers": dict(self.tokens[row.who])}
+        if isinstance(sent, bytes):
+            options |= {"content": sent}
+            options["headers"]["content-type"] = "application/zip"
+        elif sent == "files":
+            options["files"] = _parts(row.files) or [("nothing", (None, ""))]
+        else:
+            options["json"] = sent
+        answer = self.browsers[row.who][0].request(method, _here("/api/v1", path), **options)
+        return Answer(answer.status_code, answer.text)
+
+    def _by_command(self, row: Row, values: Mapping[str, str]) -> Answer:
+        return self._command(row.command, values)
+
+    def _command(self, line: str, values: Mapping[str, str]) -> Answer:
+        group, name, *rest = shlex.split(line.format(**values))
+        said = io.StringIO()
+        try:
+            with redirect_stdout(said):
+                load_command(group, name).main(rest, standalone_mode=False)
+        except (RobomarkError, TyperException) as error:
+            return Answer(2, str(error))
+        return Answer(0, said.getvalue())
+
+    def _restored(self, state: str) -> Snapshot:
+        snapshot = self.snapshots.get(state)
+        if snapshot is None:
+            base = self._restored("course")
+            snapshot = _snapshot(self.web, dict(base.values) | self.prepares[state](self.web))
+            self.snapshots[state] = snapshot
+        self.web.store.engine.dispose()
+        _database(self.web).write_bytes(snapshot.data)
+        return snapshot
+
+    def _changed(self, snapshot: Snapshot) -> tuple[str, ...]:
+        """Rows that are new, or gone, each beside its table; those that differ in times alone left out."""
+        after, lines = _rows(self.web), dict[str, int]()
+        for table, rows in after.items():
+            columns = snapshot.columns[table]
+            for sign, some in ((1, rows - snapshot.rows[table]), (-1, snapshot.rows[table] - rows)):
+                for each in some:
+                    line = f"{table} {_plain(dict(zip(columns, each, strict=True)), snapshot.ids)}"
+                    lines[line] = lines.get(line, 0) + sign
+        return tuple(sorted(f"{count:+d} {line}" for line, count in lines.items() if count))
+
+
+@contextmanager
+def installation_in(
+    folder: Path, members: Callable[[Web], dict[str, Any]], prepares: Mapping[str, Prepare]
+) -> Iterator[Installation]:
+    """An installation; ``members`` makes the state "course" and gives its people, and further names by ``values``."""
+    notices = Notices()
+    with pytest.MonkeyPatch.context() as patch, web_in(folder / "home") as web:
+        patch.setenv("ROBOMARK_HOME", str(web.settings.home))
+        patch.setattr(operating, "_LateNotifier", lambda _settings, _store: notices)
+        web.app.state.context = replace(web.app.state.context, notifier=notices)
+        made = members(web)
+        people = made.pop("people")
+        browsers = {}
+        for name, each in people.items():
+            browser = web.browser(each)
+            browsers[name] = (browser, csrf(browser.get("/account")))
+        tokens = {name: web.token(each, "read", "submit", "mark", "manage") for name, each in people.items()}
+        for token in tokens.values():
+            # The first use of a token is stored.
+            assert web.browser().get("/api/v1/me", headers=token).is_success
+        snapshots = {"course": _snapshot(web, made | {"folder": str(folder)})}
+        yield Installation(web, folder, notices, browsers, tokens, prepares, snapshots)
+
+
+def _snapshot(web: Web, values: dict[str, str]) -> Snapshot:
+    web.store.engine.dispose()
+    rows = _rows(web)
+    found = (_ID.findall(each) for some in rows.values() for row in some for each in row if isinstance(each, str))
+    ids = frozenset(id_ for some in found for id_ in some)
+    return Snapshot(_database(web).read_bytes(), values, rows, _columns(web, rows), ids)
+
+
+def _database(web: Web) -> Path:
+    return web.settings.home / "robomark.db"
+
+
+def _rows(web: Web) -> dict[str, frozenset[tuple[Any, ...]]]:
+    with closing(sqlite3.connect(_database(web))) as connection:
+        names = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT LIKE 'sqlite_%'")
+        return {name: frozenset(connection.execute(f'SELECT * FROM "{name}"')) for (name,) in names.fetchall()}
+
+
+def _columns(web: Web, tables: Iterable[str]) -> dict[str, list[str]]:
+    with closing(sqlite3.connect(_database(web))) as connection:
+        return {name: [each[1] for each in connection.execute(f'PRAGMA table_info("{name}")')] for name in tables}
+
+
+def _plain(row: dict[str, Any], known: frozenset[str]) -> str:
+    """A row without what differs from one request to the next."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, bytes):
+            return "bytes"
+        if not isinstance(value, str):
+            return value
+        return _ID.sub(lambda found: found[0] if found[0] in known else "new", _TIME.sub("a time", value))
+
+    return str({name: plain(value) for name, value in row.items() if name not in _UNEQUAL})
+
+
+def _here(prefix: str, path: str) -> str:
+    """The address of a path, which is one of course 1 if it begins without a slash."""
+    return f"{prefix}{path}" if path.startswith("/") else f"{prefix}/courses/1/{path}"
+
+
+def _parts(files: Mapping[str, str | bytes]) -> list[tuple[str, tuple[str, io.BytesIO]]]:
+    """Files by ``field:name`` as a browser sends them."""
+    parts = []
+    for label, content in files.items():
+        name, _, file = label.partition(":")
+        parts.append((name, (file, io.BytesIO(content if isinstance(content, bytes) else content.encode()))))
+    return parts
+
+
+def _filled(request: Any, values: Mapping[str, str]) -> Any:
+    """The request with its placeholders replaced."""
+    if isinstance(request, str):
+        return request.format(**values) if "{" in request else request
+    if isinstance(request, tuple):
+        return tuple(_filled(each, values) for each in request)
+    if isinstance(request, list):
+        return [_filled(each, values) for each in request]
+    return {name: _filled(each, values) for name, each in request.items()} if isinstance(request, Mapping) else request

@@ -1,0 +1,271 @@
+"""Each operation by page, API and command: equal rows, log entries, notices to workers, and refusals."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+from collections.abc import Iterator
+from decimal import Decimal
+from typing import Any
+
+import pytest
+from sqlalchemy import select, update
+
+import acting
+import report_builders
+from builders import grading_request
+from interfaces import INTERFACES, Installation, Row, installation_in
+from operation_table import batches, courses, grades
+from service import operations
+from service.operations.courses import find
+from service.operations.policies import PolicyLimits
+from service.store.batches import intake
+from service.store.courses import open_assignments, policies
+from service.store.courses.versions import freeze
+from service.store.engine import now
+from service.store.grades import appeals, comments, overrides
+from service.store.models import Enrolment, Job
+from service.store.people import webhooks
+from service.store.queue import jobs, tryouts
+from service.store.states import JobState
+from submissions.assignment.reader import find_assignment
+from submissions.packed import pack_submission
+from web import COURSE, Web, grade_all
+from web_world import make_world
+
+_CRITERION = report_builders.faulty_grade().criteria[0].id
+TABLE: dict[str, Row] = batches.ROWS | grades.ROWS | courses.ROWS
+#: Operations without a row, and why.
+ELSEWHERE = {
+    "assignments.prepare": "a part of prepare_from_catalogue and upload",
+    "batches.assignment_for": "reads",
+    "batches.course_of_batches": "reads",
+    "batch_views.table_page": "reads",
+    "courses.list_own": "reads",
+    "credentials.make_token": "the page of one's own account; test_account.py",
+    "credentials.end_credential": "the page of one's own account; test_account.py",
+    "credentials.end_other_credentials": "the page of one's own account; test_account.py",
+    "lookup.names_for": "reads",
+    "people.enrol_new": "the page of one student; programs send a list",
+    "people.issue_token": "the command; on the web everybody makes their own",
+    "privacy.archive": "the command",
+    "privacy.purge": "the command",
+    "sign_in_links.make_members_link": "the command; on the web an instructor gets a link when they are added",
+}
+#: How functions begin that change nothing; those that a table shows have a row all the same.
+READING = (
+    "list_",
+    "show",
+    "find",
+    "search_",
+    "export",
+    "check_",
+    "foresee",
+    "look",
+    "load",
+    "is_",
+    "sending",
+    "changes_",
+)
+
+
+def _members(web: Web) -> dict[str, Any]:
+    """One of everything, an assignment that nobody has been shown, and a person who runs the installation."""
+    world = make_world(web)
+    with web.store.transaction() as session:
+        open_assignments.prepare(session, 1, freeze(find_assignment("json-queue")))
+    people = {"grace": world.grace, "ada": world.ada, "root": web.operator()}
+    ids = {name: str(each.enrolment_id) for name, each in people.items()}
+    return world.values | ids | {"leaver": world.values["student_id"], "people": people}
+
+
+def _batch(web: Web) -> dict[str, str]:
+    asked = [grading_request(who, f"print({who!r})\n") for who in ("cat", "dan")]
+    batch = intake.accept_batch(web.store, "week two", asked, (), course=COURSE, max_attempts=3)
+    return {"batch_id": batch.id, "job_id": batch.jobs[0].job_id}
+
+
+def _graded(web: Web) -> dict[str, str]:
+    made = _batch(web)
+    grade_all(web, report_builders.faulty_grade())
+    return made
+
+
+def _regraded(web: Web) -> dict[str, str]:
+    made = _graded(web)
+    acting.publish(web.store, made["batch_id"], anyway=True)
+    acting.regrade(web.store, made["batch_id"])
+    grade_all(web, report_builders.faulty_grade())
+    return made
+
+
+def _paused(web: Web) -> dict[str, str]:
+    made = _batch(web)
+    acting.pause(web.store, made["batch_id"])
+    return made
+
+
+def _cancelled(web: Web) -> dict[str, str]:
+    made = _batch(web)
+    acting.cancel(web.store, made["batch_id"])
+    return made
+
+
+def _dead(web: Web) -> dict[str, str]:
+    made = _batch(web)
+    with web.store.transaction() as session:
+        of_batch = update(Job).where(Job.batch_id == made["batch_id"])
+        session.execute(of_batch.values(state=JobState.DEAD, error="the worker ended"))
+    return made
+
+
+def _over_a_limit(web: Web) -> dict[str, str]:
+    made = _batch(web)
+    with web.store.transaction() as session:
+        jobs.put_aside(session, made["job_id"], now(session))
+    return made
+
+
+def _marked(web: Web) -> dict[str, str]:
+    with web.store.transaction() as session:
+        (job_id,) = session.scalars(select(Job.id).where(Job.submission_id == 1))
+        overrides.set_marks(session, job_id, _CRITERION, Decimal(1), "seen again", "staff")
+        comments.comment(session, job_id, "", "Well done.", "staff")
+    return {}
+
+
+def _answered(web: Web) -> dict[str, str]:
+    with web.store.transaction() as session:
+        appeals.answer(session, 1, 1, "It is right.", "staff")
+    return {}
+
+
+def _running_a_test(web: Web) -> dict[str, str]:
+    with web.store.transaction() as session:
+        version_id = open_assignments.find(session, 1, "echo-responder").version_id
+        ada = session.scalars(select(Enrolment.id).where(Enrolment.student == "ada")).one()
+        tryouts.ask(session, ada, version_id, pack_submission(grading_request("ada").submission))
+    return {}
+
+
+def _closed(web: Web) -> dict[str, str]:
+    with web.store.transaction() as session:
+        open_assignments.close(session, 1, "echo-responder")
+    return {}
+
+
+def _with_a_policy(web: Web) -> dict[str, str]:
+    with web.store.transaction() as session:
+        policies.set_policy(session, 1, "echo-responder", PolicyLimits(attempts=3))
+    return {}
+
+
+def _with_many_webhooks(web: Web) -> dict[str, str]:
+    with web.store.transaction() as session:
+        for number in range(webhooks.MOST - 1):
+            webhooks.create(session, 1, f"https://hooks.example.org/{number}", ["grade.finished"])
+    return {}
+
+
+STATES = {
+    "queued": _batch,
+    "graded": _graded,
+    "regraded": _regraded,
+    "paused": _paused,
+    "cancelled": _cancelled,
+    "dead": _dead,
+    "over a limit": _over_a_limit,
+    "marked": _marked,
+    "answered": _answered,
+    "running a test": _running_a_test,
+    "closed": _closed,
+    "with a policy": _with_a_policy,
+    "many webhooks": _with_many_webhooks,
+}
+
+
+@pytest.fixture(scope="module")
+def installation(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Installation]:
+    folder = tmp_path_factory.mktemp("installation")
+    (folder / "people.csv").write_bytes(courses.TABLE)
+    for name, files in batches.FOLDERS.items():
+        for path, text in files.items():
+            (folder / name / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name / path).write_text(text)
+    with installation_in(folder, _members, STATES) as made:
+        yield made
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_an_operation_is_the_same_by_every_interface(installation: Installation, name: str) -> None:
+    row = TABLE[name]
+    done = {interface: installation.run(row, interface) for interface in row.interfaces}
+    told = {interface: answer for interface, (answer, _) in done.items()}
+    first = next(iter(done.values()))[1]
+    for interface, (answer, left) in done.items():
+        assert left == first, interface
+        if row.refused is None:
+            assert answer.is_accepted, told
+            assert all(word in answer.text for word in row.says), told
+        else:
+            status, sentence = row.refused
+            assert answer.status == (2 if interface == "command" else status), told
+            assert sentence.casefold() in answer.text.casefold(), told
+    changes = bool(first.rows or first.notices)
+    assert changes is (row.refused is None and not row.says and name not in batches.UNCHANGED), first
+
+
+def test_every_operation_has_a_row_and_every_missing_interface_a_reason() -> None:
+    found = {
+        each
+        for room in pkgutil.iter_modules(operations.__path__)
+        for each in vars(importlib.import_module(f"service.operations.{room.name}")).values()
+        if inspect.isfunction(each)
+        and each.__module__ == f"service.operations.{room.name}"
+        and [*inspect.signature(each).parameters][:2] == ["service", "actor"]
+        and not each.__name__.startswith(("_", *READING))
+    }
+    shown = {_name(row.operation) for row in TABLE.values()}
+    assert {_name(each) for each in found} <= shown | set(ELSEWHERE)
+    assert not shown & set(ELSEWHERE)
+    for name, row in TABLE.items():
+        assert bool(row.alone) == (row.interfaces != INTERFACES), name
+
+
+def _name(operation: Any) -> str:
+    return f"{operation.__module__.rpartition('.')[2]}.{operation.__name__}"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "course policy",
+        "course policy --attempts 1",
+        "course policy --drop",
+        "course extend ada --more-attempts 1",
+        "course enrol {folder}/people.csv",
+        "course prepare echo-responder",
+        "course open echo-responder",
+        "course close echo-responder",
+        "course remove echo-responder",
+        "course hide-names echo-responder",
+        "user add zoe --student",
+        "user list",
+        "user links",
+        "webhook list",
+        "webhook add https://hooks.example.org/ --event batch.finished",
+        "platform enrol",
+    ],
+)
+def test_no_command_creates_a_course_from_a_mistyped_name(installation: Installation, line: str) -> None:
+    row = Row(find, command=f"{line} --course typo", alone="commands name courses")
+    answer, left = installation.run(row, "command")
+    assert (answer.status, left.rows) == (2, ())
+    assert "there is no course called 'typo'" in answer.text
+
+
+def test_an_export_is_the_same_by_every_interface(installation: Installation) -> None:
+    told = {interface: installation.run(TABLE["export"], interface)[0].text for interface in INTERFACES}
+    texts = {interface: text.removeprefix("\ufeff").replace("\r\n", "\n") for interface, text in told.items()}
+    assert texts["page"] == texts["api"] == texts["command"]
