@@ -192,7 +192,8 @@ def installation_in(
     with pytest.MonkeyPatch.context() as patch, web_in(folder / "home") as web:
         patch.setenv("ROBOMARK_HOME", str(web.settings.home))
         patch.setattr(operating, "_LateNotifier", lambda _settings, _store: notices)
-        web.app.state.context = replace(web.app.state.context, notifier=notices)
+        context = web.app.state.context
+        web.app.state.context = replace(context, service=replace(context.service, notifier=notices))
         made = members(web)
         people = made.pop("people")
         browsers = {}

@@ -52,6 +52,20 @@ ELSEWHERE = {
     "privacy.archive": "the command",
     "privacy.purge": "the command",
     "sign_in_links.make_members_link": "the command; on the web an instructor gets a link when they are added",
+    "sign_in_links.make_own_link": "the command that brings the service up",
+    "sign_in.identify": "test_reach.py; pages and API, before anything else",
+    "sign_in.note_use": "the API; test_reach.py",
+    "sign_in.sign_in": "the page; test_sign_in.py",
+    "sign_in.sign_out": "the page; test_sign_in.py",
+    "launches.begin": "learning platforms; test_lti.py",
+    "launches.complete": "learning platforms; test_lti.py",
+    "database.upgrade": "the command",
+    "database.back_up": "the command",
+    "database.restore": "the command",
+    "database.remove_old": "the command",
+    "replies.begin": "the API; test_api.py",
+    "replies.keep": "the API; test_api.py",
+    "replies.forget": "the API; test_api.py",
 }
 #: How functions begin that change nothing; those that a table shows have a row all the same.
 READING = (
@@ -64,6 +78,7 @@ READING = (
     "foresee",
     "look",
     "load",
+    "count_",
     "is_",
     "sending",
     "changes_",
