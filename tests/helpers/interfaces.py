@@ -102,9 +102,9 @@ class Installation:
     """One web server with its home, and the databases that it is given."""
 
     web: Web
-    folder: Path
     notices: Notices
     browsers: Mapping[str, tuple[TestClient, str]]
+    program: TestClient
     tokens: Mapping[str, Mapping[str, str]]
     prepares: Mapping[str, Prepare]
     snapshots: dict[str, Snapshot]
@@ -117,10 +117,6 @@ class Installation:
         answer: Answer = getattr(self, f"_by_{interface}")(row, snapshot.values)
         notices = tuple(each for each in self.notices.sent if each[1])
         return answer, Left(answer.is_accepted, self._changed(snapshot), notices)
-
-    def command(self, line: str, state: str = "course") -> Answer:
-        """What a command answers, from a state."""
-        return self._command(line, self._restored(state).values)
 
     def _by_page(self, row: Row, values: Mapping[str, str]) -> Answer:
         assert row.page is not None
@@ -145,14 +141,11 @@ class Installation:
             options["files"] = _parts(row.files) or [("nothing", (None, ""))]
         else:
             options["json"] = sent
-        answer = self.browsers[row.who][0].request(method, _here("/api/v1", path), **options)
+        answer = self.program.request(method, _here("/api/v1", path), **options)
         return Answer(answer.status_code, answer.text)
 
     def _by_command(self, row: Row, values: Mapping[str, str]) -> Answer:
-        return self._command(row.command, values)
-
-    def _command(self, line: str, values: Mapping[str, str]) -> Answer:
-        group, name, *rest = shlex.split(line.format(**values))
+        group, name, *rest = shlex.split(row.command.format(**values))
         said = io.StringIO()
         try:
             with redirect_stdout(said):
@@ -201,11 +194,12 @@ def installation_in(
             browser = web.browser(each)
             browsers[name] = (browser, csrf(browser.get("/account")))
         tokens = {name: web.token(each, "read", "submit", "mark", "manage") for name, each in people.items()}
+        program = web.browser()
         for token in tokens.values():
             # The first use of a token is stored.
-            assert web.browser().get("/api/v1/me", headers=token).is_success
+            assert program.get("/api/v1/me", headers=token).is_success
         snapshots = {"course": _snapshot(web, made | {"folder": str(folder)})}
-        yield Installation(web, folder, notices, browsers, tokens, prepares, snapshots)
+        yield Installation(web, notices, browsers, program, tokens, prepares, snapshots)
 
 
 def _snapshot(web: Web, values: dict[str, str]) -> Snapshot:
