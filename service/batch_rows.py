@@ -21,14 +21,14 @@ def rows_of(
     store: Store, lines: Sequence[JobLine], refusals: Sequence[Refusal] = (), *, published: bool = False
 ) -> list[TableRow[Grade]]:
     """A row for each submission and each refusal; with ``published``, no other grade is shown."""
+    reasons = {line.id: why_not_shown(line, published=published) for line in lines}
+    with store.reading() as session:
+        grades = dict(results.load_each(session, [line.id for line in lines if not reasons[line.id]]))
     rows = [refused_row(refusal) for refusal in refusals]
     for line in lines:
-        reason = why_not_shown(line, published=published)
-        grade = None
-        if not reason:
-            with store.reading() as session:
-                grade = replace(results.load(session, line.id), student=line.student)
-        rows.append(row_of(line, grade, reason))
+        grade = grades.get(line.id)
+        named = None if grade is None else replace(grade, student=line.student)
+        rows.append(row_of(line, named, reasons[line.id]))
     return sorted(rows, key=lambda row: (row.who, row.assignment))
 
 

@@ -36,7 +36,7 @@ from service.store.engine import Store, now, open_engine
 from service.store.installation import secret_of
 from service.store.models import Job
 from service.store.queue import workers
-from service.store.queue.metrics import collect
+from service.store.queue.metrics import collect_queue
 from service.store.revision import newest_revision, schema_state
 from service.store.states import JobState
 from service.version import GRADER_VERSION, release_problem
@@ -342,17 +342,16 @@ def _queue(settings: Settings) -> tuple[bool, str]:
 
 def _queue_of_service(_settings: Settings, store: Store) -> tuple[bool, str]:
     with store.reading() as session:
-        metrics = collect(session)
+        metrics = collect_queue(session)
     waiting = sum(metrics.claimable.values())
     oldest = max(metrics.oldest_seconds.values(), default=0.0)
-    by_state = {each: sum(count for (_, state), count in metrics.jobs.items() if state is each) for each in JobState}
-    dead = by_state[JobState.DEAD]
+    dead = metrics.count(JobState.DEAD)
     told = f"{waiting} waiting" + (f", the oldest for {timedelta(seconds=round(oldest))}" if waiting else "")
     told += f"; {dead} dead: robomark batch list, and retry" if dead else ""
     if waiting and oldest > _LONG_SECONDS and not any(seen.lately for seen in metrics.workers):
         return False, f"{told}; no worker was heard of lately"
     # Between two jobs of a long backlog none runs for a moment.
-    idle = metrics.idle_seconds > _STUCK_SECONDS and not by_state[JobState.RUNNING]
+    idle = metrics.idle_seconds > _STUCK_SECONDS and not metrics.count(JobState.RUNNING)
     if waiting and oldest > _STUCK_SECONDS and idle:
         return False, f"{told}; workers live and none begins it: their logs may say why, and restarting them may help"
     return True, told

@@ -5,7 +5,7 @@ What a report says is decided there, and nothing there reads the database; what 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -157,26 +157,47 @@ def write_batch(store: Store, title: str, lines: Sequence[JobLine], refusals: Se
     return write_page(folder, _INDEX, batch_index(rows, title, sandbox, ranks))
 
 
-def report_body(store: Store, line: JobLine, view: View) -> ReportParts:
+def report_body(store: Store, job_id: str, plotted: PlotState, view: View) -> ReportParts:
     """The report of one graded job as one reader may see it, for a page with a frame of its own.
 
     Plots that are not drawn yet are left out: whoever waits for a page does not wait for them.
     """
-    return report_parts(view, *_kept(store, line, view))
+    return report_parts(view, *_kept(store, job_id, plotted, view))
 
 
-def report_alone(store: Store, line: JobLine, view: View) -> str:
+def report_alone(store: Store, job_id: str, plotted: PlotState, view: View) -> str:
     """The same as a page of its own."""
-    return report(view, *_kept(store, line, view))
+    return report(view, *_kept(store, job_id, plotted, view))
 
 
-def _kept(store: Store, line: JobLine, view: View) -> tuple[Mapping[str, bytes], Submission, Mapping[str, Pixels]]:
+def report_each(
+    session: Session, views: Iterable[tuple[str, View]], job_ids: Collection[str]
+) -> Iterator[tuple[str, View, str]]:
+    """Each of the graded jobs with what its reader may see and the report of that as a page of its own.
+
+    All are read in the same few statements. ``views`` are those of ``job_ids``, in the database's order of ids.
+    """
+    submissions, drawn = intake.load_each_submission(session, job_ids), plots.load_each(session, job_ids)
+    floors: dict[tuple[str, str], Mapping[str, Pixels]] = {}
+    for (job_id, view), (_, submission), (_, plotted) in zip(views, submissions, drawn, strict=True):
+        version = (view.grade.assignment, view.grade.assignment_version)
+        if not _is_built_in(view) and version not in floors:
+            floors[version] = own_floors(intake.load_assignment(session, job_id))
+        yield job_id, view, report(view, plotted, submission, floors.get(version, {}))
+
+
+def _is_built_in(view: View) -> bool:
+    return {trial.recording.background for trial in view.grade.trials} <= set(names())
+
+
+def _kept(
+    store: Store, job_id: str, plotted: PlotState, view: View
+) -> tuple[Mapping[str, bytes], Submission, Mapping[str, Pixels]]:
     """The plots, the submission and the floors that a report shows."""
     with store.reading() as session:
-        submission = intake.load_submission(session, line.id)
-        drawn = plots.load(session, line.id) if line.plots is PlotState.DONE else {}
-        built_in = {trial.recording.background for trial in view.grade.trials} <= set(names())
-        floors = {} if built_in else own_floors(intake.load_assignment(session, line.id))
+        submission = intake.load_submission(session, job_id)
+        drawn = plots.load(session, job_id) if plotted is PlotState.DONE else {}
+        floors = {} if _is_built_in(view) else own_floors(intake.load_assignment(session, job_id))
     return drawn, submission, floors
 
 

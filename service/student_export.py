@@ -9,23 +9,24 @@ import io
 import json
 import re
 import zipfile
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from typing import Any
 
-from sqlalchemy import or_, select
+from sqlalchemy import ColumnElement, and_, or_, select
 from sqlalchemy.orm import Session
 
-from service.report_files import report_alone
+from service.report_files import report_each
 from service.reports.formats.json_output import json_document
-from service.reports.view import student_view
-from service.store.batches import batches
+from service.reports.view import View, student_view
 from service.store.courses import policies
 from service.store.engine import Store
-from service.store.grades import results
+from service.store.grades import current, results
 from service.store.models import Course, Enrolment, Extension, Job, Person, SubmissionRow
 from service.store.people import membership
-from service.store.states import JobState, Standing
 from service.store.web_tables import Appeal, Credential
+
+#: How many submissions are fetched at once.
+_AT_ONCE = 10
 
 
 def export_student(store: Store, enrolment_id: int, without: Set[str] = frozenset()) -> bytes:
@@ -35,27 +36,29 @@ def export_student(store: Store, enrolment_id: int, without: Set[str] = frozense
     enrolment, which are left out with them.
     """
     sink = io.BytesIO()
-    with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
-        with store.reading() as session:
-            student = _student(session, enrolment_id) | ({} if without else _moments(session, enrolment_id))
-            mine = (SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment.not_in(without))
-            ids = session.scalars(select(SubmissionRow.id).where(*mine).order_by(SubmissionRow.id)).all()
-        told = []
-        for submission_id in ids:
-            document, files = _submission(store, submission_id)
+    with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive, store.reading() as session:
+        query = select(Enrolment, Course.name, Person).join(Course, Enrolment.course_id == Course.id)
+        query = query.join(Person, Enrolment.person_id == Person.id).where(Enrolment.id == enrolment_id)
+        enrolment, course, person = session.execute(query).one()
+        student = _student(session, enrolment, course) | ({} if without else _moments(session, enrolment, person))
+        mine = and_(SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment.not_in(without))
+        folders, told = {}, []
+        for submission_id, document, packed in _submissions(session, mine):
             folder = f"submissions/{re.sub('[^a-zA-Z0-9._-]', '_', document['assignment'])}-{document['attempt']}"
-            for name, data in files.items():
-                archive.writestr(f"{folder}/{name}", data)
+            archive.writestr(f"{folder}/submission.zip", packed)
+            folders[submission_id] = folder
             told.append({**document, "folder": folder})
+        for submission_id, view, report in _seen_grades(session, mine):
+            archive.writestr(f"{folders[submission_id]}/grade.json", _written(json_document(view)))
+            archive.writestr(f"{folders[submission_id]}/report.html", report)
         archive.writestr("student.json", _written({**student, "submissions": told}))
     return sink.getvalue()
 
 
-def _student(session: Session, enrolment_id: int) -> dict[str, Any]:
-    enrolment = session.get_one(Enrolment, enrolment_id)
-    allowed = select(Extension).where(Extension.enrolment_id == enrolment_id).order_by(Extension.id)
+def _student(session: Session, enrolment: Enrolment, course: str) -> dict[str, Any]:
+    allowed = select(Extension).where(Extension.enrolment_id == enrolment.id).order_by(Extension.id)
     return {
-        "course": session.get_one(Course, enrolment.course_id).name,
+        "course": course,
         "id": enrolment.student,
         "written": enrolment.written,
         "name": enrolment.name,
@@ -65,10 +68,8 @@ def _student(session: Session, enrolment_id: int) -> dict[str, Any]:
     }
 
 
-def _moments(session: Session, enrolment_id: int) -> dict[str, Any]:
+def _moments(session: Session, enrolment: Enrolment, person: Person) -> dict[str, Any]:
     """When a student came and signed in, as far as it belongs to this course."""
-    enrolment = session.get_one(Enrolment, enrolment_id)
-    person = session.get_one(Person, enrolment.person_id)
     here = Credential.course_id == enrolment.course_id
     if not membership.is_more_than(session, enrolment):
         # One course is all they have, so what reaches everywhere reaches this course alone.
@@ -81,24 +82,29 @@ def _moments(session: Session, enrolment_id: int) -> dict[str, Any]:
     }
 
 
-def _submission(store: Store, submission_id: int) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """What is told of a submission, and its files: what was submitted, and the grade where its student may see it."""
-    with store.reading() as session:
-        row = session.get_one(SubmissionRow, submission_id)
-        asked = select(Appeal).where(Appeal.submission_id == submission_id).order_by(Appeal.id)
-        names = ("assignment", "attempt", "source", "sha256", "created_at", "submitted_at", "days_late", "staff_only")
-        appeals = [_columns(each, ("text", "asked_at", "answer", "answered_at")) for each in session.scalars(asked)]
-        document = {**_columns(row, names), "appeals": appeals}
-        files = {"submission.zip": row.packed}
-        stands = (Job.submission_id == submission_id, Job.standing == Standing.STANDS, Job.state == JobState.DONE)
-        job_id = session.scalar(select(Job.id).where(*stands, Job.suspect.is_(None)))
-        if job_id is None or row.staff_only is not None:
-            return document, files
-        view = student_view(results.load(session, job_id), policies.released(session, job_id))
-        line = batches.job_line(session, job_id)
-    files["grade.json"] = _written(json_document(view))
-    files["report.html"] = report_alone(store, line, view).encode()
-    return document, files
+def _submissions(session: Session, mine: ColumnElement[bool]) -> Iterator[tuple[int, dict[str, Any], bytes]]:
+    """The submissions in their order: the id, what is told of it, and what was submitted."""
+    asked = select(Appeal).join(SubmissionRow, Appeal.submission_id == SubmissionRow.id).where(mine)
+    appeals: dict[int, list[Appeal]] = {}
+    for appeal in session.scalars(asked.order_by(Appeal.id)):
+        appeals.setdefault(appeal.submission_id, []).append(appeal)
+    names = ("assignment", "attempt", "source", "sha256", "created_at", "submitted_at", "days_late", "staff_only")
+    columns = ("text", "asked_at", "answer", "answered_at")
+    query = select(SubmissionRow, SubmissionRow.packed).where(mine).order_by(SubmissionRow.id)
+    for row, packed in session.execute(query, execution_options={"yield_per": _AT_ONCE}):
+        own = [_columns(each, columns) for each in appeals.get(row.id, ())]
+        yield row.id, {**_columns(row, names), "appeals": own}, packed
+
+
+def _seen_grades(session: Session, mine: ColumnElement[bool]) -> Iterator[tuple[int, View, str]]:
+    """Of each submission whose grade its student may see: the id, what they may see, and the report of that."""
+    query = select(Job.id, Job.submission_id).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+    submission_of = dict(session.execute(query.where(mine, *current.CAN_COUNT)).all())
+    released = policies.released_of_each(session, submission_of)
+    graded = results.load_each(session, submission_of)
+    views = ((job_id, student_view(grade, released[job_id])) for job_id, grade in graded)
+    for job_id, view, report in report_each(session, views, submission_of):
+        yield submission_of[job_id], view, report
 
 
 def _columns(row: object, names: Sequence[str]) -> dict[str, Any]:

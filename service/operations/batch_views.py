@@ -241,13 +241,20 @@ def show_overview(
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
-        batch_in(session, course_id, batch_id)
-        line = batches.batch(session, batch_id)
-        lines = batch_table.table_lines(session, batch_id, line.refusals, hidden)
-        classes = overview(session, course_id, lines, pass_share, hidden)
-        asked = line.web_assignment if not classes else None
-        nobody = missing(session, course_id, asked, hidden) if asked else ()
-    return OverviewView(line, tuple(lines), classes, nobody)
+        row = batch_in(session, course_id, batch_id)
+        line = batches.batch(session, row.id)
+        lines = tuple(batch_table.table_lines(session, row.id, line.refusals, hidden))
+        return _overview(session, course_id, line, lines, pass_share, hidden)
+
+
+def show_overview_of(
+    service: Service, actor: Actor, course_id: int, table: TableView, pass_share: Decimal = PASS_SHARE
+) -> OverviewView:
+    """The same of a table that the actor has read. Raises NotFound."""
+    hidden = names_for(service, actor, course_id)
+    with service.store.reading() as session:
+        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        return _overview(session, course_id, table.view.batch, table.lines, pass_share, hidden)
 
 
 def changes_page(service: Service, actor: Actor, course_id: int, batch_id: str, number: int) -> ChangesPage:
@@ -264,10 +271,23 @@ def is_graded(line: TableLine) -> bool:
     return line.state == JobState.DONE and line.staff_only is None
 
 
+def _overview(
+    session: Session,
+    course_id: int,
+    line: BatchLine,
+    lines: tuple[TableLine, ...],
+    pass_share: Decimal,
+    hidden: HiddenNames,
+) -> OverviewView:
+    classes = overview(session, course_id, lines, pass_share, hidden)
+    asked = line.web_assignment if not classes else None
+    return OverviewView(line, lines, classes, missing(session, course_id, asked, hidden) if asked else ())
+
+
 def _view(session: Session, actor: Actor, course_id: int, batch_id: str) -> BatchView:
     course_for(session, actor, course_id, Role.INSTRUCTOR)
-    batch_in(session, course_id, batch_id)
-    line = batches.batch(session, batch_id)
+    row = batch_in(session, course_id, batch_id)
+    line = batches.batch(session, row.id)
     return BatchView(line, batches.progress(session, batch_id), metrics.pace(session, batch_id))
 
 

@@ -49,6 +49,7 @@ class GradeView:
     attempts: list[OwnGrading]
     history: list[AuditEntry]
     put_aside: bool  # over a limit, and not graded until staff ask for it
+    beside: Neighbours
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,23 +80,17 @@ def show_grade(service: Service, actor: Actor, course_id: int, job_id: str, lang
         attempts = own_gradings.newest(session, row.enrolment_id, line.assignment)
         view = _view(session, line, language) if line.state is JobState.DONE else None
         history = audit.entries(session, "job", job_id)
-    report = None if view is None else report_body(service.store, whole, view)
+        beside = _neighbours(session, row, hidden)
+    report = None if view is None else report_body(service.store, whole.id, whole.plots, view)
     put_aside = line.state is JobState.CANCELLED and line.error == OVER_A_LIMIT
-    return GradeView(line, row.batch_id, report, change, gradings, attempts, history, put_aside)
+    return GradeView(line, row.batch_id, report, change, gradings, attempts, history, put_aside, beside)
 
 
 def show_neighbours(service: Service, actor: Actor, course_id: int, job_id: str) -> Neighbours:
     """The grades before and after one in the table of its batch, in the order that the actor sees. Raises NotFound."""
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
-        row = _grade(session, actor, course_id, job_id)
-        if row.batch_id is None:
-            return Neighbours()
-        ids = [line.id for line in batch_table.table_lines(session, row.batch_id, (), hidden) if line.id]
-    if job_id not in ids:
-        return Neighbours()
-    place = ids.index(job_id)
-    return Neighbours(ids[place - 1] if place else "", ids[place + 1] if place + 1 < len(ids) else "")
+        return _neighbours(session, _grade(session, actor, course_id, job_id), hidden)
 
 
 def show_result(service: Service, actor: Actor, course_id: int, job_id: str) -> View:
@@ -105,7 +100,8 @@ def show_result(service: Service, actor: Actor, course_id: int, job_id: str) -> 
 
 def show_report(service: Service, actor: Actor, course_id: int, job_id: str, language: Language = ENGLISH) -> str:
     """The report of a grade as a page of its own. Raises NotFound, also where there is no grade yet."""
-    return report_alone(service.store, *_result(service, actor, course_id, job_id, language))
+    line, view = _result(service, actor, course_id, job_id, language)
+    return report_alone(service.store, line.id, line.plots, view)
 
 
 def show_replay(service: Service, actor: Actor, course_id: int, job_id: str) -> dict[str, Any]:
@@ -135,6 +131,16 @@ def replay_document(session: Session, job_id: str, view: View) -> dict[str, Any]
 def _grade(session: Session, actor: Actor, course_id: int, job_id: str) -> Job:
     course_for(session, actor, course_id, Role.INSTRUCTOR)
     return job_in(session, course_id, job_id)
+
+
+def _neighbours(session: Session, row: Job, hidden: HiddenNames) -> Neighbours:
+    if row.batch_id is None:
+        return Neighbours()
+    ids = [line.id for line in batch_table.table_lines(session, row.batch_id, (), hidden) if line.id]
+    if row.id not in ids:
+        return Neighbours()
+    place = ids.index(row.id)
+    return Neighbours(ids[place - 1] if place else "", ids[place + 1] if place + 1 < len(ids) else "")
 
 
 def _result(service: Service, actor: Actor, course_id: int, job_id: str, language: Language) -> tuple[JobLine, View]:

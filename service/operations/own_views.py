@@ -17,14 +17,13 @@ from service.operations.own_work import Allowance, OwnAssignment, OwnSubmission
 from service.report_files import report_alone, report_body
 from service.reports.html import ReportParts
 from service.reports.view import View, student_view
-from service.store.batches import batches, intake
-from service.store.batches.batches import JobLine
-from service.store.courses import open_assignments, policies
+from service.store.batches import intake
+from service.store.courses import open_assignments
 from service.store.courses.open_assignments import CourseAssignment
 from service.store.grades import appeals, results
 from service.store.grades.appeals import AppealLine
 from service.store.queue import tryouts
-from service.store.queue.queue_places import QueuePlace, queue_place
+from service.store.queue.queue_places import QueuePlace, queue_place, queue_places
 from service.store.states import Role
 from service.trying import tryout_assignment
 from submissions.assignment.definition import Assignment
@@ -80,7 +79,8 @@ def list_opened(
         enrolment_id = _enrolment_id(session, actor, course_id)
         opened = [each for each in open_assignments.of_course(session, course_id) if each.opened_at is not None]
         some = [each for each in opened if each.assignment > after][:limit]
-        return [(each, own_work.allowance(session, enrolment_id, each.assignment)) for each in some]
+        allowed = own_work.allowances(session, enrolment_id, [each.assignment for each in some])
+        return [(each, allowed[each.assignment]) for each in some]
 
 
 def show_sheet(service: Service, actor: Actor, course_id: int, assignment: str) -> TaskSheet:
@@ -104,10 +104,11 @@ def show_task(service: Service, actor: Actor, course_id: int, assignment: str) -
         enrolment_id = _enrolment_id(session, actor, course_id)
         seen = seen_assignment(session, course_id, enrolment_id, assignment)
         is_open = _is_open(session, course_id, assignment)
+        attempts = own_work.own_attempts(session, enrolment_id, assignment)
         return TaskView(
             task_sheet(seen),
-            own_work.own_submissions(session, enrolment_id, assignment),
-            own_work.counting_submission(session, enrolment_id, assignment),
+            attempts.newest,
+            attempts.counting,
             own_work.allowance(session, enrolment_id, assignment),
             is_open,
             can_try=is_open and tryout_assignment(seen) is not None,
@@ -122,7 +123,9 @@ def list_submissions(
     with service.store.reading() as session:
         enrolment_id = _enrolment_id(session, actor, course_id)
         found = own_work.own_submissions_before(session, enrolment_id, before, limit)
-        return [_with_place(session, each) for each in found]
+        waiting = [each.job_id for each in found if each.waits]
+        places = queue_places(session, waiting) if waiting else {}
+        return [SubmissionView(each, places.get(each.job_id)) for each in found]
 
 
 def show_submission(service: Service, actor: Actor, course_id: int, submission_id: int) -> SubmissionView:
@@ -137,36 +140,38 @@ def show_submission_report(
     """One of the actor's submissions with all that its page shows. Raises NotFound."""
     with service.store.reading() as session:
         enrolment_id = _enrolment_id(session, actor, course_id)
-        found = _with_place(session, _own(session, enrolment_id, submission_id))
-        own, assignment = found.submission, found.submission.assignment
-        attempts = own_work.own_submissions(session, enrolment_id, assignment)
-        counting = own_work.counting_submission(session, enrolment_id, assignment)
+        found = own_work.own_attempts_beside(session, enrolment_id, submission_id)
+        if found is None:
+            raise _nothing()
+        own, attempts = found
+        assignment, place = own.assignment, _with_place(session, own).place
         allowance = own_work.allowance(session, enrolment_id, assignment)
         is_open = _is_open(session, course_id, assignment)
         asked = appeals.of_submission(session, submission_id)
         shown = _view(session, own, language) if own.shown else None
-    report = None if shown is None else report_body(service.store, *shown)
-    return ReportView(own, found.place, attempts, counting, allowance, is_open, asked, report)
+    report = None if shown is None else report_body(service.store, own.job_id, own.plots, shown)
+    return ReportView(own, place, attempts.newest, attempts.counting, allowance, is_open, asked, report)
 
 
 def show_result(service: Service, actor: Actor, course_id: int, submission_id: int) -> tuple[str, View]:
     """The grade's id, and what the actor may see of it. Raises NotFound, also while there is nothing to see."""
-    line, view = _result(service, actor, course_id, submission_id, ENGLISH)
-    return line.id, view
+    found, view = _result(service, actor, course_id, submission_id, ENGLISH)
+    return found.job_id, view
 
 
 def show_report(
     service: Service, actor: Actor, course_id: int, submission_id: int, language: Language = ENGLISH
 ) -> str:
     """The report as a page of its own, as far as the actor may see it. Raises NotFound as ``show_result`` does."""
-    return report_alone(service.store, *_result(service, actor, course_id, submission_id, language))
+    found, view = _result(service, actor, course_id, submission_id, language)
+    return report_alone(service.store, found.job_id, found.plots, view)
 
 
 def show_replay(service: Service, actor: Actor, course_id: int, submission_id: int) -> dict[str, Any]:
     """What a replay plays of the trials that the actor may see. Raises NotFound as ``show_result`` does."""
-    line, view = _result(service, actor, course_id, submission_id, ENGLISH)
+    found, view = _result(service, actor, course_id, submission_id, ENGLISH)
     with service.store.reading() as session:
-        return replay_document(session, line.id, view)
+        return replay_document(session, found.job_id, view)
 
 
 def show_files(service: Service, actor: Actor, course_id: int, submission_id: int) -> SubmittedFiles:
@@ -181,7 +186,7 @@ def seen_assignment(session: Session, course_id: int, enrolment_id: int, assignm
     """An assignment that a student may see: it is open, or they have submitted to it. Raises NotFound."""
     if _is_open(session, course_id, assignment):
         return open_assignments.load(session, course_id, assignment)
-    submitted = own_work.own_submissions(session, enrolment_id, assignment)
+    submitted = own_work.own_attempts(session, enrolment_id, assignment).newest
     if not submitted:
         raise _nothing()
     return intake.load_assignment(session, submitted[0].job_id)
@@ -209,18 +214,16 @@ def _with_place(session: Session, found: OwnSubmission) -> SubmissionView:
 
 def _result(
     service: Service, actor: Actor, course_id: int, submission_id: int, language: Language
-) -> tuple[JobLine, View]:
+) -> tuple[OwnSubmission, View]:
     with service.store.reading() as session:
         found = _own(session, _enrolment_id(session, actor, course_id), submission_id)
         if not found.shown:
             raise _nothing()
-        return _view(session, found, language)
+        return found, _view(session, found, language)
 
 
-def _view(session: Session, found: OwnSubmission, language: Language) -> tuple[JobLine, View]:
-    released = policies.released(session, found.job_id)
-    view = student_view(results.load(session, found.job_id), released, language)
-    return batches.job_line(session, found.job_id), view
+def _view(session: Session, found: OwnSubmission, language: Language) -> View:
+    return student_view(results.load(session, found.job_id), found.released, language)
 
 
 def _nothing() -> NotFound:

@@ -6,13 +6,15 @@ Reads what is stored and lets ``reports.view`` decide what of it is shown; what 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from decimal import Decimal
 
-from sqlalchemy import ColumnElement, Select, and_, func, select
+from sqlalchemy import ColumnElement, Select, func, literal, or_, select, tuple_
 from sqlalchemy.orm import Session, aliased
 
+from service.grading.grade import Grade
 from service.reports.view import student_view
 from service.store.courses import open_assignments, policies
 from service.store.courses.policies import OverLimit, PolicyLimits
@@ -21,7 +23,7 @@ from service.store.grades import appeals, current, results
 from service.store.grades.appeals import AppealLine
 from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
 from service.store.queue import jobs
-from service.store.states import UNFINISHED, BatchState, JobState, Standing
+from service.store.states import UNFINISHED, BatchState, JobState, PlotState, Standing
 
 #: Of one student and one assignment; a student who submits more often sees the newest.
 MOST_SHOWN = 50
@@ -46,6 +48,9 @@ class OwnSubmission:
     suspect: bool
     superseded: bool
     published: bool  # whether all of the grade is released
+    plots: PlotState
+    counts: bool  # whether its marks are those of its assignment
+    released: frozenset[str] = frozenset()  # the visibilities that its student sees
     marks: Decimal | None = None
     max_marks: Decimal | None = None
 
@@ -120,41 +125,49 @@ class OwnAssignment:
     appeal: AppealLine | None  # what was asked last
 
 
+@dataclass(frozen=True, slots=True)
+class OwnAttempts:
+    """A student's submissions to an assignment, the newest first, and the one whose marks count."""
+
+    newest: list[OwnSubmission]
+    counting: OwnSubmission | None
+
+
 def own_assignments(session: Session, course_id: int, enrolment_id: int) -> list[OwnAssignment]:
     """What is open to a student or was submitted by them: first what is open, of that what is due soonest."""
-    newest = _newest_of_each(session, enrolment_id)
-    counting = _counting(session, SubmissionRow.enrolment_id == enrolment_id, enrolment_id)
+    found = _read(session, _submissions(enrolment_id).where(or_(_counts(enrolment_id), _is_newest(enrolment_id))))
+    newest = {each.assignment: each for each in sorted(found, key=lambda each: each.attempt)}
+    counting = {each.assignment: each for each in found if each.counts}
     asked = appeals.newest_of(session, enrolment_id)
     prepared = open_assignments.of_course(session, course_id)
     titles = {each.assignment: each.title for each in prepared if each.open}
     is_open = frozenset(titles)
     titles = {name: each.title for name, each in newest.items()} | titles
+    allowed = allowances(session, enrolment_id, titles)
     lines = [
         OwnAssignment(
-            name,
-            title,
-            name in is_open,
-            allowance(session, enrolment_id, name),
-            newest.get(name),
-            counting.get(name),
-            asked.get(name),
+            name, title, name in is_open, allowed[name], newest.get(name), counting.get(name), asked.get(name)
         )
         for name, title in titles.items()
     ]
     return sorted(lines, key=_by_urgency)
 
 
-def counting_submission(session: Session, enrolment_id: int, assignment: str) -> OwnSubmission | None:
-    """The one of a student's submissions whose marks count: the newest that is graded and over no limit."""
-    of_both = and_(SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment == assignment)
-    return _counting(session, of_both, enrolment_id).get(assignment)
+def own_attempts(session: Session, enrolment_id: int, assignment: str) -> OwnAttempts:
+    """A student's submissions to an assignment."""
+    return _listed(_read(session, _attempts(enrolment_id, literal(assignment))))
 
 
-def own_submissions(session: Session, enrolment_id: int, assignment: str) -> list[OwnSubmission]:
-    """A student's submissions to an assignment, the newest first."""
-    query = _submissions(enrolment_id).where(SubmissionRow.assignment == assignment)
-    rows = session.execute(query.order_by(SubmissionRow.attempt.desc()).limit(MOST_SHOWN))
-    return [_submission(session, *row) for row in rows]
+def own_attempts_beside(
+    session: Session, enrolment_id: int, submission_id: int
+) -> tuple[OwnSubmission, OwnAttempts] | None:
+    """One of a student's submissions with those to the same assignment; None where they have none of this id."""
+    row = aliased(SubmissionRow)
+    own = (row.id == submission_id, row.enrolment_id == enrolment_id)
+    assignment = select(row.assignment).where(*own).scalar_subquery()
+    found = _read(session, _attempts(enrolment_id, assignment, SubmissionRow.id == submission_id))
+    this = next((each for each in found if each.id == submission_id), None)
+    return None if this is None else (this, _listed(found))
 
 
 def own_submissions_before(
@@ -164,51 +177,68 @@ def own_submissions_before(
     query = _submissions(enrolment_id)
     if submission_id is not None:
         query = query.where(SubmissionRow.id < submission_id)
-    rows = session.execute(query.order_by(SubmissionRow.id.desc()).limit(limit))
-    return [_submission(session, *row) for row in rows]
+    return _read(session, query.order_by(SubmissionRow.id.desc()).limit(limit))
 
 
 def own_submission(session: Session, enrolment_id: int, submission_id: int) -> OwnSubmission | None:
     """One of a student's submissions; None where they have none of this id."""
-    row = session.execute(_submissions(enrolment_id).where(SubmissionRow.id == submission_id)).one_or_none()
-    return None if row is None else _submission(session, *row)
+    found = _read(session, _submissions(enrolment_id).where(SubmissionRow.id == submission_id))
+    return found[0] if found else None
 
 
 def allowance(session: Session, enrolment_id: int, assignment: str) -> Allowance:
     """What a student may still do, extensions included."""
-    limits, at = policies.limits(session, enrolment_id, assignment), now(session)
-    return Allowance(
-        limits,
-        policies.attempts_made(session, enrolment_id, assignment),
-        None if limits.due_at is None else limits.due_at - at,
-        None if limits.closed_at is None else limits.closed_at - at,
+    return allowances(session, enrolment_id, [assignment])[assignment]
+
+
+def allowances(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, Allowance]:
+    """The same for several assignments, in as many statements."""
+    limits, at = policies.limits_of_each(session, enrolment_id, assignments), now(session)
+    made = policies.attempts_made(session, enrolment_id, assignments)
+    return {
+        each: Allowance(
+            limits[each],
+            made[each],
+            None if (due_at := limits[each].due_at) is None else due_at - at,
+            None if (closed_at := limits[each].closed_at) is None else closed_at - at,
+        )
+        for each in assignments
+    }
+
+
+_Submissions = Select[SubmissionRow, Job, str, BatchState | None, int | None, bool]
+
+
+def _attempts(enrolment_id: int, assignment: ColumnElement[str], *also: ColumnElement[bool]) -> _Submissions:
+    """The newest to an assignment, the one that counts, and others that are asked for."""
+    row = aliased(SubmissionRow)
+    newest = select(row.id).where(row.enrolment_id == enrolment_id, row.assignment == assignment)
+    some = or_(
+        SubmissionRow.id.in_(newest.order_by(row.attempt.desc()).limit(MOST_SHOWN)), _counts(enrolment_id), *also
     )
+    query = _submissions(enrolment_id).where(SubmissionRow.assignment == assignment, some)
+    return query.order_by(SubmissionRow.attempt.desc())
 
 
-_Submissions = Select[SubmissionRow, Job, str, BatchState | None, int | None]
+def _listed(found: list[OwnSubmission]) -> OwnAttempts:
+    return OwnAttempts(found[:MOST_SHOWN], next((each for each in found if each.counts), None))
 
 
-def _counting(session: Session, which: ColumnElement[bool], enrolment_id: int) -> dict[str, OwnSubmission]:
-    """The attempts of a student that count, by assignment."""
-    query = _submissions(enrolment_id).where(SubmissionRow.id.in_(current.counting(which)))
-    found = (_submission(session, *row) for row in session.execute(query))
-    return {each.assignment: each for each in found}
+def _counts(enrolment_id: int) -> ColumnElement[bool]:
+    """Of a ``SubmissionRow`` of a student: its marks count for its assignment."""
+    return SubmissionRow.id.in_(current.counting(SubmissionRow.enrolment_id == enrolment_id))
 
 
-def _newest_of_each(session: Session, enrolment_id: int) -> dict[str, OwnSubmission]:
-    """By assignment; only the newest are looked at closely."""
-    latest = (
-        select(SubmissionRow.assignment, func.max(SubmissionRow.attempt).label("attempt"))
-        .join(Job, Job.submission_id == SubmissionRow.id)
-        .where(SubmissionRow.enrolment_id == enrolment_id, Job.standing == Standing.STANDS)
-        .group_by(SubmissionRow.assignment)
-        .subquery()
+def _is_newest(enrolment_id: int) -> ColumnElement[bool]:
+    """Of a ``SubmissionRow`` of a student: none to its assignment came later."""
+    row = aliased(SubmissionRow)
+    newest = (
+        select(row.assignment, func.max(row.attempt))
+        .join(Job, Job.submission_id == row.id)
+        .where(row.enrolment_id == enrolment_id, Job.standing == Standing.STANDS)
+        .group_by(row.assignment)
     )
-    query = _submissions(enrolment_id).join(
-        latest, (latest.c.assignment == SubmissionRow.assignment) & (latest.c.attempt == SubmissionRow.attempt)
-    )
-    found = (_submission(session, *row) for row in session.execute(query))
-    return {each.assignment: each for each in found}
+    return tuple_(SubmissionRow.assignment, SubmissionRow.attempt).in_(newest)
 
 
 def _submissions(enrolment_id: int) -> _Submissions:
@@ -224,7 +254,7 @@ def _submissions(enrolment_id: int) -> _Submissions:
         .scalar_subquery()
     )
     return (
-        select(SubmissionRow, Job, AssignmentVersion.title, Batch.state, same_as)
+        select(SubmissionRow, Job, AssignmentVersion.title, Batch.state, same_as, _counts(enrolment_id))
         .join(Job, Job.submission_id == SubmissionRow.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
         .outerjoin(Batch, Job.batch_id == Batch.id)
@@ -232,10 +262,24 @@ def _submissions(enrolment_id: int) -> _Submissions:
     )
 
 
+def _read(session: Session, query: _Submissions) -> list[OwnSubmission]:
+    found = [_submission(*row) for row in session.execute(query)]
+    shown = [each.job_id for each in found if each.shown]
+    marked, released = results.load_marks(session, shown), policies.released_of_each(session, shown)
+    return [
+        _marked(each, marked[each.job_id], released[each.job_id]) if each.job_id in marked else each for each in found
+    ]
+
+
+def _marked(found: OwnSubmission, grade: Grade, released: frozenset[str]) -> OwnSubmission:
+    seen = student_view(grade, released).grade
+    return replace(found, marks=seen.marks, max_marks=seen.max_marks, released=released)
+
+
 def _submission(
-    session: Session, row: SubmissionRow, job: Job, title: str, batch: BatchState | None, same_as: int | None
+    row: SubmissionRow, job: Job, title: str, batch: BatchState | None, same_as: int | None, counts: bool
 ) -> OwnSubmission:
-    found = OwnSubmission(
+    return OwnSubmission(
         id=row.id,
         job_id=job.id,
         assignment=row.assignment,
@@ -251,11 +295,9 @@ def _submission(
         suspect=job.suspect is not None,
         superseded=jobs.superseded_by(job.error) is not None,
         published=job.published_at is not None,
+        plots=job.plots,
+        counts=counts,
     )
-    if not found.shown:
-        return found
-    shown = student_view(results.load_marks(session, job.id), policies.released(session, job.id)).grade
-    return replace(found, marks=shown.marks, max_marks=shown.max_marks)
 
 
 def _by_urgency(line: OwnAssignment) -> tuple[bool, bool, float, str]:

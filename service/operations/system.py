@@ -15,6 +15,7 @@ from service.store.queue.metrics import collect
 from service.store.queue.metrics import quantile as quantile
 from service.store.queue.tryouts import TryoutLane
 from service.store.queue.workers import InQuarantine, WorkerLine
+from service.store.states import JobState
 from service.version import GRADER_VERSION
 
 if TYPE_CHECKING:
@@ -41,13 +42,14 @@ def show(service: Service, actor: Actor) -> SystemView:
     check_operator(actor)
     findings = examine_service(service.settings, service.store)
     with service.store.reading() as session:
+        metrics = collect(session)
         return SystemView(
             GRADER_VERSION,
             tuple(findings),
-            collect(session),
+            metrics,
             {each.worker: each for each in workers.in_quarantine(session)},
             tuple(dead_letters.dead_letters(session)),
-            dead_letters.count(session),
+            metrics.queue.count(JobState.DEAD),
             tryouts.lane(session),
         )
 

@@ -7,16 +7,20 @@ from __future__ import annotations
 
 import hashlib
 import zlib
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from datetime import datetime
+from itertools import groupby
 
-from sqlalchemy import delete, select
+from sqlalchemy import and_, delete, select
 from sqlalchemy.orm import Session
 
-from service.store.models import Artifact
+from service.store.models import Artifact, Job
 from sim.errors import HostError
 
 CAP_BYTES = 64_000_000
+#: How many are fetched at once.
+_AT_ONCE = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,20 +53,34 @@ def put(session: Session, job_id: str, files: list[File], at: datetime) -> None:
 
 
 def get(session: Session, job_id: str, *, prefix: str = "") -> dict[str, File]:
-    """The files of a job whose names begin with ``prefix``, by name.
+    """The files of a job whose names begin with ``prefix``, by name. Raises like ``get_each``."""
+    return dict(get_each(session, [job_id], prefix=prefix)).get(job_id, {})
 
-    Raises HostError where the bytes are not those that were kept.
+
+def get_each(session: Session, job_ids: Collection[str], *, prefix: str = "") -> Iterator[tuple[str, dict[str, File]]]:
+    """Each of the jobs with its files, read in one statement, in the database's order of ids.
+
+    The files of one job at a time are in memory. Raises HostError where the bytes are not those that were kept.
     """
-    query = select(Artifact.name, Artifact.media_type, Artifact.sha256, Artifact.compressed).where(
-        Artifact.job_id == job_id, Artifact.name.startswith(prefix, autoescape=True)
+    mine = and_(Artifact.job_id == Job.id, Artifact.name.startswith(prefix, autoescape=True))
+    query = (
+        select(Job.id, Artifact.name, Artifact.media_type, Artifact.sha256, Artifact.compressed)
+        .outerjoin(Artifact, mine)
+        .where(Job.id.in_(job_ids))
+        .order_by(Job.id, Artifact.name)
     )
-    files = {}
-    for name, media_type, sha256, compressed in session.execute(query.order_by(Artifact.name)):
-        try:
-            data = zlib.decompress(compressed)
-        except zlib.error as error:
-            raise HostError(f"The database is damaged: {name} of {job_id}: {error}") from None
-        if hashlib.sha256(data).hexdigest() != sha256:
-            raise HostError(f"The database is damaged: {name} of {job_id} has another hash than when it was kept")
-        files[name] = File(name, media_type, data)
-    return files
+    rows = session.execute(query, execution_options={"yield_per": _AT_ONCE})
+    for job_id, of_job in groupby(rows, key=lambda row: row[0]):
+        # A job without such files has one row without a file.
+        kept = [(name, media_type, sha256, data) for _, name, media_type, sha256, data in of_job if name is not None]
+        yield job_id, {each[0]: _file(job_id, *each) for each in kept}
+
+
+def _file(job_id: str, name: str, media_type: str, sha256: str, compressed: bytes) -> File:
+    try:
+        data = zlib.decompress(compressed)
+    except zlib.error as error:
+        raise HostError(f"The database is damaged: {name} of {job_id}: {error}") from None
+    if hashlib.sha256(data).hexdigest() != sha256:
+        raise HostError(f"The database is damaged: {name} of {job_id} has another hash than when it was kept")
+    return File(name, media_type, data)

@@ -18,7 +18,11 @@ def secret_of(store: Store) -> Secret:
     if store.secret is not None:
         return store.secret
     with store.reading() as session:
-        text = session.scalar(select(Installation.secret))
+        return secret_read(session.scalar(select(Installation.secret)))
+
+
+def secret_read(text: str | None) -> Secret:
+    """The database's own secret as it was read. Raises HostError where it is gone."""
     if text is None:
         raise HostError("The database is damaged: the secret that it was made with is gone; restore a backup")
     return Secret(text)

@@ -57,7 +57,8 @@ def caller_of(request: Request, context: Context) -> Caller:
     if identity is None:
         raise SignInNeeded("the token does not count")
     context.limits.api_calls.spend(identity.credential_id)
-    sign_in.note_use(context.service, identity)
+    if not identity.use_is_noted:
+        sign_in.note_use(context.service, identity)
     return Caller(identity)
 
 

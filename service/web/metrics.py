@@ -49,7 +49,7 @@ def _queue(metrics: ServiceMetrics) -> Iterator[Metric]:
     open_jobs = GaugeMetricFamily("robomark_jobs_open", "Jobs that have not ended.", labels=["lane", "state"])
     for lane in Lane:
         for state in _UNFINISHED:
-            open_jobs.add_metric([lane.value, state.value], metrics.jobs.get((lane, state), 0))
+            open_jobs.add_metric([lane.value, state.value], metrics.queue.jobs.get((lane, state), 0))
     yield open_jobs
     depth = GaugeMetricFamily("robomark_queue_depth", "Jobs that a worker could begin now.", labels=["lane"])
     oldest = GaugeMetricFamily(
@@ -58,8 +58,8 @@ def _queue(metrics: ServiceMetrics) -> Iterator[Metric]:
         labels=["lane"],
     )
     for lane in Lane:
-        depth.add_metric([lane.value], metrics.claimable.get(lane, 0))
-        oldest.add_metric([lane.value], metrics.oldest_seconds.get(lane, 0.0))
+        depth.add_metric([lane.value], metrics.queue.claimable.get(lane, 0))
+        oldest.add_metric([lane.value], metrics.queue.oldest_seconds.get(lane, 0.0))
     yield depth
     yield oldest
     plots = GaugeMetricFamily("robomark_plots", "Grades by the state of their plots.", labels=["state"])
@@ -73,7 +73,7 @@ def _endings(metrics: ServiceMetrics) -> Iterator[Metric]:
     ended = CounterMetricFamily("robomark_jobs_ended", "Jobs that have ended.", labels=["lane", "state"])
     for lane in Lane:
         for state in _ENDED:
-            ended.add_metric([lane.value, state.value], metrics.jobs.get((lane, state), 0))
+            ended.add_metric([lane.value, state.value], metrics.queue.jobs.get((lane, state), 0))
     yield ended
     verdicts = CounterMetricFamily("robomark_verdicts", "Grades by verdict.", labels=["verdict"])
     for verdict, count in sorted(metrics.verdicts.items()):
@@ -91,7 +91,7 @@ def _endings(metrics: ServiceMetrics) -> Iterator[Metric]:
 
 
 def _workers(metrics: ServiceMetrics) -> Iterator[Metric]:
-    lately = [seen for seen in metrics.workers if seen.lately]
+    lately = [seen for seen in metrics.queue.workers if seen.lately]
     yield GaugeMetricFamily("robomark_workers", "Workers heard of in the last 30 s.", len(lately))
     yield GaugeMetricFamily(
         "robomark_workers_quarantined", "Workers that got a known answer wrong.", metrics.quarantined
@@ -100,9 +100,9 @@ def _workers(metrics: ServiceMetrics) -> Iterator[Metric]:
         "robomark_worker_silent_seconds", "Since the worker was last heard of.", labels=["worker", "host", "version"]
     )
     slots = GaugeMetricFamily("robomark_worker_slots", "Gradings at a time.", labels=["worker", "host"])
-    for seen in metrics.workers:
+    for seen in metrics.queue.workers:
         worker = seen.worker
-        silent.add_metric([worker.name, worker.host, worker.grader_version], metrics.silent_seconds[worker.name])
+        silent.add_metric([worker.name, worker.host, worker.grader_version], metrics.queue.silent_seconds[worker.name])
         slots.add_metric([worker.name, worker.host], worker.concurrency)
     yield silent
     yield slots

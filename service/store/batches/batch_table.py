@@ -115,6 +115,7 @@ SORTS: Mapping[str, Callable[[TableLine], Any]] = MappingProxyType(
 
 def table_lines(session: Session, batch_id: str, refusals: Sequence[Refusal], hidden: HiddenNames) -> list[TableLine]:
     """All rows of a batch, by student."""
+    row = session.get(Batch, batch_id)  # kept, so that it is read once
     query = (
         select(
             Job.id,
@@ -144,8 +145,8 @@ def table_lines(session: Session, batch_id: str, refusals: Sequence[Refusal], hi
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
         .where(*standing_in(session, batch_id))
     )
-    is_regrade = session.scalar(select(Batch.regrade_of).where(Batch.id == batch_id)) is not None
-    lines = [_line(tuple(row), None if is_regrade else batch_id, hidden) for row in session.execute(query)]
+    own_batch = None if row is None or row.regrade_of is not None else batch_id
+    lines = [_line(tuple(found), own_batch, hidden) for found in session.execute(query)]
     lines += [_refused(refusal) for refusal in refusals]
     return sorted(lines, key=_by_student)
 

@@ -183,16 +183,22 @@ def batch(session: Session, batch_id: str) -> BatchLine:
     return _batch_lines(session, [row])[0]
 
 
+def is_regrade(session: Session, batch_id: str) -> bool:
+    """Whether a batch is one of regrades; asks nothing where the caller keeps its row."""
+    row = session.get(Batch, batch_id)
+    return row is not None and row.regrade_of is not None
+
+
 def standing_in(session: Session, batch_id: str) -> tuple[ColumnElement[bool], ...]:
     """What holds of the job that stands for a submission of the batch; of a batch of regrades, of its own jobs."""
-    if session.scalar(select(Batch.regrade_of).where(Batch.id == batch_id)) is not None:
+    if is_regrade(session, batch_id):
         return (Job.batch_id == batch_id, Job.suspect.is_(None))
     return (Job.submission_id.in_(counting([batch_id])), Job.standing == Standing.STANDS)
 
 
 def submissions_in(session: Session, batch_id: str) -> Select[int]:
     """The submissions that a batch is about: those that count of it, or all that a batch of regrades has."""
-    if session.scalar(select(Batch.regrade_of).where(Batch.id == batch_id)) is not None:
+    if is_regrade(session, batch_id):
         return select(Job.submission_id).where(Job.batch_id == batch_id)
     return counting([batch_id])
 

@@ -5,7 +5,7 @@ Publishes nothing: the row is the job, and the queue's notice comes after the co
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import TYPE_CHECKING, TypeVar
@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from submissions.assignment.definition import Assignment
 
 Read = TypeVar("Read")
+#: How many submissions are fetched at once.
+_AT_ONCE = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,6 +203,17 @@ def load_submission(session: Session, job_id: str) -> Submission:
     """What was submitted for a job; raises like ``load_grading_request``."""
     kept = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
     return _read_back(unpack_submission, session.scalar(kept.where(Job.id == job_id)), "submission", job_id)
+
+
+def load_each_submission(session: Session, job_ids: Collection[str]) -> Iterator[tuple[str, Submission]]:
+    """Each of the jobs with what was submitted for it, read in one statement, in the database's order of ids.
+
+    One submission at a time is in memory. Raises HostError where what was kept cannot be read.
+    """
+    query = select(Job.id, SubmissionRow.packed).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+    query = query.where(Job.id.in_(job_ids)).order_by(Job.id)
+    for job_id, kept in session.execute(query, execution_options={"yield_per": _AT_ONCE}):
+        yield job_id, _read_back(unpack_submission, kept, "submission", job_id)
 
 
 def load_assignment(session: Session, job_id: str) -> Assignment:

@@ -11,12 +11,13 @@ import hashlib
 import hmac
 from dataclasses import dataclass
 
-from sqlalchemy.orm import Session
+from sqlalchemy import select
 
-from service.store.courses.open_assignments import with_names_hidden
+from service.store.courses.open_assignments import are_hidden
 from service.store.engine import Store
-from service.store.installation import secret_of
-from submissions.seeds import Secret
+from service.store.installation import secret_read
+from service.store.models import Installation
+from service.store.web_tables import OpenAssignment
 
 _LONG = 6
 
@@ -42,13 +43,12 @@ NAMED = HiddenNames(frozenset(), b"")
 
 
 def hidden_names_of(store: Store, course_id: int) -> HiddenNames:
-    """Those of a course, by the installation's own secret."""
-    secret = secret_of(store)
+    """Those of a course; numbers follow from the installation's own secret, so that nobody can count them out."""
+    own_secret = select(Installation.secret).scalar_subquery()
     with store.reading() as session:
-        return hidden_names(session, course_id, secret)
-
-
-def hidden_names(session: Session, course_id: int, secret: Secret) -> HiddenNames:
-    """Those of a course; numbers follow from the installation's secret, so that nobody can count them out."""
+        rows = session.execute(select(OpenAssignment.assignment, own_secret).where(*are_hidden(course_id))).all()
+    if not rows:
+        return NAMED
+    secret = store.secret or secret_read(rows[0][1])
     key = hmac.new(secret.text.encode("utf-8", "surrogateescape"), f"names {course_id}".encode(), hashlib.sha256)
-    return HiddenNames(with_names_hidden(session, course_id), key.digest())
+    return HiddenNames(frozenset(assignment for assignment, _ in rows), key.digest())

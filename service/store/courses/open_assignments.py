@@ -11,7 +11,7 @@ from datetime import datetime
 from decimal import Decimal
 from typing import TYPE_CHECKING
 
-from sqlalchemy import select
+from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
 
 from service.store import outbox
@@ -104,8 +104,12 @@ def hide_names(session: Session, course_id: int, assignment: str, hidden: bool) 
 
 def with_names_hidden(session: Session, course_id: int) -> frozenset[str]:
     """The assignments of a course whose instructors do not see whose work it is."""
-    of_them = (OpenAssignment.course_id == course_id, OpenAssignment.names_hidden.is_(True))
-    return frozenset(session.scalars(select(OpenAssignment.assignment).where(*of_them)))
+    return frozenset(session.scalars(select(OpenAssignment.assignment).where(*are_hidden(course_id))))
+
+
+def are_hidden(course_id: int) -> tuple[ColumnElement[bool], ...]:
+    """Of an ``OpenAssignment``: it is the course's, and its instructors do not see whose work it is."""
+    return OpenAssignment.course_id == course_id, OpenAssignment.names_hidden.is_(True)
 
 
 def of_course(session: Session, course_id: int) -> list[CourseAssignment]:

@@ -6,11 +6,13 @@ What is over a limit is kept and marked all the same, but shown to staff alone; 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Literal
 
-from sqlalchemy import delete, func, or_, select
+from sqlalchemy import ColumnElement, delete, func, or_, select
+from sqlalchemy.exc import NoResultFound
 from sqlalchemy.orm import Session
 
 from service.store.courses.local_days import add_days, days_after, local_zone
@@ -20,6 +22,8 @@ from service.store.models import Enrolment, Extension, Job, Policy, SubmissionRo
 from service.store.states import JobState
 
 _ALWAYS = frozenset({"visible"})
+_AFTER_DUE_DATE = frozenset({"after_due_date"})
+_WITH_PUBLICATION = _AFTER_DUE_DATE | {"after_published"}
 _NOT_THE_STUDENTS = ("assignment_error", "host_error")
 
 
@@ -59,10 +63,26 @@ def limits(session: Session, enrolment_id: int, assignment: str) -> PolicyLimits
 
     Extensions for all assignments and for this one hold together: the latest due date, the larger number of attempts.
     """
-    course_id = session.scalar(select(Enrolment.course_id).where(Enrolment.id == enrolment_id))
-    policy = _policy(session, course_id, assignment)
-    query = select(Extension).where(Extension.enrolment_id == enrolment_id, Extension.assignment.in_(("", assignment)))
-    extensions = session.scalars(query).all()
+    return limits_of_each(session, enrolment_id, [assignment])[assignment]
+
+
+def limits_of_each(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, PolicyLimits]:
+    """The same for several assignments, in as many statements."""
+    course_id = select(Enrolment.course_id).where(Enrolment.id == enrolment_id).scalar_subquery()
+    known = _known_policies(session, Policy.course_id == course_id, assignments)
+    own = {assignment: policy for (_, assignment), policy in known.items()}
+    of_student = (Extension.enrolment_id == enrolment_id, Extension.assignment.in_(("", *assignments)))
+    extensions = session.scalars(select(Extension).where(*of_student)).all()
+    return {
+        each: _extended(
+            own.get(each) or own.get("") or PolicyLimits(),
+            [extension for extension in extensions if extension.assignment in ("", each)],
+        )
+        for each in assignments
+    }
+
+
+def _extended(policy: PolicyLimits, extensions: Sequence[Extension]) -> PolicyLimits:
     due_at, attempts = policy.due_at, policy.attempts
     if due_at is not None:
         due_at = max([due_at, *(each.due_at for each in extensions if each.due_at is not None)])
@@ -79,7 +99,8 @@ def in_days(count: int) -> str:
 def rule(session: Session, enrolment_id: int, assignment: str, sha256: str, submitted_at: datetime | None) -> Ruling:
     """What the policy says of a submission that comes in now; a moment of submitting that nobody knows is in time."""
     allowed = limits(session, enrolment_id, assignment)
-    earlier = _counted(session, enrolment_id, assignment, sha256)
+    counted = _counted(session, enrolment_id, [assignment]).get(assignment, {})
+    earlier = [when for sha, when in counted.items() if sha != sha256]
     if allowed.attempts is not None and len(earlier) >= allowed.attempts:
         return Ruling(over=f"attempt {len(earlier) + 1}, allowed: {allowed.attempts}")
     if submitted_at is None:
@@ -104,26 +125,40 @@ def limit_of(over: str) -> OverLimit | None:
     return "cool-down" if over.startswith("submitted ") else "date"
 
 
-def attempts_made(session: Session, enrolment_id: int, assignment: str) -> int:
-    """How many of a student's submissions count as attempts until now."""
-    return len(_counted(session, enrolment_id, assignment, ""))
+def attempts_made(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, int]:
+    """How many of a student's submissions count as attempts until now, by assignment."""
+    counted = _counted(session, enrolment_id, assignments)
+    return {each: len(counted.get(each, {})) for each in assignments}
 
 
 def released(session: Session, job_id: str) -> frozenset[str]:
     """Which visibilities a student may see of a grade now.
 
     ``after_due_date`` opens when nobody of the course may submit any more, extensions and late days included; all
-    but ``hidden`` opens when the grade is published.
+    but ``hidden`` opens when the grade is published. Raises NoResultFound where the job is gone.
     """
-    job = session.get_one(Job, job_id)
-    seen = set(_ALWAYS)
-    if job.published_at is not None:
-        seen |= {"after_published", "after_due_date"}
-    assignment = session.get_one(SubmissionRow, job.submission_id).assignment
-    closed_at = _closed_for_all(session, job.enrolment_id, assignment)
-    if closed_at is not None and now(session) > closed_at:
-        seen.add("after_due_date")
-    return frozenset(seen)
+    found = released_of_each(session, [job_id])
+    if job_id not in found:
+        raise NoResultFound
+    return found[job_id]
+
+
+def released_of_each(session: Session, job_ids: Collection[str]) -> dict[str, frozenset[str]]:
+    """The same for several grades, in as many statements."""
+    query = (
+        select(Job.id, Job.published_at, Enrolment.course_id, SubmissionRow.assignment)
+        .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+        .join(Enrolment, Job.enrolment_id == Enrolment.id)
+        .where(Job.id.in_(job_ids))
+    )
+    rows = session.execute(query).all()
+    closed = _closed_for_all(session, {(course_id, assignment) for *_, course_id, assignment in rows})
+    return {
+        job_id: _ALWAYS
+        | (_WITH_PUBLICATION if published_at is not None else frozenset())
+        | (_AFTER_DUE_DATE if (course_id, assignment) in closed else frozenset())
+        for job_id, published_at, course_id, assignment in rows
+    }
 
 
 def set_policy(session: Session, course_id: int, assignment: str, allowed: PolicyLimits) -> None:
@@ -182,44 +217,62 @@ def extensions(session: Session, course_id: int) -> list[ExtensionLine]:
     ]
 
 
-def _policy(session: Session, course_id: int | None, assignment: str) -> PolicyLimits:
-    """The policy of the assignment itself, else the course's."""
-    query = select(Policy).where(Policy.course_id == course_id, Policy.assignment.in_(("", assignment)))
-    row = session.scalar(query.order_by(func.length(Policy.assignment).desc()).limit(1))
-    return PolicyLimits() if row is None else _limits(row)
+def _known_policies(
+    session: Session, of_course: ColumnElement[bool], assignments: Collection[str]
+) -> dict[tuple[int, str], PolicyLimits]:
+    """The policies for some assignments and those for all others, by course and assignment."""
+    rows = session.scalars(select(Policy).where(of_course, Policy.assignment.in_(("", *assignments))))
+    return {(row.course_id, row.assignment): _limits(row) for row in rows}
 
 
 def _limits(row: Policy) -> PolicyLimits:
     return PolicyLimits(row.due_at, row.late_days, row.attempts, row.cool_down_seconds, row.zone)
 
 
-def _closed_for_all(session: Session, enrolment_id: int, assignment: str) -> datetime | None:
-    course_id = session.scalar(select(Enrolment.course_id).where(Enrolment.id == enrolment_id))
-    policy = _policy(session, course_id, assignment)
-    if policy.due_at is None:
-        return None
-    latest = session.scalar(
-        select(func.max(Extension.due_at))
+def _closed_for_all(session: Session, which: Collection[tuple[int, str]]) -> set[tuple[int, str]]:
+    """Those of some assignments of courses to which nobody may submit any more."""
+    course_ids, assignments = {course_id for course_id, _ in which}, {assignment for _, assignment in which}
+    known = _known_policies(session, Policy.course_id.in_(course_ids), assignments)
+    extended = (
+        select(Enrolment.course_id, Extension.assignment, func.max(Extension.due_at))
         .join(Enrolment, Extension.enrolment_id == Enrolment.id)
-        .where(Enrolment.course_id == course_id, Extension.assignment.in_(("", assignment)))
+        .where(Enrolment.course_id.in_(course_ids), Extension.assignment.in_(("", *assignments)))
+        .group_by(Enrolment.course_id, Extension.assignment)
     )
-    return replace(policy, due_at=policy.due_at if latest is None else max(policy.due_at, latest)).closed_at
+    latest = {(course_id, each): due_at for course_id, each, due_at in session.execute(extended) if due_at is not None}
+    at = now(session)
+    closed = set()
+    for course_id, assignment in which:
+        policy = known.get((course_id, assignment)) or known.get((course_id, ""))
+        if policy is None or policy.due_at is None:
+            continue
+        later = [latest[course_id, each] for each in ("", assignment) if (course_id, each) in latest]
+        closed_at = replace(policy, due_at=max([policy.due_at, *later])).closed_at
+        if closed_at is not None and at > closed_at:
+            closed.add((course_id, assignment))
+    return closed
 
 
-def _counted(session: Session, enrolment_id: int, assignment: str, sha256: str) -> list[datetime]:
-    """When the different submissions came that count as attempts: begun, and not ended by a fault of ours."""
+def _counted(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, dict[str, datetime]]:
+    """When the different submissions came that count as attempts, by assignment and hash.
+
+    They were begun, and not ended by a fault of ours.
+    """
     submission = SubmissionRow
     counts = or_(Job.state == JobState.RUNNING, (Job.state == JobState.DONE) & Job.verdict.not_in(_NOT_THE_STUDENTS))
+    came_at = func.coalesce(submission.submitted_at, submission.created_at)
     query = (
-        select(func.coalesce(submission.submitted_at, submission.created_at), submission.sha256)
+        select(submission.assignment, submission.sha256, came_at)
         .join(Job, Job.submission_id == submission.id)
         .where(
             submission.enrolment_id == enrolment_id,
-            submission.assignment == assignment,
-            submission.sha256 != sha256,
+            submission.assignment.in_(assignments),
             submission.staff_only.is_(None),
             counts,
         )
         .order_by(submission.attempt)
     )
-    return list({sha: when for when, sha in session.execute(query)}.values())
+    found: dict[str, dict[str, datetime]] = {}
+    for assignment, sha256, when in session.execute(query):
+        found.setdefault(assignment, {})[sha256] = when
+    return found

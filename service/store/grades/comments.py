@@ -5,6 +5,7 @@ When a student sees it is ``reports/view.py``'s.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -66,10 +67,18 @@ def withdraw(session: Session, job_id: str, comment_id: int, actor: str) -> None
 
 def of_job(session: Session, job_id: str) -> list[CommentLine]:
     """The comments on the submission of a job, the oldest first."""
+    return of_jobs(session, [job_id]).get(job_id, [])
+
+
+def of_jobs(session: Session, job_ids: Collection[str]) -> dict[str, list[CommentLine]]:
+    """The same by job, of those that have some."""
     query = (
-        select(Comment)
-        .join(Job, Job.submission_id == Comment.submission_id)
-        .where(Job.id == job_id, Comment.withdrawn_at.is_(None))
+        select(Job.id, Comment)
+        .join(Comment, Comment.submission_id == Job.submission_id)
+        .where(Job.id.in_(job_ids), Comment.withdrawn_at.is_(None))
         .order_by(Comment.id)
     )
-    return [CommentLine(row.id, row.criterion, row.text, row.actor, row.made_at) for row in session.scalars(query)]
+    found: dict[str, list[CommentLine]] = {}
+    for job_id, row in session.execute(query):
+        found.setdefault(job_id, []).append(CommentLine(row.id, row.criterion, row.text, row.actor, row.made_at))
+    return found

@@ -5,7 +5,7 @@ It belongs to the submission, so every grade of that counts so, a later one too.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from decimal import Decimal, InvalidOperation
@@ -114,7 +114,7 @@ def withdraw(session: Session, job_id: str, criterion: str, actor: str, *, seen:
     _recount_all(session, submission_id)
 
 
-def of_jobs(session: Session, job_ids: Sequence[str]) -> Mapping[str, Mapping[str, OverrideLine]]:
+def of_jobs(session: Session, job_ids: Collection[str]) -> Mapping[str, Mapping[str, OverrideLine]]:
     """What is set by hand for the submissions of these jobs, by job and criterion; no job where nothing is."""
     query = (
         select(Job.id, Override)

@@ -5,13 +5,14 @@ Whether a worker may store a grade is ``jobs``'s to say; nothing here judges.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any, cast
 
 from sqlalchemy import delete, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, defer
+from sqlalchemy.orm.interfaces import ORMOption
 
 from service.grading.grade import (
     Accuracy,
@@ -85,59 +86,111 @@ def insert(session: Session, job_id: str, prepared: PreparedGrade, at: datetime)
 
 def load(session: Session, job_id: str) -> Grade:
     """The grade of a job as it counts, with what instructors set and wrote. Raises UsageError when it has none."""
-    return _as_all_counts(session, job_id, load_graded(session, job_id))
+    return _only(load_each(session, [job_id]), job_id)
+
+
+def load_each(session: Session, job_ids: Collection[str]) -> Iterator[tuple[str, Grade]]:
+    """As ``load``, the grades of those jobs that have one, in the database's order of ids, in as many statements.
+
+    The recordings of one job at a time are read.
+    """
+    from service.store.grades.recordings import from_bytes
+
+    return _as_all_count(session, job_ids, _graded(session, job_ids, from_bytes))
 
 
 def load_words(session: Session, job_id: str) -> Grade:
     """As ``load``, for whoever tells what was said and marked: recordings without their ticks and pixels."""
-    return _as_all_counts(session, job_id, _load(session, job_id, _trials(session, job_id, words_from_bytes)))
+    return _only(_as_all_count(session, [job_id], _graded(session, [job_id], words_from_bytes)), job_id)
 
 
 def load_graded(session: Session, job_id: str) -> Grade:
     """The grade of a job as the grader gave it. Raises UsageError when it has none."""
-    return _load(session, job_id, load_trials(session, job_id))
+    from service.store.grades.recordings import from_bytes
+
+    return _only(_graded(session, [job_id], from_bytes), job_id)
 
 
-def load_marks(session: Session, job_id: str) -> Grade:
-    """The grade of a job as it counts, without its trials and predictions, for lists, which read no recordings.
+def load_marks(session: Session, job_ids: Collection[str]) -> dict[str, Grade]:
+    """The grades of jobs as they count, for lists: without trials, predictions and comments.
 
-    Raises like ``load``.
+    No recordings are read. Jobs without a grade are left out.
     """
-    return _as_all_counts(session, job_id, _load(session, job_id, ()))
+    heads = _heads(session, job_ids, defer(CriterionResultRow.predictions))
+    by_hand = overrides.of_jobs(session, job_ids)
+    return {
+        job_id: _as_it_all_counts(_with_criteria(grade, rows, ()), by_hand.get(job_id, {}))
+        for job_id, (grade, rows) in heads.items()
+    }
 
 
-def _as_all_counts(session: Session, job_id: str, graded: Grade) -> Grade:
-    by_hand = overrides.of_jobs(session, [job_id]).get(job_id, {})
-    return replace(
-        graded,
-        criteria=tuple(_as_it_counts(result, by_hand.get(result.id)) for result in graded.criteria),
-        comments=tuple(WrittenComment(each.criterion, each.text) for each in comments.of_job(session, job_id)),
-    )
+def load_each_trials(session: Session, job_ids: Collection[str]) -> Iterator[tuple[str, tuple[TrialResult, ...]]]:
+    """Each of the jobs with its trials, those of one at a time in memory; none where it has no grade."""
+    from service.store.grades.recordings import from_bytes
+
+    return _trials(session, job_ids, from_bytes)
 
 
-def _load(session: Session, job_id: str, trials: tuple[TrialResult, ...]) -> Grade:
+_Loaded = Iterator[tuple[str, Grade]]
+
+
+def _only(found: _Loaded, job_id: str) -> Grade:
+    for _, grade in found:
+        return grade
+    raise UsageError(f"{job_id} has no grade")
+
+
+def _as_all_count(session: Session, job_ids: Collection[str], graded: _Loaded) -> _Loaded:
+    by_hand, said = overrides.of_jobs(session, job_ids), comments.of_jobs(session, job_ids)
+    for job_id, grade in graded:
+        written = tuple(WrittenComment(each.criterion, each.text) for each in said.get(job_id, ()))
+        yield job_id, replace(_as_it_all_counts(grade, by_hand.get(job_id, {})), comments=written)
+
+
+def _as_it_all_counts(grade: Grade, by_hand: Mapping[str, OverrideLine]) -> Grade:
+    return replace(grade, criteria=tuple(_as_it_counts(result, by_hand.get(result.id)) for result in grade.criteria))
+
+
+def _graded(session: Session, job_ids: Collection[str], read: Callable[[bytes], Recording]) -> _Loaded:
+    heads = _heads(session, job_ids)
+    for job_id, trials in _trials(session, heads, read):
+        yield job_id, _with_criteria(*heads[job_id], trials)
+
+
+def _with_criteria(grade: Grade, rows: Sequence[CriterionResultRow], trials: tuple[TrialResult, ...]) -> Grade:
+    return replace(grade, criteria=tuple(_criterion(row, trials) for row in rows), trials=trials)
+
+
+def _heads(
+    session: Session, job_ids: Collection[str], *options: ORMOption
+) -> dict[str, tuple[Grade, list[CriterionResultRow]]]:
+    """What is read of grades but their trials, by job: all but the criteria, and the rows of these."""
     query = (
         select(Job, SubmissionRow.sha256, Enrolment.student, AssignmentVersion)
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
-        .where(Job.id == job_id)
+        .where(Job.id.in_(job_ids), Job.verdict.is_not(None))
     )
-    found = session.execute(query).one_or_none()
-    if found is None or found[0].verdict is None:
-        raise UsageError(f"{job_id} has no grade")
-    job, sha256, student, version = found
-    rows = session.scalars(
-        select(CriterionResultRow).where(CriterionResultRow.job_id == job_id).order_by(CriterionResultRow.position)
-    )
+    heads = {
+        job.id: (_head(job, sha256, student, version), list[CriterionResultRow]())
+        for job, sha256, student, version in session.execute(query)
+    }
+    rows = select(CriterionResultRow).where(CriterionResultRow.job_id.in_(heads)).options(*options)
+    for row in session.scalars(rows.order_by(CriterionResultRow.job_id, CriterionResultRow.position)):
+        heads[row.job_id][1].append(row)
+    return heads
+
+
+def _head(job: Job, sha256: str, student: str, version: AssignmentVersion) -> Grade:
     return Grade(
         assignment=version.assignment,
         assignment_title=version.title,
         assignment_version=version.version,
         submission=sha256,
         student=student,
-        criteria=tuple(_criterion(row, trials) for row in rows),
-        trials=trials,
+        criteria=(),
+        trials=(),
         sandbox=job.sandbox or "",
         grader_version=job.grader_version or "",
         notes=tuple(job.notes),
@@ -148,29 +201,28 @@ def _load(session: Session, job_id: str, trials: tuple[TrialResult, ...]) -> Gra
     )
 
 
-def load_trials(session: Session, job_id: str) -> tuple[TrialResult, ...]:
-    """The trials of a job with their recordings; none where it has no grade."""
-    from service.store.grades.recordings import from_bytes
+def _trials(
+    session: Session, job_ids: Collection[str], read: Callable[[bytes], Recording]
+) -> Iterator[tuple[str, tuple[TrialResult, ...]]]:
+    query = select(TrialRow).where(TrialRow.job_id.in_(job_ids)).order_by(TrialRow.job_id, TrialRow.position)
+    rows: dict[str, list[TrialRow]] = {}
+    for row in session.scalars(query):
+        rows.setdefault(row.job_id, []).append(row)
+    for job_id, files in artifacts.get_each(session, job_ids, prefix="recording-"):
+        yield job_id, tuple(_trial(row, read(_recording(files, job_id, row.position))) for row in rows.get(job_id, ()))
 
-    return _trials(session, job_id, from_bytes)
 
-
-def _trials(session: Session, job_id: str, read: Callable[[bytes], Recording]) -> tuple[TrialResult, ...]:
-    files = artifacts.get(session, job_id, prefix="recording-")
-    rows = session.scalars(select(TrialRow).where(TrialRow.job_id == job_id).order_by(TrialRow.position))
-    return tuple(
-        TrialResult(
-            scenario=row.scenario,
-            index=row.scenario_index,
-            seed=row.seed,
-            light_noise=row.light_noise,
-            motor_noise=row.motor_noise,
-            visibility=row.visibility,
-            recording=read(_recording(files, job_id, row.position)),
-            sweep=decode(tuple[tuple[str, float], ...], row.sweep),
-            place=row.place,
-        )
-        for row in rows
+def _trial(row: TrialRow, recording: Recording) -> TrialResult:
+    return TrialResult(
+        scenario=row.scenario,
+        index=row.scenario_index,
+        seed=row.seed,
+        light_noise=row.light_noise,
+        motor_noise=row.motor_noise,
+        visibility=row.visibility,
+        recording=recording,
+        sweep=decode(tuple[tuple[str, float], ...], row.sweep),
+        place=row.place,
     )
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
-from sqlalchemy import ColumnElement, delete, exists, func, or_, select, update
+from sqlalchemy import ColumnElement, and_, delete, exists, func, or_, select, true, update
 from sqlalchemy.orm import Session, aliased
 
 from service.store.engine import now
@@ -61,6 +61,7 @@ class Identity:
     roles: Mapping[int, Role]  # by course
     scopes: frozenset[str] | None
     reach: Reach
+    use_is_noted: bool  # within the last hour
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,16 +216,22 @@ def identify(session: Session, secret: str, kind: CredentialKind) -> Identity | 
     row = _valid(session, secret, kind)
     if row is None:
         return None
-    person, reach = session.get_one(Person, row.person_id), _reach(row)
-    query = select(Enrolment.course_id, Enrolment.role).where(Enrolment.person_id == person.id, *_reached(reach))
+    reach = _reach(row)
+    reached = _reached(reach)
+    query = select(Person.operator, Enrolment, and_(*reached) if reached else true())
+    query = query.outerjoin(Enrolment, Enrolment.person_id == Person.id).where(Person.id == row.person_id)
+    known = session.execute(query.order_by(Enrolment.role != Role.INSTRUCTOR, Enrolment.id)).all()
+    in_courses = [(enrolment, is_reached) for _, enrolment, is_reached in known if enrolment is not None]
+    own = [each for each, _ in in_courses if row.course_id in (None, each.course_id)]
     return Identity(
         row.id,
-        person.id,
-        person_name(session, person.id, row.course_id),
-        person.operator and reach.is_everywhere,
-        dict(session.execute(query).all()),
+        row.person_id,
+        _name(row.person_id, [(each.name, each.written) for each in own]),
+        known[0][0] and reach.is_everywhere,
+        {each.course_id: each.role for each, is_reached in in_courses if is_reached},
         None if kind is CredentialKind.SESSION and not reach.scopes else reach.scopes,
         reach,
+        row.used_at is not None and row.used_at >= now(session) - _NOTED_EVERY,
     )
 
 
@@ -279,6 +286,11 @@ def person_name(session: Session, person_id: int, course_id: int | None = None) 
     if course_id is not None:
         query = query.where(Enrolment.course_id == course_id)
     known = session.execute(query.order_by(Enrolment.role != Role.INSTRUCTOR, Enrolment.id)).all()
+    return _name(person_id, [(name, written) for name, written in known])
+
+
+def _name(person_id: int, known: Sequence[tuple[str, str]]) -> str:
+    """The first name among a person's enrolments, else the first id."""
     names = [name for name, _ in known if name] or [written for _, written in known if written]
     return names[0] if names else f"person {person_id}"
 

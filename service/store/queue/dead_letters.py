@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import func, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.store.models import Batch, Course, Enrolment, Job
@@ -55,8 +55,3 @@ def dead_letters(session: Session) -> list[DeadLetter]:
         )
         for job, course, batch in session.execute(query)
     ]
-
-
-def count(session: Session) -> int:
-    """How many there are."""
-    return session.scalar(select(func.count()).select_from(Job).where(Job.state == JobState.DEAD)) or 0

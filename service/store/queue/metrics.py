@@ -30,56 +30,79 @@ _LATELY = timedelta(hours=1)
 
 
 @dataclass(frozen=True, slots=True)
-class ServiceMetrics:
-    """One look at the whole service."""
+class QueueMetrics:
+    """What waits, and whether anybody grades it."""
 
     jobs: Mapping[tuple[Lane, JobState], int]
     claimable: Mapping[Lane, int]
     oldest_seconds: Mapping[Lane, float]  # how long the oldest job that could be claimed has waited
     idle_seconds: float  # since a job was begun or ended; infinite where none was in the last hour
+    workers: Sequence[workers.WorkerLine]
+    silent_seconds: Mapping[str, float]  # by worker, since it was last heard of
+
+    def count(self, state: JobState) -> int:
+        """The number of jobs in a state, of all lanes."""
+        return sum(count for (_, each), count in self.jobs.items() if each is state)
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceMetrics:
+    """One look at the whole service."""
+
+    queue: QueueMetrics
     verdicts: Mapping[str, int]
     host_faults: int  # attempts that ended through no fault of the student's
     unjudged: int  # criteria that could not be judged
     surprises: int  # trials in which our own code stumbled over what a child sent
     plots: Mapping[PlotState, int]
     paused_batches: int
-    workers: Sequence[workers.WorkerLine]
-    silent_seconds: Mapping[str, float]  # by worker, since it was last heard of
     quarantined: int
     times: Mapping[str, Sequence[float]]  # seconds by span, sorted
 
 
 def collect(session: Session) -> ServiceMetrics:
     """All metrics at one moment."""
+    verdicts = select(Job.verdict, func.count()).where(Job.verdict.is_not(None)).group_by(Job.verdict)
+    # Of the attempts of a job that is graded, or is being graded, the last is no fault.
+    good = case((Job.state.in_((JobState.DONE, JobState.RUNNING)), 1), else_=0)
+    plots = select(Job.plots, func.count()).where(Job.plots != PlotState.NONE).group_by(Job.plots)
+    counts = (
+        select(func.sum(Job.attempt - good)).where(Job.attempt > 0),
+        select(func.count()).select_from(CriterionResultRow).where(CriterionResultRow.unjudged.is_not(None)),
+        select(func.count()).select_from(TrialRow).where(TrialRow.surprise.is_not(None)),
+        select(func.count()).select_from(Batch).where(Batch.state == BatchState.PAUSED),
+        select(func.count()).select_from(Worker).where(Worker.quarantined_at.is_not(None)),
+    )
+    faults, unjudged, surprises, paused, quarantined = session.execute(
+        select(*(count.scalar_subquery() for count in counts))
+    ).one()
+    return ServiceMetrics(
+        queue=collect_queue(session),
+        verdicts={verdict: count for verdict, count in session.execute(verdicts) if verdict is not None},
+        host_faults=faults or 0,
+        unjudged=unjudged,
+        surprises=surprises,
+        plots=dict(session.execute(plots).all()),
+        paused_batches=paused,
+        quarantined=quarantined,
+        times=_times(session),
+    )
+
+
+def collect_queue(session: Session) -> QueueMetrics:
+    """The part of them that tells whether the queue stands still."""
     at = now(session)
     by_state = select(Job.lane, Job.state, func.count()).group_by(Job.lane, Job.state)
     waiting = select(Job.lane, func.count(), func.min(Job.queued_at)).where(*claimable(at)).group_by(Job.lane)
     rows = session.execute(waiting).all()
-    verdicts = select(Job.verdict, func.count()).where(Job.verdict.is_not(None)).group_by(Job.verdict)
-    # Of the attempts of a job that is graded, or is being graded, the last is no fault.
-    good = case((Job.state.in_((JobState.DONE, JobState.RUNNING)), 1), else_=0)
-    faults = select(func.sum(Job.attempt - good)).where(Job.attempt > 0)
-    plots = select(Job.plots, func.count()).where(Job.plots != PlotState.NONE).group_by(Job.plots)
-    paused = select(func.count()).select_from(Batch).where(Batch.state == BatchState.PAUSED)
-    quarantined = select(func.count()).select_from(Worker).where(Worker.quarantined_at.is_not(None))
-    unjudged = select(func.count()).select_from(CriterionResultRow).where(CriterionResultRow.unjudged.is_not(None))
-    surprises = select(func.count()).select_from(TrialRow).where(TrialRow.surprise.is_not(None))
     seen = workers.known_workers(session)
-    return ServiceMetrics(
+    return QueueMetrics(
         jobs={(lane, state): count for lane, state, count in session.execute(by_state)},
         claimable={lane: count for lane, count, _ in rows},
         oldest_seconds={lane: max(0.0, (at - oldest).total_seconds()) for lane, _, oldest in rows},
         idle_seconds=_idle_seconds(session, at),
-        verdicts={verdict: count for verdict, count in session.execute(verdicts) if verdict is not None},
-        host_faults=session.scalar(faults) or 0,
-        unjudged=session.scalar(unjudged) or 0,
-        surprises=session.scalar(surprises) or 0,
-        plots=dict(session.execute(plots).all()),
-        paused_batches=session.scalar(paused) or 0,
         workers=seen,
         silent_seconds={each.worker.name: max(0.0, (at - each.seen_at).total_seconds()) for each in seen},
-        quarantined=session.scalar(quarantined) or 0,
-        times=_times(session),
     )
 
 

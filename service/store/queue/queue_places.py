@@ -5,12 +5,12 @@ An estimate: whose turn it really is, is decided by ``scheduling.py`` when a wor
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
 
-from sqlalchemy import ColumnElement, and_, func, or_, select
-from sqlalchemy.orm import InstrumentedAttribute, Session
+from sqlalchemy import and_, case, func, or_, select
+from sqlalchemy.orm import Session
 
 from service.store.engine import now
 from service.store.models import Enrolment, Job
@@ -40,48 +40,54 @@ class QueuePlace:
 
 def queue_place(session: Session, job_id: str) -> QueuePlace:
     """Of a job that waits or runs."""
+    return queue_places(session, [job_id])[job_id]
+
+
+def queue_places(session: Session, job_ids: Collection[str]) -> dict[str, QueuePlace]:
+    """Of several such jobs, in as many statements."""
     at = now(session)
-    job = session.get_one(Job, job_id)
+    jobs = session.scalars(select(Job).where(Job.id.in_(job_ids))).all()
     lively = [seen.worker for seen in workers.known_workers(session) if seen.lately]
-    before = _before(session, job, at) if job.state is JobState.QUEUED else 0
-    each = _usual_seconds(session)
-    if each is None or not lively:
-        return QueuePlace(before, None, len(lively))
-    running = (at - job.started_at).total_seconds() if job.state is JobState.RUNNING and job.started_at else 0.0
-    progress = min(running / each, _MOST_PROGRESS) if each else 0.0
     slots = sum(worker.concurrency for worker in lively)
-    return QueuePlace(before, before * each / slots + each * (1 - progress), len(lively), progress)
+    before, each = _before(session, job_ids, at), _usual_seconds(session)
+    places = {}
+    for job in jobs:
+        ahead = before[job.id] if job.state is JobState.QUEUED else 0
+        if each is None or not lively:
+            places[job.id] = QueuePlace(ahead, None, len(lively))
+            continue
+        running = (at - job.started_at).total_seconds() if job.state is JobState.RUNNING and job.started_at else 0.0
+        progress = min(running / each, _MOST_PROGRESS) if each else 0.0
+        places[job.id] = QueuePlace(ahead, ahead * each / slots + each * (1 - progress), len(lively), progress)
+    return places
 
 
-def _before(session: Session, job: Job, at: datetime) -> int:
+def _before(session: Session, job_ids: Collection[str], at: datetime) -> dict[str, int]:
+    """How many jobs that can be claimed come before each of these, by id."""
     recent = recently_begun(at).cte("recent")
     of_course = shares(recent.c.course_id)
     of_batch, of_student = shares(recent.c.batch_id), shares(recent.c.enrolment_id)
-    keys: list[ColumnElement[Any] | InstrumentedAttribute[Any]] = [
+    order = (
+        Job.lane == Lane.BATCH,
         func.coalesce(of_course.c.begun, 0),
         func.coalesce(of_batch.c.begun, 0),
         func.coalesce(of_student.c.begun, 0),
         Job.queued_at,
         Job.id,
-    ]
-    own = select(*keys).select_from(Job).join(Enrolment, Job.enrolment_id == Enrolment.id)
-    joined = (
-        (of_course, of_course.c.share == Enrolment.course_id),
-        (of_batch, of_batch.c.share == Job.batch_id),
-        (of_student, of_student.c.share == Job.enrolment_id),
     )
-    others = select(func.count()).select_from(Job).join(Enrolment, Job.enrolment_id == Enrolment.id)
-    for share, on in joined:
-        own, others = own.outerjoin(share, on), others.outerjoin(share, on)
-    mine = session.execute(own.where(Job.id == job.id)).one()
-    earlier = [
-        and_(*(key == value for key, value in zip(keys[:number], mine, strict=False)), keys[number] < mine[number])
-        for number in range(len(keys))
-    ]
-    sooner = and_(Job.lane == job.lane, or_(*earlier))
-    if job.lane is Lane.BATCH:
-        sooner = or_(sooner, Job.lane == Lane.INTERACTIVE)
-    return session.scalar(others.where(*claimable(at), Job.id != job.id, sooner)) or 0
+    can_be_claimed, mine = and_(*claimable(at)), Job.id.in_(job_ids)
+    earlier = func.sum(case((can_be_claimed, 1), else_=0)).over(order_by=order, rows=(None, -1))
+    ranked = (
+        select(Job.id, earlier.label("earlier"))
+        .join(Enrolment, Job.enrolment_id == Enrolment.id)
+        .outerjoin(of_course, of_course.c.share == Enrolment.course_id)
+        .outerjoin(of_batch, of_batch.c.share == Job.batch_id)
+        .outerjoin(of_student, of_student.c.share == Job.enrolment_id)
+        .where(or_(can_be_claimed, mine))
+        .subquery()
+    )
+    query = select(ranked.c.id, func.coalesce(ranked.c.earlier, 0)).where(ranked.c.id.in_(job_ids))
+    return dict(session.execute(query).all())
 
 
 def _usual_seconds(session: Session) -> float | None:

@@ -182,9 +182,9 @@ def service(operator: Reads, context: Context) -> ServiceShape:
         lanes=[
             LaneShape(
                 lane=lane,
-                queued=found.jobs.get((lane, JobState.QUEUED), 0),
-                running=found.jobs.get((lane, JobState.RUNNING), 0),
-                oldest_seconds=found.oldest_seconds.get(lane, 0.0),
+                queued=found.queue.jobs.get((lane, JobState.QUEUED), 0),
+                running=found.queue.jobs.get((lane, JobState.RUNNING), 0),
+                oldest_seconds=found.queue.oldest_seconds.get(lane, 0.0),
             )
             for lane in Lane
         ],

@@ -118,8 +118,8 @@ def show_overview(
     at_least: Annotated[int, Query(alias="pass", ge=0, le=100)] = int(PASS_SHARE * 100),
 ) -> Response:
     """What came of a batch: marks, criteria, causes, who is missing, and whom to look at."""
-    _, shown = _batch(here, context, batch_id)
-    found = views.show_overview(context.service, here.acting, here.course_id, batch_id, Decimal(at_least) / 100)
+    table, shown = _batch(here, context, batch_id)
+    found = views.show_overview_of(context.service, here.acting, here.course_id, table, Decimal(at_least) / 100)
     lines = found.lines
     return page(
         request,

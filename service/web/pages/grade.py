@@ -39,7 +39,7 @@ def grade(request: Request, here: Instructing, context: Context, job_id: RowName
         gradings=found.gradings,
         attempts=found.attempts,
         history=newest_first,
-        beside=grade_views.show_neighbours(*asked),
+        beside=found.beside,
         batch_id=found.batch_id,
         put_aside=found.put_aside,
         told=next((entry for entry in newest_first if entry.action == done == "publish"), None),

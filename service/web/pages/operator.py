@@ -35,9 +35,9 @@ def operation(request: Request, reader: Operating, context: Context) -> Response
     lanes = [
         (
             _LANES[lane],
-            view.metrics.jobs.get((lane, JobState.QUEUED), 0),
-            view.metrics.jobs.get((lane, JobState.RUNNING), 0),
-            round(view.metrics.oldest_seconds.get(lane, 0.0)),
+            view.metrics.queue.jobs.get((lane, JobState.QUEUED), 0),
+            view.metrics.queue.jobs.get((lane, JobState.RUNNING), 0),
+            round(view.metrics.queue.oldest_seconds.get(lane, 0.0)),
         )
         for lane in Lane
     ]

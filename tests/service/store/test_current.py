@@ -54,7 +54,7 @@ def _readers(store: Store, batch_id: str | None) -> dict[str, str | None]:
         enrolment_id = session.scalars(select(Enrolment.id)).one()
         of_all = own_work.own_assignments(session, 1, enrolment_id)
         found["own list"] = None if of_all[0].counting is None else of_all[0].counting.job_id
-        own = own_work.counting_submission(session, enrolment_id, "echo-responder")
+        own = own_work.own_attempts(session, enrolment_id, "echo-responder").counting
         found["own page"] = None if own is None else own.job_id
         lines = {"course": batches.course_lines(session, 1, ["echo-responder"])}
         if batch_id is not None:

@@ -95,7 +95,7 @@ def _totals(store: Store, batch: str) -> dict[str, tuple[float, float]]:
         each.get("name"): each.get("value") or ""
         for each in ElementTree.fromstring(_written(FORMATS["junit"].table, rows)).iter("property")
     }
-    body = str(report_body(store, line, student_view(grade)).body)
+    body = str(report_body(store, line.id, line.plots, student_view(grade)).body)
     score = re.search(r"<b>([\d.]+)</b><span>of ([\d.]+) marks", body)
     assert score is not None
     assert line.marks is not None
@@ -304,7 +304,7 @@ def test_a_report_says_what_was_set_why_and_what_was_written(store: Store) -> No
     assert told["comments"] == [
         {"criterion": "", "text": "Well <b>done</b>."}, {"criterion": SHAPE, "text": "Line 3 was right."},
     ]  # fmt: skip
-    body = str(report_body(store, line, student_view(grade)).body)
+    body = str(report_body(store, line.id, line.plots, student_view(grade)).body)
     assert "Well &lt;b&gt;done" in body
     rows = rows_of(store, [line])
     assert _csv(FORMATS["csv"].table, rows)[0][f"marks: {ALOUD}"] == ""

@@ -1,0 +1,96 @@
+"""How many SQL statements each page and each answer of the API takes, however much there is to show."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from sqlalchemy import event
+from starlette.testclient import TestClient
+
+from crowded_world import crowd
+from paths import DATA
+from service.store.engine import Store
+from service.store.grades import plots
+from web import Web, web_in
+from web_world import World, filled, make_world
+
+MOST = 25
+API = "/api/v1/"
+_ROUTES = {
+    route.removeprefix("GET "): who.split()[0]
+    for table in sorted((DATA / "access").glob("*.toml"))
+    for route, who in tomllib.loads(table.read_text()).items()
+    if route.startswith("GET ")
+}
+#: Who asks, for each word of the tables.
+_READERS = {
+    "anybody": ("nobody",),
+    "signed-in": ("ada", "grace", "root"),
+    "student": ("ada",),
+    "owner": ("ada",),
+    "instructor": ("grace",),
+    "operator": ("root",),
+}
+#: What begins a transaction, and what sets a connection of SQLite.
+_NO_STATEMENT = re.compile("BEGIN|PRAGMA")
+
+
+def test_no_route_needs_many_statements_or_more_of_them_the_more_there_is(tmp_path: Path) -> None:
+    with web_in(tmp_path) as web:
+        world = make_world(web)
+        plots.finish(web.store, world.values["job_id"], {"path": b"PNG"})
+        browsers, tokens = _sign_in(web, world)
+        crowd(web, world, range(1))
+        few = {asked: _count(web.store, *asked, browsers, tokens, world) for asked in _all_asked()}
+        crowd(web, world, range(1, 50))
+        many = {asked: _count(web.store, *asked, browsers, tokens, world) for asked in _all_asked()}
+    assert {asked: count for asked, count in many.items() if count > MOST} == {}
+    assert {asked: (few[asked], count) for asked, count in many.items() if count > few[asked]} == {}
+
+
+def _all_asked() -> list[tuple[str, str]]:
+    return [(route, who) for route, allowed in _ROUTES.items() for who in _READERS[allowed]]
+
+
+def _sign_in(web: Web, world: World) -> tuple[dict[str, TestClient], dict[str, dict[str, str]]]:
+    members = {"ada": world.ada, "grace": world.grace, "root": web.operator()}
+    browsers = {"nobody": web.browser(), **{who: web.browser(member) for who, member in members.items()}}
+    scopes = ("read", "submit", "mark", "manage", "sign-in")
+    return browsers, {who: web.token(member, *scopes) for who, member in members.items()}
+
+
+def _count(
+    store: Store,
+    route: str,
+    who: str,
+    browsers: dict[str, TestClient],
+    tokens: dict[str, dict[str, str]],
+    world: World,
+) -> int:
+    path = filled(route, world.values)
+    with _counted(store) as statements:
+        if route.startswith(API):
+            answer = browsers["nobody"].get(path, headers=tokens.get(who, {}))
+        else:
+            answer = browsers[who].get(path)
+    assert answer.status_code in (200, 303, 410, 422, 503), (path, answer.text)
+    return len(statements)
+
+
+@contextmanager
+def _counted(store: Store) -> Iterator[list[str]]:
+    statements: list[str] = []
+
+    def note(_connection: object, _cursor: object, statement: str, *_: object) -> None:
+        if _NO_STATEMENT.match(statement) is None:
+            statements.append(statement)
+
+    event.listen(store.engine, "before_cursor_execute", note)
+    try:
+        yield statements
+    finally:
+        event.remove(store.engine, "before_cursor_execute", note)
