@@ -37,7 +37,6 @@ from service.store.courses.policies import in_days as in_days
 from service.store.grades.marked import marked
 from service.store.models import Batch
 from service.store.queue import metrics, workers
-from service.store.queue.jobs import superseded_by as superseded_by
 from service.store.queue.metrics import Pace
 from service.store.queue.workers import WorkerDescription as WorkerDescription
 from service.store.states import BatchState, JobState, Role

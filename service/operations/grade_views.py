@@ -25,8 +25,7 @@ from service.store.courses.hidden_names import HiddenNames
 from service.store.grades import own_gradings, results
 from service.store.grades.own_gradings import OwnGrading
 from service.store.models import Job
-from service.store.queue.jobs import OVER_A_LIMIT
-from service.store.states import JobState, Role
+from service.store.states import CancelReason, JobState, Role
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +81,7 @@ def show_grade(service: Service, actor: Actor, course_id: int, job_id: str, lang
         history = audit.entries(session, "job", job_id)
         beside = _neighbours(session, row, hidden)
     report = None if view is None else report_body(service.store, whole.id, whole.plots, view)
-    put_aside = line.state is JobState.CANCELLED and line.error == OVER_A_LIMIT
+    put_aside = line.state is JobState.CANCELLED and line.cancelled_for is CancelReason.OVER_LIMIT
     return GradeView(line, row.batch_id, report, change, gradings, attempts, history, put_aside, beside)
 
 

@@ -16,14 +16,14 @@ from sqlalchemy.orm import Session, aliased
 
 from service.grading.grade import Grade
 from service.reports.view import student_view
+from service.store.codec import decode
 from service.store.courses import open_assignments, policies
-from service.store.courses.policies import OverLimit, PolicyLimits
+from service.store.courses.policies import Exceeded, OverLimit, PolicyLimits
 from service.store.engine import now
 from service.store.grades import appeals, current, results
 from service.store.grades.appeals import AppealLine
 from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
-from service.store.queue import jobs
-from service.store.states import UNFINISHED, BatchState, JobState, PlotState, Standing
+from service.store.states import UNFINISHED, BatchState, CancelReason, JobState, PlotState, Standing
 
 #: Of one student and one assignment; a student who submits more often sees the newest.
 MOST_SHOWN = 50
@@ -41,7 +41,8 @@ class OwnSubmission:
     source: str
     submitted_at: datetime
     days_late: int
-    staff_only: str  # the limit that it is over
+    staff_only: str  # the limit that it is over, as a sentence for staff
+    over: OverLimit | None
     same_as: int | None  # the student's first attempt with these files, which is the same attempt
     state: JobState
     held_back: bool  # its batch is paused or called off
@@ -63,11 +64,6 @@ class OwnSubmission:
     def shown(self) -> bool:
         """Whether its student may see its grade."""
         return self.state is JobState.DONE and not self.suspect and not self.staff_only
-
-    @property
-    def over(self) -> OverLimit | None:
-        """Which limit it is over."""
-        return policies.limit_of(self.staff_only)
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,11 +285,12 @@ def _submission(
         submitted_at=row.submitted_at or row.created_at,
         days_late=row.days_late,
         staff_only=row.staff_only or "",
+        over=None if row.exceeded is None else decode(Exceeded, row.exceeded).limit,
         same_as=same_as,
         state=job.state,
         held_back=batch not in (None, BatchState.OPEN),
         suspect=job.suspect is not None,
-        superseded=jobs.superseded_by(job.error) is not None,
+        superseded=job.cancelled_for is CancelReason.SUPERSEDED,
         published=job.published_at is not None,
         plots=job.plots,
         counts=counts,

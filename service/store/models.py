@@ -18,7 +18,7 @@ from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from service.store.columns import ExactDecimal, SafeJson, SafeText, UtcDateTime
 from service.store.ids import LENGTH as ID_LENGTH
 from service.store.ids import new_id
-from service.store.states import BatchState, CredentialKind, JobState, Lane, PlotState, Role, Standing
+from service.store.states import BatchState, CancelReason, CredentialKind, JobState, Lane, PlotState, Role, Standing
 
 
 def _enum(kind: type[StrEnum]) -> Enum:
@@ -52,6 +52,7 @@ class Base(DeclarativeBase):
         CredentialKind: _enum(CredentialKind),
         Lane: _enum(Lane),
         JobState: _enum(JobState),
+        CancelReason: _enum(CancelReason),
         PlotState: _enum(PlotState),
         BatchState: _enum(BatchState),
         Standing: _enum(Standing),
@@ -165,6 +166,7 @@ class SubmissionRow(Base):
     submitted_at: Mapped[datetime | None]  # by the student; None where nobody said
     days_late: Mapped[int] = mapped_column(default=0)
     staff_only: Mapped[str | None]  # the limit that this submission is over: it is marked, and shown to staff alone
+    exceeded: Mapped[Any | None]  # the same limit as data: {"limit": "attempts", "actual": 3, "allowed": 2}
 
 
 _STANDS = text("standing = 'stands'")
@@ -205,6 +207,8 @@ class Job(Base):
     process: Mapped[int | None]  # which of that worker's
     progress: Mapped[float] = mapped_column(default=0.0)  # 0 to 1
     error: Mapped[str | None]  # a sentence, of the last fault of ours or the reason of death
+    cancelled_for: Mapped[CancelReason | None]
+    superseded_by: Mapped[str | None] = mapped_column(String(ID_LENGTH))  # a newer submission's job, where known
 
     queued_at: Mapped[datetime]
     notified_at: Mapped[datetime | None]

@@ -37,7 +37,14 @@ class JobState(StrEnum):
     RUNNING = "running"
     DONE = "done"  # has a grade
     DEAD = "dead"  # could not be graded; ``error`` says why
-    CANCELLED = "cancelled"  # by somebody, or because a newer submission came; ``error`` says which
+    CANCELLED = "cancelled"  # by the intake, which gives a ``CancelReason``, or by staff; ``error`` tells people why
+
+
+class CancelReason(StrEnum):
+    """Why the intake cancelled a job."""
+
+    SUPERSEDED = "superseded"  # by a newer submission
+    OVER_LIMIT = "over limit"  # graded only when staff ask for it
 
 
 UNFINISHED = (JobState.QUEUED, JobState.RUNNING)

@@ -16,7 +16,6 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from service.language import Language, languages
-from service.operations.batch_views import superseded_by
 from service.operations.types import Role
 from service.reports.html import report_script, report_style
 from service.reports.readable import number, readable
@@ -94,7 +93,6 @@ def _environment(language: Language) -> Environment:
     environment.filters["duration"] = _duration
     environment.filters["typed"] = _typed
     environment.globals["zone_now"] = zone_now
-    environment.globals["superseded_by"] = superseded_by
     return environment
 
 

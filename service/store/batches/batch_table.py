@@ -27,7 +27,7 @@ from service.store.models import (
     SubmissionRow,
     TrialRow,
 )
-from service.store.states import JobState
+from service.store.states import CancelReason, JobState
 from submissions.student_identity import Refusal
 
 REFUSED = "refused"
@@ -51,6 +51,8 @@ class TableLine:
     marks: Decimal | None
     max_marks: Decimal
     error: str
+    cancelled_for: CancelReason | None
+    superseded_by: str | None  # the newer submission's job, where it is known
     suspect: str | None
     staff_only: str | None
     days_late: int
@@ -129,6 +131,8 @@ def table_lines(session: Session, batch_id: str, refusals: Sequence[Refusal], hi
             Job.marks,
             func.coalesce(Job.max_marks, AssignmentVersion.max_marks),
             Job.error,
+            Job.cancelled_for,
+            Job.superseded_by,
             Job.suspect,
             SubmissionRow.staff_only,
             SubmissionRow.days_late,
@@ -183,7 +187,8 @@ def remarked(session: Session, lines: Sequence[TableLine]) -> dict[str, Remarked
 
 
 def _line(row: tuple[Any, ...], own_batch: str | None, hidden: HiddenNames) -> TableLine:
-    (job_id, submission_id, student, name, source, assignment, state, verdict, marks, max_marks, error, *rest) = row
+    job_id, submission_id, student, name, source, assignment, state, verdict, marks, max_marks, *rest = row
+    error, cancelled_for, superseded_by, *rest = rest
     suspect, staff_only, days_late, attempt, sha256, started_at, graded_at, published_at, batch_id, newer = rest
     nameless = assignment in hidden.assignments
     took: timedelta | None = None if started_at is None or graded_at is None else graded_at - started_at
@@ -199,6 +204,8 @@ def _line(row: tuple[Any, ...], own_batch: str | None, hidden: HiddenNames) -> T
         marks=marks,
         max_marks=max_marks,
         error=error or "",
+        cancelled_for=cancelled_for,
+        superseded_by=superseded_by,
         suspect=suspect,
         staff_only=staff_only,
         days_late=days_late,
@@ -224,6 +231,8 @@ def _refused(refusal: Refusal) -> TableLine:
         marks=None,
         max_marks=Decimal(0),
         error=refusal.reason,
+        cancelled_for=None,
+        superseded_by=None,
         suspect=None,
         staff_only=None,
         days_late=0,

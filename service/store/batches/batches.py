@@ -27,7 +27,7 @@ from service.store.models import (
     SubmissionRow,
     TrialRow,
 )
-from service.store.states import UNFINISHED, BatchState, JobState, PlotState, Role, Standing
+from service.store.states import UNFINISHED, BatchState, CancelReason, JobState, PlotState, Role, Standing
 from service.store.web_tables import OpenAssignment, Override
 from sim.errors import UsageError
 from submissions.nearest import did_you_mean
@@ -61,6 +61,8 @@ class JobLine:
     accuracy: float | None  # of the first criterion that classifies and is not excused
     attempt: int  # the student's
     error: str | None
+    cancelled_for: CancelReason | None
+    superseded_by: str | None  # the newer submission's job, where it is known
     plots: PlotState
     sandbox: str | None  # what stood around the student's code
     worker: str | None
@@ -388,6 +390,8 @@ def _line(row: Row[*_Asked]) -> JobLine:
         accuracy=accuracy,
         attempt=attempt,
         error=job.error,
+        cancelled_for=job.cancelled_for,
+        superseded_by=job.superseded_by,
         plots=job.plots,
         sandbox=job.sandbox,
         worker=job.worker,

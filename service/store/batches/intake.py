@@ -25,7 +25,7 @@ from service.store.locks import lock_jobs
 from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
 from service.store.people.students import DEFAULT_COURSE, Students, course_of
 from service.store.queue import jobs
-from service.store.states import BatchState, JobState, Lane, Standing
+from service.store.states import BatchState, CancelReason, JobState, Lane, Standing
 from service.store.web_tables import Comment
 from service.version import grader_sha256
 from sim.errors import HostError, UsageError
@@ -352,7 +352,7 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
     ruling = Ruling()
     if not terms.anew:
         ruling = rule(session, enrolment_id, assignment.id, submission.sha256, grading_request.submitted_at)
-    put_aside = bool(ruling.over) and terms.most_bytes is not None
+    put_aside = ruling.over is not None and terms.most_bytes is not None
     if put_aside:
         _forget_put_aside(session, of_student)
     if terms.most_bytes is not None:
@@ -372,7 +372,8 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
         created_at=at,
         submitted_at=grading_request.submitted_at,
         days_late=ruling.days_late,
-        staff_only=ruling.over or None,
+        staff_only=str(ruling.over) if ruling.over else None,
+        exceeded=encode(ruling.over),
     )
     session.add(row)
     session.flush()
@@ -397,7 +398,7 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
     )
     if source is not None:
         jobs.copy(session, job_id, source, at)
-    return Accepted(job_id, row.id, submission.student, assignment.id, row.attempt, source, ruling.over)
+    return Accepted(job_id, row.id, submission.student, assignment.id, row.attempt, source, row.staff_only or "")
 
 
 def _forget_put_aside(session: Session, of_student: tuple[ColumnElement[bool], ...]) -> None:
@@ -406,10 +407,15 @@ def _forget_put_aside(session: Session, of_student: tuple[ColumnElement[bool], .
     Those that have a comment are kept, too.
     """
     own = select(SubmissionRow.id).where(*of_student, SubmissionRow.staff_only.is_not(None))
-    waiting = (Job.submission_id.in_(own), Job.state == JobState.CANCELLED, Job.error == jobs.OVER_A_LIMIT)
+    waiting = (
+        Job.submission_id.in_(own),
+        Job.state == JobState.CANCELLED,
+        Job.cancelled_for == CancelReason.OVER_LIMIT,
+    )
     gone = session.scalars(select(Job.submission_id).where(*waiting)).all()
     # What was graded before, and was asked for again, has other jobs.
-    others = select(Job.submission_id).where(Job.submission_id.in_(gone), Job.error.is_distinct_from(jobs.OVER_A_LIMIT))
+    other_reason = Job.cancelled_for.is_distinct_from(CancelReason.OVER_LIMIT)
+    others = select(Job.submission_id).where(Job.submission_id.in_(gone), other_reason)
     kept = set(session.scalars(others))
     kept.update(session.scalars(select(Comment.submission_id).where(Comment.submission_id.in_(gone))))
     ids = [each for each in gone if each not in kept]

@@ -47,15 +47,33 @@ class PolicyLimits:
         return 0 if self.due_at is None else days_after(self.due_at, submitted_at, self.zone)
 
 
+OverLimit = Literal["attempts", "date", "cool-down"]
+
+
+@dataclass(frozen=True, slots=True)
+class Exceeded:
+    """A limit that a submission is over, and by how much: the attempt, the days late, or the minutes waited."""
+
+    limit: OverLimit
+    actual: int
+    allowed: int
+
+    def __str__(self) -> str:
+        match self.limit:
+            case "attempts":
+                return f"attempt {self.actual}, allowed: {self.allowed}"
+            case "date":
+                return f"{in_days(self.actual)} late, allowed: {self.allowed}"
+            case "cool-down":
+                return f"submitted {self.actual} min after the one before, asked for: {self.allowed} min"
+
+
 @dataclass(frozen=True, slots=True)
 class Ruling:
-    """How many days late a submission is, and the limit that it is over, as a sentence; empty if it is over none."""
+    """How many days late a submission is, and the limit that it is over, if any."""
 
     days_late: int = 0
-    over: str = ""
-
-
-OverLimit = Literal["attempts", "date", "cool-down"]
+    over: Exceeded | None = None
 
 
 def limits(session: Session, enrolment_id: int, assignment: str) -> PolicyLimits:
@@ -102,27 +120,18 @@ def rule(session: Session, enrolment_id: int, assignment: str, sha256: str, subm
     counted = _counted(session, enrolment_id, [assignment]).get(assignment, {})
     earlier = [when for sha, when in counted.items() if sha != sha256]
     if allowed.attempts is not None and len(earlier) >= allowed.attempts:
-        return Ruling(over=f"attempt {len(earlier) + 1}, allowed: {allowed.attempts}")
+        return Ruling(over=Exceeded("attempts", len(earlier) + 1, allowed.attempts))
     if submitted_at is None:
         return Ruling()
     days_late = allowed.days_late(submitted_at)
     if days_late > allowed.late_days:
-        return Ruling(days_late, f"{in_days(days_late)} late, allowed: {allowed.late_days}")
+        return Ruling(days_late, Exceeded("date", days_late, allowed.late_days))
     since = [submitted_at - when for when in earlier if when <= submitted_at]
     if since and min(since).total_seconds() < allowed.cool_down_seconds:
         minutes = math.floor(min(since).total_seconds() / 60)
         asked = math.ceil(allowed.cool_down_seconds / 60)
-        return Ruling(days_late, f"submitted {minutes} min after the one before, asked for: {asked} min")
+        return Ruling(days_late, Exceeded("cool-down", minutes, asked))
     return Ruling(days_late)
-
-
-def limit_of(over: str) -> OverLimit | None:
-    """Which limit a ruling's sentence names."""
-    if not over:
-        return None
-    if over.startswith("attempt "):
-        return "attempts"
-    return "cool-down" if over.startswith("submitted ") else "date"
 
 
 def attempts_made(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, int]:

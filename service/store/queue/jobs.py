@@ -26,16 +26,13 @@ from service.store.models import Job
 from service.store.queue import workers
 from service.store.queue.scheduling import next_job
 from service.store.revision import needs_newer_code
-from service.store.states import JobState, PlotState
+from service.store.states import CancelReason, JobState, PlotState
 from service.version import grader_sha256
 from sim.errors import Cancelled, HostError
 
 if TYPE_CHECKING:
     from service.store.grades import results
 
-_SUPERSEDED = "superseded by "
-#: The error of a job that is put aside.
-OVER_A_LIMIT = "over a limit: it is graded when staff ask for it"
 _LONGEST_BACKOFF = timedelta(hours=1)
 #: Clocks are corrected all the time by less than this.
 _TOLERANCE = timedelta(seconds=2)
@@ -118,27 +115,21 @@ def copy(session: Session, job_id: str, source_id: str, at: datetime) -> None:
 def supersede(session: Session, submissions: Select[int], by: str, at: datetime) -> None:
     """Cancel what waits of these submissions for the job ``by``; but a regrade of what was graded once goes on."""
     which = (Job.regrade_of.is_(None), Job.submission_id.in_(submissions))
-    if _make(session, SUPERSEDE, which, at, {"error": f"{_SUPERSEDED}{by}"}):
+    reason = {"error": f"superseded by {by}", "cancelled_for": CancelReason.SUPERSEDED, "superseded_by": by}
+    if _make(session, SUPERSEDE, which, at, reason):
         outbox.superseded(session, submissions, at)
 
 
 def put_aside(session: Session, job_id: str, at: datetime) -> None:
     """Grade a job that waits only once staff ask for it."""
-    _make(session, PUT_ASIDE, (Job.id == job_id,), at, {"error": OVER_A_LIMIT})
+    sentence = "over a limit: it is graded when staff ask for it"
+    _make(session, PUT_ASIDE, (Job.id == job_id,), at, {"error": sentence, "cancelled_for": CancelReason.OVER_LIMIT})
 
 
 def ask_for(session: Session, job_id: str, at: datetime) -> bool:
     """Let a job wait that was put aside. Returns whether it was."""
-    which = (Job.id == job_id, Job.error == OVER_A_LIMIT)
-    return _make(session, ASK_FOR, which, at, {"error": None}) > 0
-
-
-def superseded_by(error: str | None) -> str | None:
-    """The id of the job that took the place of one with this error; None where none did, "" where it is not known."""
-    if error is None or not error.startswith(_SUPERSEDED):
-        return None
-    told = error.removeprefix(_SUPERSEDED)
-    return told if told.isalnum() else ""
+    which = (Job.id == job_id, Job.cancelled_for == CancelReason.OVER_LIMIT)
+    return _make(session, ASK_FOR, which, at, {"error": None, "cancelled_for": None}) > 0
 
 
 @retry_conflicts

@@ -23,15 +23,17 @@ from service.settings import Settings
 from service.store import artifacts, new_database
 from service.store.backup import back_up, restore
 from service.store.batches import batches, intake
+from service.store.codec import decode
 from service.store.courses import open_assignments, policies
+from service.store.courses.policies import Exceeded
 from service.store.engine import Store, open_engine, open_store
 from service.store.grades import results
 from service.store.migrate import configuration, migrate
-from service.store.models import Artifact, Batch, CriterionResultRow, Enrolment, Job, Person, TrialRow
+from service.store.models import Artifact, Batch, CriterionResultRow, Enrolment, Job, Person, SubmissionRow, TrialRow
 from service.store.queue import jobs
 from service.store.recorded_schema import statements_of
 from service.store.revision import current_revision, newest_revision, revision_of, schema_state
-from service.store.states import JobState, Role, Standing
+from service.store.states import CancelReason, JobState, Role, Standing
 from service.store.web_tables import METADATA, Credential, LtiCourse, LtiPlatform, OpenAssignment
 from sim.errors import HostError
 from submissions.student_identity import Refusal
@@ -211,8 +213,40 @@ def test_what_the_first_tables_called_superseded_is_cancelled(service_settings: 
         connection.execute(text("UPDATE alembic_version SET version_num = '0001'"))
     engine.dispose()
     with open_store(service_settings) as store, store.reading() as session:
-        reasons = session.scalars(select(Job.error).where(Job.state == JobState.CANCELLED)).all()
-    assert reasons == ["superseded by a newer submission"]
+        reasons = session.scalars(select(Job).where(Job.state == JobState.CANCELLED)).all()
+    assert [(each.error, each.cancelled_for, each.superseded_by) for each in reasons] == [
+        ("superseded by a newer submission", CancelReason.SUPERSEDED, None)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("sentence", "exceeded"),
+    [
+        ("attempt 3, allowed: 2", Exceeded("attempts", 3, 2)),
+        ("1 day late, allowed: 0", Exceeded("date", 1, 0)),
+        ("12 days late, allowed: 3", Exceeded("date", 12, 3)),
+        ("submitted 0 min after the one before, asked for: 10 min", Exceeded("cool-down", 0, 10)),
+    ],
+)
+def test_sentences_of_earlier_releases_become_data(
+    service_settings: Settings, tmp_path: Path, sentence: str, exceeded: Exceeded
+) -> None:
+    assert str(exceeded) == sentence
+    engine = lay_first_release(service_settings.database, tmp_path)
+    with engine.begin() as connection:
+        command.upgrade(configuration(connection), "0017")
+        connection.execute(text("UPDATE submission SET staff_only = :sentence"), {"sentence": sentence})
+        aside = {"sentence": "over a limit: it is graded when staff ask for it"}
+        connection.execute(text("UPDATE job SET state = 'cancelled', error = :sentence WHERE state = 'dead'"), aside)
+        assert connection.scalar(text("SELECT count(*) FROM job WHERE error LIKE 'over a limit%'")) == 1
+    engine.dispose()
+    with open_store(service_settings) as store, store.reading() as session:
+        stored = session.scalars(select(SubmissionRow.exceeded)).all()
+        assert {decode(Exceeded, each) for each in stored} == {exceeded}
+        (replaced,) = session.scalars(select(Job).where(Job.cancelled_for == CancelReason.SUPERSEDED))
+        assert replaced.error == f"superseded by {replaced.superseded_by}"
+        assert session.get(Job, replaced.superseded_by) is not None
+        assert session.scalar(select(func.count()).where(Job.cancelled_for == CancelReason.OVER_LIMIT)) == 1
 
 
 def test_what_was_submitted_on_the_web_before_it_had_a_batch_is_in_one(
