@@ -23,7 +23,7 @@ from service.store.grades import results
 from service.store.models import Job, SubmissionRow
 from service.store.queue import jobs
 from service.store.queue.jobs import TRANSITIONS, Claim, Fenced, Retry, Transition
-from service.store.states import JobState
+from service.store.states import CancelReason, JobState
 from sim.errors import HostError
 
 WORKER = "worker"
@@ -74,7 +74,7 @@ def _submissions(subject: Subject) -> Select[int]:
 
 def _ask_for(session: Session, subject: Subject, at: datetime) -> None:
     """As if the job had been cancelled because it is over a limit."""
-    session.execute(update(Job).where(Job.id == subject.job_id).values(error=jobs.OVER_A_LIMIT))
+    session.execute(update(Job).where(Job.id == subject.job_id).values(cancelled_for=CancelReason.OVER_LIMIT))
     jobs.ask_for(session, subject.job_id, at)
 
 
