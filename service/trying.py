@@ -23,8 +23,9 @@ from sim.recorded import faults_of
 from sim.recording import Verdict
 from submissions.assignment.definition import Assignment
 from submissions.criteria.code import SourceRules
+from submissions.part_notes import missing_part_note
 from submissions.seeds import PUBLIC
-from submissions.submission import Submission
+from submissions.submission import PART_FILES, Submission
 from submissions.sweep import NO_SWEEP
 
 #: Simulated; of an assignment that runs shorter, its own.
@@ -83,16 +84,17 @@ def tryout_assignment(assignment: Assignment) -> Assignment | None:
 def run_tryout(submission: Submission, once: Assignment, runner: TrialRunner, observe: Observe) -> TryoutResult:
     """Run a submission in the trial of a ``tryout_assignment``; raises as ``grade`` does."""
     graded = grade(submission, once, secret=PUBLIC, runner=runner, observe=observe)
-    run = replace(graded, criteria=(), hints=(), missing="", notes=_notes(graded))
+    run = replace(graded, criteria=(), hints=(), missing="", notes=_notes(graded, submission))
     replay = replay_of_grade(student_view(run), submission, own_floors(once)) if run.trials else None
     return TryoutResult(run.verdict, _words(run, submission), packed(replay) if replay else None)
 
 
-def _notes(graded: Grade) -> tuple[str, ...]:
+def _notes(graded: Grade, submission: Submission) -> tuple[str, ...]:
     """What a part that is not there means where nothing is marked."""
     if not graded.missing:
         return graded.notes
-    others = tuple(note for note in graded.notes if not note.startswith(f"There is no {graded.missing}"))
+    with_marks = {missing_part_note(part, submission.files) for part in PART_FILES}
+    others = tuple(note for note in graded.notes if note not in with_marks)
     return (*others, f"There is no {graded.missing}: only the part that is there was run.")
 
 

@@ -21,6 +21,7 @@ from submissions.file_kinds import advice_on_kind, advice_on_names, is_compiled
 from submissions.marked_run import named_run, runs_of
 from submissions.names import LONGEST_NAME, shown_name
 from submissions.notebook import is_script, read_notebook, read_script
+from submissions.part_notes import PART_WORDS, missing_part_note, taken_for_note
 from submissions.raw_files import RawFiles, read_folder, read_single_file, read_zip, shown
 from submissions.source_text import decode_source
 from submissions.submission import (
@@ -41,9 +42,6 @@ if TYPE_CHECKING:
 
 _NAMES: Mapping[str, Part] = MappingProxyType(
     {"robot.py": "program", "program.py": "program", "responder.py": "responder"}
-)
-_WORDS: Mapping[Part, Sentence] = MappingProxyType(
-    {"program": Sentence("a robot program"), "responder": Sentence("a responder")}
 )
 _NOTEBOOK = ".ipynb"
 _LOOKS_LIKE_RESPONDER = re.compile(
@@ -126,11 +124,11 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
         lone = parts[submitted[0]]
         if lone is not None and lone.name.lower() not in _NAMES:
             parts = {submitted[0]: None, wanted[0]: lone}
-            notes = [note for note in notes if not note.startswith(f"{shown(lone.name)} was taken for")]
-            notes.append(f"{shown(lone.name)} was taken for {_WORDS[wanted[0]]}.")
+            notes = [note for note in notes if note != taken_for_note(lone.name, submitted[0])]
+            notes.append(taken_for_note(lone.name, wanted[0]))
     missing = [part for part in wanted if parts.get(part) is None]
     files = [PART_FILES[part] for part in missing]
-    needed = [_needed(PART_FILES[part], _WORDS[part]) for part in wanted]
+    needed = [_needed(PART_FILES[part], PART_WORDS[part]) for part in wanted]
     if asked.second_program == "student":
         needed.append(_needed(SECOND_PROGRAM, Sentence("the second robot's program")))
         files += [SECOND_PROGRAM] if SECOND_PROGRAM not in submission.files else []
@@ -143,13 +141,10 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
             expected=listed(needed),
             renamed=advice_on_names(missing, submission.files),
         )
-    for part in missing:
-        others = [shown(name) for name in submission.files if name.lower().endswith(".py")]
-        beside = f" (beside it lies {', '.join(others[:3])})" if others else ""
-        notes.append(f"There is no {PART_FILES[part]}{beside}; what needs {_WORDS[part]} has no marks.")
+    notes += [missing_part_note(part, submission.files) for part in missing]
     for part, source in parts.items():
         if source is not None and part not in wanted:
-            notes.append(f"{shown(source.name)} was left out: {_WORDS[part]} is not asked for.")
+            notes.append(f"{shown(source.name)} was left out: {PART_WORDS[part]} is not asked for.")
             parts[part] = None
     fitted = dataclasses.replace(submission, program=parts.get("program"), responder=parts.get("responder"))
     notes += [f"{name} is empty." for name in empty_parts(fitted)]
@@ -209,12 +204,13 @@ def _with_agents(submission: Submission, asked: Parts, where: str) -> Submission
         return submission
     program, responder = submission.program, submission.responder
     files, notes = dict(submission.files), list(submission.notes)
-    for part in (program, responder):
-        if part is not None and agent_of(part.name, asked.agents):
-            files[part.name] = part.text.encode("utf-8", "surrogatepass")
-            notes = [note for note in notes if not note.startswith(f"{shown(part.name)} was taken for")]
-            program = None if part is program else program
-            responder = None if part is responder else responder
+    parts: dict[Part, Code | None] = {"program": program, "responder": responder}
+    for part, code in parts.items():
+        if code is not None and agent_of(code.name, asked.agents):
+            files[code.name] = code.text.encode("utf-8", "surrogatepass")
+            notes = [note for note in notes if note != taken_for_note(code.name, part)]
+            program = None if part == "program" else program
+            responder = None if part == "responder" else responder
     for name in [
         each for each in files if asked.agents.get(agent_of(each, asked.agents) or "", "student") != "student"
     ]:
@@ -368,7 +364,7 @@ def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alo
     if len(python) == 1 or (len(python) == 2 and all(len(names) == 1 for names in looks.values())):
         found: dict[Part, str] = {part: names[0] for part, names in looks.items() if names}
         for part, name in found.items():
-            notes.append(f"{shown(name)} was taken for {_WORDS[part]}.")
+            notes.append(taken_for_note(name, part))
         return found
     found_names = ", ".join(shown(name) for name in sorted(files)[:5])
     advice = advice_on_kind(sorted(files))

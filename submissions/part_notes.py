@@ -1,0 +1,29 @@
+"""The notes on which file was taken for which part, and on parts that are not there.
+
+Whoever drops or replaces such a note makes it again to find it, so no code reads its words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from sim.sentences import Sentence
+from submissions.raw_files import shown
+from submissions.submission import PART_FILES, Part
+
+PART_WORDS: Mapping[Part, Sentence] = MappingProxyType(
+    {"program": Sentence("a robot program"), "responder": Sentence("a responder")}
+)
+
+
+def taken_for_note(name: str, part: Part) -> str:
+    """Return the note that a file was taken for a part although it is not called so."""
+    return f"{shown(name)} was taken for {PART_WORDS[part]}."
+
+
+def missing_part_note(part: Part, files: Mapping[str, bytes]) -> str:
+    """Return the note that a part is missing; ``files`` lie beside the parts."""
+    others = [shown(name) for name in files if name.lower().endswith(".py")]
+    beside = f" (beside it lies {', '.join(others[:3])})" if others else ""
+    return f"There is no {PART_FILES[part]}{beside}; what needs {PART_WORDS[part]} has no marks."
