@@ -162,10 +162,9 @@ class Agents:
         """The recording with what the agents have printed and written until they were ended."""
         return replace(recording, agent_outputs=tuple(self._outputs))
 
-    def failed(self, name: str, fault: Fault, slept: int) -> Told:
+    def failed(self, name: str, fault: Fault, why: str, slept: int) -> Told:
         """What an asker is told of an agent's fault, which is kept unless an asker may have brought it about."""
         process = self._processes[name]
-        why = fault.message.removeprefix(f"the {name} was stopped: ").removeprefix("RuntimeError: ")
         sentence = f"{name} gave no answer: {why}"
         if not process.given or not process.alive:
             self.faults.append(fault)
@@ -235,11 +234,12 @@ class AgentProcess(ResponderProcess):
         try:
             self._child.send({"do": "asked", "t": t, "arguments": question["arguments"], "named": question["named"]})
             return self._read(self._until("returned"))
-        except ChildStopped as stop:
-            fault = self._stopped(stop, t + self._slept)
+        except ChildStopped as stopped:
+            stop = stopped
         except Exception as error:
-            fault = self._stopped(surprise(error), t + self._slept)
-        told = self._all.failed(self._who, fault, self._slept)
+            stop = surprise(error)
+        fault = self._stopped(stop, t + self._slept)
+        told = self._all.failed(self._who, fault, stop.message, self._slept)
         self._ended = replace(told, slept=0)
         return told
 
@@ -259,6 +259,9 @@ class AgentProcess(ResponderProcess):
                 return Told("value", text, self._slept)
             case {"kind": "error", "error": error}:
                 fault = error_fault(error, self._asked_at + self._slept, self._who)
+                # A RuntimeError tells an asker of another agent's fault; only the first cause is passed on.
+                why = str(error["text"] or fault.message) if error["type"] == "RuntimeError" else fault.message
+                return self._all.failed(self._who, fault, why, self._slept)
             case {"kind": "other", "type": kind}:
                 sentence = f"the {self._who} returned {kind[:_LONGEST_TYPE]}, which no message can hold"
                 fault = self._protocol_fault(self._asked_at, sentence)
@@ -267,7 +270,7 @@ class AgentProcess(ResponderProcess):
                 fault = self._protocol_fault(self._asked_at, sentence)
             case _:
                 raise ChildStopped(Verdict.SANDBOX_VIOLATION, "it sent an answer without its content")
-        return self._all.failed(self._who, fault, self._slept)
+        return self._all.failed(self._who, fault, sentence, self._slept)
 
 
 def _content(text: str, kind: type) -> Any:
