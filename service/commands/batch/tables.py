@@ -99,9 +99,7 @@ def history_table(history: Sequence[AuditEntry]) -> Table:
 
 
 def _worth_a_row(change: Change) -> bool:
-    return (
-        change.differs or bool(change.criteria) or change.state is not JobState.DONE or "unexplained" in change.reason
-    )
+    return change.differs or bool(change.criteria) or change.state is not JobState.DONE or change.is_unexplained
 
 
 def _criterion(change: CriterionChange) -> str:

@@ -26,6 +26,7 @@ from service.store.states import UNFINISHED, JobState, Lane, Standing
 from sim.errors import UsageError
 
 _CHANGES_A_PAGE = 50
+_UNEXPLAINED = "unexplained: other recordings from the same assignment and grader; robomark verify both"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +67,7 @@ class Change:
     after_max: Decimal | None
     criteria: tuple[CriterionChange, ...]
     reason: str
+    is_unexplained: bool  # other recordings, although nothing that they depend on differs
 
     @property
     def differs(self) -> bool:
@@ -246,6 +248,7 @@ def _proposal(job: Job, version_id: int | None, batch_id: str | None, lane: Lane
 
 
 def _change(session: Session, after: Job, before: Job, student: str) -> Change:
+    reason = _reason(session, before, after)
     return Change(
         student=student,
         job_id=after.id,
@@ -257,7 +260,8 @@ def _change(session: Session, after: Job, before: Job, student: str) -> Change:
         before_max=before.max_marks,
         after_max=after.max_marks,
         criteria=_criteria(session, before.id, after.id) if after.state is JobState.DONE else (),
-        reason=_reason(session, before, after),
+        reason=reason or _UNEXPLAINED,
+        is_unexplained=reason is None,
     )
 
 
@@ -279,8 +283,8 @@ def _worth(line: CriterionMarks | None) -> tuple[Decimal, Decimal] | None:
     return None if line is None else (line.marks, line.max_marks)
 
 
-def _reason(session: Session, before: Job, after: Job) -> str:
-    """Why the grades may differ: everything that differs between the two gradings."""
+def _reason(session: Session, before: Job, after: Job) -> str | None:
+    """Why the grades may differ: everything that differs between the two gradings; None where nothing explains it."""
     if after.state is not JobState.DONE:
         return after.error or after.state.value
     reasons = []
@@ -299,7 +303,7 @@ def _reason(session: Session, before: Job, after: Job) -> str:
         reasons.append("the earlier worker was found to grade wrongly")
     if not reasons and _chains(session, before.id) != _chains(session, after.id):
         # The same grader and assignment owe the same recordings: somebody has to look.
-        return "unexplained: other recordings from the same assignment and grader; robomark verify both"
+        return None
     return ", ".join(reasons) or "nothing changed"
 
 
