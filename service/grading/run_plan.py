@@ -34,7 +34,6 @@ from submissions.source_text import modules_of
 from submissions.submission import SECOND_PROGRAM, Notebook, Part, Submission
 
 _MEGABYTE = 1 << 20
-_IGNORED = "the program's magic line is ignored"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,11 +84,7 @@ class RunPlan:
     second_program: ProgramSpec | None = None  # where there are two robots
     second_flags: Flags = field(default_factory=Flags)
     ran: Mapping[Part, RanStatements] = field(default_factory=lambda: MappingProxyType({}))  # of parts that are watched
-
-    @property
-    def ignored_magic(self) -> str:
-        """Why the program's magic line is ignored; empty where it is not."""
-        return next((note.removeprefix(f"{_IGNORED}: ") for note in self.notes if note.startswith(_IGNORED)), "")
+    ignored_magic: str = ""  # why a program's magic line is ignored
 
     @property
     def processes(self) -> tuple[ProgramSpec | ResponderSpec, ...]:
@@ -166,18 +161,20 @@ def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
         asked = replace(asked, responder="none")
     code = _part("robot program", "robot.py", asked.program, submission.program, assignment)
     responder = _part("responder", "responder.py", asked.responder, submission.responder, assignment)
-    flags, text, notes = _flags(code.text, assignment) if code is not None else (Flags(), "", ())
+    head = _read_head(code.text, assignment) if code is not None else _Head(Flags(), "", ())
+    notes = head.notes
     if submission.responder is not None and responder is not submission.responder:
         notes += ("your responder is not used: this assignment brings its own, or none",)
     files = _files(submission, assignment, asked.program)
-    program = _program(Code(code.name, text), flags, files, assignment) if code is not None else None
+    program = _program(Code(code.name, head.text), head.flags, files, assignment) if code is not None else None
     beside = _responder(responder, _files(submission, assignment, asked.responder), assignment)
-    plan = _beside_each_other(ProgramTrial(), program, flags, beside, assignment, notes)
+    plan = _beside_each_other(ProgramTrial(), program, head.flags, beside, assignment, notes)
     if missing == "program" and (asking := _stand_in(assignment)) is not None:
         asked_by = "your responder was asked by a program of Robomark's own, which only sends the texts"
         plan = replace(plan, program=asking, notes=(*plan.notes, asked_by))
     # What is sent to a responder that is not there is a message all the same.
-    return replace(plan, missing=missing, collaborative=plan.collaborative or missing == "responder")
+    collaborative = plan.collaborative or missing == "responder"
+    return replace(plan, missing=missing, collaborative=collaborative, ignored_magic=head.ignored)
 
 
 def _stand_in(assignment: Assignment) -> ProgramSpec | None:
@@ -195,27 +192,29 @@ def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignm
     if asked.program == "none":
         return _executed(submission, notebook, assignment, None, Flags(), ())
     if asked.program != "student":
-        flags, text, notes = _flags(assignment.given_parts[asked.program], assignment)
-        return _executed(submission, notebook, assignment, Code(asked.program, text), flags, notes)
+        head = _read_head(assignment.given_parts[asked.program], assignment)
+        plan = _executed(submission, notebook, assignment, Code(asked.program, head.text), head.flags, head.notes)
+        return replace(plan, ignored_magic=head.ignored)
     choice = choose_run(notebook, assignment, submission.run)
     site, cell = choice.site, choice.run.program
-    flags, text, notes = _flags(cell.source if cell is not None else "", assignment)
+    head = _read_head(cell.source if cell is not None else "", assignment)
     if asked.responder == "student":
         # A line that cannot be read is told by its execution, which may come to another cell.
-        notes = tuple(note for note in notes if not note.startswith(_IGNORED))
+        notes = () if head.ignored else head.notes
         if cell is not None:
             again = "" if site.cell == cell.number else f", as it is run again by cell {site.cell}"
             marked = f"the robot program in cell {cell.number} of {notebook.name} is marked{again}"
             notes = (marked, *choice.notes, *notes)
-        return _executed(submission, notebook, assignment, Code(notebook.name, text), flags, notes, choice)
+        return _executed(submission, notebook, assignment, Code(notebook.name, head.text), head.flags, notes, choice)
     if cell is None:
         raise UsageError(f"{notebook.name}: has no cell that begins with %%sim_magic_preloaded, expected one.")
     responder = _part("responder", "responder.py", asked.responder, None, assignment)
     files = _files(submission, assignment, asked.program)
-    program = _program(Code(f"cell {cell.number}", text), flags, files, assignment)
+    program = _program(Code(f"cell {cell.number}", head.text), head.flags, files, assignment)
     beside = _responder(responder, _files(submission, assignment, asked.responder), assignment)
-    notes += (f"of {notebook.name} only the robot program in cell {cell.number} is run", *choice.notes)
-    return _beside_each_other(ProgramTrial(cell.number), program, flags, beside, assignment, notes)
+    notes = (*head.notes, f"of {notebook.name} only the robot program in cell {cell.number} is run", *choice.notes)
+    plan = _beside_each_other(ProgramTrial(cell.number), program, head.flags, beside, assignment, notes)
+    return replace(plan, ignored_magic=head.ignored)
 
 
 def _beside_each_other(
@@ -290,9 +289,16 @@ def _with_second_program(plan: RunPlan, submission: Submission) -> RunPlan:
         return replace(plan, second_program=plan.program, second_flags=plan.flags, collaborative=True)
     code = _part("second robot program", SECOND_PROGRAM, who, submission.code(SECOND_PROGRAM), assignment)
     assert code is not None
-    flags, text, notes = _flags(code.text, assignment)
-    program = _program(Code(code.name, text), flags, _files(submission, assignment, who), assignment)
-    return replace(plan, second_program=program, second_flags=flags, collaborative=True, notes=(*plan.notes, *notes))
+    head = _read_head(code.text, assignment)
+    program = _program(Code(code.name, head.text), head.flags, _files(submission, assignment, who), assignment)
+    return replace(
+        plan,
+        second_program=program,
+        second_flags=head.flags,
+        collaborative=True,
+        notes=(*plan.notes, *head.notes),
+        ignored_magic=plan.ignored_magic or head.ignored,
+    )
 
 
 def _part(what: str, usual: str, who: str, submitted: Code | None, assignment: Assignment) -> Code | None:
@@ -305,13 +311,24 @@ def _part(what: str, usual: str, who: str, submitted: Code | None, assignment: A
     return submitted
 
 
-def _flags(text: str, assignment: Assignment) -> tuple[Flags, str, tuple[str, ...]]:
-    """The flags of the program's first line, its text, and notes where the assignment decides otherwise."""
+@dataclass(frozen=True, slots=True)
+class _Head:
+    """A program's flags, its text after its magic line, notes on both, and why that line is ignored, if it is."""
+
+    flags: Flags
+    text: str
+    notes: tuple[str, ...]
+    ignored: str = ""
+
+
+def _read_head(text: str, assignment: Assignment) -> _Head:
+    """Take a program's magic line apart; a note tells where the assignment decides otherwise."""
     try:
         flags, text = split_program(text)
         wanted = setup(flags)
     except UsageError as error:
-        return Flags(), without_magic(text), (f"{_IGNORED}: {error}",)
+        note = f"the program's magic line is ignored: {error}"
+        return _Head(Flags(), without_magic(text), (note,), str(error))
     world = assignment.world
     notes = []
     if "b" in flags.values and wanted.background != world.background:
@@ -321,7 +338,7 @@ def _flags(text: str, assignment: Assignment) -> tuple[Flags, str, tuple[str, ..
         notes.append(f"the program asks for the robot {wanted.robot}; the assignment's is {world.robot}")
     if flags.values.keys() & {"N", "M"}:
         notes.append("the assignment's noise is used, not the program's -N or -M")
-    return flags, text, tuple(notes)
+    return _Head(flags, text, tuple(notes))
 
 
 def _files(submission: Submission, assignment: Assignment, who: str) -> Mapping[str, bytes]:
