@@ -6,6 +6,7 @@ Faults of the responder do not end a program, so they are no business of this mo
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,12 +27,8 @@ def judge_finishes(criterion: Finishes, trial: TrialResult) -> Outcome:
     fault = cut(recording)
     measures = (Measure("time", recording.end_t, "s"),)
     if fault is not None:
-        return failed(
-            f"Expected the program to end by itself, but {_ended(fault)}.",
-            fault.t,
-            recording.end,
-            measures=measures,
-        )
+        message = f"Expected the program to end by itself, but {_ended(fault)}."
+        return replace(failed(message, fault.t, recording.end, measures=measures), tells_end=True)
     if criterion.seconds is not None and recording.end_t > criterion.seconds + 1e-9:
         return failed(
             f"Expected the program to end within {criterion.seconds:g} s, but it took {recording.end_t:.2f} s.",

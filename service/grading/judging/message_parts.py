@@ -61,10 +61,8 @@ def shown_words(message: str) -> str:
 def early_end(trial: TrialResult, outcome: Outcome | None = None) -> str:
     """Why the run ended before its time, unless the outcome tells already."""
     fault = cut(trial.recording)
-    if fault is None or (outcome is not None and fault_words(fault) in outcome.message):
+    if fault is None or (outcome is not None and outcome.tells_end):
         return ""
     if fault.verdict is Verdict.TIME_LIMIT:
-        if outcome is not None and "still running" in outcome.message:
-            return ""
         return f" The program was still running when the time was up, at {fault.t:g} s."
     return f" The run ended early, at {fault.t:.2f} s."

@@ -32,6 +32,7 @@ class Outcome:
     pose: Pose | None = None
     measures: tuple[Measure, ...] = ()
     for_staff: str = ""  # where somebody should look, which no student is told
+    tells_end: bool = False  # the message says already why the run ended early
 
 
 def passed(

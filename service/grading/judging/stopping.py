@@ -6,6 +6,7 @@ The end of a run is the last tick that was reached; motors that are still on do 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 from typing import Literal
 
@@ -28,12 +29,9 @@ def judge_stop_on(criterion: StopOn, trial: TrialResult) -> Outcome:
     recording = trial.recording
     fault = cut(recording)
     if fault is not None and fault.verdict is not Verdict.PROGRAM_ERROR:
-        return failed(
-            f"Expected the robot to stop {_wanted(criterion)}, but its program was still running after "
-            f"{recording.end_t:.2f} s.",
-            recording.end_t,
-            recording.end,
-        )
+        wanted, end_t = _wanted(criterion), recording.end_t
+        message = f"Expected the robot to stop {wanted}, but its program was still running after {end_t:.2f} s."
+        return replace(failed(message, end_t, recording.end), tells_end=fault.verdict is Verdict.TIME_LIMIT)
     if not len(recording.ticks):
         return failed(f"Expected the robot to stop {_wanted(criterion)}, but it never moved: no time passed.")
     sides: tuple[Side, ...] = ("left", "right") if criterion.sensor == "either" else (criterion.sensor,)
