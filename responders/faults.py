@@ -53,6 +53,24 @@ def stopped(stop: ChildStopped, who: str, now: int) -> Fault:
     return _fault(now, verdict, who, sentence, stop.line, staff=cause, file=stop.file or "")
 
 
+#: How the sentence begins of a responder that returns something else than a text.
+_RETURNED = "the responder returned "
+
+
+def returned_sentence(what: str) -> str:
+    """Return the sentence of the fault of a responder that returned ``what`` instead of a text."""
+    return f"{_RETURNED}{what}"
+
+
+def is_no_text(fault: Fault) -> bool:
+    """Return whether a responder gave something else than a text.
+
+    A stored recording has the sentence alone, and a further field would change its form: so it is read here, beside
+    where it is made, and nowhere else.
+    """
+    return fault.verdict is Verdict.PROTOCOL_ERROR and fault.message.startswith(_RETURNED)
+
+
 def error_fault(error: Mapping[str, Any], now: int, who: str) -> Fault:
     """What a child said of an exception, as a fault; running out of memory is a limit, not a mistake in a line."""
     out_of_memory = error["type"] == "OSError" and error["text"].startswith(f"[Errno {errno.ENOMEM}]")

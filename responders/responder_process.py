@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from responders import message_format, wire
 from responders.conversation import Answer
-from responders.faults import error_fault, refusal, stopped, surprise
+from responders.faults import error_fault, refusal, returned_sentence, stopped, surprise
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import ServedChild
@@ -156,7 +156,7 @@ class ResponderProcess:
             case _:
                 what = f"{frame['type'][:_MOST_SHOWN]} instead of a text; an answer has to be a str"
                 hint = _FORGOT_RETURN if frame["type"] == "NoneType" else _MAKE_JSON
-        return Answer(fault=self._protocol_fault(t, f"the responder returned {what}", hint))
+        return Answer(fault=self._protocol_fault(t, returned_sentence(what), hint))
 
     def _protocol_fault(self, t: int, sentence: str, hint: str = "") -> Fault:
         agent = "" if self._who == "responder" else self._who

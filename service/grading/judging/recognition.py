@@ -15,6 +15,7 @@ from statistics import fmean
 from typing import Literal
 
 from models.intervals import wilson
+from responders.faults import is_no_text
 from service.grading.grade import (
     Accuracy,
     AccuracyCurve,
@@ -34,7 +35,7 @@ from service.grading.judging.outcome import earned
 from service.grading.judging.patterns import Sample, by_pattern
 from service.grading.judging.text_tokens import LabelFinder
 from service.grading.judging.truths import NO_IMAGE, missing_truth, nameable, shown_in
-from sim.recording import Image, Line, Message, Recording, Verdict
+from sim.recording import Image, Line, Message, Recording
 from submissions.assignment.definition import Assignment
 from submissions.criteria.recognition import Recognition
 
@@ -95,7 +96,7 @@ def _silence(recording: Recording, answers: Answers, question: int, came: Sequen
     if sent is not None and sent.note == "lost":
         return Reply("unanswered", None, "the image was lost on its way")
     fault = answers.fault_after(question)
-    if fault is not None and fault.verdict is Verdict.PROTOCOL_ERROR and "the responder returned" in fault.message:
+    if fault is not None and is_no_text(fault):
         return Reply("malformed", None, answers.silence(question))
     return Reply("unanswered", None, answers.silence(question))
 
