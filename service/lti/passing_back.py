@@ -11,7 +11,6 @@ from service.store.grades import current
 from service.store.models import AssignmentVersion, Enrolment, Job, SubmissionRow
 from service.store.people import lti
 from service.store.people.lti import CourseLink
-from service.store.states import Standing
 from sim.errors import UsageError
 
 
@@ -46,7 +45,7 @@ def _published(session: Session, link: CourseLink, course_id: int, assignment: s
             Enrolment.course_id == course_id,
             SubmissionRow.assignment == assignment,
             SubmissionRow.id.in_(current.counting(SubmissionRow.assignment == assignment)),
-            Job.standing == Standing.STANDS,
+            *current.CAN_COUNT,
             Job.published_at.is_not(None),
         )
         .order_by(SubmissionRow.id)

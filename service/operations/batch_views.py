@@ -34,12 +34,13 @@ from service.store.courses import open_assignments
 from service.store.courses.hidden_names import HiddenNames
 from service.store.courses.open_assignments import CourseAssignment
 from service.store.courses.policies import in_days as in_days
+from service.store.grades import current
 from service.store.grades.marked import marked
 from service.store.models import Batch
 from service.store.queue import metrics, workers
 from service.store.queue.metrics import Pace
 from service.store.queue.workers import WorkerDescription as WorkerDescription
-from service.store.states import BatchState, JobState, Role
+from service.store.states import BatchState, Role
 
 if TYPE_CHECKING:
     from service.operations.batches import SubmittedBatch
@@ -267,7 +268,7 @@ def changes_page(service: Service, actor: Actor, course_id: int, batch_id: str, 
 
 def is_graded(line: TableLine) -> bool:
     """Whether the row has a grade that counts."""
-    return line.state == JobState.DONE and line.staff_only is None
+    return current.is_for_students(line)
 
 
 def _overview(

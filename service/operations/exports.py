@@ -20,7 +20,8 @@ from service.reports.rows import TableRow
 from service.reports.written import file_stems, refused_stems
 from service.store.batches import batches, publishing
 from service.store.batches.batches import JobLine as JobLine
-from service.store.states import JobState, Role
+from service.store.grades import current
+from service.store.states import Role
 from submissions.raw_files import shown
 
 _TYPES: Mapping[str, str] = MappingProxyType(
@@ -149,7 +150,7 @@ def _format(request: ExportRequest) -> Format:
 
 
 def _is_for_staff(line: JobLine) -> bool:
-    return line.state is JobState.DONE and line.suspect is None and line.staff_only is not None
+    return current.is_trusted(line) and not current.is_for_students(line)
 
 
 def _files(chosen: Format, rows: Sequence[TableRow[Grade]]) -> list[tuple[str, str]]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from decimal import Decimal
 
-from sqlalchemy import ColumnElement, Select, func, literal, or_, select, tuple_
+from sqlalchemy import ColumnElement, Select, and_, func, literal, or_, select, tuple_
 from sqlalchemy.orm import Session, aliased
 
 from service.grading.grade import Grade
@@ -50,6 +50,7 @@ class OwnSubmission:
     superseded: bool
     published: bool  # whether all of the grade is released
     plots: PlotState
+    shown: bool  # whether its student may see its grade
     counts: bool  # whether its marks are those of its assignment
     released: frozenset[str] = frozenset()  # the visibilities that its student sees
     marks: Decimal | None = None
@@ -59,11 +60,6 @@ class OwnSubmission:
     def waits(self) -> bool:
         """Whether something is still to come."""
         return self.state in UNFINISHED
-
-    @property
-    def shown(self) -> bool:
-        """Whether its student may see its grade."""
-        return self.state is JobState.DONE and not self.suspect and not self.staff_only
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +198,7 @@ def allowances(session: Session, enrolment_id: int, assignments: Collection[str]
     }
 
 
-_Submissions = Select[SubmissionRow, Job, str, BatchState | None, int | None, bool]
+_Submissions = Select[SubmissionRow, Job, str, BatchState | None, int | None, bool, bool]
 
 
 def _attempts(enrolment_id: int, assignment: ColumnElement[str], *also: ColumnElement[bool]) -> _Submissions:
@@ -250,7 +246,15 @@ def _submissions(enrolment_id: int) -> _Submissions:
         .scalar_subquery()
     )
     return (
-        select(SubmissionRow, Job, AssignmentVersion.title, Batch.state, same_as, _counts(enrolment_id))
+        select(
+            SubmissionRow,
+            Job,
+            AssignmentVersion.title,
+            Batch.state,
+            same_as,
+            and_(*current.CAN_COUNT),
+            _counts(enrolment_id),
+        )
         .join(Job, Job.submission_id == SubmissionRow.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
         .outerjoin(Batch, Job.batch_id == Batch.id)
@@ -273,7 +277,7 @@ def _marked(found: OwnSubmission, grade: Grade, released: frozenset[str]) -> Own
 
 
 def _submission(
-    row: SubmissionRow, job: Job, title: str, batch: BatchState | None, same_as: int | None, counts: bool
+    row: SubmissionRow, job: Job, title: str, batch: BatchState | None, same_as: int | None, shown: bool, counts: bool
 ) -> OwnSubmission:
     return OwnSubmission(
         id=row.id,
@@ -293,6 +297,7 @@ def _submission(
         superseded=job.cancelled_for is CancelReason.SUPERSEDED,
         published=job.published_at is not None,
         plots=job.plots,
+        shown=shown,
         counts=counts,
     )
 

@@ -16,9 +16,10 @@ from service.grading.outliers import MarksAndTime, Outlier, outliers
 from service.grading.statistics import AssignmentStatistics, MarksBin, distribution, statistics_of
 from service.store.batches.batch_table import REFUSED, TableLine
 from service.store.courses.hidden_names import HiddenNames
+from service.store.grades import current
 from service.store.grades.marked import marked
 from service.store.models import Enrolment, SubmissionRow
-from service.store.states import JobState, Role
+from service.store.states import Role
 from submissions.student_identity import Student
 
 
@@ -38,7 +39,7 @@ def overview(
     session: Session, course_id: int, lines: Sequence[TableLine], pass_share: Decimal, hidden: HiddenNames
 ) -> tuple[ClassOverview, ...]:
     """Of the rows of a batch, by assignment."""
-    graded = [line for line in lines if line.state == JobState.DONE and line.staff_only is None]
+    graded = [line for line in lines if current.is_for_students(line)]
     found = []
     counted = marked(session, graded)
     for statistics in statistics_of(counted):

@@ -13,7 +13,7 @@ from sqlalchemy import Select, select
 from sqlalchemy.orm import Session
 
 from service.store.engine import now
-from service.store.grades import overrides
+from service.store.grades import current, overrides
 from service.store.locks import lock_jobs, lock_submissions
 from service.store.models import CriterionResultRow, Job, SubmissionRow
 from service.store.states import UNFINISHED, JobState, Standing
@@ -62,7 +62,7 @@ def would_publish(session: Session, batch_id: str) -> Publication:
 
 def unpublished_regrades(session: Session, batch_id: str) -> int:
     """How many submissions of a batch have a regrade that is done and does not stand yet."""
-    proposed = (Job.standing == Standing.PROPOSED, Job.state == JobState.DONE, Job.suspect.is_(None))
+    proposed = (Job.standing == Standing.PROPOSED, *current.IS_TRUSTED)
     query = select(Job.submission_id).where(Job.submission_id.in_(_of_batch(batch_id)), *proposed).distinct()
     return len(session.scalars(query).all())
 
@@ -137,7 +137,7 @@ def _stands(jobs: Sequence[Job], unjudged: Set[str]) -> tuple[Job | None, list[J
     The newest regrade replaces the job that stands, whatever the age of that, and every older proposal. One not graded
     yet, or ``unjudged``, stays a proposal.
     """
-    done = [job for job in jobs if job.state is JobState.DONE and job.suspect is None and job.id not in unjudged]
+    done = [job for job in jobs if current.is_trusted(job) and job.id not in unjudged]
     proposed = [job for job in done if job.standing is Standing.PROPOSED]
     if not proposed:
         return next((job for job in done if job.standing is Standing.STANDS), None), []

@@ -16,9 +16,8 @@ from service.grading.ranks import RankTable, StudentMeasures, ranked
 from service.store.batches.batches import JobLine
 from service.store.codec import decode
 from service.store.courses.versions import assignment_from_bytes
-from service.store.grades import overrides
+from service.store.grades import current, overrides
 from service.store.models import AssignmentVersion, CriterionResultRow, Job
-from service.store.states import JobState
 
 if TYPE_CHECKING:
     from submissions.criteria.timing import Ranking
@@ -29,7 +28,7 @@ _AT_ONCE = 1000
 
 def rank_tables(session: Session, lines: Sequence[JobLine]) -> list[RankTable]:
     """What is ranked among these jobs, over all that are graded, not excused, and not for staff alone."""
-    graded = [line for line in lines if line.state is JobState.DONE and line.staff_only is None]
+    graded = [line for line in lines if current.is_for_students(line)]
     asked: dict[tuple[str, str], Ranking] = {}
     for content in _contents(session, graded):
         # Most assignments rank nothing, and reading one whole takes longer than everything else here.

@@ -15,8 +15,7 @@ from service.similarity.writing import source_of
 from service.store.batches import intake
 from service.store.batches.batches import JobLine
 from service.store.engine import Store
-from service.store.grades import results
-from service.store.states import JobState
+from service.store.grades import current, results
 
 #: Submissions that are compared while somebody waits for the answer; it takes some seconds.
 MOST_AT_ONCE = 300
@@ -49,7 +48,7 @@ class SourceTexts:
 
 
 def _of_one(store: Store, lines: Sequence[JobLine], given: Path | None) -> Similarity:
-    graded = [line.id for line in lines if line.state is JobState.DONE and line.suspect is None]
+    graded = [line.id for line in lines if current.is_trusted(line)]
     with store.reading() as session:
         assignment = intake.load_assignment(session, lines[0].id)
         left_out = given_with(assignment, given)

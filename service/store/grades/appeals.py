@@ -14,9 +14,10 @@ from sqlalchemy.orm import Session
 from service.store import audit, outbox
 from service.store.courses.hidden_names import HiddenNames
 from service.store.engine import now
+from service.store.grades import current
 from service.store.locks import lock_submissions
 from service.store.models import AssignmentVersion, Enrolment, Job, SubmissionRow
-from service.store.states import JobState, Standing
+from service.store.states import Standing
 from service.store.web_tables import Appeal
 from sim.errors import UsageError
 
@@ -43,14 +44,9 @@ class AppealLine:
 
 def may_appeal(session: Session, submission_id: int) -> bool:
     """Whether there is a grade that its student may see."""
-    standing = select(Job.id).where(
-        Job.submission_id == submission_id,
-        Job.standing == Standing.STANDS,
-        Job.state == JobState.DONE,
-        Job.suspect.is_(None),
-    )
-    row = session.get(SubmissionRow, submission_id)
-    return row is not None and row.staff_only is None and session.scalar(standing) is not None
+    seen = select(Job.id).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+    seen = seen.where(SubmissionRow.id == submission_id, *current.CAN_COUNT)
+    return session.scalar(seen) is not None
 
 
 def ask(session: Session, submission_id: int, text: str) -> int:

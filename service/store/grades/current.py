@@ -1,9 +1,12 @@
-"""The attempt that counts: of each student and assignment one, whichever way it was submitted. Defined here alone.
+"""Which grades are shown, and the attempt that counts: of each student and assignment one. Defined here alone.
 
-It is the newest that is graded, not suspect, and over no limit. Every page, export and gradebook asks this module.
+A grade is trusted, seen by its student, or can count: each is a predicate and an SQL expression of the same, which a
+test compares. The attempt that counts is the newest that can, whichever way it was submitted.
 """
 
 from __future__ import annotations
+
+from typing import Protocol
 
 from sqlalchemy import ColumnElement, Select, Subquery, and_, case, func, or_, select, tuple_
 from sqlalchemy.orm import aliased
@@ -11,13 +14,50 @@ from sqlalchemy.orm import aliased
 from service.store.models import Job, SubmissionRow
 from service.store.states import JobState, Standing
 
-#: What holds of a submission and the job that stands for it, where it can count.
-CAN_COUNT: tuple[ColumnElement[bool], ...] = (
-    SubmissionRow.staff_only.is_(None),
-    Job.standing == Standing.STANDS,
-    Job.state == JobState.DONE,
-    Job.suspect.is_(None),
-)
+#: What holds of a job that has a grade, and whose worker has not been found to grade wrongly.
+IS_TRUSTED: tuple[ColumnElement[bool], ...] = (Job.state == JobState.DONE, Job.suspect.is_(None))
+#: What holds of a job beside its submission where students may be shown the grade, once it stands.
+IS_FOR_STUDENTS: tuple[ColumnElement[bool], ...] = (*IS_TRUSTED, SubmissionRow.staff_only.is_(None))
+#: What holds of a job beside its submission where its student may see the grade, and it can count.
+CAN_COUNT: tuple[ColumnElement[bool], ...] = (*IS_FOR_STUDENTS, Job.standing == Standing.STANDS)
+
+
+class JobOutcome(Protocol):
+    """What tells whether there is a grade to rely on: a job, or a line that is read of one."""
+
+    @property
+    def state(self) -> str: ...  # noqa: D102
+    @property
+    def suspect(self) -> str | None: ...  # noqa: D102
+
+
+class AttemptOutcome(JobOutcome, Protocol):
+    """The same with the limit that the submission is over."""
+
+    @property
+    def staff_only(self) -> str | None: ...  # noqa: D102
+
+
+class StandingOutcome(AttemptOutcome, Protocol):
+    """The same with what the job is to its submission."""
+
+    @property
+    def standing(self) -> Standing: ...  # noqa: D102
+
+
+def is_trusted(job: JobOutcome) -> bool:
+    """As ``IS_TRUSTED``."""
+    return job.state == JobState.DONE and job.suspect is None
+
+
+def is_for_students(attempt: AttemptOutcome) -> bool:
+    """As ``IS_FOR_STUDENTS``."""
+    return is_trusted(attempt) and attempt.staff_only is None
+
+
+def can_count(attempt: StandingOutcome) -> bool:
+    """As ``CAN_COUNT``."""
+    return is_for_students(attempt) and attempt.standing is Standing.STANDS
 
 
 def counting(*which: ColumnElement[bool]) -> Select[int]:

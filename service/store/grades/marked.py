@@ -10,9 +10,8 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.grading.statistics import MarkedCriterion, MarkedSubmission, marks_out_of_all
-from service.store.grades import overrides
+from service.store.grades import current, overrides
 from service.store.models import CriterionResultRow
-from service.store.states import JobState
 
 #: How many jobs are asked for at once: databases take so many values, and not every number of them.
 _AT_ONCE = 1000
@@ -36,12 +35,14 @@ class MarkedLine(Protocol):
     @property
     def max_marks(self) -> Decimal: ...  # noqa: D102
     @property
+    def suspect(self) -> str | None: ...  # noqa: D102
+    @property
     def staff_only(self) -> str | None: ...  # noqa: D102
 
 
 def marked(session: Session, lines: Sequence[MarkedLine]) -> list[MarkedSubmission]:
     """Those of the jobs that are graded, not for staff alone, and not excused altogether."""
-    graded = [line for line in lines if line.state == JobState.DONE and line.staff_only is None]
+    graded = [line for line in lines if current.is_for_students(line)]
     criteria: dict[str, list[MarkedCriterion]] = {line.id: [] for line in graded}
     worths = dict.fromkeys(criteria, Decimal(0))
     for begin in range(0, len(graded), _AT_ONCE):

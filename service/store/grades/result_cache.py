@@ -13,8 +13,9 @@ from sqlalchemy import exists, insert, literal, select
 from sqlalchemy.orm import Session
 
 from service.store import phases
+from service.store.grades import current
 from service.store.models import Artifact, AssignmentVersion, CriterionResultRow, Job, SubmissionRow, TrialRow, Worker
-from service.store.states import JobState, PlotState
+from service.store.states import PlotState
 
 #: How far such a trial came depends on the machine and its load, so another run may differ.
 _NOT_REPEATABLE = ("cpu_limit", "memory_limit", "stalled", "host_error")
@@ -49,8 +50,7 @@ def find(session: Session, key: str) -> str | None:
         select(Job.id)
         .where(
             Job.cache_key == key,
-            Job.state == JobState.DONE,
-            Job.suspect.is_(None),
+            *current.IS_TRUSTED,
             Job.copied_from.is_(None),
             # The key fixes the sandbox's policy; these say that both layers stood.
             Job.sandbox.contains("Landlock"),

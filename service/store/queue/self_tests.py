@@ -15,10 +15,11 @@ from sqlalchemy.orm import Session
 
 from service.store import audit
 from service.store.engine import Store, now, retry_conflicts
+from service.store.grades import current
 from service.store.locks import lock_jobs, lock_submissions
 from service.store.models import Batch, Job, SelfTest, SubmissionRow, Worker
 from service.store.queue import jobs
-from service.store.states import BatchState, JobState, Lane, Standing
+from service.store.states import BatchState, Lane, Standing
 from service.version import GRADER_VERSION, grader_sha256
 
 _FORGOTTEN = timedelta(days=30)
@@ -107,7 +108,7 @@ def _suspects(session: Session, worker: str) -> Sequence[Job]:
         .correlate(Job)
         .scalar_subquery()
     )
-    graded = (Job.worker == worker, Job.state == JobState.DONE, Job.copied_from.is_(None), Job.suspect.is_(None))
+    graded = (Job.worker == worker, *current.IS_TRUSTED, Job.copied_from.is_(None))
     own = select(Job.id).where(*graded, or_(last.is_(None), Job.finished_at > last))
     ids = session.scalars(own).all()
     which = or_(Job.id.in_(ids), Job.copied_from.in_(ids))

@@ -220,7 +220,7 @@ def _batch(here: InCourse, context: WebContext, batch_id: str) -> tuple[TableVie
         "nameless": found.nameless,
         "waiting_regrades": found.waiting_regrades,
         "history": found.history,
-        "to_publish": sum(each.published_at is None and each.suspect is None for each in graded),
+        "to_publish": sum(each.published_at is None for each in graded),
         "actions": _ACTIONS,
         **_far(here, found.view),
     }

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 from datetime import UTC, datetime
 
 import pytest
-from sqlalchemy import select
+from sqlalchemy import select, update
 
 import acting
 import report_builders
 from builders import grading_request
+from service.batch_rows import why_not_shown
 from service.lti import passing_back
 from service.lti.services import Score
 from service.operations import own_work
@@ -20,7 +22,7 @@ from service.store.courses import policies
 from service.store.courses.hidden_names import HiddenNames
 from service.store.courses.policies import PolicyLimits
 from service.store.engine import Store
-from service.store.grades import overrides, results
+from service.store.grades import current, overrides, results
 from service.store.models import Enrolment, Job, SubmissionRow
 from service.store.people import lti
 from service.store.people.students import course_of
@@ -129,6 +131,30 @@ def test_all_readers_name_the_same_attempt_after_any_history(store: Store, seed:
             )
             expected = session.scalars(query.limit(1)).one_or_none()
         assert set(_readers(store, first.id).values()) == {expected}
+
+
+def test_predicates_and_expressions_say_the_same_of_every_outcome(store: Store) -> None:
+    """Of each state, standing, suspicion and limit; a table's reason is empty for the same grades."""
+    made = itertools.product(JobState, Standing, (None, "it adds wrongly"), (None, "attempt 3, allowed: 2"))
+    pairs = {
+        current.is_trusted: current.IS_TRUSTED,
+        current.is_for_students: current.IS_FOR_STUDENTS,
+        current.can_count: current.CAN_COUNT,
+    }
+    job_id = _submit(store, "one")
+    for state, standing, suspect, staff_only in made:
+        lease = "a lease" if state is JobState.RUNNING else None
+        with store.transaction() as session:
+            session.execute(update(Job).values(state=state, standing=standing, suspect=suspect, lease=lease))
+            session.execute(update(SubmissionRow).values(staff_only=staff_only))
+        with store.reading() as session:
+            line = batches.job_line(session, job_id)
+            asked = [select(Job.id).join(SubmissionRow).where(*which) for which in pairs.values()]
+            found = [session.scalar(query) is not None for query in asked]
+        assert [is_so(line) for is_so in pairs] == found, line
+        assert (why_not_shown(line) == "") == current.is_for_students(line), line
+        counts = state is JobState.DONE and standing is Standing.STANDS and suspect is None and staff_only is None
+        assert current.can_count(line) == counts, line
 
 
 def test_an_earlier_attempt_is_not_passed_back_where_all_of_the_newest_is_excused(
