@@ -1,7 +1,7 @@
-"""Classifiers that Robomark brings: how they are trained, what they can do, and their weights.
+"""Classifiers packaged with Robomark: training, evaluation and weights.
 
-A file of weights is a pickle, so our own processes load only those whose hash stands on the card beside them; what
-students submit is loaded inside their own process.
+Weights files are pickles. Robomark's own processes load only files whose hash matches the card beside them. Models
+submitted by students are loaded inside the sandbox.
 """
 
 from models.cards import Card, card, names, weights_bytes

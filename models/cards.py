@@ -1,6 +1,6 @@
-"""Model cards: what a classifier was trained on, how good it is, and which bytes it is.
+"""Model cards: training data, accuracy and file hash of each packaged classifier.
 
-A card lies beside its weights as JSON. Reading one loads no model.
+Each card is a JSON file beside the weights. Reading a card does not load the model.
 """
 
 from __future__ import annotations
@@ -21,44 +21,44 @@ Confusion = tuple[tuple[int, ...], ...]
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """How many of ``n`` images were named rightly."""
+    """Number of correctly identified images among ``n``."""
 
     right: int
     n: int
 
     @property
     def share(self) -> float:
-        """The part of the images that was named rightly, 0 to 1; 0 without images."""
+        """Share of correctly identified images, 0 to 1; 0 without images."""
         return self.right / self.n if self.n else 0.0
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The 95 % interval of the share, by Wilson."""
+        """Wilson 95 % confidence interval of the share."""
         return wilson(self.right, self.n)
 
 
 @dataclass(frozen=True, slots=True)
 class CardCurve:
-    """Tallies while one condition is varied and the rest stays as ``under`` says."""
+    """Accuracy over the values of one varied condition; ``under`` describes the fixed conditions."""
 
     varied: str
     unit: str
     under: str
     values: tuple[float, ...]  # ascending
-    tallies: tuple[Tally, ...]  # one a value
+    tallies: tuple[Tally, ...]  # one per value
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What a test of a classifier found."""
+    """Results of testing a classifier."""
 
-    accuracy: Tally  # of everything in the confusion
-    confusion: Confusion  # rows are the truth, columns what was answered
+    accuracy: Tally  # all images of the confusion matrix
+    confusion: Confusion  # rows: true class, columns: predicted class
     curves: tuple[CardCurve, ...]
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Measured:
-        """From what ``asdict`` and JSON have made of one."""
+        """Build an instance from the JSON form of ``asdict``."""
         curves = tuple(
             CardCurve(
                 curve["varied"],
@@ -74,7 +74,7 @@ class Measured:
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """What there is to know about a classifier."""
+    """Description of a packaged classifier."""
 
     name: str
     file: str
@@ -88,15 +88,15 @@ class Card:
     classes: tuple[str, ...]
     measured: Measured
     libraries: Mapping[str, str]
-    sha256: str  # of the weights file
+    sha256: str  # SHA-256 of the weights file
 
     def to_json(self) -> str:
-        """Text that does not change unless the card does."""
+        """Return the card as JSON. Equal cards give equal text."""
         return json.dumps(asdict(self), indent=1, sort_keys=True) + "\n"
 
     @classmethod
     def from_json(cls, text: str) -> Card:
-        """The card that ``to_json`` made this text of."""
+        """Parse a card from the text that ``to_json`` returns."""
         data = json.loads(text)
         data["classes"] = tuple(data["classes"])
         data["measured"] = Measured.from_json(data["measured"])
@@ -108,21 +108,29 @@ def _folder() -> Traversable:
 
 
 def names() -> tuple[str, ...]:
-    """The classifiers that are packaged."""
+    """Return the names of the packaged classifiers."""
     return tuple(
         sorted(entry.name.removesuffix(".json") for entry in _folder().iterdir() if entry.name.endswith(".json"))
     )
 
 
 def card(name: str) -> Card:
-    """The card of a packaged classifier. Raises UsageError if there is none of that name."""
+    """Return the card of a packaged classifier.
+
+    Raises:
+        UsageError: No classifier has this name.
+    """
     if name not in names():
         raise UsageError(f"there is no model called {name!r}; expected one of {', '.join(names())}")
     return Card.from_json((_folder() / f"{name}.json").read_text())
 
 
 def weights_bytes(name: str) -> bytes:
-    """The weights file of a packaged classifier. Raises HostError if it is not the one that its card describes."""
+    """Return the weights file of a packaged classifier.
+
+    Raises:
+        HostError: The file does not match the hash on its card.
+    """
     about = card(name)
     data = (_folder() / about.file).read_bytes()
     if hashlib.sha256(data).hexdigest() != about.sha256:

@@ -1,6 +1,7 @@
-"""Fitting a small convolutional network and writing it down, so that training again gives the same bytes.
+"""Reproducible training and export of a small convolutional network.
 
-What it is trained on is the business of ``families/``; the process is set up by ``training.py``.
+The training data are defined in ``families/``. ``training.py`` sets up the process so that training again gives the
+same bytes.
 """
 
 from __future__ import annotations
@@ -19,25 +20,31 @@ from models.preprocessing import Vector
 
 _DECIMALS = 4
 _BATCH = 100
-_WARM_UP = 200  # steps until the whole step size is used
-#: Of Adam: how much of the mean slope and of the mean square of the slopes stays from step to step.
+_WARM_UP = 200  # number of warm-up steps before the full step size
+#: Decay rates of Adam's moving averages: gradient and squared gradient.
 _MEAN, _SQUARE = 0.9, 0.999
 
 
 @dataclass(frozen=True, slots=True)
 class Convolution:
-    """Three layers of filters (5 x 5 and halved, 3 x 3, 3 x 3), a hidden layer and one of the classes; an ONNX file."""
+    """Convolutional network with three filter layers, a hidden layer and an output layer, saved as ONNX.
+
+    The filters are 5 x 5 (followed by 2 x 2 max pooling), 3 x 3 and 3 x 3.
+    """
 
     filters: tuple[int, int, int]
     hidden: int
     passes: int
-    step: float  # the largest of Adam; it falls with a cosine to 0
-    decay: float  # the part of a weight that goes, at that step, with each unit of step
-    forget: float  # the share of numbers before the hidden layer that each step does without
+    step: float  # maximum step size of Adam; it falls to 0 along a cosine
+    decay: float  # weight decay per unit of step size
+    forget: float  # dropout rate before the hidden layer
     seed: int
 
     def fit(self, images: Vector, labels: NDArray[np.int64]) -> bytes:
-        """The file of a network for ``images`` of shape (n, inputs) and their class numbers, its weights rounded."""
+        """Train a network and return it as a file with rounded weights.
+
+        ``images`` has shape (n, inputs); ``labels`` are their class numbers.
+        """
         chance = np.random.default_rng(self.seed)
         side, classes = math.isqrt(images.shape[1]), int(labels.max()) + 1
         layers = self._layers(side, classes, chance)
@@ -54,12 +61,12 @@ class Convolution:
             descent.step([slopes for layer in layers for slopes in layer.slopes], size)
         for layer in layers:
             for weights in layer.weights:
-                # So that last bits do not show.
+                # Rounding hides differences in the last bits.
                 weights[...] = np.round(weights, _DECIMALS)
         return onnx_file(layers, side, classes)
 
     def architecture(self, inputs: int, classes: int) -> str:
-        """The layers in words."""
+        """Describe the layers in words."""
         side = math.isqrt(inputs)
         first, second, third = self.filters
         return (
@@ -87,7 +94,7 @@ class Convolution:
 
 
 class _Descent:
-    """Adam (D. Kingma, J. Ba, ICLR 2015) with decay of the weights (I. Loshchilov, F. Hutter, ICLR 2019)."""
+    """Adam (D. Kingma, J. Ba, ICLR 2015) with weight decay (I. Loshchilov, F. Hutter, ICLR 2019)."""
 
     def __init__(self, weights: Sequence[Floats], decay: float) -> None:
         self._weights, self._decay, self._steps = weights, decay, 0
@@ -95,7 +102,7 @@ class _Descent:
         self._squares = [np.zeros_like(each) for each in weights]
 
     def step(self, slopes: Sequence[Floats], size: float) -> None:
-        """Take one step down ``slopes``, one a weight."""
+        """Update each weight by one step along the negative gradients in ``slopes``."""
         self._steps += 1
         corrected = size * math.sqrt(1 - _SQUARE**self._steps) / (1 - _MEAN**self._steps)
         for weights, slope, mean, square in zip(self._weights, slopes, self._means, self._squares, strict=True):
@@ -107,7 +114,7 @@ class _Descent:
 
 
 def _slopes(layers: Sequence[Layer], images: Floats, labels: NDArray[np.int64]) -> None:
-    """Let every layer have the slopes of the mean cross entropy of its softmax over ``images``."""
+    """Compute the gradients of the mean softmax cross entropy over ``images`` and store them in each layer."""
     values = images
     for layer in layers:
         values = layer.forward(values)

@@ -1,6 +1,6 @@
-"""Measures a classifier: how often it names rightly what a robot sees, and how that falls as conditions get harder.
+"""Evaluation of classifiers: accuracy on simulated sensor images, and its decline under harder conditions.
 
-It draws nothing; tables and plots of what was found are the service's.
+This module only measures. Tables and plots are made in ``service``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _DEGREES: tuple[float, ...] = (-8, -5, -3, -2, -1, -0.5, 0, 0.5, 1, 2, 3, 5, 8)
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """One image of the test: where it was taken, what it shows, and what it was taken for."""
+    """One test image: its place, true class and predicted class."""
 
     place: LabelledPose
     noise: float
@@ -35,13 +35,13 @@ class Answered:
 
     @property
     def right(self) -> bool:
-        """Whether the image was taken for what it shows."""
+        """Return whether the prediction is correct."""
         return self.answer == self.place.label
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """What was measured here and now, beside what the card says; ``answered`` are the images in the confusion."""
+    """A new measurement beside the card; ``answered`` holds the images of the confusion matrix."""
 
     card: Card
     measured: Measured
@@ -49,14 +49,18 @@ class Evaluation:
 
 
 def evaluate(name: str) -> Evaluation:
-    """Run the packaged classifier over its whole test. Raises UsageError for an unknown name."""
+    """Run the packaged classifier over its whole test.
+
+    Raises:
+        UsageError: No classifier has this name.
+    """
     about = card(name)
     measured, answered = measure(tasks()[name], read(about.file, weights_bytes(name)))
     return Evaluation(about, measured, answered)
 
 
 def measure(task: Task, network: Network) -> tuple[Measured, tuple[Answered, ...]]:
-    """The whole test of ``task``, and the images that its accuracy counts."""
+    """Run the whole test of ``task`` and return the results and the images that count for its accuracy."""
     with Photographer() as photographer:
         answered = tuple(_accuracy(task, network, photographer))
         curves = tuple(_curves(task, network, photographer))

@@ -1,6 +1,6 @@
-"""What the robot's left light sensor sees at a pose on a floor, as it is in a trial: drive, camera and noise included.
+"""Images of the robot's left light sensor at given poses, made with the drive, camera and noise of a trial.
 
-A place says what is there to be named; who names it is ``evaluation.py``'s business.
+Each pose has the class of the object shown there; ``evaluation.py`` compares it with the prediction.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sim.world import Chain, Noise, World
 
 @dataclass(frozen=True, slots=True)
 class LabelledPose:
-    """Where the robot stands to see one thing, on which floor, and the number of that thing's class."""
+    """Pose of the robot on a floor, and the class number of the object that its sensor sees."""
 
     background: str
     sheet: int
@@ -31,7 +31,7 @@ class LabelledPose:
 
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """How far beside a place the robot stands, mm and degrees, and how noisy its light sensor is, grey levels."""
+    """Offset of the robot from a pose (mm and degrees), and noise of the light sensor (grey levels)."""
 
     x: float = 0.0
     y: float = 0.0
@@ -40,11 +40,11 @@ class Shift:
 
 
 class Photographer:
-    """A robot that is put down at places. Use it as a context manager."""
+    """Robot that takes images at given poses. Use it as a context manager."""
 
     def __init__(self) -> None:
         self._arena = Arena(())
-        # A test goes through its sheets, six at most, once for each value that it varies.
+        # The test visits up to six sheets, once for each value of a varied condition.
         self._cameras = Cameras(most=6)
         self._robot = robot("Default_Robot")
 
@@ -58,7 +58,7 @@ class Photographer:
         self._arena.close()
 
     def image(self, place: LabelledPose, shift: Shift, seed: int = 0) -> Grey:
-        """The grey focus of the left light sensor, shape (14, 14)."""
+        """Return the grey focus of the left light sensor, shape (14, 14)."""
         pose = Pose(place.pose.x + shift.x, place.pose.y + shift.y, place.pose.heading + shift.heading)
         camera = self._cameras.camera(_ground(place).pixels)
         world = World(self._robot, self._arena, camera, pose, Noise(light=shift.noise), seed, Chain())
@@ -67,7 +67,7 @@ class Photographer:
     def draws(
         self, places: Sequence[LabelledPose], shift: Shift, name: str, draws: int
     ) -> Iterator[tuple[LabelledPose, Grey]]:
-        """Every place ``draws`` times, each time with noise of its own that ``name`` decides; once without noise."""
+        """Yield every place ``draws`` times, each with its own noise seeded by ``name``; once without noise."""
         for number, place in enumerate(places):
             for draw in range(draws if shift.noise > 0 else 1):
                 yield place, self.image(place, shift, Stream(0, f"{name}:{shift}:{number}:{draw}").integer(0) >> 1)

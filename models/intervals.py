@@ -1,6 +1,6 @@
-"""How sure a share is that was counted: the interval of Wilson.
+"""Wilson confidence interval of a proportion.
 
-It knows counts only, not what was counted.
+The module works on counts alone.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ _Z95 = 1.959963984540054
 
 
 def wilson(right: int, count: int) -> tuple[float, float]:
-    """The 95 % interval of a share (Wilson, J. Am. Stat. Assoc. 22 (1927) 209); 0 to 1 for no trials at all."""
+    """Return the 95 % interval of a proportion (Wilson, J. Am. Stat. Assoc. 22 (1927) 209); (0, 1) without trials."""
     if count == 0:
         return 0.0, 1.0
     share = right / count
     square = _Z95 * _Z95
     middle = (share + square / (2 * count)) / (1 + square / count)
     half = _Z95 * math.sqrt(share * (1 - share) / count + square / (4 * count * count)) / (1 + square / count)
-    # At the ends the interval touches them exactly; rounding must not push it past.
+    # The interval includes 0 or 1 exactly at the extremes; rounding must not exclude them.
     low = 0.0 if right == 0 else max(middle - half, 0.0)
     high = 1.0 if right == count else min(middle + half, 1.0)
     return low, high

@@ -1,7 +1,7 @@
-"""The layers of a small convolutional network on numpy: what they make of images, and the slopes of their weights.
+"""Layers of a small convolutional network on numpy: forward pass and gradients.
 
-Numbers are float32, images of shape (n, height, width, channels); a layer keeps what its last ``forward`` saw until
-``backward``. How many there are and how they are fitted stands in ``convolutions.py``.
+Values are float32; images have shape (n, height, width, channels). A layer keeps the input of its last ``forward`` call
+until ``backward``. ``convolutions.py`` combines the layers and trains them.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ Floats = NDArray[np.float32]
 
 
 class Layer(ABC):
-    """One step from images to scores."""
+    """One layer of a network."""
 
-    weights: tuple[Floats, ...] = ()  # changed in place while it is fitted
-    slopes: tuple[Floats, ...] = ()  # of what is minimised, one a weight, after ``backward``
+    weights: tuple[Floats, ...] = ()  # updated in place during training
+    slopes: tuple[Floats, ...] = ()  # gradient of the loss for each weight, set by ``backward``
 
     @abstractmethod
     def forward(self, values: Floats) -> Floats:
-        """What the layer makes of ``values``."""
+        """Return the output of the layer for the input ``values``."""
 
     @abstractmethod
     def backward(self, slopes: Floats) -> Floats:
-        """The slopes of what is minimised at the layer's input, from those at its output."""
+        """Return the gradient of the loss at the layer's input, given the gradient at its output."""
 
 
 class Filters(Layer):
-    """Filters of ``side`` x ``side`` at every pixel, with ``margin`` pixels of zeroes round the image."""
+    """Convolution with ``side`` x ``side`` filters and ``margin`` pixels of zero padding."""
 
     def __init__(self, side: int, channels: int, filters: int, margin: int, chance: Generator) -> None:
         self.side, self.margin = side, margin
@@ -61,7 +61,7 @@ class Filters(Layer):
 
 
 class Halving(Layer):
-    """The largest of each 2 x 2 pixels; height and width are even."""
+    """Max pooling over 2 x 2 pixels. Height and width must be even."""
 
     def forward(self, values: Floats) -> Floats:
         self._upper = values[:, 0::2] >= values[:, 1::2]
@@ -75,7 +75,7 @@ class Halving(Layer):
 
 
 class Positive(Layer):
-    """What is negative becomes 0 (ReLU)."""
+    """ReLU activation: negative values become 0."""
 
     def forward(self, values: Floats) -> Floats:
         self._positive = values > 0
@@ -86,7 +86,7 @@ class Positive(Layer):
 
 
 class Flat(Layer):
-    """Each image as one row of numbers."""
+    """Flatten each image to a row of numbers."""
 
     def forward(self, values: Floats) -> Floats:
         self._shape = values.shape
@@ -97,7 +97,7 @@ class Flat(Layer):
 
 
 class Forgetting(Layer):
-    """Puts ``share`` of the numbers to 0, others each time (dropout); only while the network is fitted."""
+    """Dropout with rate ``share``. Used only during training."""
 
     def __init__(self, share: float, chance: Generator) -> None:
         self._share, self._chance = share, chance
@@ -112,7 +112,7 @@ class Forgetting(Layer):
 
 
 class Dense(Layer):
-    """Weighted sums of all numbers of a row."""
+    """Fully connected layer."""
 
     def __init__(self, inputs: int, outputs: int, chance: Generator) -> None:
         self.weights = _start(chance, inputs, outputs)
@@ -127,13 +127,13 @@ class Dense(Layer):
 
 
 def _start(chance: Generator, inputs: int, outputs: int) -> tuple[Floats, Floats]:
-    """Weights and offsets before fitting (K. He et al., ICCV 2015, 1026)."""
+    """Return initial weights and biases (K. He et al., ICCV 2015, 1026)."""
     weights = chance.standard_normal((inputs, outputs)) * np.sqrt(2 / inputs)
     return weights.astype(np.float32), np.zeros(outputs, np.float32)
 
 
 def _apart(slopes: Floats, first: NDArray[np.bool_], axis: int) -> Floats:
-    """Each slope where the larger of its two was; 0 where the smaller was."""
+    """Return the gradient at the larger value of each pair, and 0 at the smaller."""
     pairs = np.stack((slopes * first, slopes * ~first), axis=axis + 1)
     shape = list(slopes.shape)
     shape[axis] *= 2

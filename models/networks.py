@@ -1,6 +1,6 @@
-"""A network from the file that its card describes, whichever library its family is written for.
+"""Loading of packaged networks from the files that their cards describe, for every supported library.
 
-Fitting one is the business of ``perceptrons.py`` and ``convolutions.py``.
+Training is in ``perceptrons.py`` and ``convolutions.py``.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from models.preprocessing import Vector
 
 
 class Network(Protocol):
-    """What can be measured."""
+    """A network that can be evaluated."""
 
     def predict(self, images: Vector) -> NDArray[np.int64]:
-        """The class number of each row."""
+        """Return the predicted class number of each row."""
         ...
 
 
 def read(file: str, data: bytes) -> Network:
-    """The network in the bytes of ``file``, whose hash stands on a card; never for anybody else's."""
+    """Load the network in ``file``. The hash of the file must be on a card; never use it for other files."""
     if file.endswith(".onnx"):
         return _OnnxSession(data)
     from models import perceptrons

@@ -1,6 +1,6 @@
-"""Writes a network of layers as an ONNX file: as much of protocol buffers and of ONNX's schema as that needs.
+"""Writer of ONNX files: the parts of Protocol Buffers and of the ONNX schema that the layers need.
 
-Reading one is onnxruntime's business.
+onnxruntime reads the files.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ import numpy as np
 from models.layers import Dense, Filters, Flat, Floats, Halving, Layer, Positive
 
 _IR_VERSION, _OPERATOR_SET = 8, 17
-_FLOAT, _INTEGERS = 1, 7  # of TensorProto.DataType and of AttributeProto.AttributeType
+_FLOAT, _INTEGERS = 1, 7  # values of TensorProto.DataType and AttributeProto.AttributeType
 
 
 @dataclass(frozen=True, slots=True)
 class _Node:
-    """One operator: its name in ONNX, its tensors, and its attributes of whole numbers."""
+    """One ONNX operator: its name, tensors and integer attributes."""
 
     operator: str
     tensors: tuple[Floats, ...] = ()
@@ -26,7 +26,7 @@ class _Node:
 
 
 def onnx_file(layers: Iterable[Layer], side: int, classes: int) -> bytes:
-    """A file whose network takes images of shape (n, 1, side, side) and gives shares of shape (n, classes)."""
+    """Return an ONNX file of the network: input shape (n, 1, side, side), output shape (n, classes)."""
     nodes = [*_nodes(layers, side), _Node("Softmax")]
     graph = b"".join(
         (
@@ -46,7 +46,7 @@ def onnx_file(layers: Iterable[Layer], side: int, classes: int) -> bytes:
 
 
 def _nodes(layers: Iterable[Layer], side: int) -> Iterator[_Node]:
-    """ONNX has the channels before height and width; ``layers`` have them last."""
+    """Return the operators of the layers. ONNX puts channels before height and width; ``layers`` put them last."""
     shape = (side, side, 1)
     for layer in layers:
         match layer:
@@ -94,7 +94,7 @@ def _tensor(name: str, values: Floats) -> bytes:
 
 
 def _value(name: str, sizes: Sequence[int]) -> bytes:
-    """A value with any number of images, and ``sizes`` for each."""
+    """Describe a value with a variable number of images and ``sizes`` for each image."""
     shape = _bytes(1, _bytes(2, b"n")) + b"".join(_bytes(1, _whole(1, size)) for size in sizes)
     kind = _bytes(1, _whole(1, _FLOAT) + _bytes(2, shape))
     return _bytes(1, name.encode()) + _bytes(2, kind)
@@ -117,7 +117,7 @@ def _bytes(field_number: int, data: bytes) -> bytes:
 
 
 def _number(value: int) -> bytes:
-    """Seven bits a byte, the lowest first."""
+    """Encode a number as a varint: seven bits per byte, lowest bits first."""
     data = bytearray()
     while value > 127:
         data.append(value & 127 | 128)

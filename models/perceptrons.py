@@ -1,6 +1,7 @@
-"""Fitting a multi-layer perceptron and writing it down, so that training again gives the same bytes.
+"""Reproducible training and export of a multi-layer perceptron.
 
-What it is trained on is the business of ``families/``; the process is set up by ``training.py``.
+The training data are defined in ``families/``. ``training.py`` sets up the process so that training again gives the
+same bytes.
 """
 
 from __future__ import annotations
@@ -22,21 +23,24 @@ _DECIMALS = 4
 
 @dataclass(frozen=True, slots=True)
 class Perceptron:
-    """One hidden layer, fitted in stages of (step size of Adam, passes over all images); a joblib file."""
+    """Perceptron with one hidden layer, trained in stages of (Adam step size, epochs), saved with joblib."""
 
     hidden: int
     stages: tuple[tuple[float, int], ...]
-    decay: float  # the weight of the squared weights in what is minimised
+    decay: float  # L2 regularisation
     seed: int
 
     def fit(self, images: Vector, labels: NDArray[np.int64]) -> bytes:
-        """The file of a network for ``images`` of shape (n, inputs) and their class numbers, its weights rounded."""
+        """Train a network and return it as a file with rounded weights.
+
+        ``images`` has shape (n, inputs); ``labels`` are their class numbers.
+        """
         network = MLPClassifier(
             hidden_layer_sizes=(self.hidden,), alpha=self.decay, tol=0, n_iter_no_change=10_000, batch_size=200,
             warm_start=True, random_state=self.seed,
         )  # fmt: skip
         with warnings.catch_warnings():
-            # The passes are counted out; that the loss might fall further is no news.
+            # The number of epochs is fixed, so the warning about convergence does not apply.
             warnings.simplefilter("ignore", ConvergenceWarning)
             for step, passes in self.stages:
                 network.set_params(learning_rate_init=step, max_iter=passes)
@@ -47,12 +51,12 @@ class Perceptron:
         return file.getvalue()
 
     def architecture(self, inputs: int, classes: int) -> str:
-        """The layers in words."""
+        """Describe the layers in words."""
         return f"multi-layer perceptron {inputs}-{self.hidden}-{classes}, ReLU, Adam"
 
 
 def _settle(network: MLPClassifier) -> None:
-    """Round the weights, so that last bits do not show, and drop what only the fitting needs."""
+    """Round the weights to hide differences in the last bits, and remove attributes used only in training."""
     network.coefs_ = [np.ascontiguousarray(np.round(weights, _DECIMALS), np.float32) for weights in network.coefs_]
     network.intercepts_ = [np.round(weights, _DECIMALS).astype(np.float32) for weights in network.intercepts_]
     network.loss_ = network.best_loss_ = round(float(network.loss_), 2)
@@ -62,5 +66,5 @@ def _settle(network: MLPClassifier) -> None:
 
 
 def read(data: bytes) -> MLPClassifier:
-    """A network from bytes whose hash stands on a card; never for anybody else's."""
+    """Load a network. The hash of the bytes must be on a card; never use it for other files."""
     return joblib.load(io.BytesIO(data))

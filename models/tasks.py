@@ -1,7 +1,7 @@
-"""What a packaged classifier is for: the images it is trained on, and the places where it is tested.
+"""Definitions of the packaged classifiers: training images and test places.
 
-The tasks themselves are in ``families/``, a module a family, and each is registered where it is defined.
-All are trained and measured by the same code.
+The definitions are in ``families/``, one module per family, and register themselves. All use the same code for training
+and evaluation.
 """
 
 from __future__ import annotations
@@ -22,40 +22,40 @@ Examples = tuple[Vector, NDArray[np.int64]]
 
 
 class Plan(Protocol):
-    """How a network is fitted, and what its file is."""
+    """Training method of a network and format of its file."""
 
     @property
     def seed(self) -> int:
-        """What its chance comes from."""
+        """The seed of the random numbers."""
         ...
 
     def fit(self, images: Vector, labels: NDArray[np.int64]) -> bytes:
-        """The file of a network for ``images`` of shape (n, inputs) and their class numbers; again the same bytes."""
+        """Train a network reproducibly and return its file; ``images`` has shape (n, inputs)."""
         ...
 
     def architecture(self, inputs: int, classes: int) -> str:
-        """The layers in words."""
+        """Describe the layers in words."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Altered:
-    """A test of images that no packaged floor shows: what is varied over which values, and what is seen at each."""
+    """Test on images that no packaged floor shows: one varied condition, its values, and the images at each value."""
 
     varied: str
     unit: str
     under: str
     values: tuple[float, ...]  # ascending
-    seen: Callable[[float], Iterable[tuple[int, Grey]]]  # the number of the class, and the focus
+    seen: Callable[[float], Iterable[tuple[int, Grey]]]  # class number and focus of each image
 
 
 @dataclass(frozen=True, slots=True)
 class Test:
-    """Where a classifier is tested: ``places`` for its accuracy, some of them for its curves.
+    """Test of a classifier: ``places`` give the accuracy, and a selection of them the curves.
 
-    ``noises`` are those at which its accuracy is counted, each (grey levels, draws at a place); ``noises_beside`` those
-    at which it is tested beside the spot, and ``draws`` the number of draws for a point of a curve that has noise;
-    ``altered`` are curves beyond those.
+    ``noises`` are pairs of (grey levels, draws per place) that count for the accuracy. ``noises_beside`` are the noise
+    levels tested beside the spot. ``draws`` is the number of draws for a point of a curve with noise. ``altered`` lists
+    additional curves.
     """
 
     places: tuple[LabelledPose, ...]
@@ -69,25 +69,25 @@ class Test:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One classifier: its name and files, how it is trained, and how it is tested."""
+    """One classifier: name, files, training and test."""
 
     name: str
     file: str
     words: str
     classes: tuple[str, ...]
-    side: int  # pixels of an image, each way
+    side: int  # width and height of the images in pixels
     plan: Plan
     examples: Callable[[], Examples]
     training_words: str
     test: Callable[[], Test]
-    needs: str | None = None  # the package beyond Robomark's own that the training data come in
+    needs: str | None = None  # extra package that provides the training data
 
 
 _TASKS: dict[str, Task] = {}
 
 
 def register(task: Task) -> Task:
-    """Make ``task`` one that can be trained and measured by its name."""
+    """Register ``task`` so that it can be trained and evaluated by name."""
     if task.name in _TASKS:
         raise ValueError(f"there are two models called {task.name}")
     _TASKS[task.name] = task
@@ -95,7 +95,7 @@ def register(task: Task) -> Task:
 
 
 def tasks() -> Mapping[str, Task]:
-    """Every task by its name, in the order of the names."""
-    # A family registers its tasks here, so it cannot be imported before this module is.
+    """Return all tasks by name, in alphabetical order."""
+    # Families import this module to register their tasks, so the import cannot be at the top.
     importlib.import_module("models.families")
     return MappingProxyType(dict(sorted(_TASKS.items())))

@@ -1,6 +1,7 @@
-"""Trains a classifier again, in a process of its own whose arithmetic does not depend on the machine.
+"""Training of classifiers in a process with reproducible arithmetic.
 
-One thread and one kind of matrix and vector kernels: the order in which numbers are added decides their last bits.
+The process uses one thread and one set of matrix and vector kernels, because the order of additions affects the last
+bits.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ from sim.processes import python_command, same_arithmetic, start
 
 
 def train(name: str, folder: Path) -> Card:
-    """Write the weights and the card of ``name`` into ``folder``.
+    """Train the classifier ``name`` and write its weights and card into ``folder``.
 
-    Raises UsageError for a model that cannot be trained here or a folder that cannot be written to.
+    Raises:
+        UsageError: The model cannot be trained on this computer, or the folder cannot be written.
     """
     known = tasks()
     if name not in known:

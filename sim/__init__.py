@@ -1,1 +1,1 @@
-"""The simulated world: floors, the robot, its drive and sensors, and the recording of what happens there."""
+"""Simulated world: floors, the robot, its drive and sensors, and the recording of a trial."""

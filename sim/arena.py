@@ -1,6 +1,6 @@
-"""Walls and obstacles in PyBullet: what an ultrasonic ray meets, what the robot's body touches, what may stop it.
+"""Walls and obstacles in PyBullet, for ultrasonic rays and contact detection.
 
-Nothing here stops the robot: where it gets to is decided in ``motion.py``.
+``motion.py`` decides whether a contact stops the robot.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from sim.trigonometry import round_half_up, sincos
 _METRE = 0.001
 _RANGE = 2550.0  # mm
 _RAYS = tuple(math.radians(angle) for angle in (0, 7, -7, 14, -14, 21, -21))
-_HORIZONTAL, _VERTICAL = 2, 4  # collision groups of the edges that run along x and along y
-TOUCH = 0.5  # mm: Bullet lets a body that is pressed against a wall rest a fraction of a millimetre before it
+_HORIZONTAL, _VERTICAL = 2, 4  # collision groups of edges parallel to x and to y
+TOUCH = 0.5  # mm; Bullet keeps a pressed body a fraction of a millimetre away from the wall
 
 
 class Arena:
-    """The walls round the floor and a set of obstacles; has no state that a trial could change."""
+    """Walls round the floor and a set of obstacles. A trial does not change an arena."""
 
     def __init__(self, obstacles: tuple[Rectangle, ...] = ()) -> None:
         self._client = Client()
@@ -52,15 +52,15 @@ class Arena:
         self._motions: dict[tuple[str, Physics], Motion] = {}
 
     def close(self) -> None:
-        """Leave Bullet, and let every robot's motion do so."""
+        """Disconnect from Bullet, and close the motion of every robot."""
         self._client.close()
         for motion in self._motions.values():
             motion.close()
 
     def motion(self, robot: Robot, physics: Physics, x: float, y: float, heading: float) -> Motion:
-        """What moves ``robot`` from this pose on, among these walls and obstacles; heading in radians.
+        """Return the motion of ``robot`` in this arena, placed at this pose; heading in radians.
 
-        Kept for the next trial, so it serves one trial at a time.
+        The object is reused, so it can serve only one trial at a time.
         """
         key = robot.name, physics
         if key not in self._motions:
@@ -74,10 +74,10 @@ class Arena:
         return SolidMotion(robot, self.obstacles) if physics.solid else FreeMotion(robot)
 
     def distance(self, x: float, y: float, heading: float, forward: float) -> float:
-        """What the ultrasonic sensor reads, mm, 0..2550, ``forward`` mm in front of the axle; heading in radians.
+        """Return the ultrasonic reading in mm, 0..2550, from ``forward`` mm in front of the axle; heading in radians.
 
-        Seven rays within 21 degrees; an edge counts if its direction and the central heading (wrapped to one turn)
-        differ by more than 40 and less than 140 degrees (robolab section 4).
+        The sensor uses seven rays within 21 degrees. It detects an edge if the edge's direction and the central heading
+        (wrapped to one turn) differ by more than 40 and less than 140 degrees (robolab section 4).
         """
         degrees = math.degrees(heading) % 360
         groups = 0
@@ -92,7 +92,7 @@ class Arena:
         return self._nearest_hit(x, y, heading, forward, groups)
 
     def _nearest_hit(self, x: float, y: float, heading: float, forward: float, groups: int) -> float:
-        """Where the first of the rays meets something of these collision groups, mm in whole ones."""
+        """Return the distance to the nearest hit of any ray in these collision groups, in whole mm."""
         sine, cosine = sincos(heading)
         start = ((x + cosine * forward) * _METRE, (y + sine * forward) * _METRE, 0.0)
         ends = []
@@ -105,9 +105,9 @@ class Arena:
         return min(max(round_half_up(nearest * _RANGE), 0.0), _RANGE)
 
     def stands_between(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
-        """Whether the straight way from one place to another, mm, meets an edge of the floor or of an obstacle.
+        """Return whether an edge of the floor or of an obstacle crosses the straight line between two points, mm.
 
-        Walls and obstacles are higher than whatever looks across, so the height of the ray makes no difference.
+        Walls and obstacles are taller than every sensor, so the height of the ray does not matter.
         """
         ray = [(x * _METRE, y * _METRE, 0.0) for x, y in (start, end)]
         edges = _HORIZONTAL | _VERTICAL
@@ -115,7 +115,7 @@ class Arena:
         return bool(body >= 0)
 
     def touching(self, robot: Robot, x: float, y: float, heading: float) -> tuple[str, ...]:
-        """The names of the walls and obstacles that the robot's body overlaps, or comes within half a millimetre of."""
+        """Return the names of walls and obstacles that overlap the robot's body or are within half a millimetre."""
         near = [(name, block) for name, box, block in self._blocks if gap(box, x, y) <= robot.reach + TOUCH]
         if not near:
             return ()
@@ -139,7 +139,7 @@ class Arena:
         return body
 
     def _add_edges(self, lines: list[Rectangle], group: int) -> int:
-        """Upright sheets without thickness, so that a ray's hit is the edge itself."""
+        """Add vertical sheets of zero thickness, so that a ray hits the edge itself."""
         vertices: list[list[float]] = []
         indices: list[int] = []
         for x1, y1, x2, y2 in lines:

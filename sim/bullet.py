@@ -1,6 +1,6 @@
-"""One PyBullet client in this process, without a screen; it prints nothing and is closed with its owner.
+"""PyBullet client in this process, without a display and without output.
 
-PyBullet writes its greeting to the standard streams from C, so the import is done here and nowhere else.
+Only this module imports PyBullet, because its C code prints a greeting on import.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from types import ModuleType, TracebackType
 
 
 def _import_quietly() -> ModuleType:
-    """Import PyBullet with the process's stderr turned away: the greeting is printed by C code."""
+    """Import PyBullet with stderr redirected, because C code prints the greeting."""
     sys.stderr.flush()
     kept, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
@@ -28,13 +28,13 @@ pb = _import_quietly()
 
 
 class Client:
-    """A physics client, for the camera or for rays and contacts; use it as a context manager or call ``close``."""
+    """Physics client for the camera, or for rays and contacts. Use it as a context manager or call ``close``."""
 
     def __init__(self) -> None:
         self.id: int = pb.connect(pb.DIRECT)
 
     def close(self) -> None:
-        """Leave Bullet; once is enough, and more does no harm."""
+        """Disconnect from Bullet. More than one call is harmless."""
         if self.id >= 0:
             pb.disconnect(physicsClientId=self.id)
             self.id = -1

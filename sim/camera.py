@@ -1,7 +1,7 @@
-"""The floor as PyBullet's camera sees it: square windows for the light sensors, looking straight down.
+"""PyBullet camera over the floor: square windows for the light sensors, seen from straight above.
 
 The camera is orthographic and shifted by half a pixel, so that each image pixel is exactly one pixel of the printed
-floor. It knows nothing of robots; where a sensor is and what it makes of a window is ``sensors.py``.
+floor. ``sensors.py`` places the sensors and interprets the windows.
 """
 
 from __future__ import annotations
@@ -19,49 +19,49 @@ from sim.bullet import Client, pb
 
 Bytes = NDArray[np.uint8]
 
-WIDTH, HEIGHT = 2362, 1143  # the floor, in pixels and in mm
-_METRE = 0.001  # metres a pixel
-_PAD = 192  # black pixels round what is seen, more than a tile reaches: off the floor the original reads 0, 0, 0
+WIDTH, HEIGHT = 2362, 1143  # size of the floor in pixels and in mm
+_METRE = 0.001  # metres per pixel
+_PAD = 192  # black border in pixels, wider than a tile's reach: the original reads 0, 0, 0 off the floor
 _TILE = 128
 
 
 class LightCamera(Protocol):
-    """Sees windows of ``side`` x ``side`` pixels whose upper left pixel is (column, row) of the floor image."""
+    """Camera that returns windows of ``side`` x ``side`` pixels; (column, row) is the upper left pixel on the floor."""
 
     def window(self, column: int, row: int, side: int) -> Bytes:
-        """RGB, shape (side, side, 3), top row first; black outside the floor."""
+        """Return the window as RGB, shape (side, side, 3), top row first; black outside the floor."""
         ...
 
     def sums(self, column: int, row: int, side: int) -> tuple[int, int, int]:
-        """R, G, B summed over the pixels that a round sensor of diameter ``side`` sees."""
+        """Return the sums of R, G and B over the pixels that a round sensor of diameter ``side`` sees."""
         ...
 
 
 def sensor_mask(side: int) -> NDArray[np.bool_]:
-    """Which pixels of the window count, shape (side, side): 305 for a side of 20 (robolab section 4)."""
+    """Return the mask of the round sensor, shape (side, side): 305 pixels for a side of 20 (robolab section 4)."""
     radius = side / 2
     rows, columns = np.mgrid[0:side, 0:side]
     return np.asarray((rows - radius) ** 2 + (columns - radius) ** 2 < radius**2)
 
 
 def _orthographic(half: float, shift: float) -> tuple[float, ...]:
-    """Projection of a square of 2 x ``half`` metres, moved by ``shift``, from height 0 to 1 m."""
+    """Return the projection of a square of 2 x ``half`` metres, shifted by ``shift``, for heights 0 to 1 m."""
     left, right = -half + shift, half + shift
     scale, offset = 2 / (right - left), -(right + left) / (right - left)
     return (scale, 0, 0, 0, 0, scale, 0, 0, 0, 0, -2, 0, offset, offset, -1, 1)
 
 
 class BulletCamera:
-    """The reference: every window is one image taken by PyBullet's software renderer of a textured floor."""
+    """Reference camera. PyBullet's software renderer takes one image of the textured floor for each window."""
 
     def __init__(self, pixels: Bytes) -> None:
-        """``pixels`` is a floor or a part of one, shape (height, width, 3), row 0 at the top."""
+        """Create the camera over a floor or part of one. ``pixels`` has shape (height, width, 3), row 0 at the top."""
         self._client = Client()
         self._masks: dict[int, NDArray[np.bool_]] = {}
         self._height, self._width, _ = pixels.shape
         width, height = (self._width + 2 * _PAD) * _METRE, (self._height + 2 * _PAD) * _METRE
         x, y = -_PAD * _METRE, -_PAD * _METRE
-        # One triangle twice the size of the floor: the renderer tests one face a pixel and there is no seam.
+        # One triangle twice the size of the floor has no seam and one face per pixel to test.
         shape = pb.createVisualShape(
             pb.GEOM_MESH,
             vertices=[[x, y, 0], [x + 2 * width, y, 0], [x, y + 2 * height, 0]],
@@ -81,17 +81,17 @@ class BulletCamera:
         self._shoot(0, 0, 2, light=True)
 
     def close(self) -> None:
-        """Leave Bullet; no image can be taken afterwards."""
+        """Disconnect from Bullet. The camera cannot take images afterwards."""
         self._client.close()
 
     def window(self, column: int, row: int, side: int) -> Bytes:
-        """RGB, shape (side, side, 3), top row first; black outside the floor."""
+        """Return the window as RGB, shape (side, side, 3), top row first; black outside the floor."""
         if not (-side < column < self._width and -side < row < self._height):
             return np.zeros((side, side, 3), np.uint8)
         return self._shoot(column, row, side)
 
     def sums(self, column: int, row: int, side: int) -> tuple[int, int, int]:
-        """R, G, B summed over the pixels that a round sensor of diameter ``side`` sees."""
+        """Return the sums of R, G and B over the pixels that a round sensor of diameter ``side`` sees."""
         mask = self._masks.get(side)
         if mask is None:
             mask = self._masks[side] = sensor_mask(side)
@@ -103,7 +103,7 @@ class BulletCamera:
         y = (self._height - row - side / 2) * _METRE
         view = (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -x, -y, -0.5, 1)
         projection = _orthographic(side * _METRE / 2, _METRE / 2)
-        # Full ambient light and nothing else gives the texture's own colours; the client remembers it.
+        # Ambient light alone gives the texture's own colours. The client keeps this setting.
         lighting = (
             {
                 "lightAmbientCoeff": 1,
@@ -130,7 +130,7 @@ class BulletCamera:
 
 
 class _Part(NamedTuple):
-    """A part of the floor, in pixels; beyond the floor's own borders there is nothing to see."""
+    """Part of the floor in pixels. Areas beyond the floor's borders are empty."""
 
     left: int
     top: int
@@ -138,7 +138,7 @@ class _Part(NamedTuple):
     bottom: int
 
     def has(self, column: int, row: int, side: int) -> bool:
-        """Whether all of a window that lies on the floor is in it."""
+        """Return whether this part contains the whole window, ignoring areas off the floor."""
         return (
             self.left <= max(column, 0)
             and self.top <= max(row, 0)
@@ -151,16 +151,17 @@ _WHOLE = _Part(0, 0, WIDTH, HEIGHT)
 
 
 class CachedCamera:
-    """The same windows, cut from tiles of the floor that a BulletCamera photographed when they were first needed.
+    """Camera that returns the windows of a BulletCamera from cached tiles, rendered on first use.
 
-    That one sees only what lies round the first tile until a tile elsewhere is needed: most robots that stay where they
-    are have a floor of their own, and a texture of the whole floor takes long.
-    Equal to the reference in every pixel, and some hundred times cheaper for a robot that stays on its track. Tiles of
-    one colour are not photographed.
+    Results equal those of the reference in every pixel, at about a hundredth of the cost for a robot that stays on its
+    track. Tiles of a single colour are not rendered.
+
+    The BulletCamera sees only the area round the first tile until a tile elsewhere is needed. Most robots that don't
+    move have a floor of their own, and a texture of the whole floor takes long.
     """
 
     def __init__(self, pixels: Bytes) -> None:
-        """``pixels`` has shape (1143, 2362, 3), row 0 at the top."""
+        """Create the camera. ``pixels`` has shape (1143, 2362, 3), row 0 at the top."""
         self._pixels = pixels
         self._camera: BulletCamera | None = None
         self._seen = _WHOLE
@@ -168,13 +169,13 @@ class CachedCamera:
         self._sums: dict[tuple[int, int, int], memoryview] = {}
 
     def close(self) -> None:
-        """Give back PyBullet's 60 MB; the tiles stay, and a new one brings PyBullet back."""
+        """Release PyBullet's 60 MB. The cached tiles remain; the next new tile loads PyBullet again."""
         if self._camera is not None:
             self._camera.close()
             self._camera = None
 
     def window(self, column: int, row: int, side: int) -> Bytes:
-        """RGB, shape (side, side, 3), top row first; black outside the floor."""
+        """Return the window as RGB, shape (side, side, 3), top row first; black outside the floor."""
         if not (-side < column < WIDTH and -side < row < HEIGHT):
             return np.zeros((side, side, 3), np.uint8)
         tile = self._tile(column // _TILE, row // _TILE, side)
@@ -182,7 +183,7 @@ class CachedCamera:
         return tile[row : row + side, column : column + side]
 
     def sums(self, column: int, row: int, side: int) -> tuple[int, int, int]:
-        """R, G, B summed over the pixels that a round sensor of diameter ``side`` sees."""
+        """Return the sums of R, G and B over the pixels that a round sensor of diameter ``side`` sees."""
         if not (-side < column < WIDTH and -side < row < HEIGHT):
             return 0, 0, 0
         key = (column // _TILE, row // _TILE, side)
@@ -203,7 +204,7 @@ class CachedCamera:
         if 0 <= column <= WIDTH - side and 0 <= row <= HEIGHT - side:
             printed = self._pixels[row : row + side, column : column + side]
             if (printed == printed[0, 0]).all():
-                # What is of one colour looks so in a photograph too, for which PyBullet would have to come.
+                # A rendering of a single colour equals the print, so PyBullet is not needed.
                 return printed
         if self._camera is None:
             self._see(_Part(column - _TILE, row - _TILE, column + 3 * _TILE, row + 3 * _TILE))
@@ -219,7 +220,7 @@ class CachedCamera:
 
 
 def _disc_sums(tile: Bytes, side: int) -> memoryview:
-    """Masked sums of every window in a tile, shape (128, 128, 3): differences of a running sum along each mask row."""
+    """Return the masked sums of every window in a tile, shape (128, 128, 3), computed from running sums by mask row."""
     running = np.zeros((_TILE + side, _TILE + side + 1, 3), np.int64)
     np.cumsum(tile, axis=1, out=running[:, 1:])
     total = np.zeros((_TILE, _TILE, 3), np.int64)
@@ -233,16 +234,16 @@ def _disc_sums(tile: Bytes, side: int) -> memoryview:
 
 
 class Cameras:
-    """A few cached cameras, one an image. Only the one used last keeps PyBullet; the oldest is dropped."""
+    """Small cache of cameras by image. Only the last one used keeps PyBullet open; the oldest is evicted."""
 
     def __init__(self, most: int = 3) -> None:
-        """The tiles of each grow to 50 MB, once a robot has been everywhere on its floor."""
+        """Create the cache. A camera's tiles take up to 50 MB once a robot has covered its floor."""
         self._most = most
-        # Keyed by identity: an image that is held here cannot share its id with another.
+        # The keys are object ids. Holding the image prevents reuse of its id.
         self._cameras: OrderedDict[int, tuple[Bytes, CachedCamera]] = OrderedDict()
 
     def camera(self, pixels: Bytes) -> CachedCamera:
-        """The camera over ``image``, which must not change afterwards."""
+        """Return the camera over ``image``, which must not change afterwards."""
         held = self._cameras.pop(id(pixels), None)
         self.close()
         if held is None:
@@ -253,6 +254,6 @@ class Cameras:
         return held[1]
 
     def close(self) -> None:
-        """Give back PyBullet's memory."""
+        """Release PyBullet's memory."""
         for _, camera in self._cameras.values():
             camera.close()

@@ -1,6 +1,6 @@
-"""Imports all modules of a package, so that what registers itself where it is defined has done so.
+"""Import of all modules of a package, so that they register their contents.
 
-It knows no registry; what a module registers, and where, is the module's.
+The modules themselves decide what they register, and in which registry.
 """
 
 from __future__ import annotations
@@ -11,6 +11,6 @@ from collections.abc import Iterable
 
 
 def import_all(package: str, path: Iterable[str]) -> None:
-    """Import the modules that lie in ``path``, the ``__path__`` of ``package``; in the order of their names."""
+    """Import the modules in ``path``, the ``__path__`` of ``package``, in alphabetical order."""
     for name in sorted(found.name for found in pkgutil.iter_modules(path)):
         importlib.import_module(f"{package}.{name}")

@@ -1,7 +1,7 @@
-"""The course's drive: two wheels with a speed, a command and an encoder, advanced a thirtieth of a second at a time.
+"""The course's drive: two wheels with speed, command and encoder, advanced by one tick (1/30 s) at a time.
 
-These are the original's equations, quirks included, because student programs are tuned to them; where the robot gets
-to when its wheels turn is decided in ``motion.py``.
+The equations are the original's, quirks included, because student programs are tuned to them. ``motion.py`` converts
+wheel travel to a new position of the robot.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ TWO_PI = 2 * math.pi
 
 @dataclass(slots=True)
 class Wheel:
-    """One motor and its wheel: degrees and degrees per second, ``time_sp`` in seconds."""
+    """One motor and its wheel: degrees and degrees per second; ``time_sp`` is in seconds."""
 
     position: float = 0.0
     speed: float = 0.0
@@ -35,7 +35,7 @@ class Wheel:
     _position_target: float = 0.0
 
     def run(self, command: str, clock: int) -> None:
-        """Take a command between two ticks; ``clock`` counts the ticks that have passed."""
+        """Apply a command between two ticks; ``clock`` is the number of ticks that have passed."""
         self.command = command
         if command == "run-forever":
             self.state = "running"
@@ -52,10 +52,10 @@ class Wheel:
                 self.state = "running"
 
     def change_speed(self, most: float, noise: float, both_directions: bool = False) -> None:
-        """Move the speed towards its set point. Unless ``both_directions``, no negative speed is rounded and noisy.
+        """Move the speed towards its set point. Without ``both_directions``, negative speeds get no rounding or noise.
 
-        The original does not cap negative speeds either; a program that asks for more than a motor can do, past the
-        brick's own checks, would win every race there.
+        The original does not limit negative speeds either. A program that bypassed the brick's checks and asked for
+        more than the motor's maximum would win every race.
         """
         if self.speed < self.speed_sp:
             self.speed = min(self.speed + most, self.speed_sp)
@@ -68,7 +68,10 @@ class Wheel:
             self.speed = -min(round_half_up(-noisy), MAX_SPEED)
 
     def travel(self, clock: int) -> float:
-        """Wheel degrees moved in this tick. A move to a position counts on the encoder twice, as in the original."""
+        """Return the wheel travel of this tick in degrees.
+
+        As in the original, a move to a position counts twice on the encoder.
+        """
         degrees = self.speed / 30
         sign = -1.0 if self.polarity == "inversed" else 1.0
         if self.command == "run-forever" or (self.command == "run-timed" and clock < self._time_target):
@@ -91,7 +94,7 @@ class Wheel:
 
 @dataclass(slots=True)
 class Drive:
-    """Pose and wheels. ``heading`` is radians, wrapped from above only; ``turns`` counts the wraps."""
+    """Pose and wheels. ``heading`` is in radians and wraps only at the upper end; ``turns`` counts the wraps."""
 
     robot: Robot
     motion: Motion
@@ -99,7 +102,7 @@ class Drive:
     y: float
     heading: float
     noise: float = 0.0
-    both_directions: bool = False  # noise for negative speeds, too
+    both_directions: bool = False  # noise also for negative speeds
     left_chance: Stream | None = None
     right_chance: Stream | None = None
     turns: int = 0
@@ -110,11 +113,11 @@ class Drive:
 
     @property
     def heading_degrees(self) -> float:
-        """Unwrapped."""
+        """The heading in degrees, not wrapped."""
         return math.degrees(self.heading) + 360.0 * self.turns
 
     def tick(self, clock: int) -> None:
-        """Advance a thirtieth of a second: speeds, travel, then the pose."""
+        """Advance by one tick: update the speeds, the wheel travel and the pose, in this order."""
         most = self.robot.acceleration
         both = self.both_directions and self.noise > 0
         self.left.change_speed(most, self._noise(self.left_chance, clock), both)

@@ -1,19 +1,19 @@
-"""The tree of errors; each carries one sentence that a user can act on.
+"""Exception hierarchy. Each error has one sentence that tells the user how to act.
 
 RobomarkError
 ├── UsageError          the caller's mistake: a wrong flag, a missing file, an unreadable submission (exit status 2)
 │   └── AssignmentError the instructor's mistake: an assignment that cannot be used
-├── HostError           ours: a machine, a process or a service that failed (exit status 3)
-└── Cancelled           somebody asked the grading to stop
+├── HostError           a machine, process or service of this installation failed (exit status 3)
+└── Cancelled           the grading was cancelled
 """
 
 from sim.sentences import Sentence
 
 
 class RobomarkError(Exception):
-    """Base of every error Robomark raises on purpose; ``str(error)`` is the sentence for the user.
+    """Base class of all errors that Robomark raises on purpose; ``str(error)`` is the sentence for the user.
 
-    With values it is the template of one, as ``Sentence`` has it.
+    With values, the text is a template as in ``Sentence``.
     """
 
     def __init__(self, sentence: str | Sentence = "", /, **values: object) -> None:
@@ -22,16 +22,16 @@ class RobomarkError(Exception):
 
 
 class UsageError(RobomarkError):
-    """What the caller gave cannot be used."""
+    """The caller's input cannot be used."""
 
 
 class AssignmentError(UsageError):
-    """The assignment itself is wrong."""
+    """The assignment itself contains a mistake."""
 
 
 class HostError(RobomarkError):
-    """The machine, not the student, failed; the work may be tried again elsewhere."""
+    """The host failed, not the student. The work can be retried elsewhere."""
 
 
 class Cancelled(RobomarkError):
-    """The grading was asked to stop, by a user or because another worker holds the job now."""
+    """A user cancelled the grading, or another worker now has the job."""

@@ -1,6 +1,6 @@
-"""The families of packaged classifiers, a module each: what it is trained on and where it is tested.
+"""Families of packaged classifiers, one module each: training data and test places.
 
-How they are trained and measured is the same for all, and stands in ``training.py`` and ``evaluation.py``.
+Training and evaluation are shared by all families; see ``training.py`` and ``evaluation.py``.
 """
 
 from sim.discovery import import_all

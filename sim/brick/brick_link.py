@@ -1,6 +1,7 @@
-"""The brick's end of the bridge: it tells the world what the program does and asks what the program wants to know.
+"""The robot program's end of the connection to the world: sends actions and asks for values.
 
-It knows no physics: positions, sensor values and the time come with the answers, and only a wait can change them.
+This module contains no physics. Positions, sensor values and the time come with the answers, and change only when the
+program waits.
 """
 
 from __future__ import annotations
@@ -15,14 +16,13 @@ Frame = dict[str, Any]
 
 SECOND = 3_000_000  # thirds of a microsecond
 READ = SECOND // 100
-#: The longest time that the world lets pass at once: longer than any trial.
+#: Maximum time of a single wait; longer than any trial.
 MOST_UNITS = 10**15
 FREE_READS = 100_000
 
 _WAITS = frozenset({"until", "until_said", "paid_motor"})
 
-#: Acts that programs do by the thousand go packed: what it is, of which part of the robot, a motor's set point and
-#: command, and a value.
+#: Packed format for frequent actions: kind, part of the robot, set point and command of a motor, and a value.
 _packed = struct.Struct("<BBBBd").pack
 _READ, _WAIT, _MOTOR = range(3)
 _PORTS = {"outB": 0, "outC": 1}
@@ -40,7 +40,7 @@ _COMMANDS = {
 
 
 class Wire(Protocol):
-    """What leads to the world; one that sends later may hold things back until something cannot wait."""
+    """Connection to the world. ``send_later`` and ``act_later`` may buffer data until an urgent message."""
 
     def send(self, frame: Frame) -> None: ...
 
@@ -59,25 +59,25 @@ class _Unconnected:
 
 
 class Link:
-    """Holds the connection, the time as last told, and the messages that have arrived."""
+    """Connection to the world, with the last known time and the messages that have arrived."""
 
     def __init__(self) -> None:
         self.units = 0
-        self.number = 1  # of the robot, where there are two
+        self.number = 1  # of the robot, if there are two
         self.state: dict[str, list[Any]] = {"messages": []}
         self._wire: Wire = _Unconnected()
         self._stuck: Callable[[], None] | None = None
         self._free = 0
         self._sensors: dict[tuple[str, int], tuple[bytes, int, int | slice]] = {}
-        self._seen: list[float] = []  # what the sensors read up to _seen_until
+        self._seen: list[float] = []  # sensor readings, valid until _seen_until
         self._seen_until = 0
         self._tick = SECOND
 
     def connect(self, wire: Wire, stuck: Callable[[], None], sensors: Mapping[str, int], tick: int) -> None:
-        """``stuck`` ends a program that never waits.
+        """Connect to the world. ``stuck`` ends a program that never waits.
 
-        Each time one of ``sensors`` is read, the world tells what they all give, in this order: so many numbers each,
-        0 for one that stands alone. Values change every ``tick``.
+        For each read of one of ``sensors``, the world sends the values of all sensors in this order. The number given
+        for a sensor is the length of its list of values; 0 means a single value. Values change every ``tick``.
         """
         self._wire, self._stuck, self._tick = wire, stuck, tick
         start = 0
@@ -88,14 +88,14 @@ class Link:
             start += width or 1
 
     def tell(self, frame: Frame) -> None:
-        """Something happened; no answer is awaited."""
+        """Send a notification that needs no answer."""
         self.read_freely()
         self._wire.send(frame)
 
     def set_motor(
         self, port: str, command: str | None = None, polarity: str | None = None, **set_points: float
     ) -> None:
-        """Set points, and then a command; they show only once the world moves, so they are sent with what waits."""
+        """Send set points and a command with the next wait. They take effect only when the world moves."""
         self.read_freely()
         if command not in _COMMANDS:
             raise ValueError(
@@ -113,12 +113,12 @@ class Link:
             self._wire.act_later(_packed(_MOTOR, part, 0, _COMMANDS[command], 0))
 
     def run_forever(self, port: str, speed: float) -> None:
-        """What ``set_motor`` does for the programs that steer all the time."""
+        """Set a speed and run. This is a fast path of ``set_motor`` for programs that steer all the time."""
         self.read_freely()
         self._wire.act_later(_packed(_MOTOR, _PORTS[port], _SET_POINTS["speed_sp"], _COMMANDS["run-forever"], speed))
 
     def ask(self, frame: Frame) -> Any:
-        """The answer's value, once the world has moved as far as the question takes."""
+        """Send a question and return the value of the answer. The world moves as far as the question requires."""
         if frame["do"] in _WAITS:
             self._free = 0
         else:
@@ -131,15 +131,15 @@ class Link:
         self.units = answer["t"]
         arrived = answer.get("m")
         if arrived:
-            # A new dictionary for new messages: what a program took earlier stays as it was.
+            # New messages go into a new dictionary, so that a dictionary returned earlier does not change.
             self.state = {"messages": [*self.state["messages"], *arrived]}
         return answer.get("v")
 
     def read(self, what: str, times: int) -> Any:
-        """A sensor's value after ``times`` reading times.
+        """Return a sensor's value after ``times`` reading times.
 
-        Values change only at ticks: a reading that ends before the next one is known already, so the world is told
-        of it and not asked. The world counts the time by the same rule, and gives no answer then.
+        Values change only at ticks. If the reading ends before the next tick, the value is already known. The world
+        then gets a notification instead of a question, and counts the time by the same rule.
         """
         packed, lasts, where = self._sensors[what, times]
         self._free = 0
@@ -155,21 +155,21 @@ class Link:
 
     @property
     def ticks(self) -> int:
-        """How many there were."""
+        """The number of ticks that have passed."""
         return self.units // self._tick
 
     def read_freely(self) -> None:
-        """Count an act that costs no time; the world cannot move while a program only does these."""
+        """Count an action that costs no time. The world cannot move during such actions."""
         self._free += 1
         if self._free > FREE_READS and self._stuck is not None:
             self._stuck()
 
     def wait(self, seconds: float) -> None:
-        """Let the world move for that long."""
+        """Let the world move for this time."""
         self.wait_units(round(seconds * SECOND))
 
     def wait_units(self, units: int) -> None:
-        """The same, in thirds of a microsecond; a trial ends long before the longest."""
+        """Let the world move for this time in thirds of a microsecond, at most the maximum wait."""
         self._free = 0
         self._wire.act(_packed(_WAIT, 0, 0, 0, min(units, MOST_UNITS)))
         self._answer()
@@ -179,18 +179,22 @@ link = Link()
 
 
 def finite(name: str, value: float) -> float:
-    """The nearest number that the world knows. Raises ValueError for NaN."""
+    """Return the nearest number that the world can represent.
+
+    Raises:
+        ValueError: The value is NaN.
+    """
     if math.isnan(value):
         raise ValueError(f"{name} is not a number ({value})")
     return min(max(float(value), -sys.float_info.max), sys.float_info.max)
 
 
 def number(value: float) -> float:
-    """Whole numbers as ``int``, so that they print as they do in the simulator."""
+    """Return whole numbers as ``int``, so that they print as in the simulator."""
     return int(value) if value == int(value) else value
 
 
 def clock() -> float:
-    """Seconds since the program began, in whole ticks, of which the original has thirty a second."""
+    """Return the seconds since the start of the program, in whole ticks. The original has thirty ticks a second."""
     link.read_freely()
     return number(link.ticks / 30)

@@ -1,4 +1,4 @@
-"""What the notebook's magics put before a program, so that it can use motors and sensors without importing them."""
+"""Preambles that the notebook magics add before a program, so that it can use motors and sensors without imports."""
 
 IMPORTS = """\
 from ev3dev2.motor import MoveTank, MoveSteering, SpeedPercent, OUTPUT_B, OUTPUT_C

@@ -1,4 +1,4 @@
-"""The door between the robot program and the simulator: the clock and the messages that came back from Python."""
+"""The robot program's interface to the simulator: the clock and the messages from the responder."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ __all__ = [
 
 
 def get_clock() -> float:
-    """Seconds since the program began; changes thirty times a second, while the program waits."""
+    """Return the seconds since the start of the program. The value changes thirty times a second during waits."""
     return clock()
 
 
 def pyState() -> dict[str, list[Any]]:
-    """``{"messages": [...]}``: what the responder answered with ``JSON::``, oldest first."""
+    """Return ``{"messages": [...]}`` with the responder's ``JSON::`` answers, oldest first."""
     return link.state
 
 
 def robot_number() -> int:
-    """1, or 2 for the second robot: so that one program can be run on both."""
+    """Return 1, or 2 on the second robot, so that one program can run on both."""
     return link.number
 
 

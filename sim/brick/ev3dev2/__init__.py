@@ -1,1 +1,1 @@
-"""The part of ev3dev2 that the RoboLab simulator offers; everything it does happens in the simulated world."""
+"""The subset of ev3dev2 that the RoboLab simulator supports, connected to the simulated world."""

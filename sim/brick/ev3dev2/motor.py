@@ -1,4 +1,4 @@
-"""The simulator's motors: single ones, and the tank and steering pairs that the course drives with."""
+"""Motors of the simulator: single motors, and the tank and steering pairs used in the course."""
 
 from ev3dev2.motor_pairs import MotorSet, MoveSteering, MoveTank
 from ev3dev2.single_motor import (

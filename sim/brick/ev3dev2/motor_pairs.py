@@ -1,4 +1,4 @@
-"""Motors together: sets, the tank with a speed for each side, and steering."""
+"""Groups of motors: motor sets, tank drive (one speed per side) and steering drive."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ev3dev2.speeds import Speed, whole
 
 
 class MotorSet:
-    """Motors by port. Making one stops them."""
+    """Motors by port. Creating a set stops its motors."""
 
     def __init__(self, motor_specs: Mapping[str, type[Motor]], desc: str | None = None) -> None:
         self.motors = {port: kind(port) for port, kind in motor_specs.items()}
@@ -30,7 +30,7 @@ class MotorSet:
 
 
 class MoveTank(MotorSet):
-    """Two motors with a speed each."""
+    """Two motors with separate speeds."""
 
     def __init__(
         self,
@@ -47,7 +47,7 @@ class MoveTank(MotorSet):
     def on_for_degrees(
         self, left_speed: Speed, right_speed: Speed, degrees: float, brake: bool = True, block: bool = True
     ) -> None:
-        """The faster wheel turns ``degrees``, the other in proportion."""
+        """Turn the faster wheel by ``degrees`` and the other in proportion."""
         left, right = self._speeds(left_speed, right_speed)
         self._move_degrees(left, right, degrees, block)
 
@@ -95,20 +95,20 @@ class MoveTank(MotorSet):
         link.run_forever(self.right_motor.address, right)
 
     def _block(self) -> None:
-        # One motor after the other, as in the original: the second has often stopped by then, and the
-        # wait for it to begin runs into its time-out.
+        # The motors are started one after the other, as in the original. The second motor has often stopped before the
+        # wait for its start begins, so that the wait times out.
         self.left_motor._block()
         self.right_motor._block()
 
 
 class MoveSteering(MoveTank):
-    """Two motors with a speed and a steering: 0 straight on, 100 on the spot to the right, -100 to the left."""
+    """Two motors with a speed and a steering: 0 straight ahead, 100 on the spot to the right, -100 to the left."""
 
     def get_speed_steering(self, steering: float, speed: Speed) -> tuple[int, int]:
-        """Whole degrees per second of the left and the right wheel."""
+        """Return whole degrees per second for the left and the right wheel."""
         if not -100 <= steering <= 100:
             raise ValueError(f"{steering} is an invalid steering, must be between -100 and 100 (inclusive)")
-        # Rounded only after the steering, wheel by wheel, as in the original.
+        # As in the original, each wheel's speed is rounded after the steering is applied.
         outer = self.left_motor._exact(speed)
         inner = outer * (50 - abs(steering)) / 50
         left, right = (outer, inner) if steering >= 0 else (inner, outer)

@@ -1,4 +1,4 @@
-"""One motor: every set point and command goes to the world, and nothing moves until the program waits."""
+"""A single motor. Set points and commands go to the world; the motor moves only when the program waits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ OUTPUT_B = "outB"
 OUTPUT_C = "outC"
 OUTPUT_D = "outD"
 
-#: Milliseconds that a blocking call waits for a motor to begin.
+#: Maximum time in milliseconds that a blocking call waits for the motor to start.
 WAIT_RUNNING_TIMEOUT = 100
 
 _POLL = 0.01  # seconds
@@ -42,7 +42,7 @@ class Motor:
 
     max_speed = 1050
     count_per_rot = 360
-    # Whole-number division in the original: 1050 / 360 is 2 there.
+    # The original uses integer division: 1050 / 360 gives 2.
     max_rps = 2
     max_rpm = 120
     max_dps = 720
@@ -119,7 +119,7 @@ class Motor:
 
     @property
     def time_sp(self) -> float:
-        """The set speed: the original reads the wrong field."""
+        """The set speed. The original reads the wrong field."""
         return self.speed_sp
 
     @time_sp.setter
@@ -174,12 +174,12 @@ class Motor:
             setattr(self, name, value)
 
     def reset(self, **fields: Any) -> None:
-        """Stop. The position stays as it is."""
+        """Stop the motor. Its position does not change."""
         self._set(fields)
         self._tell(command="reset")
 
     def run_direct(self, **fields: Any) -> None:
-        """Only the set points; the simulator has no such command."""
+        """Apply only the set points; the simulator does not have this command."""
         self._set(fields)
 
     def run_forever(self, **fields: Any) -> None:
@@ -203,7 +203,7 @@ class Motor:
         self._tell(command="")
 
     def wait(self, cond: Callable[[str], bool], timeout: float | None = None) -> bool:
-        """Look every 10 ms until ``cond(state)`` holds; False once more than ``timeout`` milliseconds have passed."""
+        """Poll every 10 ms until ``cond(state)`` is true. Return False after ``timeout`` milliseconds."""
         began = link.units
         while not cond(self.state):
             link.wait(_POLL)
@@ -231,14 +231,14 @@ class Motor:
                     "do": "until",
                     "port": self.address,
                     "state": state,
-                    # One below zero has passed at the first look, as one of zero has.
+                    # A negative time-out has expired at the first poll, like a time-out of zero.
                     "timeout": None if timeout is None else round(min(max(timeout * 3000, 0), MOST_UNITS)),
                 }
             )
         )
 
     def _exact(self, speed: Speed) -> float:
-        """Degrees per second of a SpeedValue, or of a number taken as per cent."""
+        """Return degrees per second for a SpeedValue, or for a number in per cent."""
         if isinstance(speed, SpeedValue):
             return speed.to_native_units(self)
         if not -100 <= speed <= 100:
@@ -246,11 +246,11 @@ class Motor:
         return speed / 100 * self.max_speed
 
     def _native(self, speed: Speed) -> int:
-        """Whole degrees per second."""
+        """Return whole degrees per second."""
         return whole(self._exact(speed))
 
     def _aim(self, degrees: float, speed: int) -> None:
-        """Set points of a relative move; a negative speed turns the way round."""
+        """Set the target of a relative move; a negative speed reverses the direction."""
         self._tell(position_sp=whole(degrees if speed >= 0 else -degrees), speed_sp=abs(speed))
 
     def on_for_rotations(self, speed: Speed, rotations: float, brake: bool = True, block: bool = True) -> None:
@@ -290,11 +290,11 @@ class Motor:
 
 
 class LargeMotor(Motor):
-    """The simulator's motors are all alike."""
+    """Large motor; all motors of the simulator are the same."""
 
 
 class MediumMotor(Motor):
-    """The simulator's motors are all alike."""
+    """Medium motor; all motors of the simulator are the same."""
 
 
 def not_negative(seconds: float) -> None:

@@ -1,4 +1,4 @@
-"""The robot's voice: what it says is written down, and lasts as long as reading it aloud would."""
+"""Speech of the robot. Texts are recorded and last as long as reading them aloud."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Sound:
         self._volume = 1.0
 
     def speak(self, text: object, espeak_opts: str = "", volume: int = 100, play_type: int = 0) -> None:
-        """Say ``text``; with PLAY_WAIT_FOR_COMPLETE, return when it has been said."""
+        """Say ``text``. With PLAY_WAIT_FOR_COMPLETE, return when the speech has ended."""
         link.tell({"do": "say", "text": str(text)})
         if play_type == self.PLAY_WAIT_FOR_COMPLETE:
             link.ask({"do": "until_said"})

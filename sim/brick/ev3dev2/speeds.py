@@ -1,4 +1,4 @@
-"""Speeds in the units that the course uses; each knows how many wheel degrees per second it is for a motor."""
+"""Speeds in the units used in the course, with conversion to wheel degrees per second."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 class SpeedValue:
-    """A speed in some unit; ``to_native_units`` gives wheel degrees per second."""
+    """A speed in a unit; ``to_native_units`` returns wheel degrees per second."""
 
     def __init__(self, value: float, desc: str | None = None) -> None:
         self.value = value
@@ -37,7 +37,7 @@ class SpeedValue:
 
 
 class SpeedPercent(SpeedValue):
-    """Per cent of the greatest speed, -100..100."""
+    """Per cent of the maximum speed, -100..100."""
 
     def __init__(self, percent: float, desc: str | None = None) -> None:
         if not -100 <= percent <= 100:
@@ -58,7 +58,7 @@ class SpeedNativeUnits(SpeedValue):
 
 
 class _SpeedRate(SpeedValue):
-    """A speed as a share of the most that the simulator's own scale knows."""
+    """A speed as a share of the maximum on the simulator's own scale."""
 
     _most = ""
 
@@ -70,25 +70,25 @@ class _SpeedRate(SpeedValue):
 
 
 class SpeedRPS(_SpeedRate):
-    """Rotations per second; the simulator takes 2 for the most."""
+    """Rotations per second; the simulator's maximum is 2."""
 
     _most = "max_rps"
 
 
 class SpeedRPM(_SpeedRate):
-    """Rotations per minute; the simulator takes 120 for the most."""
+    """Rotations per minute; the simulator's maximum is 120."""
 
     _most = "max_rpm"
 
 
 class SpeedDPS(_SpeedRate):
-    """Degrees per second; the simulator takes 720 for the most."""
+    """Degrees per second; the simulator's maximum is 720."""
 
     _most = "max_dps"
 
 
 class SpeedDPM(_SpeedRate):
-    """Degrees per minute; the simulator takes 43200 for the most."""
+    """Degrees per minute; the simulator's maximum is 43200."""
 
     _most = "max_dpm"
 
@@ -97,5 +97,5 @@ Speed = float | SpeedValue
 
 
 def whole(value: float) -> int:
-    """The nearest whole number, halves upwards, as the simulator's ``int(round(x))`` gives."""
+    """Round to the nearest whole number, halves upwards, like the simulator's ``int(round(x))``."""
     return math.floor(value + 0.5)

@@ -1,4 +1,4 @@
-"""The sensor ports: ultrasonic in 1, left and right light in 2 and 3, gyro in 4."""
+"""Sensor ports: ultrasonic in 1, left and right light in 2 and 3, gyro in 4."""
 
 INPUT_1 = "in1"
 INPUT_2 = "in2"

@@ -1,4 +1,4 @@
-"""Colour spaces as the simulator computes them from mean red, green and blue (0..255), cut to whole numbers."""
+"""The simulator's colour space conversions from mean red, green and blue (0..255), truncated to integers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def _hue(red: float, green: float, blue: float, most: float, spread: float) -> f
 
 
 def hsv(red: float, green: float, blue: float) -> list[int]:
-    """Hue 0..359, saturation and value 0..100."""
+    """Return hue 0..359, saturation and value 0..100."""
     red, green, blue = red / 255, green / 255, blue / 255
     most = max(red, green, blue)
     spread = most - min(red, green, blue)
@@ -25,7 +25,7 @@ def hsv(red: float, green: float, blue: float) -> list[int]:
 
 
 def hls(red: float, green: float, blue: float) -> list[int]:
-    """Hue 0..359, lightness and saturation 0..100; the saturation of white is 0, as of black."""
+    """Return hue 0..359, lightness and saturation 0..100. The saturation of black and white is 0."""
     red, green, blue = red / 255, green / 255, blue / 255
     most, least = max(red, green, blue), min(red, green, blue)
     spread, lightness = most - least, (most + least) / 2
@@ -34,7 +34,7 @@ def hls(red: float, green: float, blue: float) -> list[int]:
 
 
 def lab(red: float, green: float, blue: float) -> list[int]:
-    """CIE L*a*b* by way of sRGB and the D65 white that the simulator uses."""
+    """Return CIE L*a*b*, converted through sRGB with the simulator's D65 white."""
 
     def linear(value: float) -> float:
         value /= 255
@@ -51,7 +51,7 @@ def lab(red: float, green: float, blue: float) -> list[int]:
 
 
 def number(red: float, green: float, blue: float) -> int:
-    """The colour's number: 1 black, 2 blue, 3 green, 4 yellow, 5 red, 6 white."""
+    """Return the colour number: 1 black, 2 blue, 3 green, 4 yellow, 5 red, 6 white."""
     hue, saturation, value = hsv(red, green, blue)
     if saturation < 20:
         return 1 if value < 30 else 6

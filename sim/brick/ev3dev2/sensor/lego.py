@@ -1,4 +1,4 @@
-"""The simulator's sensors. Reading one takes 10 ms (colour, angle, rate 20 ms); values change thirty times a second."""
+"""Sensors of the simulator. A reading takes 10 ms (colour, angle, rate 20 ms); values change thirty times a second."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from ev3dev2.sensor import colour
 
 
 def _round(value: float) -> int:
-    """JavaScript's rounding: halves go up."""
+    """Round like JavaScript: halves go up."""
     return math.floor(value + 0.5)
 
 
 class Sensor:
-    """What all sensors share: a port that must have the right sensor in it."""
+    """Base class of all sensors. Checks that the port has the right sensor."""
 
     _ports: tuple[str, ...] = ()
     _kind = ""
@@ -26,7 +26,7 @@ class Sensor:
         self.address = address
 
     def _read(self, what: str, times: int = 1) -> Any:
-        """A value after ``times`` reading times of 10 ms."""
+        """Return a value after ``times`` reading times of 10 ms."""
         return link.read(what, times)
 
 
@@ -70,7 +70,7 @@ class ColorSensor(Sensor):
 
     @property
     def ambient_light_intensity(self) -> int:
-        """There is no other light."""
+        """Always zero: the simulator has no ambient light."""
         return 0
 
     @property
@@ -84,7 +84,7 @@ class ColorSensor(Sensor):
 
     @property
     def raw(self) -> list[float]:
-        """Mean red, green and blue, not cut to whole numbers."""
+        """Mean red, green and blue, not truncated."""
         return self._means()
 
     @property
@@ -118,7 +118,7 @@ class ColorSensor(Sensor):
         return colour.lab(*self._means())
 
     def calibrate_white(self) -> None:
-        """Nothing to calibrate: white paper reads 255."""
+        """Do nothing: white paper already reads 255."""
 
 
 class GyroSensor(Sensor):
@@ -133,7 +133,7 @@ class GyroSensor(Sensor):
 
     @property
     def angle(self) -> int:
-        """Degrees turned since the program began, clockwise."""
+        """Degrees turned since the start of the program, clockwise."""
         return _round(self._read("gyro", times=2)[0])
 
     @property
@@ -146,7 +146,7 @@ class GyroSensor(Sensor):
         return [_round(value) for value in self._read("gyro")]
 
     def wait_until_angle_changed_by(self, delta: float, direction_sensitive: bool = False) -> None:
-        """Return when the angle has changed by ``delta`` degrees; either way round unless told otherwise."""
+        """Wait until the angle has changed by ``delta`` degrees, in either direction by default."""
         start = self.angle
         while True:
             change = self.angle - start
@@ -169,7 +169,7 @@ class UltrasonicSensor(Sensor):
 
     @property
     def distance_centimeters(self) -> float:
-        """Distance to what is in front, 0..255 cm; 255 when nothing is seen."""
+        """Distance to the object in front, 0..255 cm; 255 if there is none."""
         return int(self._read("ultrasonic")) / 10.0
 
     @property
