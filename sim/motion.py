@@ -1,6 +1,6 @@
-"""What decides where the robot gets to when its wheels turn: the course's equations, or these and solid walls.
+"""Motion of the robot when its wheels turn: the course's equations, with or without solid walls.
 
-The rigid-body wheels are in ``rigid_wheels.py``; how fast the wheels turn is ``drive.py``'s.
+``drive.py`` computes the wheel speeds, ``rigid_wheels.py`` the alternative motion with rigid-body wheels.
 """
 
 from __future__ import annotations
@@ -19,52 +19,52 @@ Rectangle = tuple[float, float, float, float]  # x, y of the lower left corner, 
 WALL = 100.0  # thickness, mm; only the inner face matters
 _METRE = 0.001
 _TICK = 1 / 30
-#: Bullet moves a free body as the equations do but for rounding, far below this (mm, radians).
+#: Tolerance (mm, radians) between Bullet and the equations for a free body; rounding differences are far smaller.
 _UNTOUCHED = 1e-4
 
 
 class Motion(Protocol):
-    """Moves a robot, with its axle's middle at (x, y) mm and its heading in radians, tick by tick."""
+    """Tick-by-tick motion of a robot; (x, y) is the middle of its axle in mm, the heading is in radians."""
 
     def place(self, x: float, y: float, heading: float) -> None:
-        """Begin at a pose."""
+        """Start at a pose."""
         ...
 
     def close(self) -> None:
-        """Give back what it holds."""
+        """Release resources."""
         ...
 
     def moved(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
-        """The new x and y, and by how many radians it turned; ``left`` and ``right`` are mm rolled by the wheels."""
+        """Return the new x and y and the turn in radians; ``left`` and ``right`` are the wheels' travel in mm."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Physics:
-    """What is decided by Bullet besides cameras and rays: contact with walls and obstacles, and the wheels."""
+    """Use of Bullet besides cameras and rays: contact with walls and obstacles, and the wheels."""
 
     solid: bool = False
     drive: Literal["course", "wheels"] = "course"
 
 
-#: The original's: nothing stops the robot, and its equations move it.
+#: Physics of the original: the equations move the robot and nothing stops it.
 COURSE_PHYSICS = Physics()
 
 
 class FreeMotion:
-    """The original's explicit Euler step, with the heading before the tick (robolab section 3); nothing stops it."""
+    """The original's explicit Euler step with the heading before the tick (robolab section 3), without collisions."""
 
     def __init__(self, robot: Robot) -> None:
         self._spacing = robot.wheel_spacing
 
     def close(self) -> None:
-        """It holds nothing."""
+        """Do nothing; there are no resources."""
 
     def place(self, x: float, y: float, heading: float) -> None:
-        """Nothing is remembered from tick to tick."""
+        """Do nothing; no state is kept between ticks."""
 
     def moved(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
-        """The new x and y, mm, and the turn, radians, by the equations alone."""
+        """Return the new x and y in mm and the turn in radians, computed by the equations alone."""
         if left == 0.0 and right == 0.0:
             return x, y, 0.0
         sine, cosine = sincos(heading)
@@ -73,10 +73,10 @@ class FreeMotion:
 
 
 class SolidMotion:
-    """Free motion until the body would touch a wall or an obstacle; then Bullet decides, and the wheels slip.
+    """Free motion until the body would touch a wall or an obstacle; Bullet then computes contact and wheel slip.
 
-    A tick depends on nothing but its arguments: Bullet's state is put back before each, so that no contact that it
-    remembers can differ from one worker to another.
+    Each tick depends only on its arguments. Bullet's state is restored before each tick, so that cached contacts cannot
+    cause differences between workers.
     """
 
     def __init__(self, robot: Robot, obstacles: tuple[Rectangle, ...], partner: Partner | None = None) -> None:
@@ -99,8 +99,8 @@ class SolidMotion:
             lateralFriction=0.3,
             physicsClientId=client,
         )
-        # Measured over twenty places: at full speed the body sinks at most 0.7 mm into a wall with 16 steps a tick,
-        # 3.4 mm with 4.
+        # Measured at twenty positions: at full speed the body penetrates a wall by at most 0.7 mm with 16 steps a tick,
+        # and by 3.4 mm with 4.
         pb.setPhysicsEngineParameter(
             fixedTimeStep=_TICK,
             numSubSteps=16,
@@ -111,14 +111,14 @@ class SolidMotion:
         self._state = pb.saveState(physicsClientId=client)
 
     def close(self) -> None:
-        """Leave Bullet."""
+        """Disconnect from Bullet."""
         self._client.close()
 
     def place(self, x: float, y: float, heading: float) -> None:
-        """Nothing is remembered from tick to tick."""
+        """Do nothing; no state is kept between ticks."""
 
     def moved(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
-        """The new x and y, mm, and the turn, radians; Bullet is asked only near a wall or an obstacle."""
+        """Return the new x and y in mm and the turn in radians. Bullet is used only near walls and obstacles."""
         new_x, new_y, turned = self._free.moved(x, y, heading, left, right)
         far = self._reach + math.hypot(new_x - x, new_y - y)
         partner = self._partner
@@ -138,14 +138,14 @@ class SolidMotion:
         pb.stepSimulation(physicsClientId=client)
         (met_x, met_y, _), turn = pb.getBasePositionAndOrientation(self._body, physicsClientId=client)
         met_x, met_y, met_turn = met_x / _METRE, met_y / _METRE, turn_between(heading, turn)
-        # A contact may have come and gone within the tick, so it is the outcome that tells, not the contacts left.
+        # A contact may begin and end within the tick. Therefore the result is compared, not the remaining contacts.
         free = math.hypot(met_x - new_x, met_y - new_y) < _UNTOUCHED and abs(met_turn - turned) < _UNTOUCHED
         return (new_x, new_y, turned) if free else (round(met_x, 6), round(met_y, 6), round(met_turn, 9))
 
 
 @dataclass(slots=True)
 class Partner:
-    """The other robot on a floor and where it is now, mm and radians: a body in the way, which nothing here moves."""
+    """The other robot on the floor and its current pose, mm and radians. This motion does not move it."""
 
     robot: Robot
     x: float = 0.0
@@ -153,19 +153,19 @@ class Partner:
     heading: float = 0.0
 
     def gap(self, x: float, y: float) -> float:
-        """The least that a point can be away from its body, mm, however it stands."""
+        """Return the lower bound of the distance from a point to its body in mm, for any heading."""
         return math.hypot(x - self.x, y - self.y) - self.robot.reach
 
 
 def turn_between(heading: float, quaternion: tuple[float, float, float, float]) -> float:
-    """Radians from ``heading`` to the yaw of a quaternion (x, y, z, w), between -pi and pi."""
+    """Return the angle from ``heading`` to the yaw of a quaternion (x, y, z, w) in radians, between -pi and pi."""
     x, y, z, w = quaternion
     yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     return (yaw - heading + math.pi) % (2 * math.pi) - math.pi
 
 
 def walls() -> dict[str, Rectangle]:
-    """The four walls round the floor, each by its name."""
+    """Return the four walls round the floor by name."""
     return {
         "left wall": (-WALL, -WALL, WALL, HEIGHT + 2 * WALL),
         "right wall": (WIDTH, -WALL, WALL, HEIGHT + 2 * WALL),
@@ -175,7 +175,7 @@ def walls() -> dict[str, Rectangle]:
 
 
 def add_block(box: Rectangle, client: Client) -> int:
-    """Put a block that does not move into a client's world; its Bullet number."""
+    """Add a static block to a client's world and return its Bullet id."""
     x, y, width, height = (value * _METRE for value in box)
     shape = pb.createCollisionShape(pb.GEOM_BOX, halfExtents=[width / 2, height / 2, 0.1], physicsClientId=client.id)
     body: int = pb.createMultiBody(0, shape, basePosition=[x + width / 2, y + height / 2, 0], physicsClientId=client.id)
@@ -183,7 +183,7 @@ def add_block(box: Rectangle, client: Client) -> int:
 
 
 def add_body(robot: Robot, client: Client, mass: float, half_height: float = 0.03) -> int:
-    """Put a robot's body, a box, into a client's world; its Bullet number. Without mass it stays where it is placed."""
+    """Add a robot's body, a box, to a client's world and return its Bullet id. A body without mass does not move."""
     length = robot.front - robot.back
     shape = pb.createCollisionShape(
         pb.GEOM_BOX,
@@ -196,7 +196,7 @@ def add_body(robot: Robot, client: Client, mass: float, half_height: float = 0.0
 
 
 def place_body(body: int, x: float, y: float, heading: float, client: Client) -> None:
-    """Put a body with the middle of its axle at (x, y) mm; heading in radians."""
+    """Move a body so that the middle of its axle is at (x, y) mm; heading in radians."""
     half = sincos(heading / 2)
     pb.resetBasePositionAndOrientation(
         body, (x * _METRE, y * _METRE, 0), (0, 0, half[0], half[1]), physicsClientId=client.id
@@ -204,6 +204,6 @@ def place_body(body: int, x: float, y: float, heading: float, client: Client) ->
 
 
 def gap(box: Rectangle, x: float, y: float) -> float:
-    """Distance from a point to a rectangle, mm."""
+    """Return the distance from a point to a rectangle in mm."""
     left, bottom, width, height = box
     return math.hypot(max(left - x, 0, x - left - width), max(bottom - y, 0, y - bottom - height))

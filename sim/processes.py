@@ -1,6 +1,7 @@
-"""Starts every process of ours: outside of the current folder, and without the user's settings for Python.
+"""Start of all Robomark processes: outside the current folder, and without the user's Python settings.
 
-Whoever runs a command may stand in a folder of submissions. No file in it is imported, or read as a setting, by us.
+Users may run a command in a folder of submissions. Robomark does not import files in that folder or read settings from
+it.
 """
 
 from __future__ import annotations
@@ -14,16 +15,16 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-#: The working folder of all that we start, and of services: nobody but root can put a file there.
+#: Working folder of all processes started here, and of services. Only root can create files in it.
 SAFE_FOLDER = "/"
-#: Variables that make a library run or read a file of somebody's choice.
+#: Variables that make a library run or read an arbitrary file.
 _LEFT_OUT = frozenset({"MATPLOTLIBRC", "MPLBACKEND", "CELERY_CONFIG_MODULE", "CELERY_LOADER"})
-#: One thread, and one order in sets of texts.
+#: One thread, and one iteration order for sets of texts.
 _SAME_ORDER: Mapping[str, str] = MappingProxyType(
     {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONHASHSEED": "0"}
 )
-#: One kind of kernels for matrices and functions of numpy, and what a processor must have to run it. What newer ones
-#: have besides is left unused: the order in which numbers are added decides their last bits.
+#: One set of numpy kernels, and the processor features they require. Newer features are disabled, because the order of
+#: additions affects the last bits of results.
 _SAME_KERNELS: Mapping[str, str] = MappingProxyType(
     {"OPENBLAS_CORETYPE": "Haswell", "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR"}
 )
@@ -32,24 +33,24 @@ _OUR_PACKAGES = str(Path(__file__).absolute().parents[1])
 
 
 def python_command(*arguments: str) -> list[str]:
-    """The command line of this interpreter, with neither the current folder nor a user's packages on its path."""
+    """Return the command line of this interpreter, without the current folder and the user's packages on its path."""
     return [sys.executable, "-P", "-s", *arguments]
 
 
 def clean_environment(extra: Mapping[str, str]) -> dict[str, str]:
-    """Our environment without what directs Python and libraries, and with these variables beside it."""
+    """Return the environment without variables that redirect Python or libraries, plus the variables in ``extra``."""
     kept = {
         name: value for name, value in os.environ.items() if not name.startswith("PYTHON") and name not in _LEFT_OUT
     }
-    # For the processes that these start in turn, such as the pool children of a worker.
+    # For child processes of the started process, such as the pool children of a worker.
     return kept | {"PYTHONSAFEPATH": "1", "PYTHONNOUSERSITE": "1"} | dict(extra)
 
 
 @functools.cache
 def same_arithmetic() -> dict[str, str]:
-    """The variables of a process that computes to the bit as such a process on any other machine does.
+    """Return the variables that make a process compute the same bits on every machine.
 
-    A processor without AVX2 or FMA, as x86-64 servers had until 2013, computes as it can.
+    Processors without AVX2 or FMA, such as x86-64 servers until 2013, use their own kernels.
     """
     try:
         flags = next(line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("flags"))
@@ -59,17 +60,18 @@ def same_arithmetic() -> dict[str, str]:
 
 
 def start(command: Sequence[str], extra: Mapping[str, str] | None = None, **options: Any) -> subprocess.Popen[Any]:
-    """Start ``command``; ``options`` are those of ``subprocess.Popen`` but for its folder and environment.
+    """Start ``command``; ``options`` are those of ``subprocess.Popen``, without folder and environment.
 
-    Raises OSError when it cannot be started.
+    Raises:
+        OSError: The process cannot be started.
     """
     return subprocess.Popen(command, cwd=SAFE_FOLDER, env=clean_environment(extra or {}), **options)
 
 
 def leave_current_folder() -> None:
-    """Move this process to the safe folder and take the current one off its path, before a service begins here.
+    """Change to the safe folder and remove the current one from the import path, before a service starts.
 
-    Libraries look for modules and settings where a process stands, whatever its path is.
+    Libraries look for modules and settings in the working folder, regardless of the import path.
     """
     not_ours = {str(Path.cwd())} - {_OUR_PACKAGES}
     sys.path[:] = [folder for folder in sys.path if folder.startswith("/") and folder not in not_ours]

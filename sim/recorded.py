@@ -1,6 +1,6 @@
-"""What belongs to a recording without being in it: the floor and the robot that it names, and where that robot was.
+"""Values derived from a recording: its floor and robot, the robot's pose at a time, faults and verdict.
 
-Whatever is drawn or judged of it is the service's.
+Plots and judging are in ``service``.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 
 def floor_of(recording: Recording) -> Floor | None:
-    """The floor that was driven on; None for an image of an instructor's own, which is not kept with the recording."""
-    # Whoever only reads what happened needs no floor, nor what draws them.
+    """Return the floor of the recording; None for an instructor's own image, which is not stored with it."""
+    # Imported here, because readers of plain values do not need the drawing code.
     from sim.floors import floor, names
 
     if recording.background not in names():
@@ -26,14 +26,14 @@ def floor_of(recording: Recording) -> Floor | None:
 
 
 def robot_of(recording: Recording) -> Robot:
-    """The robot that was driven; the default one if its name is not known any more."""
+    """Return the robot of the recording, or the default robot if its name is unknown."""
     return ROBOTS.get(recording.robot, ROBOTS["Default_Robot"])
 
 
 def stood_still(recording: Recording) -> bool:
-    """Whether no robot moved or turned in any tick; so too if there was none."""
+    """Return whether no robot moved or turned in any tick; True without ticks."""
     ticks, start = recording.ticks, recording.start
-    # The heading has been radians in between.
+    # The conversion to radians and back loses the last bits.
     still = all(
         bool((abs(column - first) < 1e-9).all())
         for column, first in ((ticks.x, start.x), (ticks.y, start.y), (ticks.heading, start.heading))
@@ -42,7 +42,7 @@ def stood_still(recording: Recording) -> bool:
 
 
 def printed_alone(recording: Recording) -> list[Line]:
-    """What one robot printed, without what ``say`` printed because it was said."""
+    """Return the printed lines of one robot without those that ``say`` added."""
     said = Counter((line.t, line.text) for line in recording.spoken)
     alone = []
     for line in recording.printed:
@@ -54,7 +54,7 @@ def printed_alone(recording: Recording) -> list[Line]:
 
 
 def without_responder(recording: Recording) -> bool:
-    """Whether the simulator stood in for a responder, by what every answer is: the text itself, after one word."""
+    """Return whether the simulator answered instead of a responder: every answer repeats the text after one word."""
     messages = recording.messages
     answers = [each for each in messages if each.sender == "responder"]
     return bool(answers) and all(
@@ -63,30 +63,30 @@ def without_responder(recording: Recording) -> bool:
 
 
 def faults_of(recording: Recording) -> tuple[Fault, ...]:
-    """The faults of all robots, the earliest first; of the same moment, the first robot's."""
+    """Return the faults of all robots, earliest first. At equal times, the first robot's faults come first."""
     partners = recording.partner.faults if recording.partner is not None else ()
     return tuple(sorted((*recording.faults, *partners), key=lambda fault: fault.t))
 
 
 def verdict_of(recording: Recording) -> Verdict:
-    """How the trial ended: by the earliest fault of any robot."""
+    """Return the verdict of the trial, decided by the earliest fault of any robot."""
     if recording.partner is None:
         return recording.verdict
     return next((fault.verdict for fault in faults_of(recording)), Verdict.FINISHED)
 
 
 def seconds_at(recording: Recording, tick: int) -> float:
-    """When a tick was done."""
+    """Return the time in seconds at the end of a tick."""
     return tick * recording.ticks.length / SECOND
 
 
 def ticks_until(recording: Recording, t: float) -> int:
-    """How many ticks were done at ``t`` seconds."""
+    """Return the number of ticks completed at ``t`` seconds."""
     return int(t * recording.ticks.per_second + 1e-6)
 
 
 def pose_after(recording: Recording, tick: int) -> Pose:
-    """Where the robot was after that many ticks; at its start before the first, at its end from the last on."""
+    """Return the pose after this number of ticks: the start pose before the first, the final pose after the last."""
     ticks = recording.ticks
     done = min(tick, len(ticks))
     if done < 1:
@@ -95,5 +95,5 @@ def pose_after(recording: Recording, tick: int) -> Pose:
 
 
 def pose_at(recording: Recording, t: float) -> Pose:
-    """Where the robot was at ``t`` seconds: its pose after the last tick until then."""
+    """Return the pose at ``t`` seconds, taken after the last completed tick."""
     return pose_after(recording, ticks_until(recording, t))

@@ -1,7 +1,7 @@
-"""What happened in one trial, tick by tick and word by word, and how it ended.
+"""Recording of a trial: every tick, message, print and fault, and the verdict.
 
-A recording is plain data: it knows neither students nor marks, and nothing in it is read back into a simulation. Who
-reads no ticks need not wait for numpy.
+Recordings are plain data without students or marks. They are never read back into a simulation. Readers that need no
+ticks can import this module without numpy.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 Floats: TypeAlias = "NDArray[np.float64]"
 Integers: TypeAlias = "NDArray[np.int64]"
 
-#: Units of simulated time in a second: a third of a microsecond, so that a tick and 10 ms are both whole.
+#: Units of simulated time per second. A unit is a third of a microsecond, so that a tick and 10 ms are integers.
 SECOND = 3_000_000
 TICK = SECOND // 30
-#: A tick in the original's browser, whose timer leaves out what is less than a millisecond.
+#: Tick length in the original's browser, whose timer truncates to whole milliseconds.
 BROWSER_TICK = SECOND // 1000 * 33
 MILLISECOND = SECOND // 1000
 #: Pixels that a light sensor of 20 mm sees (robolab: rows and columns with (r-10)**2 + (c-10)**2 < 100).
@@ -32,7 +32,7 @@ SENSOR_SIDE = 20
 
 
 class Verdict(StrEnum):
-    """How a trial ended and whose fault it was."""
+    """Verdict of a trial: how it ended and who caused it."""
 
     FINISHED = "finished"
     PROGRAM_ERROR = "program_error"
@@ -50,7 +50,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where the robot is: mm from the lower left corner, degrees anticlockwise from +x."""
+    """Pose of the robot: mm from the lower left corner, degrees anticlockwise from +x."""
 
     x: float
     y: float
@@ -65,10 +65,10 @@ _WHEELS = Panel("Wheel encoders, degrees", height=0.75, rank=1)
 
 @dataclass(frozen=True, slots=True)
 class Ticks:
-    """One row a tick; row i is the state after tick i+1. All arrays have n rows.
+    """One row per tick; row i is the state after tick i+1. All arrays have n rows.
 
-    A column that is not given is not known. This is the table of columns: what the chain packs, what a program can
-    read, what the store keeps, what traces and plots show is taken from here.
+    Missing columns have unknown values. The fields of this class define the columns for the hash chain, the sensors,
+    the store, traces and plots.
     """
 
     x: Floats = column("mm", "drive.x")
@@ -109,7 +109,7 @@ class Ticks:
     )
     left_pixels: int = 305  # how many pixels the sums are over
     right_pixels: int = 305
-    length: int = TICK  # of a tick, units of simulated time
+    length: int = TICK  # of a tick, in units of simulated time
 
     def __post_init__(self) -> None:
         for each in COLUMNS:
@@ -120,7 +120,7 @@ class Ticks:
         return len(self.x)
 
     def told(self) -> dict[str, Floats]:
-        """What readers of a recording are told of it, seconds first; every array has n rows."""
+        """Return the columns as readers see them, seconds first; every array has n rows."""
         return {"t": self.t, **{each.told_as: getattr(self, each.told_as) for each in COLUMNS}}
 
     @property
@@ -132,7 +132,7 @@ class Ticks:
 
     @property
     def per_second(self) -> float:
-        """How many there are in a second."""
+        """The number of ticks per second."""
         return SECOND / self.length
 
     @property
@@ -148,64 +148,66 @@ class Ticks:
 
 #: In the order of the chain's rows.
 COLUMNS = columns_of(Ticks)
-#: What a program can read: each sensor, and the path from the world to what it gives.
+#: Readings of programs: each sensor, and the path of its value in the world.
 SENSORS: Mapping[str, str] = MappingProxyType({each.sensor: each.reading for each in COLUMNS if each.sensor})
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """Something printed or spoken, and when (seconds)."""
+    """A printed or spoken text and its time in seconds."""
 
     t: float
     text: str
 
 
-#: Where there is no responder the simulator answers each text with itself, after this.
+#: Prefix of the simulator's answers when there is no responder; the text itself follows.
 STAND_IN = "pingpong "
-#: Why the channel lost a text; empty where it did not.
+#: Reason why the channel lost a text; empty if it was delivered.
 LossReason = Literal["", "chance", "out of range", "facing away", "blocked"]
 
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """One text that crossed the bridge.
+    """One text sent over the bridge.
 
-    ``t`` is when it was sent; ``delivered`` when it arrived, None if it never did. ``reply_to`` is the index, in
-    the recording's messages, of the text that it answers. ``note`` says what befell it: lost, duplicated, malformed.
-    ``distance`` (mm) and ``angle`` (degrees, to the left above 0) are from the robot to the other end of an infrared
-    link when the text set out or, of an answer, when it came or was lost.
+    ``t`` is the sending time; ``delivered`` is the arrival time, or None if the text was lost. ``reply_to`` is the
+    index of the answered text in the recording's messages. ``note`` lists effects of the channel: lost, duplicated,
+    malformed.
+
+    ``distance`` (mm) and ``angle`` (degrees, positive to the left) describe the other end of an infrared link, seen
+    from the robot. They are measured when the text is sent; for an answer, when it arrives or is lost.
     """
 
     t: float
-    sender: Literal["robot", "responder", "partner"]  # the partner is the other robot, where there are two
+    sender: Literal["robot", "responder", "partner"]  # "partner" is the other robot, if there are two
     text: str
     delivered: float | None
     reply_to: int | None = None
     note: str = ""
-    lost: LossReason = ""  # recordings of earlier releases say so in their note alone
+    lost: LossReason = ""  # earlier releases record it only in the note
     distance: float | None = None
     angle: float | None = None
-    arrived_as: str | None = None  # where the channel corrupted it
-    to_partner: bool = False  # whether a robot's text went to the other robot, and to no responder
+    arrived_as: str | None = None  # the received text, if the channel corrupted it
+    to_partner: bool = False  # the text of a robot goes to the other robot instead of a responder
 
     @property
     def received(self) -> str:
-        """The text as it arrived, if it did."""
+        """The text as received, including corruption."""
         return self.text if self.arrived_as is None else self.arrived_as
 
 
 @dataclass(frozen=True, slots=True)
 class AgentMessage:
-    """One text between the responder and an agent, or between two agents, while the robot's message was answered.
+    """One text between the responder and an agent, or between two agents, during the answer to a robot's message.
 
-    ``message`` is the index of that one, -1 while the responder was loaded. ``reply_to`` is the index, in the
-    recording's agent messages, of what it answers; ``note`` says of a question why it got no answer.
+    ``message`` is the index of the robot's message, -1 while the responder is loaded. ``reply_to`` is the index of the
+    answered text in the recording's agent messages. For an unanswered question, ``note`` has the reason.
     """
 
     t: float
     sender: str
     receiver: str
-    text: str  # what was sent, if it was a text; else as JSON has it
+    text: str  # the text sent; other values as JSON
     message: int
     reply_to: int | None = None
     note: str = ""
@@ -214,7 +216,7 @@ class AgentMessage:
 
 @dataclass(frozen=True, slots=True)
 class AgentOutput:
-    """What an agent printed, and what it wrote to its logger.txt."""
+    """The output of an agent: printed text and the content of its logger.txt."""
 
     agent: str
     printed: str
@@ -223,10 +225,10 @@ class AgentOutput:
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """What both light sensors saw when the program printed IMG_DATA, and where the robot was.
+    """Images of both light sensors when the program printed IMG_DATA, and the robot's pose.
 
-    ``left`` and ``right`` are the raw RGBA bytes of side x side pixels, row-major, top row first;
-    ``message`` is the index of the message that carried it.
+    ``left`` and ``right`` are the raw RGBA bytes of side x side pixels, row-major, top row first. ``message`` is the
+    index of the message that carries them.
     """
 
     t: float
@@ -235,13 +237,13 @@ class Image:
     left: bytes
     right: bytes
     message: int
-    truth: str | None = None  # what the floor has under the left sensor, where it has a label
+    truth: str | None = None  # label of the floor under the left sensor, if any
     side: int = SENSOR_SIDE
 
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A call inside the responder (parser, agent, logger, predict), for the sequence diagram; never marked."""
+    """A call inside the responder (parser, agent, logger, predict), for the sequence diagram; not used for marks."""
 
     message: int  # index of the message being answered
     depth: int
@@ -249,7 +251,7 @@ class Call:
     callee: str  # parser, agent, logger, or the name bound to a network
     argument: str  # shortened repr
     result: str  # shortened repr
-    before: int = 0  # how many agent messages there were when it ended
+    before: int = 0  # number of agent messages at the end of the call
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,7 +266,7 @@ class Datum:
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """The robot's body began to touch a wall or an obstacle."""
+    """Start of a contact between the robot's body and a wall or an obstacle."""
 
     t: float
     what: str
@@ -273,9 +275,9 @@ class Touch:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Something that went wrong: when, whose, one sentence, and the line of the student's file if there is one.
+    """A fault: time, cause, one sentence, and the line in the student's file, if known.
 
-    In a notebook the line is that of a cell, both counted from 1; with a ``file`` it is that of a file beside.
+    In a notebook, ``line`` counts within ``cell``, both from 1. With ``file``, it is a line of that file.
     """
 
     t: float
@@ -285,13 +287,13 @@ class Fault:
     line: int | None = None
     hint: str = ""
     cell: int | None = None
-    staff: str = ""  # what our own code stumbled over, for staff to look at
-    agent: str = ""  # which agent of the responder's it was, if not the responder itself
-    file: str = ""  # the Python file beside the program, responder or notebook that the line is in
+    staff: str = ""  # the error in Robomark's own code, for staff
+    agent: str = ""  # the agent at fault; empty for the responder itself
+    file: str = ""  # the Python file that contains the line, if it is an additional file
 
     @property
     def place(self) -> str:
-        """``line 3``, ``cell 7, line 3``, ``parser, line 3`` or ``line 3 of helper.py``; empty where none is known."""
+        """``line 3``, ``cell 7, line 3``, ``parser, line 3`` or ``line 3 of helper.py``; empty if unknown."""
         within = [self.agent] if self.agent else []
         within += [f"cell {self.cell}"] if self.cell is not None else []
         beside = f" of {self.file}" if self.file else ""
@@ -300,10 +302,10 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """All that happened in a trial. ``sha256`` is the chain over every tick, value, print and message.
+    """Complete record of a trial. ``sha256`` is the hash chain over every tick, value, print and message.
 
-    Of two robots each has a recording: this is the first one's, with the second's as its ``partner``. What is in it is
-    its own robot's, but for ``sha256``, which is over both, and what the responder printed and logged.
+    With two robots, each has a recording; the second is the ``partner`` of the first. A recording describes its own
+    robot. The exceptions are ``sha256``, which covers both, and the responder's output and log.
     """
 
     background: str
@@ -319,20 +321,20 @@ class Recording:
     images: tuple[Image, ...] = ()
     calls: tuple[Call, ...] = ()
     datalog: tuple[Datum, ...] = ()
-    image_log: tuple[tuple[str, str, int], ...] = ()  # side, csv, tick: what ``image_data left|right|both`` collects
+    image_log: tuple[tuple[str, str, int], ...] = ()  # (side, csv, tick) of each ``image_data left|right|both``
     touches: tuple[Touch, ...] = ()
     faults: tuple[Fault, ...] = ()
     obstacles: tuple[tuple[float, float, float, float], ...] = ()  # x, y, width, height
     beacon: tuple[float, float] | None = None  # the other end of an infrared link
-    label_patches: bool = True  # whether the floor showed its grey label patches
-    sheet: int = 0  # the seed of the digits on it, for a digit sheet
+    label_patches: bool = True  # the floor shows its grey label patches
+    sheet: int = 0  # the seed of the digits, for a digit sheet
     robot: str = "Default_Robot"
-    pen: tuple[tuple[int, bool], ...] = ()  # (tick, down) whenever the pen changes
+    pen: tuple[tuple[int, bool], ...] = ()  # (tick, down) for each change of the pen
     responder_output: str = ""
-    responder_log: str = ""  # what the responder wrote to logger.txt
+    responder_log: str = ""  # the content of the responder's logger.txt
     sandbox: str = "process limits only"
     notes: tuple[str, ...] = field(default=())
     agent_messages: tuple[AgentMessage, ...] = ()
     agent_outputs: tuple[AgentOutput, ...] = ()  # of every agent, in the assignment's order
     partner: Recording | None = None
-    cell_errors: tuple[Fault, ...] = ()  # of a notebook: the first cells that failed, whatever came of it
+    cell_errors: tuple[Fault, ...] = ()  # of a notebook: the first cells that failed, even if the run continued

@@ -1,6 +1,6 @@
-"""A robot with rigid-body wheels: Bullet rolls two wheels and a caster over the floor, motors and friction included.
+"""Robot with rigid-body wheels: Bullet simulates two wheels and a caster with motors and friction.
 
-The alternative to the course's equations; how fast the wheels are told to turn stays ``drive.py``'s.
+This is the alternative to the course's equations. ``drive.py`` still computes the requested wheel speeds.
 """
 
 from __future__ import annotations
@@ -13,19 +13,20 @@ from sim.robot import Robot
 from sim.trigonometry import sincos
 
 _METRE = 0.001
-_STEPS = 4  # in a tick
+_STEPS = 4  # per tick
 _BODY_KG, _WHEEL_KG = 1.0, 0.05
-_TORQUE = 1.0  # N m, enough that a wheel on the floor turns as it is told
+_TORQUE = 1.0  # N m, enough for a wheel on the floor to reach the requested speed
 _LEFT, _RIGHT, _CASTER = 0, 1, 2
 
 
 class RigidWheels:
-    """Two ball-shaped wheels that touch the floor in a point, and a caster without friction.
+    """Two spherical wheels with point contact, and a caster without friction.
 
-    Measured over 60 s of random driving this stays within 0.03 % of the path of the equations
-    (spec/pybullet.md section 3a: 120 Hz, 200 solver iterations); wide cylinders, or fewer iterations, do not. Its
-    last digits depend on whether the processor fuses multiplication and addition, so recordings are the same on all
-    machines that do (x86-64 with FMA), not on all machines.
+    Over 60 s of random driving, this stays within 0.03 % of the path of the equations (spec/pybullet.md section 3a: 120
+    Hz, 200 solver iterations). Wide cylinders or fewer iterations do not reach this precision.
+
+    The last digits depend on fused multiply-add. Recordings are therefore the same on all machines with FMA (x86-64),
+    but not on machines without it.
     """
 
     def __init__(self, robot: Robot, blocks: tuple[Rectangle, ...] = (), partner: Partner | None = None) -> None:
@@ -48,16 +49,16 @@ class RigidWheels:
         self._partner = partner
         self._partners_body = add_body(partner.robot, self._client, 0, 0.1) if partner is not None else -1
         self._body = self._build(robot)
-        # Bullet tells where the centre of mass is, not where the middle of the axle is.
+        # Bullet reports the centre of mass, not the middle of the axle.
         self._mass_ahead = robot.back / 6
         self._state = pb.saveState(physicsClientId=client)
 
     def close(self) -> None:
-        """Leave Bullet."""
+        """Disconnect from Bullet."""
         self._client.close()
 
     def place(self, x: float, y: float, heading: float) -> None:
-        """Stand still at a pose, with nothing left of what was before."""
+        """Stop at a pose and reset all state."""
         client = self._client.id
         pb.restoreState(self._state, physicsClientId=client)
         half = sincos(heading / 2)
@@ -68,7 +69,7 @@ class RigidWheels:
         )
 
     def moved(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
-        """Where Bullet has rolled the robot after a tick; ``x`` and ``y`` are where it was put or got to before."""
+        """Return the new x and y in mm and the turn in radians; ``x`` and ``y`` are the previous position."""
         client = self._client.id
         if self._partner is not None:
             partner = self._partner
@@ -93,7 +94,7 @@ class RigidWheels:
         client = self._client.id
         radius, half_spacing = self._radius * _METRE, robot.wheel_spacing / 2 * _METRE
         caster_radius = radius * 0.36
-        # The box clears the floor, and stands as high as the obstacles' upper half.
+        # The box clears the floor and reaches the height of the obstacles' upper half.
         half_length, half_height = (robot.front - robot.back) / 2 * _METRE, radius / 2
         box = pb.createCollisionShape(
             pb.GEOM_BOX,
@@ -103,7 +104,7 @@ class RigidWheels:
         )
         wheel = pb.createCollisionShape(pb.GEOM_SPHERE, radius=radius, physicsClientId=client)
         ball = pb.createCollisionShape(pb.GEOM_SPHERE, radius=caster_radius, physicsClientId=client)
-        # A joint about the link's own z; the link is rolled so that a positive speed rolls forwards.
+        # The joint turns about the link's z axis; the link is rotated so that a positive speed rolls forwards.
         rolled = pb.getQuaternionFromEuler([math.pi / 2, 0, 0])
         upright = (0, 0, 0, 1)
         caster_at = robot.back * 0.75 * _METRE

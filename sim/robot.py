@@ -1,6 +1,6 @@
-"""The robots that RoboLab offers: dimensions, where the sensors sit, how quickly a wheel changes speed.
+"""RoboLab's robots: dimensions, sensor positions and wheel acceleration.
 
-Local coordinates have x to the robot's right and y forward, from the middle of the axle; lengths are mm.
+Local coordinates start at the middle of the axle, with x to the robot's right and y forward; lengths are in mm.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from types import MappingProxyType
 
 from sim.errors import UsageError
 
-#: Degrees per second that a wheel of weight 1 gains in a second.
+#: Acceleration in degrees per second squared of a wheel with weight 1.
 ACCELERATION = 5000.0
 MAX_SPEED = 1050.0  # wheel degrees per second at 100 %
 
 
 @dataclass(frozen=True, slots=True)
 class LightSensor:
-    """A round window on the floor, ``diameter`` pixels wide."""
+    """Light sensor with a round window on the floor, ``diameter`` pixels wide."""
 
     x: float
     y: float
@@ -28,7 +28,7 @@ class LightSensor:
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """What is bolted together. ``weight`` divides the acceleration; 0 means that speeds change at once."""
+    """A robot's configuration. ``weight`` divides the acceleration; with 0, speeds change at once."""
 
     name: str = "Default_Robot"
     wheel_diameter: float = 56.0
@@ -43,12 +43,12 @@ class Robot:
 
     @property
     def acceleration(self) -> float:
-        """The most a wheel's speed can change in a tick, degrees per second."""
+        """The maximum change of a wheel's speed per tick, in degrees per second."""
         return ACCELERATION / self.weight / 30 if self.weight else math.inf
 
     @property
     def reach(self) -> float:
-        """The farthest any point of the body is from the middle of the axle, mm."""
+        """The maximum distance of a point of the body from the middle of the axle, in mm."""
         return math.hypot(max(self.front, -self.back), self.half_width)
 
 
@@ -66,7 +66,7 @@ _SMALL = Robot(
     half_width=50,
 )
 
-#: What choosing the background Radial_grey makes of each robot: its light sensors are 60 mm to either side.
+#: Robots on the background Radial_grey: the light sensors are 60 mm to either side.
 WIDENED: Mapping[str, str] = MappingProxyType(
     {
         "Default_Robot": "Default_Robot_Wide_Eyes",
@@ -106,7 +106,11 @@ ROBOTS: Mapping[str, Robot] = MappingProxyType(
 
 
 def robot(name: str) -> Robot:
-    """The robot called ``name``. Raises UsageError for a name that RoboLab does not have."""
+    """Return the robot called ``name``.
+
+    Raises:
+        UsageError: RoboLab has no robot of this name.
+    """
     try:
         return ROBOTS[name]
     except KeyError:
@@ -114,5 +118,5 @@ def robot(name: str) -> Robot:
 
 
 def usual_robot(background: str) -> str:
-    """The name of the robot that stands on a background unless another is asked for (robolab section 1.1)."""
+    """Return the name of the default robot of a background (robolab section 1.1)."""
     return WIDENED["Default_Robot"] if background == "Radial_grey" else "Default_Robot"

@@ -1,6 +1,6 @@
-"""A sentence for people that can still be said in another language: what it says, apart from what it says it of.
+"""Translatable sentences: a template and its values.
 
-Which languages there are is the service's to know; written out here it is English.
+Converted to text here, a sentence is English. ``service`` translates it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class Sentence:
-    """``%(name)s`` in the template stands for a value, which may be a sentence too; without any it is as it stands."""
+    """A template with ``%(name)s`` for each value. Values may be sentences too. Without values, the text is literal."""
 
     template: str
     values: Mapping[str, object] = field(default_factory=dict)
@@ -21,6 +21,6 @@ class Sentence:
 
 
 def listed(parts: Sequence[str | Sentence]) -> str | Sentence:
-    """Those parts with "and" between them; empty for none."""
+    """Join the parts with "and"; empty for no parts."""
     *before, last = parts or ("",)
     return Sentence("%(these)s and %(last)s", {"these": listed(before), "last": last}) if before else last

@@ -1,6 +1,6 @@
-"""An arena with another robot in it: ultrasonic rays meet its body, this robot's body touches it, and may be stopped.
+"""Arena with a second robot, which ultrasonic rays detect and the first robot's body can touch.
 
-What the other one does is not decided here; it is where it was last placed. Light sensors look at the floor alone.
+The second robot is at the pose where it was last placed. Light sensors see only the floor.
 """
 
 from __future__ import annotations
@@ -14,30 +14,30 @@ _PARTNER = 8  # collision group
 
 
 class SharedArena(Arena):
-    """The arena as one of two robots has it; each has one of its own."""
+    """The arena from the view of one of two robots. Each robot has its own instance."""
 
     def __init__(self, obstacles: tuple[Rectangle, ...], partner: Robot, name: str) -> None:
-        """``name`` is what the partner is called where it is touched."""
+        """Create the arena; ``name`` is the partner's name in touches."""
         super().__init__(obstacles)
         self._partner = Partner(partner)
         self._name = name
         self._partners_body = self._group(add_body(partner, self._client, 0), _PARTNER, -1)
 
     def place_partner(self, x: float, y: float, heading: float) -> None:
-        """The other robot stands there from now on: mm and radians."""
+        """Set the pose of the other robot, in mm and radians."""
         partner = self._partner
         partner.x, partner.y, partner.heading = x, y, heading
         place_body(self._partners_body, x, y, heading, self._client)
 
     def distance(self, x: float, y: float, heading: float, forward: float) -> float:
-        """As in an arena, but that another robot is heard wherever it is met: it has no smooth sides."""
+        """Return the distance as in an arena. The other robot has no smooth sides, so rays detect it at any angle."""
         nearest = super().distance(x, y, heading, forward)
         if self._partner.gap(x, y) > nearest + forward:
             return nearest
         return min(nearest, self._nearest_hit(x, y, heading, forward, _PARTNER))
 
     def touching(self, robot: Robot, x: float, y: float, heading: float) -> tuple[str, ...]:
-        """As in an arena, and the partner's name where the bodies meet."""
+        """Return the objects touched as in an arena, and the partner's name if the bodies touch."""
         touched = super().touching(robot, x, y, heading)
         if self._partner.gap(x, y) > robot.reach + TOUCH:
             return touched

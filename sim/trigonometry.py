@@ -1,8 +1,7 @@
-"""Sine and cosine from additions and multiplications alone, so that every processor gives the same last bit.
+"""Sine and cosine from additions and multiplications alone, bit-identical on every processor.
 
-The C library chooses between variants with and without fused multiply-add at run time, and they differ in the
-last place; a recording's hash must not. The kernels are the published polynomials of fdlibm (k_sin.c, k_cos.c,
-e_rem_pio2.c).
+The C library selects variants with or without fused multiply-add at run time. They differ in the last place, which
+would change a recording's hash. The kernels are the polynomials of fdlibm (k_sin.c, k_cos.c, e_rem_pio2.c).
 """
 
 from __future__ import annotations
@@ -10,14 +9,14 @@ from __future__ import annotations
 import math
 
 _TWO_OVER_PI = 6.36619772367581382433e-01
-# pi/2 in two pieces of 33 bits and a rest: n times a piece is exact for |n| < 2**20.
+# pi/2 in two parts of 33 bits and a remainder: n times a part is exact for |n| < 2**20.
 _HALF_PI_1 = 1.57079632673412561417e00
 _HALF_PI_2 = 6.07710050630396597660e-11
 _HALF_PI_2_REST = 2.02226624879595063154e-21
 
 
 def sincos(angle: float) -> tuple[float, float]:
-    """Sine and cosine of ``angle`` radians, to about one unit in the last place for |angle| < 1e6."""
+    """Return sine and cosine of ``angle`` in radians, to about one unit in the last place for |angle| < 1e6."""
     n = math.floor(angle * _TWO_OVER_PI + 0.5)
     first = angle - n * _HALF_PI_1
     step = n * _HALF_PI_2
@@ -50,5 +49,5 @@ def sincos(angle: float) -> tuple[float, float]:
 
 
 def round_half_up(value: float) -> float:
-    """JavaScript's ``Math.round``: halves go up, also below zero."""
+    """Round like JavaScript's ``Math.round``: halves go up, also below zero."""
     return float(math.floor(value + 0.5))

@@ -1,7 +1,7 @@
-"""One trial's world: the drive, the sensors and the touches, advanced tick by tick and written down as they go.
+"""World of one trial: drive, sensors and touches, advanced and recorded tick by tick.
 
-A world is made afresh for every trial from parts that keep no state (arena, camera); it knows nothing of programs
-or messages, and time moves only when ``tick`` is called.
+Each trial gets a new world, built from shared parts without state (arena, camera). Programs and messages are handled
+elsewhere; time advances only in ``tick``.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from sim.robot import Robot
 from sim.sensors import Footprint, LightReader, footprint
 from sim.trigonometry import sincos
 
-#: A row: the time and all columns, of which those of the chain come first.
+#: A row: the time and all columns, those of the chain first.
 _ROW = struct.Struct("<q" + "".join(f"{each.width}{'q' if each.whole else 'd'}" for each in COLUMNS))
 _TABLE = np.dtype(
     [("time", "<i8"), *((each.name, each.dtype, (each.width,) if each.width > 1 else ()) for each in COLUMNS)]
 )
 _CHAINED = 8 + 8 * sum(each.width for each in COLUMNS if each.in_chain)  # bytes
 _sources = ", ".join(f"*world.{each.source}" if each.width > 1 else f"world.{each.source}" for each in COLUMNS)
-# Written out once, as it is called at every tick: to follow the table there would take a twentieth of the whole tick.
+# Compiled to one expression, because it runs at every tick; a loop over the table would take 5 % of the tick.
 _row_of: Callable[[World], tuple[float, ...]] = eval(f"lambda world: ({_sources},)")
 _readings = attrgetter(*SENSORS.values())
 _RIGHT_ANGLE = math.pi / 2
@@ -41,9 +41,9 @@ _RIGHT_ANGLE = math.pi / 2
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Amplitudes: grey levels for each pixel of a light sensor, degrees per second for each wheel.
+    """Noise amplitudes: grey levels per pixel of a light sensor, degrees per second per wheel.
 
-    In the original a wheel at a negative speed has no noise; with ``both_directions`` it has.
+    In the original, wheels at negative speeds have no noise. With ``both_directions`` they have noise too.
     """
 
     light: float = 0.0
@@ -52,29 +52,29 @@ class Noise:
 
 
 class Chain:
-    """The SHA-256 of everything that happened, in order."""
+    """SHA-256 over all events in order."""
 
     def __init__(self) -> None:
         self._digest = hashlib.sha256()
-        #: Something as it is: called for each tick with its row, and for each reading.
+        #: Adds raw bytes. Called for the row of each tick and for each reading.
         self.add_bytes = self._digest.update
 
     def add(self, kind: str, time: int, data: bytes) -> None:
-        """Something that is not a tick: its kind, when (thirds of a microsecond), and its bytes."""
+        """Add an event other than a tick: its kind, its time (thirds of a microsecond) and its bytes."""
         self.add_bytes(f"{kind}:{time}:{len(data)}:".encode() + data)
 
     @staticmethod
     def timeless(kind: str, numbers: str) -> bytes:
-        """What ``add`` would add of numbers, once ``%`` has put the time into it: for what is added time and again."""
+        """Return the bytes that ``add`` adds for these numbers, with ``%d`` for the time. Used for frequent events."""
         return f"{kind}:%d:{len(numbers)}:{numbers}".encode()
 
     def hexdigest(self) -> str:
-        """The hash of all that was added so far, 64 hexadecimal digits."""
+        """Return the hash of all data added so far, 64 hexadecimal digits."""
         return self._digest.hexdigest()
 
 
 class World:
-    """A robot on a floor. ``clock`` counts ticks; every value that a program can read changes only at a tick."""
+    """A robot on a floor. ``clock`` counts ticks; values that programs can read change only at ticks."""
 
     def __init__(
         self,
@@ -88,7 +88,7 @@ class World:
         physics: Physics = COURSE_PHYSICS,
         tick: int = TICK,
     ) -> None:
-        """``tick`` is how long one lasts, units of simulated time; the equations know only thirtieths of a second."""
+        """Create the world. ``tick`` is its length in units of simulated time; the equations assume 1/30 s."""
         self.robot = robot
         self._tick = tick
         self.clock = 0
@@ -115,22 +115,22 @@ class World:
         self.left_sums = self.right_sums = (0, 0, 0)
         self.ultrasonic = 0.0
         self.touches: list[Touch] = []
-        # What the start pose touches already is no touch: several of the course's own overlap a wall.
+        # Contacts at the start pose do not count as touches: several of the course's poses overlap a wall.
         self._touching = arena.touching(robot, pose.x, pose.y, self.drive.heading)
         self._rows: list[bytes] = []
         self._sense(moved=True, listen=True)
 
     @property
     def pose(self) -> Pose:
-        """Where the robot is now: the middle of its axle, mm, and its heading, degrees."""
+        """The robot's pose: the middle of its axle in mm, and its heading in degrees."""
         return Pose(self.drive.x, self.drive.y, self.drive.heading_degrees)
 
     def tick(self) -> None:
-        """Advance one tick."""
+        """Advance by one tick."""
         self.sense(self.move())
 
     def move(self) -> bool:
-        """The first half of a tick: the wheels turn. Whether the robot is elsewhere, or stands otherwise, then."""
+        """Run the first half of a tick: turn the wheels. Return whether the robot moved or turned."""
         self.clock += 1
         drive = self.drive
         x, y, heading = drive.x, drive.y, drive.heading
@@ -138,14 +138,14 @@ class World:
         return x != drive.x or y != drive.y or heading != drive.heading
 
     def sense(self, moved: bool) -> None:
-        """The second half, once all that shares the floor has moved: the sensors look, and the row is written."""
+        """Run the second half of a tick, after all robots have moved: read the sensors and write the row."""
         self._sense(moved, listen=self.clock % 3 == 0)
         row = _ROW.pack(self.clock * self._tick, *_row_of(self))
         self._rows.append(row)
         self._chain.add_bytes(row[:_CHAINED])
 
     def readings(self) -> dict[str, Any]:
-        """What each sensor gives a program, as of the last tick."""
+        """Return the readings of every sensor after the last tick."""
         return dict(zip(SENSORS, _readings(self), strict=True))
 
     @property
@@ -160,11 +160,11 @@ class World:
 
     @property
     def gyro_angle_and_rate(self) -> list[float]:
-        """What the gyro has turned, degrees, and its rate, degrees a second; both clockwise."""
+        """The gyro's angle in degrees and its rate in degrees per second, both clockwise."""
         return [self.drive.gyro_angle, self.drive.gyro_rate]
 
     def images(self) -> tuple[bytes, bytes]:
-        """RGBA bytes of the left and the right light sensor, as of the last tick."""
+        """Return the RGBA bytes of the left and the right light sensor after the last tick."""
         left, right = (
             reader.image(where, self.clock) for reader, where in zip(self._lights, self._footprints, strict=True)
         )
@@ -172,11 +172,11 @@ class World:
 
     @property
     def left_footprint(self) -> Footprint:
-        """Where the left light sensor looks."""
+        """The position of the left light sensor."""
         return self._footprints[0]
 
     def ticks(self) -> Ticks:
-        """All rows so far."""
+        """Return all rows so far."""
         table = np.frombuffer(b"".join(self._rows), _TABLE)
         return Ticks(
             **{each.name: table[each.name].astype(each.dtype) for each in COLUMNS},

@@ -1,7 +1,7 @@
-"""The floors that the robot drives over: what they look like, and what is where on them.
+"""Floors that the robot drives over: images, labels and obstacles.
 
-Images only: how a light sensor sees them is the camera's, and what a flag asks for is the flags'.
-Every module here that draws a floor registers it itself.
+Each module that draws a floor registers it. Light sensors see floors through ``camera.py``; the flags of magics that
+select a floor are parsed elsewhere.
 """
 
 from sim.discovery import import_all

@@ -1,6 +1,6 @@
-"""What every floor is drawn with: its size, colours, and canvases with hard and with smooth edges.
+"""Canvas for drawing floors: size, colours, and drawing with hard or smooth edges.
 
-Image coordinates (y down); no floor is drawn here.
+Coordinates are image coordinates (y down).
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-#: Size of every floor in mm, and in pixels.
+#: Size of every floor, in mm and in pixels.
 WIDTH, HEIGHT = 2362, 1143
 
-#: Smooth images are drawn so many times larger and then averaged.
+#: Factor by which smooth images are enlarged before averaging.
 SCALE = 4
 
 Colour = tuple[int, int, int]
@@ -33,21 +33,21 @@ YELLOW: Colour = (255, 255, 0)
 
 
 def grey(level: int) -> Colour:
-    """The grey whose three channels are ``level``, 0 (black) to 255 (white)."""
+    """Return the colour whose three channels equal ``level``, 0 (black) to 255 (white)."""
     return (level, level, level)
 
 
 def paint(painter: Painter, paper: Colour = WHITE) -> Pixels:
-    """A floor image, shape (1143, 2362, 3), with ``painter``'s shapes on ``paper``."""
+    """Return a floor image, shape (1143, 2362, 3), with the shapes of ``painter`` on ``paper``."""
     image = Image.new("RGB", (WIDTH, HEIGHT), paper)
     painter(ImageDraw.Draw(image))
     return np.asarray(image)
 
 
 class SmoothCanvas:
-    """An image that is drawn ``SCALE`` times as large and averaged, so that slanting edges are smooth.
+    """Canvas with smooth edges: drawn ``SCALE`` times as large and averaged.
 
-    Coordinates are those of the finished image, in which pixel 0 reaches from 0 to 1.
+    Coordinates are those of the finished image. Pixel 0 covers 0 to 1.
     """
 
     def __init__(self, paper: Colour = WHITE) -> None:
@@ -55,12 +55,12 @@ class SmoothCanvas:
         self._canvas: Canvas = ImageDraw.Draw(self._image)
 
     def line(self, points: Sequence[Point], width: float, colour: Colour = BLACK) -> None:
-        """Draw a line ``width`` pixels wide from point to point, round at its bends."""
+        """Draw a line ``width`` pixels wide through the points, with round joins."""
         scaled = [(round(x * SCALE), round(y * SCALE)) for x, y in points]
         self._canvas.line(scaled, colour, width=round(width * SCALE), joint="curve")
 
     def capsule(self, start: Point, end: Point, radius: float, colour: Colour) -> None:
-        """Everything within ``radius`` of the stretch from ``start`` to ``end``."""
+        """Fill the area within ``radius`` of the line from ``start`` to ``end``."""
         self.line((start, end), 2 * radius, colour)
         for x, y in (start, end):
             self.disc((x, y), radius, colour)
@@ -71,14 +71,14 @@ class SmoothCanvas:
         self.ellipse((x - radius, y - radius, x + radius, y + radius), colour)
 
     def ring(self, centre: Point, radius: float, width: float, colour: Colour) -> None:
-        """A circle line whose middle is ``radius`` from ``centre``."""
+        """Draw a circular line; ``radius`` is measured to the middle of the line."""
         x, y = centre
         outer = radius + width / 2
         box = self._inside((x - outer, y - outer, x + outer, y + outer))
         self._canvas.ellipse(box, outline=colour, width=round(width * SCALE))
 
     def ellipse(self, box: Box, colour: Colour) -> None:
-        """Fill the ellipse that touches the four sides of ``box``: left, top, right, bottom."""
+        """Fill the ellipse inscribed in ``box``: left, top, right, bottom."""
         self._canvas.ellipse(self._inside(box), colour)
 
     def rectangle(self, box: Box, colour: Colour) -> None:
@@ -86,15 +86,15 @@ class SmoothCanvas:
         self._canvas.rectangle(self._inside(box), colour)
 
     def polygon(self, corners: Sequence[Point], colour: Colour) -> None:
-        """Fill what lies between the corners, in whatever direction they are given."""
+        """Fill the polygon with these corners, given in either direction."""
         self._canvas.polygon([(x * SCALE, y * SCALE) for x, y in corners], colour)
 
     def pixels(self) -> Pixels:
-        """What was drawn, shape (1143, 2362, 3)."""
+        """Return the image, shape (1143, 2362, 3)."""
         return np.asarray(self._image.reduce(SCALE))
 
     @staticmethod
     def _inside(box: Box) -> Box:
-        """Pillow draws both edges of a box, so the far ones move in by one of the small pixels."""
+        """Shrink a box by one small pixel at its far edges, because Pillow includes both edges."""
         left, top, right, bottom = box
         return (left * SCALE, top * SCALE, right * SCALE - 1, bottom * SCALE - 1)

@@ -1,6 +1,6 @@
-"""The middles of the lines on the floors with tracks, by name, in the direction in which they are driven.
+"""Named centrelines of the tracks, in their driving direction.
 
-World coordinates (mm, y up), cut off at the floor's edges; how the lines are drawn is ``tracks.py``'s.
+Coordinates are world coordinates (mm, y up), clipped at the floor's edges. ``tracks.py`` draws the lines.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from types import MappingProxyType
 from sim.floors.canvas import HEIGHT, Point
 from sim.floors.tracks import TrackLine, lines_of
 
-#: The lines of Line_Following_Test in the order of the data file. The name is the x where the line starts, with
-#: ``high`` for the ones that start half-way up; the broken line, in three parts, is not among them.
+#: The lines of Line_Following_Test in the order of the data file. Each name is the x where the line starts, with
+#: ``high`` for lines that start half-way up. The broken line with its three parts is not included.
 _TEST_LINES = ("141", "440", "771", "1076", "1453-high", "1453", "1821", "1821-high")
 
 
 @functools.lru_cache(maxsize=1)
 def centrelines() -> Mapping[str, tuple[Point, ...]]:
-    """All named centrelines: ``Line_Following_Test/141`` and so on, and ``Thruxton_Circuit`` (clockwise, closed)."""
+    """Return all centrelines by name: ``Line_Following_Test/141`` ..., and ``Thruxton_Circuit`` (clockwise, closed)."""
     test = lines_of("line_following_test.json")
     found = {f"Line_Following_Test/{name}": _upwards(line) for name, line in zip(_TEST_LINES, test, strict=False)}
     (circuit,) = lines_of("thruxton_circuit.json")
@@ -29,7 +29,7 @@ def centrelines() -> Mapping[str, tuple[Point, ...]]:
 
 
 def _upwards(line: TrackLine) -> tuple[Point, ...]:
-    """From the lower end on, cut off where it leaves the floor."""
+    """Return the line from its lower end, clipped at the floor's edge."""
     points = [(x, HEIGHT - y) for x, y in line.points]
     if points[0][1] > points[-1][1]:
         points.reverse()

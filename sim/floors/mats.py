@@ -1,6 +1,6 @@
-"""The competition mats, simplified: the features that activities use are where they are on the real mats.
+"""Simplified competition mats. Features that activities use are at their positions on the real mats.
 
-Images only, drawn anew, in image coordinates (y down); nothing else of the real mats is meant to be exact.
+The images are new drawings in image coordinates (y down). Other details are not exact.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from sim.floors.canvas import BLACK, BLUE, HEIGHT, RED, WHITE, WIDTH, Box, Colou
 from sim.floors.registry import printed
 from sim.recording import Pose
 
-#: The bars of Into Orbit that a robot must not cross: both ends and the radius with the white border.
+#: Bars of Into Orbit that a robot must not cross: both ends, and the radius with the white border.
 ORBIT_BARS: tuple[tuple[Point, Point, float], ...] = (
     ((900, 622), (1140, 570), 33),
     ((1020, 600), (1096, 945), 36),
@@ -29,7 +29,7 @@ ORBIT_MOON_BASE: Point = (2183, 189)
 ORBIT_MOON_BASE_RADIUS = 69.0
 ORBIT_ASTEROID: Box = (486, 16, 926, 600)
 
-#: The targets of the WRO 2018 mat, each with both edges, and their colours.
+#: Targets of the WRO 2018 mat: both edges and the colour of each.
 WRO_2018_TARGETS: tuple[tuple[Box, Colour], ...] = (
     ((295, 438, 414, 702), (255, 237, 0)),
     ((1950, 438, 2070, 701), (227, 6, 19)),
@@ -44,7 +44,7 @@ _WRO_BLUE: Colour = (0, 105, 180)
 
 @printed("FLL_2018_Into_Orbit", Pose(150, 150, 90), menu=17)
 def fll_2018_into_orbit() -> Pixels:
-    """Space with a satellite to go round to, a moon base, an asteroid, and bordered black bars in the way."""
+    """Draw space with a satellite, a moon base, an asteroid, and bordered black bars as obstacles."""
     canvas = SmoothCanvas((18, 24, 58))
     _stars(canvas)
     canvas.disc((0, HEIGHT), 420, (52, 66, 120))
@@ -70,7 +70,7 @@ def _stars(canvas: SmoothCanvas) -> None:
 
 
 def _asteroid(canvas: SmoothCanvas) -> None:
-    """A lumpy rock that just fits its box."""
+    """Draw an irregular rock that fills its box."""
     left, top, right, bottom = ORBIT_ASTEROID
     middle, half = ((left + right) / 2, (top + bottom) / 2), ((right - left) / 2, (bottom - top) / 2)
     rim = []
@@ -84,7 +84,7 @@ def _asteroid(canvas: SmoothCanvas) -> None:
 
 
 def _satellite(canvas: SmoothCanvas) -> None:
-    """A body between two solar panels, on a light disc."""
+    """Draw a body between two solar panels, on a light disc."""
     x, y = ORBIT_SATELLITE
     canvas.ring(ORBIT_SATELLITE, 78, 6, WHITE)
     for left in (x - 66, x + 22):
@@ -95,7 +95,7 @@ def _satellite(canvas: SmoothCanvas) -> None:
 
 @printed("FLL_2019_City_Shaper", Pose(500, 150, 90), menu=16)
 def fll_2019_city_shaper() -> Pixels:
-    """A city plan: launch area, streets with bordered black lines, building circles and a bridge; all free drawing."""
+    """Draw a city plan freely: launch area, streets with bordered black lines, building circles and a bridge."""
     canvas = SmoothCanvas((226, 222, 208))
     for left, top, right, bottom in (
         (120, 90, 520, 380), (620, 90, 1000, 380), (1500, 480, 1800, 760), (1900, 480, 2260, 760),
@@ -128,7 +128,7 @@ def fll_2019_city_shaper() -> Pixels:
 
 @printed("WRO_2018_Regular_Junior", Pose(1181, 150, 90), menu=15)
 def wro_2018_regular_junior() -> Pixels:
-    """A blue base, three coloured targets of three cells, and black lines from the base to each."""
+    """Draw a blue base, three coloured targets of three cells, and black lines from the base to each target."""
     canvas = SmoothCanvas()
     width = 20
     yellow, red, green = (box for box, _ in WRO_2018_TARGETS)
@@ -151,7 +151,7 @@ def wro_2018_regular_junior() -> Pixels:
 
 @printed("WRO_2019_Regular_Junior", Pose(2215, 150, 90), menu=14)
 def wro_2019_regular_junior() -> Pixels:
-    """A start area at the lower right, black lines, and rows of coloured cells; all free drawing."""
+    """Draw a start area at the lower right, black lines, and rows of coloured cells, all freely."""
     canvas = SmoothCanvas()
     width = 20
     for points in (
@@ -179,13 +179,13 @@ def wro_2019_regular_junior() -> Pixels:
 
 
 def _whole(box: Box) -> Box:
-    """A box given by its first and last pixels, up to the far edges of the last."""
+    """Return the box with the far edges of its last pixels."""
     left, top, right, bottom = box
     return (left, top, right + 1, bottom + 1)
 
 
 def _cells(box: Box) -> tuple[Box, ...]:
-    """Three squares of 60 evenly along the longer side of ``box``."""
+    """Return three squares of side 60, spaced evenly along the longer side of ``box``."""
     left, top, right, bottom = _whole(box)
     side, middle = 60, ((left + right) / 2, (top + bottom) / 2)
     third = max(right - left, bottom - top) / 3

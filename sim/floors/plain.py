@@ -1,6 +1,6 @@
-"""The plain floors: bands, gradients, loops and simple outlines, in image coordinates (rectangles with both edges).
+"""Plain floors: bands, gradients, loops and simple outlines, in image coordinates (both edges included).
 
-Not the shapes, tracks, digit sheets, test card and competition mats, which have modules of their own.
+Shapes, tracks, digit sheets, the test card and competition mats have modules of their own.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from sim.recording import Pose
 
 
 def painted(name: str, pose: Pose, *, menu: int, paper: Colour = WHITE) -> Callable[[Painter], Painter]:
-    """Registers the floor that a painter leaves on ``paper``."""
+    """Return a decorator that registers the floor drawn by a painter on ``paper``."""
 
     def register(painter: Painter) -> Painter:
         printed(name, pose, menu=menu)(lambda: paint(painter, paper))
@@ -45,12 +45,12 @@ def painted(name: str, pose: Pose, *, menu: int, paper: Colour = WHITE) -> Calla
 
 @painted("Empty_Map", Pose(100, 800, 0), menu=1)
 def nothing(canvas: Canvas) -> None:
-    """Leaves the floor as it is."""
+    """Draw nothing."""
 
 
 @painted("Grey_bands", Pose(150, 500, 0), menu=4)
 def grey_bands(canvas: Canvas) -> None:
-    """Four upright bands, three grey and one black, and to their right a red, a green and a blue disc."""
+    """Draw four vertical bands, three grey and one black, and to their right a red, a green and a blue disc."""
     for left, level in ((250, 220), (650, 211), (1050, 128), (1450, 0)):
         canvas.rectangle((left, 150, left + 200, 900), grey(level))
     for top, colour in ((250, RED), (450, GREEN), (650, BLUE)):
@@ -59,14 +59,14 @@ def grey_bands(canvas: Canvas) -> None:
 
 @painted("Coloured_bands", Pose(100, 800, 0), menu=8)
 def coloured_bands(canvas: Canvas) -> None:
-    """Four upright bands apart from each other: red, green, blue and black."""
+    """Draw four separate vertical bands: red, green, blue and black."""
     for left, colour in ((250, RED), (650, GREEN), (1050, BLUE), (1450, BLACK)):
         canvas.rectangle((left, 150, left + 200, 750), colour)
 
 
 @painted("Rainbow_bands", Pose(100, 800, 0), menu=9)
 def rainbow_bands(canvas: Canvas) -> None:
-    """Seven upright bands side by side: red, green, blue, cyan, magenta, yellow and black."""
+    """Draw seven adjacent vertical bands: red, green, blue, cyan, magenta, yellow and black."""
     colours = (RED, GREEN, BLUE, (0, 255, 255), (255, 0, 255), YELLOW, BLACK)
     for index, colour in enumerate(colours):
         left = 200 + 200 * index
@@ -75,7 +75,7 @@ def rainbow_bands(canvas: Canvas) -> None:
 
 @painted("Grey_and_black", Pose(400, 700, 90), menu=10)
 def grey_and_black(canvas: Canvas) -> None:
-    """A black strip near the top, and lower down a strip of three greys and black."""
+    """Draw a black strip near the top, and below it a strip with three greys and black."""
     canvas.rectangle((200, 100, 1800, 200), BLACK)
     for left, level in ((200, 211), (600, 0), (1000, 220), (1400, 128)):
         canvas.rectangle((left, 600, left + 400, 700), grey(level))
@@ -83,21 +83,21 @@ def grey_and_black(canvas: Canvas) -> None:
 
 @painted("Square", Pose(550, 300, -90), menu=13)
 def square(canvas: Canvas) -> None:
-    """A grey square inside the grey outline of a larger one."""
+    """Draw a grey square inside the grey outline of a larger square."""
     canvas.rectangle((600, 400, 1000, 800), grey(128))
     canvas.rectangle((300, 100, 1300, 1100), outline=grey(128), width=20)
 
 
 @painted("Loop", Pose(500, 500, 90), menu=2)
 def loop(canvas: Canvas) -> None:
-    """A black track with rounded corners, 100 pixels wide."""
+    """Draw a black track with rounded corners, 100 pixels wide."""
     canvas.rounded_rectangle((200, 200, 1900, 1000), 80, BLACK)
     canvas.rounded_rectangle((300, 300, 1800, 900), 50, WHITE)
 
 
 @painted("Two_shapes", Pose(200, 500, 90), menu=3)
 def two_shapes(canvas: Canvas) -> None:
-    """The thick black outlines of a rounded square and, to its right, of a circle."""
+    """Draw thick black outlines: a rounded square and, to its right, a circle."""
     canvas.rounded_rectangle((200, 400, 700, 900), 80, BLACK)
     canvas.rounded_rectangle((300, 500, 600, 800), 50, WHITE)
     canvas.ellipse((1200, 400, 1700, 900), BLACK)
@@ -105,9 +105,9 @@ def two_shapes(canvas: Canvas) -> None:
 
 
 def _oval(canvas: Canvas, box: Box, colour: Colour) -> None:
-    """An ellipse in ``box`` as a polygon of one corner a degree.
+    """Return the ellipse in ``box`` as a polygon with one corner per degree.
 
-    The original Lollipop was drawn so; Pillow's smoother ellipse shifts what a sensor at its rim reads.
+    The original Lollipop uses this polygon. Pillow's smoother ellipse would change sensor readings at the edge.
     """
     left, top, right, bottom = box
     corners = [
@@ -122,7 +122,7 @@ def _oval(canvas: Canvas, box: Box, colour: Colour) -> None:
 
 @painted("Lollipop", Pose(750, 375, -180), menu=11, paper=grey(211))
 def lollipop(canvas: Canvas) -> None:
-    """The line follower's track."""
+    """Draw the line follower's track."""
     _oval(canvas, (400, 371.5, 900, 771.5), BLACK)
     _oval(canvas, (420.5, 391, 879.5, 752), grey(211))
     canvas.rectangle((860, 522.5, 920, 593.5), grey(211))
@@ -135,7 +135,7 @@ def lollipop(canvas: Canvas) -> None:
 
 @painted("Sensor_Diameter_Test", Pose(550, 450, 90), menu=20)
 def sensor_diameter_test(canvas: Canvas) -> None:
-    """Black and red lines across and down, each 1, 3, 5, 7 and 9 pixels wide, and two blue dots."""
+    """Draw black and red lines, horizontal and vertical, each 1, 3, 5, 7 and 9 pixels wide, and two blue dots."""
     for top, lefts, colour in ((200, (200, 240), BLACK), (640, (1000, 1040), RED)):
         for index in range(5):
             thickness = 2 * index
@@ -150,7 +150,7 @@ def sensor_diameter_test(canvas: Canvas) -> None:
 
 @printed("Linear_grey", Pose(200, 50, 90), menu=5)
 def linear_grey() -> Pixels:
-    """An even slope from white at image row 100 to black at row 1043, 51 black rows, and white beyond."""
+    """Draw a linear gradient from white at image row 100 to black at row 1043, 51 black rows, and white below."""
     column = np.full(HEIGHT, 255, dtype=np.uint8)
     for row in range(100, 1043):
         column[row] = 255 - int(255 * (row - 100) / 943)
@@ -160,25 +160,25 @@ def linear_grey() -> Pixels:
 
 @printed("Radial_grey", Pose(100, 400, 0), menu=6)
 def radial_grey() -> Pixels:
-    """White in the middle, black at the corners."""
+    """Draw a radial gradient from white in the middle to black at the corners."""
     return _radial(inner=WHITE, outer=BLACK)
 
 
 @printed("Radial_red", Pose(100, 400, 0), menu=7)
 def radial_red() -> Pixels:
-    """Light red in the middle, dark at the corners."""
+    """Draw a radial gradient from light red in the middle to dark red at the corners."""
     return _radial(inner=(255, 80, 80), outer=(80, 0, 0))
 
 
 def _radial(inner: Colour, outer: Colour) -> Pixels:
-    """From ``inner`` at (1181, 571.5) to ``outer``, by the cube root of distance / (sqrt(2) * 1181).
+    """Draw a gradient from ``inner`` at (1181, 571.5) to ``outer``: the cube root of distance / (sqrt(2) * 1181).
 
-    The levels fall with the distance, so each is found as the distance at which it ends; a pixel's colour
-    then depends on no vectorised power function, which may differ between processors.
+    The levels decrease with the distance, so the code computes the distance at which each level ends. Colours then
+    don't depend on a vectorised power function, which may differ between processors.
     """
     x = 2 * np.arange(WIDTH, dtype=np.int64) - 2362
     y = 2 * np.arange(HEIGHT, dtype=np.int64) - 1143
-    quarters = x[None, :] ** 2 + y[:, None] ** 2  # four times the squared distance, a whole number
+    quarters = x[None, :] ** 2 + y[:, None] ** 2  # four times the squared distance, an integer
     channels = [_radial_channel(quarters, low, high) for low, high in zip(outer, inner, strict=True)]
     return np.stack(channels, axis=2)
 

@@ -1,7 +1,6 @@
-"""The floors by name: each module that draws one registers it here, with its pose, labels and obstacles.
+"""Registry of floors by name, each with its start pose, labels and obstacles.
 
-Nothing is drawn here, and no floor is known by name; what a flag with an unknown name means is decided where flags
-are read.
+Each module that draws a floor registers it here. The code that reads flags decides how to treat unknown names.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from sim.recording import Pose
 
 Obstacle = tuple[float, float, float, float]
 
-#: What the flag ``-o`` offers: x, y, width, height of each obstacle, mm, lower left corner first.
+#: Obstacles for each value of the flag ``-o``: x, y, width, height in mm, lower left corner first.
 OBSTACLE_PRESETS: Mapping[str, tuple[Obstacle, ...]] = MappingProxyType(
     {
         "None": (),
@@ -42,7 +41,7 @@ OBSTACLE_PRESETS: Mapping[str, tuple[Obstacle, ...]] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class FloorLabel:
-    """Where the left light sensor's centre sees a named thing: lower left corner and size, world mm."""
+    """Area of the left sensor's centre in which it sees a named object: lower left corner and size, world mm."""
 
     label: str
     x: float
@@ -51,7 +50,7 @@ class FloorLabel:
     height: float
 
     def holds(self, x: float, y: float) -> bool:
-        """Whether the point, world mm, is in it; the edges belong to it."""
+        """Return whether the point (world mm) is inside the label, edges included."""
         return self.x <= x <= self.x + self.width and self.y <= y <= self.y + self.height
 
 
@@ -64,11 +63,11 @@ class Floor:
     default_pose: Pose
     labels: tuple[FloorLabel, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
-    label_patches: bool = True  # whether the image shows the grey patches that tell the answer, where it has any
-    sheet: int = 0  # the seed of the handwritten digits, on a digit sheet, or of the order of the shapes
+    label_patches: bool = True  # the image shows the grey patches that encode the answers, if the floor has them
+    sheet: int = 0  # the seed of the handwritten digits of a digit sheet, or of the order of the shapes
 
     def label_at(self, x: float, y: float) -> str | None:
-        """What a left light sensor with its centre at (x, y) mm sees, if that has a name."""
+        """Return the label at the position (x, y) of the left sensor's centre in mm, if any."""
         return next((label.label for label in self.labels if label.holds(x, y)), None)
 
 
@@ -77,7 +76,7 @@ _Draw = Callable[[], Pixels]
 
 
 class _DrawAnew(Protocol):
-    """Draws the floor of one seed, with or without the patches that tell the answer."""
+    """Function that draws the floor for a seed, with or without the patches that encode the answers."""
 
     def __call__(self, seed: int, /, *, label_patches: bool) -> Drawing: ...
 
@@ -86,7 +85,7 @@ class _DrawAnew(Protocol):
 class _Plan:
     name: str
     pose: Pose
-    menu: int | None  # the place in the course's menu, counted from 1; None for a floor that is not the course's
+    menu: int | None  # position in the course's menu, from 1; None for floors outside the course
     label_names: tuple[str, ...]
     obstacles: tuple[Obstacle, ...]
     seeded: bool
@@ -105,7 +104,7 @@ def printed(
     obstacles: tuple[Obstacle, ...] = (),
     unlabelled: _Draw | None = None,
 ) -> Callable[[_Draw], _Draw]:
-    """Registers the floor that the function draws; ``unlabelled`` draws it without the patches that tell the answer."""
+    """Return a decorator that registers the drawn floor; ``unlabelled`` draws it without the label patches."""
 
     def register(draw: _Draw) -> _Draw:
         def drawing(_seed: int, *, label_patches: bool) -> Drawing:
@@ -121,7 +120,7 @@ def printed(
 def drawn_anew(
     name: str, pose: Pose, *, menu: int | None = None, label_names: tuple[str, ...]
 ) -> Callable[[_DrawAnew], _DrawAnew]:
-    """Registers the floor that the function draws anew for each seed, with any of ``label_names`` on it."""
+    """Return a decorator that registers a floor drawn for each seed, with labels from ``label_names``."""
 
     def register(draw: _DrawAnew) -> _DrawAnew:
         _add(_Plan(name, pose, menu, label_names, (), True, draw))
@@ -137,30 +136,32 @@ def _add(plan: _Plan) -> None:
 
 
 def names() -> tuple[str, ...]:
-    """Every floor that ``floor`` knows: the course's in the order of its menu, then the others by name."""
+    """Return the names of all floors: the course's in the order of its menu, then the others in alphabetical order."""
     return tuple(sorted(_PLANS, key=lambda name: (_PLANS[name].menu is None, _PLANS[name].menu or 0, name)))
 
 
 def seeded_names() -> tuple[str, ...]:
-    """The floors that each seed draws anew."""
+    """Return the names of the floors that depend on a seed."""
     return tuple(name for name in names() if _PLANS[name].seeded)
 
 
 def floor(name: str, *, labels: bool = True, seed: int = 0) -> Floor:
-    """The floor called ``name``; with ``labels=False`` drawn without the grey patches that tell the answer.
+    """Return the floor called ``name``; with ``labels=False`` without the grey patches that encode the answers.
 
-    On a floor that is drawn anew for each ``seed``, what is where changes with it; on the others it changes nothing.
-    Raises UsageError for a name that no floor has, and offers the names nearest to it.
+    On floors that depend on a seed, ``seed`` decides the positions of the objects. Other floors ignore it.
+
+    Raises:
+        UsageError: No floor has this name. The message suggests similar names.
     """
     return _seeded(name, labels, seed) if _plan(name).seeded else _printed(name, labels)
 
 
-@functools.lru_cache(maxsize=12)  # an image is 8 MB, and flags can ask for every floor there is
+@functools.lru_cache(maxsize=12)  # an image takes 8 MB, and flags can select every floor
 def _printed(name: str, labels: bool) -> Floor:
     return _floor(_plan(name), labels, 0)
 
 
-@functools.lru_cache(maxsize=12)  # a worker sees ever new seeds
+@functools.lru_cache(maxsize=12)  # a worker receives new seeds all the time
 def _seeded(name: str, labels: bool, seed: int) -> Floor:
     return _floor(_plan(name), labels, seed)
 
@@ -171,23 +172,27 @@ def _floor(plan: _Plan, labels: bool, seed: int) -> Floor:
 
 
 def start_of(name: str) -> tuple[Pose, tuple[Obstacle, ...]]:
-    """The default pose and the obstacles of the floor called ``name``, without drawing it.
+    """Return the default pose and the obstacles of the floor called ``name``, without drawing it.
 
-    Raises UsageError for a name that no floor has.
+    Raises:
+        UsageError: No floor has this name.
     """
     plan = _plan(name)
     return plan.pose, plan.obstacles
 
 
 def label_names(name: str) -> tuple[str, ...]:
-    """Every label that the floor called ``name`` can have, in the course's order; none for an unknown name."""
+    """Return all possible labels of the floor called ``name``, in the course's order; empty for an unknown name."""
     return _PLANS[name].label_names if name in _PLANS else ()
 
 
 def floor_from_image(name: str, data: bytes, default_pose: Pose = Pose(200, 800, 0)) -> Floor:  # noqa: B008
-    """A floor of the instructor's own, from the bytes of a PNG or JPEG file of 2362 x 1143 pixels.
+    """Return a floor made from an instructor's PNG or JPEG file of 2362 x 1143 pixels.
 
-    Raises UsageError when the bytes are no such image. See-through parts show white.
+    Transparent parts become white.
+
+    Raises:
+        UsageError: The bytes are not such an image.
     """
     try:
         image = read_image(data, WIDTH, HEIGHT)
@@ -208,7 +213,7 @@ def _plan(name: str) -> _Plan:
 
 
 def _suggestion(name: str) -> str:
-    """The end of a sentence that names the floors nearest to ``name``, or all."""
+    """Return the end of an error message that suggests floors similar to ``name``, or lists all floors."""
     by_lower = {known.lower(): known for known in names()}
     near = difflib.get_close_matches(name.lower(), by_lower, n=3, cutoff=0.5)
     if near:

@@ -1,6 +1,6 @@
-"""The floors with the six shapes: Simple_Shapes as in the course, and Shuffled_Shapes in an order that a seed draws.
+"""Floors with the six shapes: Simple_Shapes as in the course, and Shuffled_Shapes in an order drawn from a seed.
 
-What is drawn on them is also where it is labelled; nothing here judges what a robot says of a shape.
+The functions that draw the shapes also return their labels.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ SHAPES = (
     "diamond",
 )
 
-#: Grey of the label patch beside shape k; the course decodes exactly these values.
+#: Grey level of the label patch beside shape k. The course decodes exactly these values.
 LABEL_GREYS = tuple(k * 255 // 6 for k in range(6))
 
 
 def _outlines(x: float, y: float) -> tuple[tuple[tuple[float, float], ...], ...]:
-    """The six shapes of side 10 with their upper left anchor at (x, y), in the order of the codes 0 to 5."""
+    """Return the six shapes of side 10 with upper left anchor (x, y), in the order of the codes 0 to 5."""
     s = math.sqrt(3) * 5
     return (
         ((x + 2, y + 2), (x + 8, y + 2), (x + 8, y + 8), (x + 2, y + 8)),
@@ -41,14 +41,15 @@ def _outlines(x: float, y: float) -> tuple[tuple[tuple[float, float], ...], ...]
     )
 
 
-#: The codes of the shapes in the course's upper and lower row, from the left.
+#: Codes of the shapes in the course's upper and lower row, from the left.
 _UPPER_ROW, _LOWER_ROW = (0, 1, 2, 3, 4, 5), (1, 5, 0, 2)
 
 
 def _draw_rows(canvas: Canvas, upper: Sequence[int], lower: Sequence[int], *, label_patches: bool) -> None:
-    """Six shapes at image row 218, and the unlabelled test row at 418.
+    """Draw six shapes at image row 218, and the unlabelled test row at row 418.
 
-    With ``label_patches``, under the right light sensor of each in the upper row is a patch whose grey tells its code.
+    With ``label_patches``, the position of the right light sensor beside each shape of the upper row has a grey patch
+    that encodes the shape.
     """
     for column, code in enumerate(upper):
         _draw_shape(canvas, code, 225 + 80 * column, 218)
@@ -68,7 +69,10 @@ def _draw_shape(canvas: Canvas, code: int, x: float, y: float) -> None:
 
 
 def _labels(upper: Sequence[int], lower: Sequence[int]) -> tuple[FloorLabel, ...]:
-    """Within 10 mm of where the course stands the left sensor: the shape is then inside the sensor's view."""
+    """Return labels that cover 10 mm in each direction from the course's positions of the left sensor.
+
+    Within this area the whole shape is in the sensor's view.
+    """
     return tuple(
         FloorLabel(SHAPES[code], 230.0 + 80 * column - 10, y - 10, 20.0, 20.0)
         for y, codes in ((920.0, upper), (720.0, lower))
@@ -88,15 +92,15 @@ def _without_patches() -> Pixels:
     "Simple_Shapes", Pose(800, 400, 0), menu=21, labels=_labels(_UPPER_ROW, _LOWER_ROW), unlabelled=_without_patches
 )
 def simple_shapes() -> Pixels:
-    """The course's shapes with their patches."""
+    """Draw the course's shapes and their label patches."""
     return _rows(_UPPER_ROW, _LOWER_ROW, label_patches=True)
 
 
 @drawn_anew("Shuffled_Shapes", Pose(800, 400, 0), label_names=SHAPES)
 def shuffled_shapes(seed: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
-    """Each shape once in the upper row, in an order that the seed draws, and any four in the lower.
+    """Draw each shape once in the upper row, in an order drawn from the seed, and any four shapes in the lower row.
 
-    It is not one of the course's: where the robot stands must not tell what it sees.
+    This floor is not part of the course. It prevents programs from inferring the shape from the robot's position.
     """
     chance = Stream(seed, "shapes")
     upper = sorted(_UPPER_ROW, key=chance.integer)

@@ -1,6 +1,6 @@
-"""The Testcard floor: a television test card of our own, 2215 x 1073, in the upper left of white paper.
+"""Testcard floor: a new drawing of a television test card, 2215 x 1073, in the upper left of white paper.
 
-Only the image; unlike the original's it has no see-through parts, so no earlier floor shows through.
+Unlike the original, the image has no transparent parts, so that no earlier floor shows through.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _CENTRE = (CARD_WIDTH / 2, CARD_HEIGHT / 2)
 
 @printed("Testcard", Pose(400, 800, 90), menu=12)
 def testcard() -> Pixels:
-    """White grid on grey, and in it colour bars, a grey staircase, fine stripes and a circle."""
+    """Draw a white grid on grey, with colour bars, a grey staircase, fine stripes and a circle."""
     canvas = SmoothCanvas()
     canvas.rectangle((0, 0, CARD_WIDTH, CARD_HEIGHT), grey(128))
     _grid(canvas)
@@ -36,7 +36,7 @@ def testcard() -> Pixels:
 
 
 def _grid(canvas: SmoothCanvas) -> None:
-    """Lines 4 wide, 100 apart, counted from the middle of the card."""
+    """Draw lines 4 pixels wide, 100 apart, counted from the middle of the card."""
     pitch, width = 100, 4
     for step in range(-11, 12):
         x = _CENTRE[0] + pitch * step
@@ -55,7 +55,7 @@ def _bars(
 
 
 def _stripes(canvas: SmoothCanvas, left: float, right: float, top: float, bottom: float) -> None:
-    """Black and white stripes, in five groups from 20 wide to 4 wide."""
+    """Draw black and white stripes in five groups, from 20 to 4 pixels wide."""
     group = (right - left) / 5
     canvas.rectangle((left, top, right, bottom), WHITE)
     for index, width in enumerate((20, 16, 12, 8, 4)):

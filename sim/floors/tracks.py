@@ -1,6 +1,7 @@
-"""The floors with tracks to follow: test lines, lines with obstacles, junctions and the Thruxton circuit.
+"""Floors with tracks to follow: test lines, lines with obstacles, junctions and the Thruxton circuit.
 
-Smooth-edged images, in image coordinates (y down); the lines in world coordinates are ``centrelines.py``'s.
+The images have smooth edges and use image coordinates (y down). ``centrelines.py`` gives the lines in world
+coordinates.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ from sim.recording import Pose
 
 @dataclass(frozen=True, slots=True)
 class TrackLine:
-    """A centreline in image pixels, and the width of the line drawn along it."""
+    """A centreline in image pixels, and the width of its line."""
 
     width: float
     points: tuple[Point, ...]
 
 
 def lines_of(file_name: str) -> tuple[TrackLine, ...]:
-    """The centrelines in a data file of this package."""
+    """Return the centrelines in a data file of this package."""
     text = resources.files(__package__).joinpath(file_name).read_text(encoding="utf-8")
     return tuple(
         TrackLine(line["width"], tuple((x, y) for x, y in line["points"])) for line in json.loads(text)["lines"]
@@ -33,14 +34,14 @@ def lines_of(file_name: str) -> tuple[TrackLine, ...]:
 
 @printed("Line_Following_Test", Pose(141, 125, 90), menu=18)
 def line_following_test() -> Pixels:
-    """Eleven black lines of all kinds."""
+    """Draw eleven black lines of different kinds."""
     canvas = SmoothCanvas()
     for line in lines_of("line_following_test.json"):
         canvas.line(line.points, line.width)
     return canvas.pixels()
 
 
-#: What stands on Obstacles_Test from the start.
+#: Default obstacles on Obstacles_Test.
 _TEST_OBSTACLES: tuple[Obstacle, ...] = tuple(
     (x, y, 150, 150) for x, y in ((46, 388), (479, 704), (852, 388), (1374, 388), (1758, 900), (2126, 388))
 )
@@ -48,7 +49,7 @@ _TEST_OBSTACLES: tuple[Obstacle, ...] = tuple(
 
 @printed("Obstacles_Test", Pose(121, 125, 90), menu=25, obstacles=_TEST_OBSTACLES)
 def obstacles_test() -> Pixels:
-    """Six lines that lead to obstacles, and a broad black band."""
+    """Draw six lines that lead to obstacles, and a broad black band."""
     canvas = SmoothCanvas()
     lines = lines_of("obstacles_test.json")
     for line in lines:
@@ -60,9 +61,10 @@ def obstacles_test() -> Pixels:
 
 @printed("Junction_Handling_Test", Pose(698, 130, 90), menu=19)
 def junction_handling_test() -> Pixels:
-    """A street grid with a roundabout; a green marker in the right or left corner of a crossing says where to turn.
+    """Draw a street grid with a roundabout and green markers that show where to turn.
 
-    Drawn anew with the original's measures: lines 20 wide, markers 25.
+    A marker is in the right or left corner of a crossing. The drawing is new, with the original's dimensions: lines 20
+    wide, markers 25.
     """
     width, marker, green = 20.0, 25.0, (0, 179, 0)
     columns, rows = (238, 698, 1158, 1618, 2078), (150, 480, 810)
@@ -81,18 +83,18 @@ def junction_handling_test() -> Pixels:
     ):  # fmt: skip
         near = columns[column] + sides[side] * width / 2
         far = near + sides[side] * marker
-        bottom = rows[row] + width / 2  # behind the crossing, for a robot that comes from below
+        bottom = rows[row] + width / 2  # behind the crossing, seen by a robot that comes from below
         canvas.rectangle((min(near, far), bottom, max(near, far), bottom + marker), green)
     return canvas.pixels()
 
 
 @printed("Thruxton_Circuit", Pose(457, 242, 120), menu=22)
 def thruxton_circuit() -> Pixels:
-    """The closed loop, the grey start bar across it, and flags and chequers beside the bar."""
+    """Draw the closed loop with the grey start bar across it, and flags and chequers beside the bar."""
     canvas = SmoothCanvas()
     (track,) = lines_of("thruxton_circuit.json")
     canvas.line(track.points, track.width)
-    for point in track.points:  # closes the loop, and the specks that Pillow leaves at a line's bends
+    for point in track.points:  # closes the loop, and fills the specks that Pillow leaves at bends
         canvas.disc(point, track.width / 2, BLACK)
     bar = Stand(centre=(423.2, 847.9), turn=27.4)
     for middle in ((551, 785), (220, 955)):
@@ -105,25 +107,25 @@ def thruxton_circuit() -> Pixels:
 
 @dataclass(frozen=True, slots=True)
 class Stand:
-    """A place on the image with its own axes: ``turn`` degrees anticlockwise from the image's."""
+    """Local coordinate system on the image; ``turn`` is its angle in degrees anticlockwise."""
 
     centre: Point
     turn: float
 
     def at(self, along: float, across: float) -> Point:
-        """The point of the image that is so far along the stand's first axis, and so far down from it, pixels."""
+        """Return the image point at distance ``along`` the first axis and ``across`` downwards from it, in pixels."""
         cosine, sine = math.cos(math.radians(self.turn)), math.sin(math.radians(self.turn))
         x, y = self.centre
         return (x + along * cosine + across * sine, y - along * sine + across * cosine)
 
     def box(self, along: tuple[float, float], across: tuple[float, float]) -> tuple[Point, ...]:
-        """The four corners of what lies between two distances along and two across, pixels, in turn."""
+        """Return the four corners of a rectangle, in order, given its ranges along and across the axis in pixels."""
         (near, far), (top, bottom) = along, across
         return (self.at(near, top), self.at(far, top), self.at(far, bottom), self.at(near, bottom))
 
 
 def _chequers(canvas: SmoothCanvas, bar: Stand, start: float) -> None:
-    """A strip of two rows of squares on the bar's axis, well beside the track."""
+    """Draw a strip with two rows of squares on the bar's axis, away from the track."""
     side, count = 12.5, 5
     for row in range(2):
         for column in range(row % 2, count, 2):
@@ -132,7 +134,7 @@ def _chequers(canvas: SmoothCanvas, bar: Stand, start: float) -> None:
 
 
 def _flag(canvas: SmoothCanvas, middle: Point) -> None:
-    """A red pennant with its middle at ``middle``, on a pole at its right."""
+    """Draw a red pennant centred at ``middle``, with its pole on the right."""
     width, height, pole = 24.0, 24.0, 4.0
     x, y = middle
     right, top = x + width / 2, y - height / 2

@@ -1,5 +1,5 @@
-"""Readers of files and texts that other people made: one module per format, bounded by work and not by bytes alone.
+"""Readers of untrusted files and texts, one module per format, with limits on work as well as on bytes.
 
-A reader counts what the text would become (values, keys, depth, entries) before the format's own parser builds it, and
-raises ``Unreadable`` where that is too much. Syntax errors stay those of the format, for the caller to locate.
+A reader counts values, keys, depth or entries before the format's own parser builds them, and raises ``Unreadable`` if
+there are too many. Syntax errors keep the type of the format's parser, so that the caller can locate them.
 """

@@ -1,6 +1,7 @@
-"""Comma-separated values, bounded by the cells that they would become.
+"""CSV reader with a limit on the number of cells.
 
-``records`` goes on after a row with broken quotes, and reads no line more than ``MOST_LINES_OF_RECORD`` times for it.
+After a row with broken quotes, ``records`` continues at the next line. A row may span at most ``MOST_LINES_OF_RECORD``
+lines.
 """
 
 from __future__ import annotations
@@ -13,13 +14,13 @@ from dataclasses import dataclass
 from sim.readers.unreadable import TooMany, Unreadable
 
 MOST_CELLS = 2_000_000
-#: A row of people or of submissions never spans more; one that does has an opening quotation mark too many.
+#: Maximum lines of a row of people or submissions. A longer row has an unmatched quotation mark.
 MOST_LINES_OF_RECORD = 20
 
 
 @dataclass(frozen=True, slots=True)
 class CsvRecord:
-    """One row: the line where it begins, from 1, and its cells, none where its quotation marks do not match."""
+    """One row: its first line, counted from 1, and its cells; no cells if the quotation marks do not match."""
 
     line: int
     cells: Sequence[str]
@@ -27,7 +28,11 @@ class CsvRecord:
 
 
 def read_rows(text: str, separator: str = ",") -> list[list[str]]:
-    """Return all rows. Raises Unreadable for too many cells, and for a cell that is too long."""
+    """Return all rows.
+
+    Raises:
+        Unreadable: There are too many cells, or a cell is too long.
+    """
     _check(text.count(separator) + text.count("\n"))
     try:
         return list(csv.reader(io.StringIO(text, newline=""), delimiter=separator))
@@ -36,9 +41,10 @@ def read_rows(text: str, separator: str = ",") -> list[list[str]]:
 
 
 def records(lines: Sequence[str], separator: str) -> Iterator[CsvRecord]:
-    """Yield the rows of ``lines``, which end with line feeds. After a broken one it goes on at the next line.
+    """Yield the rows of ``lines``, which end with line feeds. After a broken row, continue at the next line.
 
-    Raises Unreadable for too many cells.
+    Raises:
+        Unreadable: There are too many cells.
     """
     _check(sum(line.count(separator) for line in lines) + len(lines))
     begun = 0

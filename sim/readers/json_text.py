@@ -1,6 +1,7 @@
-"""JSON, bounded by the values that it would become and by their depth.
+"""JSON reader with limits on the number of values and on depth.
 
-A list of empty lists takes thirty times its length in memory, and each level of nesting a level of the reader's stack.
+A list of empty lists takes thirty times its length in memory, and each nesting level uses a level of the reader's
+stack.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from sim.readers.unreadable import DEEPEST, TooMany, Unreadable, check_depth
 __all__ = ["MOST_VALUES", "JSONDecodeError", "read_json"]
 
 MOST_VALUES = 200_000
-#: A string without an end reaches to the end of the text, so that it is not looked for again at each later quote.
+#: An unterminated string extends to the end of the text, which avoids a new search at each later quote.
 _STRINGS = re.compile(r'"[^"\\]*+(?:\\.[^"\\]*+)*+(?:"|\\?\Z)', re.DOTALL)
 
 
@@ -27,9 +28,11 @@ def read_json(
     parse_constant: Callable[[str], Any] | None = None,
     strict: bool = True,
 ) -> Any:
-    """Return the value in the text; bytes are UTF-8, with or without a byte order mark.
+    """Parse the text and return its value; bytes are UTF-8, with or without a byte order mark.
 
-    Raises JSONDecodeError for what is no JSON, and Unreadable for what would take too much work.
+    Raises:
+        JSONDecodeError: The text is not JSON.
+        Unreadable: Parsing would take too much work.
     """
     if isinstance(text, bytes):
         try:
@@ -46,7 +49,7 @@ def read_json(
     except ValueError as error:
         if "integer string conversion" not in str(error):
             raise
-        # Python refuses whole numbers of thousands of digits.
+        # Python rejects integers with thousands of digits.
         raise Unreadable("it has a number that is too long") from None
 
 

@@ -1,6 +1,6 @@
-"""Python source as a syntax tree, bounded by its tokens: each becomes an object of several hundred bytes.
+"""Python parser with a limit on tokens, because each token becomes an object of several hundred bytes.
 
-For our own processes, which look at source and never compile or run it; students' code runs inside the sandbox.
+Robomark's own processes use it to inspect source, never to run it. Student code runs inside the sandbox.
 """
 
 from __future__ import annotations
@@ -15,7 +15,12 @@ _TOKEN = re.compile(r"\w++|[^\w\s]")
 
 
 def parse_module(text: str, most_tokens: int = MOST_TOKENS) -> ast.Module:
-    """Return the tree of a module. Raises SyntaxError, and Unreadable for what would take too much work."""
+    """Parse a module and return its syntax tree.
+
+    Raises:
+        SyntaxError: The text is not Python.
+        Unreadable: Parsing would take too much work.
+    """
     if len(text) > most_tokens and sum(1 for _ in _TOKEN.finditer(text)) > most_tokens:
         raise TooMany("it has more than %(most)s tokens", most=most_tokens)
     try:

@@ -1,4 +1,4 @@
-"""Images, bounded by their size and by the passes over them, before a pixel is decoded."""
+"""Image reader that checks dimensions and number of scans before it decodes pixels."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from PIL import Image
 
 from sim.readers.unreadable import Unreadable
 
-#: A progressive JPEG draws the whole image once a scan; encoders use about ten.
+#: Each scan of a progressive JPEG draws the whole image; encoders use about ten.
 _MOST_SCANS = 64
 _SCAN = b"\xff\xda"
 
 
 def read_image(data: bytes, width: int, height: int) -> Image.Image:
-    """Return the decoded PNG or JPEG image of exactly this size, as RGBA.
+    """Decode a PNG or JPEG image of exactly this size and return it as RGBA.
 
-    Raises Unreadable for other bytes, and for an image of another size, which it names.
+    Raises:
+        Unreadable: The bytes are not such an image, or the size differs. The message contains the actual size.
     """
     try:
         with Image.open(io.BytesIO(data), formats=("PNG", "JPEG")) as image:

@@ -1,6 +1,6 @@
-"""TOML, bounded by the keys, tables and values that it would become.
+"""TOML reader with limits on keys, tables and values.
 
-``tomllib`` keeps every prefix of a dotted key, so its time and memory grow with the square of the key's parts.
+``tomllib`` keeps every prefix of a dotted key, so its time and memory grow with the square of the number of parts.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from sim.readers.unreadable import TooMany, Unreadable, check_depth
 __all__ = ["MOST_KEY_PARTS", "TOMLDecodeError", "read_toml"]
 
 MOST_KEY_PARTS = 10
-#: Each key, table and list costs up to 1 kB while it is read.
+#: Reading a key, table or list takes up to 1 kB each.
 MOST_KEYS = 20_000
 MOST_VALUES = 200_000
-#: Strings and comments, read from the start as TOML does, so that what is left is structure alone. A string without an
-#: end reaches to the end of the text or line, so that it is not looked for again at each later quote.
+#: Strings and comments, matched from the start of the text as in TOML, so that only structure remains. An unterminated
+#: string extends to the end of the text or line, which avoids a new search at each later quote.
 _TEXTS = re.compile(
     r'"""[^"\\]*+(?:(?:\\.|"(?!""))[^"\\]*+)*+(?:"{3,5}|\\?\Z)'
     r"|'''[^']*+(?:'(?!'')[^']*+)*+(?:'{3,5}|\Z)"
@@ -33,9 +33,11 @@ _DOTTED = re.compile(r"(?<![\w.-])[\w-]++(?:[ \t]*+\.[ \t]*+[\w-]++)++")
 
 
 def read_toml(text: str, parse_float: Callable[[str], Any] = float) -> dict[str, Any]:
-    """Return what the text says.
+    """Parse the text and return its content.
 
-    Raises TOMLDecodeError for what is no TOML, and Unreadable for what would take too much work.
+    Raises:
+        TOMLDecodeError: The text is not TOML.
+        Unreadable: Parsing would take too much work.
     """
     _check(_TEXTS.sub(_placeholder, text))
     try:
@@ -45,14 +47,14 @@ def read_toml(text: str, parse_float: Callable[[str], Any] = float) -> dict[str,
     except RecursionError:
         raise Unreadable("it is nested too deeply") from None
     except ValueError:
-        # Python refuses whole numbers of thousands of digits.
+        # Python rejects integers with thousands of digits.
         raise Unreadable("it has a number that is too long") from None
     _check_numbers(document)
     return document
 
 
 def _check_numbers(value: object) -> None:
-    """Raise Unreadable for a number beyond TOML's 64 bits; Python refuses to write one of thousands of digits."""
+    """Raise Unreadable for a number beyond TOML's 64 bits. Python cannot print numbers with thousands of digits."""
     if isinstance(value, int) and value.bit_length() > 64:
         raise Unreadable("it has a number that is too long")
     for each in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
@@ -70,7 +72,7 @@ def _check(structure: str) -> None:
         dots = dotted[0].count(".")
         if dots >= MOST_KEY_PARTS:
             raise Unreadable("it has a key of more than %(most)s parts", most=MOST_KEY_PARTS)
-        # One dot may be that of a number.
+        # One dot can be a decimal point.
         parts += dots if dots > 1 else 0
     if structure.count("=") + structure.count("[") + structure.count("{") + parts > MOST_KEYS:
         raise TooMany("it has more than %(most)s keys, tables and lists", most=MOST_KEYS)

@@ -1,13 +1,13 @@
-"""The refusal that all readers share, and the bound on nesting that bracketed formats share.
+"""Error class and nesting limit shared by the readers.
 
-Callers add the name of the file to the message; the sentence here is only the problem.
+The message describes the problem. Callers add the file name.
 """
 
 from __future__ import annotations
 
 from sim.errors import UsageError
 
-#: No file that people or programs write for us comes near this depth; Python's own limit is ten times as far.
+#: Far deeper than any real file; Python's own limit is ten times as high.
 DEEPEST = 100
 _TO_ROUND = bytes.maketrans(b"[]{}", b"()()")
 _NO_BRACKETS = bytes(set(range(256)) - set(b"[]{}"))
@@ -18,13 +18,13 @@ class Unreadable(UsageError, ValueError):
 
 
 class TooMany(Unreadable):
-    """There are more values than are read."""
+    """The data contain more values than the limit."""
 
 
 def check_depth(structure: str, deepest: int = DEEPEST) -> None:
-    """Raise Unreadable if brackets in ``structure``, a text without its strings, are nested deeper than ``deepest``.
+    """Raise Unreadable if brackets in ``structure``, a text without strings, are nested deeper than ``deepest``.
 
-    Each pass removes all innermost pairs, so that the work is at most one pass for each level that is allowed.
+    Each pass removes all innermost pairs, so the number of passes is limited by the allowed depth.
     """
     if structure.count("[") + structure.count("{") <= deepest:
         return

@@ -1,4 +1,4 @@
-"""YAML, bounded by its values, their depth and their bytes; every scalar is text, and nothing is made or merged."""
+"""YAML reader with limits on values, depth and bytes. Scalars are texts; tags and merge keys have no effect."""
 
 from __future__ import annotations
 
@@ -9,12 +9,16 @@ import yaml
 from sim.readers.unreadable import DEEPEST, TooMany, Unreadable
 
 MOST_BYTES = 20_000_000
-#: Events of the parser: a value, or the beginning or end of a list or table.
+#: Parser events: values, and starts or ends of lists and tables.
 MOST_EVENTS = 500_000
 
 
 def read_yaml(data: bytes) -> Any:
-    """Return the document. Raises Unreadable for what is no YAML, with its line, or would take too much work."""
+    """Parse the text and return the document.
+
+    Raises:
+        Unreadable: The text is not YAML (the message has the line), or parsing would take too much work.
+    """
     if len(data) > MOST_BYTES:
         raise Unreadable("it is larger than %(most)s MB", most=MOST_BYTES // 10**6)
     try:
@@ -31,7 +35,7 @@ def _check(data: bytes) -> None:
     depth = 0
     for count, event in enumerate(yaml.parse(data, Loader=yaml.CBaseLoader)):
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        # libyaml goes down by itself, and would run out of stack.
+        # libyaml recurses without a limit and would exhaust the stack.
         if depth > DEEPEST:
             raise Unreadable("it is nested too deeply")
         if count > MOST_EVENTS:

@@ -1,6 +1,6 @@
-"""Zip archives, bounded by their entries before ``zipfile`` builds an object for each.
+"""Zip reader that limits the number of entries before ``zipfile`` creates an object for each.
 
-What an entry may be called and how many bytes may come out of it is the caller's to say; it reads them in chunks.
+Callers check the entries' names and limit the bytes they read.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from sim.readers.unreadable import TooMany, Unreadable
 __all__ = ["CHUNK", "PLAIN_COMPRESSION", "ZipFile", "ZipInfo", "entry_chunks", "is_zip", "open_zip"]
 
 CHUNK = 64 * 1024
-#: Others can ask for gigabytes before they give a byte.
+#: Other compression methods can allocate gigabytes before they return a byte.
 PLAIN_COMPRESSION = frozenset({zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED})
 _ENTRY = b"PK\x01\x02"
-#: What ``zipfile`` and its decompressors raise on archives that were made to break them.
+#: Exceptions that ``zipfile`` and its decompressors raise for malicious archives.
 _BROKEN = (
     zipfile.BadZipFile,
     zipfile.LargeZipFile,
@@ -42,9 +42,11 @@ _BROKEN = (
 
 @contextmanager
 def open_zip(source: BinaryIO, most_entries: int) -> Iterator[ZipFile]:
-    """Open an archive for as long as the block lasts.
+    """Open an archive as a context manager.
 
-    Raises Unreadable if it is none or has more than ``most_entries``, those of stored archives in it included.
+    Raises:
+        Unreadable: The data are not an archive, or there are more than ``most_entries`` entries. Entries of stored
+            archives inside it count.
     """
     if _entries(source) > most_entries:
         raise TooMany("it has more than %(most)s files", most=most_entries)
@@ -57,12 +59,16 @@ def open_zip(source: BinaryIO, most_entries: int) -> Iterator[ZipFile]:
 
 
 def is_zip(source: BinaryIO) -> bool:
-    """Return whether there is an archive in the source, however it begins."""
+    """Return whether the source contains an archive, regardless of its first bytes."""
     return _entries(source) > 0 and zipfile.is_zipfile(source)
 
 
 def entry_chunks(archive: ZipFile, info: ZipInfo) -> Iterator[bytes]:
-    """Yield what is in an entry, a chunk at a time. Raises Unreadable where it is damaged or unusually compressed."""
+    """Yield the content of an entry in chunks.
+
+    Raises:
+        Unreadable: The entry is damaged or uses an unusual compression method.
+    """
     if info.compress_type not in PLAIN_COMPRESSION:
         raise Unreadable("it is compressed in an unusual way")
     try:
@@ -74,7 +80,7 @@ def entry_chunks(archive: ZipFile, info: ZipInfo) -> Iterator[bytes]:
 
 
 def _entries(source: BinaryIO) -> int:
-    """How many entries the archive can have at most: how often their signature occurs."""
+    """Return an upper bound for the number of entries: the number of entry signatures in the data."""
     source.seek(0)
     count, before = 0, b""
     while chunk := source.read(1 << 20):
