@@ -1,1 +1,1 @@
-"""What is submitted and what it is marked against, read and checked; nothing here is run."""
+"""Submissions, and the assignments they are marked against. Files are read and validated here; nothing is run."""

@@ -1,21 +1,24 @@
-"""What can be marked without code: one schema for each kind of criterion, told apart by ``check``.
+"""Criteria that need no code: one schema per kind of criterion, selected by ``check``.
 
-Judging is the service's (``service/grading/judging``, in the module named like the schema's); this only says what is
-asked, and refuses what cannot be asked. A schema is known by being defined: a class below ``Criterion`` in a module of
-this package, with its ``check``. What it needs of the rest of an assignment it says itself (``misfits``, ``completed``
-and the properties of ``Criterion``), so that whoever reads or judges assignments names no kind and no key of one.
+A schema defines and validates the keys of a criterion. The judge is in ``service/grading/judging``, in the module with
+the same name. Each subclass of ``Criterion`` in this package with a ``check`` registers itself. A criterion states its
+requirements through ``misfits``, ``completed`` and the properties of ``Criterion``. Code that reads or judges
+assignments therefore does not refer to single kinds or keys.
 
-Criteria stay on the side of the edge, with the tables that an instructor writes: they are frozen pydantic models also
-after reading, unlike scenarios and limits, which become dataclasses. A schema is at once what may be written, its
-ranges, its documentation and what its judge is given; a dataclass beside each would be a second list of every key.
+Criteria remain frozen pydantic models after reading, while scenarios and limits become dataclasses. One schema thus
+defines the keys, their ranges, their documentation and the judge's input. A dataclass per criterion would repeat every
+key.
 
-Every criterion is judged once a trial. A trial passes or fails, and has a score between 0 and 1: the part
-of what was asked that was reached (3 of 5 lines in order, 2 of 3 messages answered), 1 exactly when it
-passes. ``over`` turns the trials into marks: ``share`` is the share of trials that pass, ``all`` is
-everything or nothing, ``mean``, ``median`` and ``worst`` are taken over the scores. Marks are rounded half
-up, once, to two places.
+Each criterion is judged once per trial. A trial passes or fails, and has a score from 0 to 1: the fulfilled part of the
+criterion, for example 3 of 5 lines in order. The score is 1 exactly when the trial passes. ``over`` converts the trials
+to marks:
 
-Texts are compared without regard to spaces at the ends and to the length of runs of spaces.
+- ``share``: the share of trials that pass
+- ``all``: full marks if every trial passes, otherwise none
+- ``mean``, ``median``, ``worst``: computed from the scores
+
+Marks are rounded once, half up, to two places. Text comparisons ignore spaces at the ends and the length of runs of
+spaces.
 """
 
 from __future__ import annotations
@@ -35,7 +38,7 @@ __all__ = ["SCHEMAS", "AnyCriterion", "Criterion"]
 
 def _schemas(of: type[Criterion] = Criterion) -> Iterator[tuple[str, type[Criterion]]]:
     for schema in of.__subclasses__():
-        # One without a name of its own is what several have in common.
+        # Classes without ``check`` are shared bases.
         yield from ((name, schema) for name in get_args(schema.model_fields["check"].annotation))
         yield from _schemas(schema)
 
@@ -53,5 +56,5 @@ def _of_its_kind(value: object) -> object:
     return value
 
 
-#: A criterion of whichever kind its ``check`` says, also where it is read back from a store.
+#: Any criterion, selected by its ``check``; also used to read criteria back from a store.
 AnyCriterion = Annotated[Criterion, BeforeValidator(_of_its_kind)]

@@ -1,6 +1,6 @@
-"""The part that criteria about messages and replies share: they can look at a pair of agents instead of the robot.
+"""Base class for criteria about messages and replies, which can also apply to a pair of agents.
 
-No kind of criterion is here.
+This module defines no criterion.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ _RESPONDER = "responder"
 
 
 class BetweenAgents(Criterion):
-    """With ``agents = ["agent", "parser"]`` what the first tells the second stands for what the robot sends.
+    """Option ``agents = ["agent", "parser"]``: judge the texts between two agents instead of those of the robot.
 
-    What the second answers stands for the responder's answers. Either may be the responder.
+    Texts from the first agent to the second replace the robot's messages. Replies of the second replace the responder's
+    answers. Either agent may be the responder.
     """
 
     agents: SomeTexts = ()
@@ -40,7 +41,7 @@ class BetweenAgents(Criterion):
         return self
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
-        """Both must be there."""
+        """Yield a problem if one of the agents does not exist."""
         yield from super().misfits(around)
         there = {_RESPONDER, *around.agents}
         for name in set(self.agents) - there:

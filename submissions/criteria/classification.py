@@ -1,6 +1,6 @@
-"""The criterion about how often images are named rightly.
+"""Criterion about the accuracy of image classification.
 
-What it has in common with ``robustness.py`` is in ``recognition.py``.
+Options shared with ``robustness.py`` are in ``recognition.py``.
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ from submissions.strict_table import Entries
 
 
 class Classification(Recognition):
-    """How often images are named rightly.
+    """Accuracy of the answers to the robot's images.
 
-    Marks: without ``at_least`` the marks times the accuracy. With it, all marks from that accuracy on, and
-    ``marks x accuracy / at_least`` below. ``over = "all"``: all marks from ``at_least`` (1 if not given)
-    on, else none. ``steps``, instead, is a list of [accuracy, marks], ascending: the marks of the last step
-    that the accuracy reaches, the last of them all the marks there are.
+    - Without ``at_least``: the marks times the accuracy.
+    - With ``at_least``: full marks from that accuracy, and ``marks x accuracy / at_least`` below it.
+    - With ``over = "all"``: full marks from ``at_least`` (default 1), otherwise none.
+    - With ``steps``, an ascending list of [accuracy, marks]: the marks of the last step that the accuracy reaches. The
+      last step gives full marks.
     """
 
     check: Literal["classification"]

@@ -1,6 +1,6 @@
-"""Criteria about the code that was submitted: what its text has, what its functions return, and checks in Python.
+"""Criteria about submitted code: its source, the results of its functions, and checks written in Python.
 
-Only what is asked; the text is read and the functions are called by the service, inside the walls.
+``service`` analyses the source and calls the functions inside the sandbox.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from submissions.criteria.common import HOLDS_ANSWERS, Criterion, Misfit, Surrou
 from submissions.magics import Flags, parse_magic
 from submissions.strict_table import StrictTable
 
-#: The words that stand for a construct; any other is a name.
+#: Words that denote a construct. Other entries are names.
 CONSTRUCTS = (
     "for",
     "while",
@@ -36,22 +36,23 @@ CONSTRUCTS = (
     "dict",
     "comprehension",
 )
-#: Begins what names a module.
+#: Prefix of a module name.
 IMPORT = "import "
 
 
 class SourceRules(Criterion):
-    """What the text of the program (or of the responder) has and has not.
+    """The source of the program or the responder contains some constructs and avoids others.
 
     ``uses`` and ``avoids`` list constructs (``for``, ``while``, ``if``, ``break`` ...), calls (``say()``,
     ``tank_drive.on()``, ``on_for_*()`` with any ending), imports (``import time``) and names (``colorLeft``,
-    ``colorLeft.rgb``). A name without a dot is found behind a dot as well: ``on()`` is also
-    ``tank_drive.on()``. ``in_loop`` lists calls that must stand inside a loop, ``defines`` functions that must
-    be defined. What it ``uses`` or has ``in_loop`` must have been run, and must not be a name that the text makes
-    itself, unless ``defines`` has it. ``flags`` are flags that the magic line must have:
-    ``["-b Simple_Shapes", "-R"]``. A module that it ``avoids`` cannot be imported either when the part is run.
+    ``colorLeft.rgb``). A name without a dot also matches after a dot: ``on()`` matches ``tank_drive.on()``. ``in_loop``
+    lists calls that must be inside a loop, ``defines`` functions that must be defined.
 
-    The score is the part of all this that holds.
+    Entries of ``uses`` and ``in_loop`` must have been executed. They must not be names that the source itself defines,
+    unless ``defines`` lists them. ``flags`` are flags that the magic line must have: ``["-b Simple_Shapes", "-R"]``. At
+    run time, the part cannot import modules in ``avoids``.
+
+    The score is the share of these requirements that are met.
     """
 
     check: Literal["source"]
@@ -66,7 +67,7 @@ class SourceRules(Criterion):
 
     @property
     def parts_needed(self) -> frozenset[str]:
-        """The one that it reads."""
+        """The part whose source is analysed."""
         return frozenset({self.part})
 
     @field_validator("flags")
@@ -87,12 +88,12 @@ class SourceRules(Criterion):
 
     @property
     def avoided_modules(self) -> Texts:
-        """``sklearn`` for ``import sklearn``."""
+        """The modules that the code must not import: ``sklearn`` for ``import sklearn``."""
         names = (text.removeprefix(IMPORT).strip() for text in self.avoids if text.startswith(IMPORT))
         return tuple(name for name in names if all(part.isidentifier() for part in name.split(".")))
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
-        """The part whose source it reads has to be there."""
+        """Yield a problem if nobody writes the part whose source is analysed."""
         yield from _without("part", self.part, around)
 
     @model_validator(mode="after")
@@ -105,12 +106,12 @@ class SourceRules(Criterion):
 
 
 class ExpectedCall(StrictTable):
-    """A call of a function, and what it must return: exactly ``returns``, or one of ``one_of``.
+    """A function call and its expected result: ``returns``, or one of ``one_of``.
 
-    Of a ``hidden`` call students learn nothing but whether it counts among those that are right.
+    Feedback on a ``hidden`` call contains only the number of correct hidden calls.
     """
 
-    function: str = ""  # the criterion's, if not given
+    function: str = ""  # defaults to the criterion's function
     arguments: tuple[Any, ...] = ()
     named: dict[str, Any] = Field(default_factory=dict)
     returns: Any = None
@@ -119,26 +120,27 @@ class ExpectedCall(StrictTable):
 
     @model_validator(mode="after")
     def _expects_something(self) -> Self:
-        # A function that does nothing returns None, which is what the lack of both would ask for.
+        # A function that does nothing returns None, so a call without an expected value would always pass.
         if "returns" not in self.model_fields_set and not self.one_of:
             raise ValueError("says of a call neither returns nor one_of, expected what the function must return")
         return self
 
 
 class Functions(Criterion):
-    """Functions of the responder are called, without a robot, and return what they must.
+    """Functions of the responder return the expected values. They are called without a robot.
 
-    ``calls`` are tables ``{ arguments = [600], returns = 1227.8 }``, made one after the other in one process;
-    ``function`` is the name for those that give none. Numbers are met within ``tolerance``; texts without
-    regard to runs of spaces, and with ``ignore_case`` to case. ``path`` picks the part of a ``JSON::`` answer
-    that is compared. With ``each`` an expected list is compared entry by entry, and ``at_least`` of the
-    entries must be right: that is how predictions are marked.
+    ``calls`` are tables ``{ arguments = [600], returns = 1227.8 }``, executed in order in one process. ``function`` is
+    the default name. Numbers may differ by ``tolerance``. Text comparisons ignore runs of spaces, and case with
+    ``ignore_case``. ``path`` selects the part of a ``JSON::`` answer that is compared.
 
-    A call that is ``hidden`` comes after those that are not; students read how many of these are right. In place of
-    ``calls``, ``table`` is a CSV file beside the assignment with a hidden call in each row below its headings: the
-    value that must be returned, then the arguments, as texts. Then ``at_least`` of the calls must be right.
+    With ``each``, an expected list is compared entry by entry, and ``at_least`` of the entries must be right. Use it to
+    mark predictions.
 
-    The score is the part of the calls (of the entries) that is right; of a ``table`` in steps of 5 %.
+    Calls with ``hidden`` come after the others, and students see only how many of them are right. Instead of ``calls``,
+    ``table`` names a CSV file beside the assignment. Each row below its headings is a hidden call: the expected value,
+    followed by the arguments as texts. ``at_least`` of the calls must then be right.
+
+    The score is the share of correct calls or entries; for a ``table`` it is rounded to steps of 5 %.
     """
 
     check: Literal["functions"]
@@ -155,11 +157,11 @@ class Functions(Criterion):
 
     @property
     def parts_needed(self) -> frozenset[str]:
-        """The one whose functions it calls."""
+        """The part whose functions are called."""
         return frozenset({"responder"})
 
     def completed(self, around: Surroundings) -> Self:
-        """With a call for each row of its table."""
+        """Return the criterion with a call for each row of its table."""
         if not self.table:
             return self
         if self.calls:
@@ -175,7 +177,7 @@ class Functions(Criterion):
         return self.model_copy(update={"calls": calls})
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
-        """The responder whose functions it calls has to be there."""
+        """Yield a problem if there is no responder."""
         yield from _without("check", "responder", around)
 
     @model_validator(mode="after")
@@ -183,7 +185,7 @@ class Functions(Criterion):
         if not self.calls and not self.table:
             raise ValueError("needs calls or a table, expected one of them")
         if any(before.hidden and not after.hidden for before, after in pairwise(self.calls)):
-            # It could keep what it was called with, and tell it when a call is shown.
+            # The function could store hidden arguments and reveal them during a visible call.
             raise ValueError("has a hidden call before one that is not, expected the hidden ones last")
         if self.each and not all(isinstance(call.returns, list | tuple) and call.returns for call in self.calls):
             raise ValueError("has each with a call that returns no list, expected a list in every returns")
@@ -195,16 +197,18 @@ class Functions(Criterion):
 
 
 class PythonCheck(Criterion):
-    """What no other criterion can ask: a Python file beside the assignment judges each trial.
+    """A Python file beside the assignment judges each trial, for requirements beyond the other criteria.
 
-    The file defines ``check(trial)``. ``trial`` is a dict with what was recorded: ``scenario``, ``index``,
-    ``start`` and ``end`` (``x``, ``y``, ``heading``), ``end_t``, ``verdict``, ``ticks`` (lists ``t``, ``x``,
-    ``y``, ``heading``, ``left_rgb``, ``right_rgb``, ``ultrasonic``, ``gyro``), ``printed``, ``spoken`` (lists of
-    [time, text]), ``messages``, ``datalog``, ``images``, ``image_log``. It returns True or False, or a dict with
-    ``passed``, ``message`` (a sentence for the student), ``score`` from 0 to 1 and ``measures`` (name to number).
+    The file defines ``check(trial)``. ``trial`` is a dict of the recorded data: ``scenario``, ``index``, ``start`` and
+    ``end`` (``x``, ``y``, ``heading``), ``end_t``, ``verdict``, ``ticks`` (lists ``t``, ``x``, ``y``, ``heading``,
+    ``left_rgb``, ``right_rgb``, ``ultrasonic``, ``gyro``), ``printed``, ``spoken`` (lists of [time, text]),
+    ``messages``, ``datalog``, ``images``, ``image_log``.
 
-    It runs inside the sandbox, like student code. If it fails in a trial, the line is not judged for that
-    submission and staff are told why; the other lines stand.
+    ``check`` returns True or False, or a dict with ``passed``, ``message`` (a sentence for the student), ``score`` from
+    0 to 1 and ``measures`` (name to number).
+
+    The check runs inside the sandbox, like student code. If it fails in a trial, the criterion is not judged for that
+    submission, and staff see the reason. Other criteria are not affected.
     """
 
     check: Literal["python"]
@@ -213,17 +217,21 @@ class PythonCheck(Criterion):
 
     @property
     def python_files(self) -> Texts:
-        """The one file that has ``check``."""
+        """The file with ``check``."""
         return (self.file,)
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
-        """Its file has to be beside the assignment."""
+        """Yield a problem if the file is not beside the assignment."""
         if self.file not in around.files:
             yield Misfit("file", f'file is "{self.file[:60]}", expected a .py file beside this file')
 
 
 def flags_in(texts: Texts) -> Flags:
-    """The flags that these texts are. Raises UsageError for one that does not exist."""
+    """Parse these texts as flags.
+
+    Raises:
+        UsageError: A flag does not exist.
+    """
     return parse_magic("%%sim_magic_preloaded " + " ".join(texts))
 
 

@@ -1,6 +1,6 @@
-"""The criterion about training data that a robot collects: how many images of each class, and how good.
+"""Criterion about training data that a robot collects: number and quality of images per class.
 
-What a single log has to hold is asked in ``logged.py``.
+Criteria about the content of a single log are in ``logged.py``.
 """
 
 from __future__ import annotations
@@ -13,18 +13,20 @@ from submissions.criteria.common import Criterion, Texts
 
 
 class Collects(Criterion):
-    """The pairs of images that a robot collects are good enough to train with.
+    """The image pairs that a robot collects are suitable for training.
 
-    A pair is usable if the left image was taken over a pattern and the right one shows that pattern's label
-    label patch, so that its grey decodes to the label as in the course (0, 42, 85 ... for shapes, 25 times the digit).
-    ``source`` says which pairs: ``"log"`` those of ``image_data both`` (or ``left`` and ``right`` in turn),
-    ``"sent"`` those of ``IMG_DATA``.
+    A pair is usable if the left image shows a pattern and the right image shows the pattern's label patch. The patch's
+    grey must decode to the label as in the course (0, 42, 85 ... for shapes, 25 times the digit). ``source`` selects
+    the pairs: ``"log"`` for ``image_data both`` (or alternating ``left`` and ``right``), ``"sent"`` for ``IMG_DATA``.
 
-    ``each`` is how many different usable pairs there must be of every class in ``classes`` (without it, of
-    every label that the floor has). ``balance`` asks that the rarest class has at least that share of the
-    pairs of the commonest. ``most_duplicates`` and ``most_unusable`` are the largest shares of pairs that may repeat
-    an earlier left image, in its pixels or in the window of the floor, and that may be of no use. The score is the
-    part of the images asked for that is there, lowered by what else is missing.
+    - ``each``: the number of different usable pairs required for every class in ``classes`` (default: every label of
+      the floor).
+    - ``balance``: the minimum ratio between the rarest and the most common class.
+    - ``most_duplicates``: the maximum share of pairs that repeat an earlier left image, in its pixels or in its window
+      of the floor.
+    - ``most_unusable``: the maximum share of unusable pairs.
+
+    The score is the share of required images that exist, reduced by violations of the other conditions.
     """
 
     check: Literal["collects"]

@@ -1,6 +1,6 @@
-"""What every criterion has, what an assignment must have around it, and the types of its lists of texts.
+"""Base class of criteria, the requirements they check, and the types of their text lists.
 
-No kind of criterion is here; each has a module of its family.
+Each kind of criterion is in the module of its family.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def one_or_many(value: object) -> object:
-    """A single text stands for a list of one."""
+    """Return a list with one entry for a single text."""
     if isinstance(value, str):
         return (value,)
     return tuple(value) if isinstance(value, list) else value
@@ -35,24 +35,24 @@ def _not_blank(value: Texts) -> Texts:
 
 
 Texts = tuple[str, ...]
-#: Marks a list that asks for nothing, and so is a mistake, where it is written with nothing in it.
+#: Marks a list that would ask for nothing if it were empty. An explicit empty list is an error.
 NOT_EMPTY = "not empty"
-#: Refuses a text that is part of every text.
+#: Rejects a text that every text contains.
 NotBlank = AfterValidator(_not_blank)
 SomeTexts = Annotated[Texts, NOT_EMPTY]
 TextOrTexts = Annotated[Texts, BeforeValidator(one_or_many)]
 SomeTextOrTexts = Annotated[TextOrTexts, NOT_EMPTY]
-#: Marks a key that may name a file beside the assignment which no student may read.
+#: Marks a key that may name a file beside the assignment. Students must not read this file.
 HOLDS_ANSWERS = "holds answers"
 
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """What an assignment has around a criterion, as far as it could be read."""
+    """The parts of an assignment around a criterion, as far as they could be read."""
 
     scenarios: Sequence[Scenario] = ()
     ground: Floor | None = None
-    without: frozenset[str] = frozenset()  # the parts, program and responder, that nobody writes
+    without: frozenset[str] = frozenset()  # parts (program, responder) that nobody writes
     agents: frozenset[str] = frozenset()
     robots: int = 1
     files: Mapping[str, bytes] = field(default_factory=dict)
@@ -60,14 +60,14 @@ class Surroundings:
     criteria: Sequence[Criterion] = ()
 
     def looked_at_by(self, criterion: Criterion) -> Iterator[Scenario]:
-        """The scenarios of the criterion."""
+        """Return the scenarios of the criterion."""
         for scenario in self.scenarios:
             if not criterion.scenarios or scenario.id in criterion.scenarios:
                 yield scenario
 
 
 class Misfit(UsageError):
-    """What a criterion asks and the assignment does not have: the key that asks, and what is wrong with it."""
+    """A requirement of a criterion that the assignment does not meet: the key and the problem."""
 
     def __init__(self, key: str, sentence: str) -> None:
         super().__init__(sentence)
@@ -75,74 +75,78 @@ class Misfit(UsageError):
 
 
 class Criterion(StrictTable):
-    """What every criterion has. ``scenarios`` names those it looks at; all, if empty.
+    """Base class of all criteria. ``scenarios`` names the scenarios it applies to; empty means all.
 
-    A kind is a class below this one with ``check: Literal["its name"]``.
+    A kind of criterion is a subclass with ``check: Literal["its name"]``.
     """
 
-    id: str = Field(default="", pattern=r"^[a-z0-9][a-z0-9_-]*$|^$", max_length=80)  # from the title, if not given
-    check: str  # the kind
+    id: str = Field(default="", pattern=r"^[a-z0-9][a-z0-9_-]*$|^$", max_length=80)  # defaults to a form of the title
+    check: str  # the kind of criterion
     title: str = Field(min_length=1, max_length=200)
     marks: Decimal = Field(ge=0, le=10000, decimal_places=2)
     scenarios: SomeTexts = ()
-    robot: Literal[1, 2] = 1  # which one it looks at, where there are two
-    #: how the trials become marks
+    robot: Literal[1, 2] = 1  # the robot it applies to, if there are two
+    #: how trials are converted to marks
     over: Literal["share", "all", "mean", "median", "worst"] = "share"
     visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible"
 
-    #: Whether it looks at runs of the robot; else at the code alone.
+    #: True if it judges runs of the robot, False if it judges only code.
     judges_runs: ClassVar[bool] = True
-    #: The figures that it measures in a trial, by name; # stands for a number from 1, ... for any words.
+    #: Names of the values it measures in a trial. # matches a number from 1, ... matches any words.
     measures: ClassVar[Texts] = ()
 
     @property
     def asks_responder(self) -> bool:
-        """Whether it looks at what a responder answers."""
+        """Return whether it judges answers of a responder."""
         return False
 
     @property
     def questions(self) -> Texts:
-        """The texts for a responder by whose answers alone it judges; without any it looks at the robot as well."""
+        """The texts sent to a responder, if its answers alone decide; empty if the robot matters too."""
         return ()
 
     @property
     def parts_needed(self) -> frozenset[str]:
-        """The parts without which there is nothing to look at."""
+        """The parts that must exist for this criterion."""
         if self.questions:
             return frozenset({"responder"})
         return frozenset({"program", "responder"} if self.asks_responder else {"program"})
 
     @property
     def result_needed(self) -> str | None:
-        """The id of the criterion that has to be judged before it."""
+        """The id of the criterion that must be judged first."""
         return None
 
     def measures_a(self, name: str) -> bool:
-        """Whether it measures a figure of this name."""
+        """Return whether it measures a value with this name."""
         known = (re.escape(each).replace(r"\#", r"[1-9]\d*").replace(r"\.\.\.", r".+") for each in self.measures)
         return any(re.fullmatch(each, name) for each in known)
 
     @property
     def python_files(self) -> Texts:
-        """The files beside the assignment that are run to judge it."""
+        """The files beside the assignment that run during judging."""
         return ()
 
     def completed(self, around: Surroundings) -> Self:
-        """The criterion with what the assignment says elsewhere. Raises Misfit where that cannot be read."""
+        """Return the criterion completed with data from the rest of the assignment.
+
+        Raises:
+            Misfit: The data cannot be read.
+        """
         return self
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
-        """All that it asks and that is not there."""
+        """Yield all requirements that the assignment does not meet."""
         yield from ()
 
 
 class AmongMany(Criterion):
-    """One that looks for something among all that a program prints, says, sends or logs.
+    """Base class of criteria that look for items among everything a program prints, says, sends or logs.
 
-    Whoever names everything has named what is looked for as well, so strays count: a thing that is looked for and came
-    where it does not belong is one, twenty other things of its sort are another. ``strays`` is how many cost nothing,
-    as many as things are looked for if not given; each further one lowers the score like one more thing that was
-    looked for and did not come.
+    A program that outputs every possible item would also output the expected ones. Therefore extra items count as
+    strays: an expected item in the wrong position, or another item of the same type. ``strays`` is the number allowed
+    without a penalty; the default is the number of expected items. Each further stray reduces the score as much as one
+    missing item.
     """
 
     strays: int | None = Field(default=None, ge=0)

@@ -1,6 +1,6 @@
-"""Criteria about coping with a channel that loses, delays and corrupts what is sent.
+"""Criteria about programs that use a channel with loss, delay and corruption.
 
-What is sent and answered at all is asked in ``texts.py`` and ``replies.py``.
+Criteria about messages and answers in general are in ``texts.py`` and ``replies.py``.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ from submissions.criteria.texts import TextConditions
 
 
 class Resends(TextConditions):
-    """Each message is sent again until its answer has come, and not after that.
+    """Each message is sent again until its answer arrives, and not after that.
 
-    Messages of the same text are tries of one message; the conditions say which messages are looked at. An answer
-    has come when one to any of the tries arrived whole. Between two tries pass from ``every[0]`` to ``every[1]``
-    seconds; after ``at_most`` tries the program may give up, and must. ``at_least`` different ones must be sent.
+    Messages with the same text are tries of one message. The conditions select the messages. A message is answered when
+    an intact answer to any of its tries has arrived. The time between two tries is from ``every[0]`` to ``every[1]``
+    seconds. After ``at_most`` tries the program may give up, and must not try again. ``at_least`` different messages
+    must be sent.
     """
 
     check: Literal["resends"]
@@ -31,10 +32,10 @@ class Resends(TextConditions):
 
 
 class InReach(TextConditions):
-    """Messages are sent while the robot is in reach of an infrared link: near enough, facing it, in clear sight.
+    """Messages are sent while an infrared link can reach the robot: close enough, facing it, with a clear view.
 
-    The conditions say which messages are looked at; ``at_least`` must be sent in reach, ``misses`` are forgiven.
-    What is lost by chance was sent in reach.
+    The conditions select the messages. ``at_least`` must be sent within reach; up to ``misses`` may be sent out of
+    reach. Messages lost by chance count as sent within reach.
     """
 
     check: Literal["in_reach"]
@@ -43,7 +44,7 @@ class InReach(TextConditions):
     misses: int = Field(default=0, ge=0)
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
-        """A cable reaches everywhere."""
+        """Yield a problem for a cable, which reaches everywhere."""
         for scenario in around.looked_at_by(self):
             if scenario.channel.link == "cable":
                 sentence = f'asks how far the link reaches, expected link = "infrared" in scenario "{scenario.id}"'
@@ -51,11 +52,11 @@ class InReach(TextConditions):
 
 
 class FreshAnswers(Criterion):
-    """What the program reports as an answer is the answer to what it sent last, not to something earlier.
+    """The program reports the answer to its latest message, not an earlier answer.
 
-    A report is a line, printed or said, that begins with ``after``; what follows must have the answer's words in it,
-    or those that its JSON has at ``path``, and no other answer's. Of every text there must be one,
-    unless chance kept it from being answered; ``at_least`` different texts must be sent.
+    A report is a printed or spoken line that begins with ``after``. The rest must contain the words of the answer (or
+    those at ``path`` in its JSON), and no other answer's. Each text needs a report, unless chance prevented its answer.
+    ``at_least`` different texts must be sent.
     """
 
     check: Literal["fresh_answers"]
@@ -66,5 +67,5 @@ class FreshAnswers(Criterion):
 
     @property
     def asks_responder(self) -> bool:
-        """True: without answers there is nothing to report."""
+        """True: reports need answers."""
         return True

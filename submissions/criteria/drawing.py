@@ -1,6 +1,6 @@
-"""The criterion about what the robot draws with straight legs: an L, a square, several squares.
+"""Criterion about figures with straight legs: an L, a square, several squares.
 
-Only what is asked; finding the legs in the path is the service's.
+``service`` finds the legs in the path.
 """
 
 from __future__ import annotations
@@ -17,17 +17,19 @@ _Angle = Annotated[float, Field(gt=0, le=180)]
 
 
 class Drawing(Criterion):
-    """Figures of straight legs, drawn one after the other: ``figures`` of ``legs`` legs each, no more, no fewer.
+    """Figures with straight legs, drawn in order: exactly ``figures`` figures of ``legs`` legs each.
 
-    ``legs`` can be a list with the number of legs of each figure, for example [3, 4] for a triangle and a square; then
-    ``angle`` can be a list as well.
+    ``legs`` can be a list with the number of legs of each figure, for example [3, 4] for a triangle and a square.
+    ``angle`` can then be a list too.
 
-    In each figure every leg has at least ``shortest`` mm, all are equal within ``equal_within`` (a share of
-    their mean), and the angles between one leg and the next are ``angle`` degrees within ``angle_within``.
-    With ``closes`` the figure ends where it began, to within ``closes_within`` mm or a tenth of a leg,
-    whichever is more. ``sizes`` is [least, most] of the mean leg, one for each figure; ``growing`` asks that
-    each figure is larger than the one before. ``at_least`` takes more figures than ``figures`` as well.
-    ``pen = false`` looks at the whole path, whether the pen was down or not.
+    - ``shortest``: the minimum length of a leg, mm.
+    - ``equal_within``: the maximum difference between legs of a figure, as a share of their mean.
+    - ``angle``, ``angle_within``: the angle between successive legs and its tolerance, degrees.
+    - ``closes``: the figure ends at its start, within ``closes_within`` mm or a tenth of a leg, whichever is more.
+    - ``sizes``: [least, most] of the mean leg, one for each figure.
+    - ``growing``: each figure is larger than the previous one.
+    - ``at_least``: more figures than ``figures`` are allowed.
+    - ``pen = false``: the whole path counts, with the pen up or down.
     """
 
     check: Literal["drawing"]
@@ -52,12 +54,12 @@ class Drawing(Criterion):
 
     @property
     def figure_count(self) -> int:
-        """The number of figures that are asked for."""
+        """The number of figures required."""
         return len(self.legs_of_each)
 
     @property
     def angle_of_each(self) -> tuple[float, ...]:
-        """The angle of each figure, degrees."""
+        """The angle of each figure in degrees."""
         return self.angle if isinstance(self.angle, tuple) else (self.angle,) * len(self.legs_of_each)
 
     @model_validator(mode="after")

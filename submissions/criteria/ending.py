@@ -1,6 +1,6 @@
-"""Criteria about how a run ends: by itself, in time, and where.
+"""Criteria about the end of a run: its cause, time and place.
 
-What happened on the way there is asked in the other modules.
+Criteria about the way there are in the other modules.
 """
 
 from __future__ import annotations
@@ -15,10 +15,9 @@ from submissions.strict_table import StrictTable
 
 
 class Finishes(Criterion):
-    """The program ends by itself, without a fault of its own, within ``seconds`` if given.
+    """The program ends by itself and without a fault of its own, within ``seconds`` if given.
 
-    A responder that raises or answers badly does not make the program fail; running out of time, CPU or
-    memory does.
+    Errors of the responder do not count as a fault of the program. Exceeding the limits on time, CPU or memory does.
     """
 
     check: Literal["finishes"]
@@ -27,9 +26,9 @@ class Finishes(Criterion):
 
 
 class SinceEvent(StrictTable):
-    """How far the robot is, at the end, from where it was when a text came first, and how long ago that was.
+    """Distance and time between the first occurrence of a text and the end.
 
-    ``of`` says which text: one that the robot ``"sent"``, ``"said"`` or ``"printed"``, or was ``"answered"``.
+    ``of`` selects the text: ``"sent"``, ``"said"`` or ``"printed"`` by the robot, or ``"answered"`` to it.
     """
 
     of: Literal["sent", "answered", "said", "printed"]
@@ -45,11 +44,11 @@ class SinceEvent(StrictTable):
 
 
 class EndPose(Criterion):
-    """Where the robot is at the end: near a point, at a heading, in a zone; all that is given must hold.
+    """Pose of the robot at the end: near a point, at a heading, in a zone. All given conditions must hold.
 
-    ``tolerance`` is in mm from (x, y), ``heading_tolerance`` in degrees, full turns ignored; ``zone`` is
-    [left, bottom, right, top] in mm. ``areas`` are areas of which the robot must be in one. All are about
-    the middle of the axle. ``since`` is about an event: ``{ of = "answered", contains = "stop", moved = [0, 150] }``.
+    ``tolerance`` is the distance from (x, y) in mm; ``heading_tolerance`` is in degrees and ignores full turns.
+    ``zone`` is [left, bottom, right, top] in mm. The robot must be in one of ``areas``. All conditions apply to the
+    middle of the axle. ``since`` measures from an event: ``{ of = "answered", contains = "stop", moved = [0, 150] }``.
     """
 
     check: Literal["pose"]

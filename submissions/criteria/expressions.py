@@ -1,6 +1,6 @@
-"""Instructors' regular expressions, by RE2: whatever the pattern, a text takes time in proportion to its length.
+"""Instructors' regular expressions on RE2, which matches any pattern in time proportional to the text.
 
-They are written as for Python's ``re`` and mean the same; which texts they are tried on is the service's.
+The expressions have the syntax and meaning of Python's ``re``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 
 import re2
 
-#: What Python's classes stand for in any script; RE2's own know a to z.
+#: Unicode equivalents of Python's classes; RE2's own classes cover only ASCII.
 _WORD, _SPACE = r"\p{L}\p{N}_", r"\s\v\x1c-\x1f\x{85}\p{Z}"
 _INSIDE = {r"\d": r"\p{Nd}", r"\D": r"\P{Nd}", r"\w": _WORD, r"\s": _SPACE}
 _OUTSIDE = _INSIDE | {
@@ -22,19 +22,23 @@ _OUTSIDE = _INSIDE | {
     r"\Z": r"\z",
     "{,": "{0,",
 }
-#: An escape, a class in brackets, or a repetition that leaves its least number out.
+#: An escape, a class in brackets, or a repetition without a minimum.
 _PART = re.compile(r"\\.|\[\^?\]?(?:\\.|[^\]\\])*\]|\{,(?=\d+\})", re.DOTALL)
 _ESCAPE = re.compile(r"\\.", re.DOTALL)
 
 
 def usable(pattern: str) -> str:
-    """The pattern itself. Raises ValueError, with what is wrong and what was expected, if it cannot be used."""
+    """Return the pattern unchanged if it can be used.
+
+    Raises:
+        ValueError: The pattern cannot be used. The message has the problem and the expected form.
+    """
     _compiled(pattern, False)
     return pattern
 
 
 def found_in(text: str, pattern: str, ignore_case: bool) -> bool:
-    """Whether the pattern is found anywhere in the text; ``$`` is the end, or before a line feed at the end."""
+    """Return whether the pattern matches anywhere in the text. ``$`` matches the end, or before a final line feed."""
     compiled, data = _compiled(pattern, ignore_case), text.encode("utf-8", "replace")
     return any(compiled.search(each) is not None for each in {data, data.removesuffix(b"\n")})
 

@@ -1,6 +1,6 @@
-"""Criteria about following a line and driving laps of a circuit.
+"""Criteria about line following and laps of a circuit.
 
-Only what is asked; a line is described as ``places.py`` has it.
+Lines are defined in ``places.py``.
 """
 
 from __future__ import annotations
@@ -17,11 +17,12 @@ from submissions.strict_table import Entries
 class Follows(Criterion):
     """The robot drives along a line.
 
-    It is on the line while it is ``within`` mm of it; ``covers`` is the share of the line that it must be on, in the
-    line's direction and without leaving parts out. A line with two ends counts from where the robot first comes
-    upon it, or from the share ``joins_by`` of its length if the robot comes upon it later than that; a closed line
-    counts as a whole. ``at_most`` is the farthest it may ever be from the line while it follows. ``one_side`` asks
-    that it is on one and the same side of the line for this share of the time.
+    The robot is on the line while it is ``within`` mm of it. ``covers`` is the share of the line that it must follow,
+    in the line's direction and without gaps. A line with two ends counts from the point where the robot first reaches
+    it, but at the latest from the share ``joins_by`` of its length. A closed line counts as a whole.
+
+    ``at_most`` is the maximum distance from the line while the robot follows it. ``one_side`` is the minimum share of
+    the time on one side of the line.
     """
 
     check: Literal["follows"]
@@ -42,11 +43,10 @@ class Follows(Criterion):
 
 
 class Laps(Criterion):
-    """Whole laps of a closed line, timed from crossing the start line to crossing it again.
+    """Whole laps of a closed line, each timed from one crossing of the start line to the next.
 
-    ``start_line`` is [x1, y1, x2, y2]. ``laps`` must be driven in the line's direction, each along at least
-    ``progress`` of it and never farther than ``within`` mm from it; ``seconds`` is [least, most] of the
-    best lap's time.
+    ``start_line`` is [x1, y1, x2, y2]. ``laps`` laps must follow the line's direction, each along at least ``progress``
+    of it and at most ``within`` mm away. ``seconds`` is [least, most] for the best lap.
     """
 
     check: Literal["laps"]

@@ -1,6 +1,6 @@
-"""Criteria about what a program logs: the datalog and the images.
+"""Criteria about logs: the datalog and the image log.
 
-Logs are what ``print("Light_left: 42")`` and ``print("image_data both")`` leave, as in the notebooks.
+Programs write them with ``print("Light_left: 42")`` and ``print("image_data both")``, as in the notebooks.
 """
 
 from __future__ import annotations
@@ -13,21 +13,22 @@ from pydantic import Field, model_validator
 from submissions.criteria.common import AmongMany, Criterion, Texts
 from submissions.criteria.places import Range
 
-#: What a series may be a log of.
+#: Instruments that a series can be a log of.
 Instrument = Literal["left light", "right light", "ultrasonic", "gyro", "left wheel", "right wheel"]
 
 
 class Datalog(AmongMany):
-    """A series of the datalog, by its name (``Light_left``), has what it should; all that is given must hold.
+    """A series of the datalog, selected by name (``Light_left``), meets all given conditions.
 
-    ``at_least`` and ``at_most`` count its samples. ``plateaus`` are values that it must keep for
-    ``plateau_samples`` samples in a row, within ``tolerance``, in this order; others may lie between.
-    ``between`` is [least, most] for every sample; ``covers`` is a range that the series must reach both ends
-    of. With ``measured`` only samples count that this instrument read (in any unit of the brick's) at most half a
-    second before they were printed, one for each 10 ms that a reading takes: a program may print any number, and any
-    number of times. ``dips_below`` names a series whose lowest
-    sample must lie above this one's. ``timed`` asks for the time in every sample, as in
-    ``print("Light_left: 42 " + str(get_clock()))``.
+    - ``at_least``, ``at_most``: limits on the number of samples.
+    - ``plateaus``: values that occur in this order, each for ``plateau_samples`` samples in a row within ``tolerance``.
+      Other values may occur between them.
+    - ``between``: [least, most] for every sample.
+    - ``covers``: a range whose two ends the series must reach.
+    - ``measured``: only samples that this instrument read (in any of its units) at most half a second earlier count.
+      Each 10 ms of reading time allows one sample, because a program can print any number at any time.
+    - ``dips_below``: a series whose lowest sample must be higher than the lowest of this one.
+    - ``timed``: every sample has the time, as in ``print("Light_left: 42 " + str(get_clock()))``.
     """
 
     check: Literal["datalog"]
@@ -56,11 +57,12 @@ class Datalog(AmongMany):
 class ImageLog(Criterion):
     """The images that the program logs with ``image_data left``, ``right`` or ``both``.
 
-    ``left`` and ``right`` are how many there must be of each sensor, ``left_at_least`` and ``right_at_least`` how many
-    or more. ``at_start`` asks that each shows what
-    the sensor sees from the pose that the scenario starts at; ``pairs`` that left and right take turns,
-    left first; ``uniform`` names the sensor whose images must be of one colour, as a label patch is, and show one
-    where the floor has them.
+    - ``left``, ``right``: the exact number of images of each sensor; ``left_at_least``, ``right_at_least``: the
+      minimum.
+    - ``at_start``: each image shows the view from the scenario's start pose.
+    - ``pairs``: left and right alternate, left first.
+    - ``uniform``: a sensor whose images have a single colour, as label patches do, and show a patch if the floor has
+      them.
     """
 
     check: Literal["image_log"]

@@ -1,6 +1,6 @@
-"""Criteria about how the robot moves: as a whole, move by move, there and back, and after what a sensor saw.
+"""Criteria about motion: the whole run, single moves, excursions, and reactions to a sensor.
 
-Only what is asked; where on the floor it goes is asked in ``path.py`` and ``line.py``.
+Criteria about places on the floor are in ``path.py`` and ``line.py``.
 """
 
 from __future__ import annotations
@@ -15,12 +15,11 @@ from submissions.strict_table import StrictTable
 
 
 class AskedMotion(StrictTable):
-    """What a move can be asked to be. Each is [least, most]; all that are given must hold.
+    """Conditions on a move. Each is [least, most]; all given conditions must hold.
 
-    ``forward`` and ``sideways`` (to the left) are how far the robot gets, seen from where and how it stood
-    at the beginning, ``distance`` is how far it is from there as the crow flies, mm; ``turn`` is by how much
-    its heading changes, degrees anticlockwise, ``turn_size`` the same without regard to the direction;
-    ``seconds`` is how long it moves.
+    ``forward`` and ``sideways`` (to the left) are the displacement in mm in the frame of the robot's pose at the
+    beginning. ``distance`` is the straight-line distance in mm. ``turn`` is the change of heading in degrees
+    anticlockwise, ``turn_size`` its absolute value. ``seconds`` is the duration of the motion.
     """
 
     forward: Range | None = None
@@ -32,13 +31,13 @@ class AskedMotion(StrictTable):
 
     @property
     def asks(self) -> bool:
-        """Whether any range is given."""
+        """Return whether any condition is given."""
         given = (self.forward, self.sideways, self.distance, self.turn, self.turn_size, self.seconds)
         return any(value is not None for value in given)
 
 
 class NamedMotion(AskedMotion):
-    """A move in a list of moves; ``name`` is what the feedback calls it."""
+    """A move in a list of moves; feedback uses its ``name``."""
 
     name: str = Field(default="", max_length=80)
 
@@ -52,11 +51,11 @@ class NamedMotion(AskedMotion):
 
 
 class Displacement(AskedMotion, Criterion):
-    """What came of the whole run: where the end is, seen from the start.
+    """Displacement of the whole run: the end pose relative to the start pose.
 
-    Beside what a move can be asked: ``left_wheel`` and ``right_wheel`` are [least, most] of the wheels'
-    positions at the end, degrees; ``agrees_with_wheels`` is how far, as a share, ``distance`` may be from
-    what the left wheel's position says.
+    In addition to the conditions on a move, ``left_wheel`` and ``right_wheel`` are [least, most] of the final wheel
+    positions in degrees. ``agrees_with_wheels`` is the maximum relative difference between ``distance`` and the travel
+    of the left wheel.
     """
 
     check: Literal["displacement"]
@@ -84,12 +83,10 @@ class Displacement(AskedMotion, Criterion):
 
 
 class Moves(Criterion):
-    """The run move by move.
+    """The moves of a run.
 
-    A move ends where the robot stands still, or where two ways of moving meet: straight on, straight back, turning
-    left, turning right.
-    ``moves`` lists what must be among them, in that order (``in_order = false``: in any order);
-    ``only`` allows no others.
+    A move ends when the robot stops or when the type of motion changes: forwards, backwards, left turn, right turn.
+    ``moves`` lists the required moves in order (``in_order = false``: in any order). ``only`` forbids other moves.
     """
 
     check: Literal["moves"]
@@ -106,11 +103,11 @@ class Moves(Criterion):
 
 
 class Excursions(Criterion):
-    """Going out and coming back, along the direction in which the robot stood at the start.
+    """Excursions out and back along the robot's start direction.
 
-    ``heights`` are how far it goes out each time, in proportion (``[1, 2, 1]``), within ``tolerance`` as a
-    share; the first is at least ``at_least`` mm. Each time it must come back to within ``returns_within`` mm
-    of the start, and it must end there. There must be neither more nor fewer.
+    ``heights`` are the relative lengths of the excursions (``[1, 2, 1]``), within the relative ``tolerance``. The first
+    must be at least ``at_least`` mm long. Each must return to within ``returns_within`` mm of the start, and the run
+    must end there. The number of excursions must be exact.
     """
 
     check: Literal["excursions"]
@@ -129,11 +126,11 @@ class Excursions(Criterion):
 
 
 class Encounters(Criterion):
-    """What the robot does each time a light sensor sees something dark.
+    """Reactions of the robot each time a light sensor sees something dark.
 
-    An encounter is when the reading of ``light`` falls below ``below`` (reflected light, percent) on the floor. It is
-    answered when what ``then`` lists follows in that order within ``seconds``: ``reverse`` (5 mm backwards),
-    ``turn`` (by 15 degrees), ``stop`` (standing still for 0.1 s). ``at_least`` of them must be answered.
+    An encounter begins when the reading of ``light`` falls below ``below`` (reflected light, percent) on the floor. The
+    reaction consists of the actions in ``then``, in this order, within ``seconds``: ``reverse`` (5 mm backwards),
+    ``turn`` (by 15 degrees), ``stop`` (no motion for 0.1 s). ``at_least`` encounters must have the reaction.
     """
 
     check: Literal["encounters"]

@@ -1,6 +1,6 @@
-"""Criteria about where the robot goes: through places, within areas, clear of them, touching nothing.
+"""Criteria about the path: through places, inside areas, outside areas, without touching anything.
 
-Lines to follow are ``line.py``'s, drawings ``drawing.py``'s, points to keep to or go round ``point.py``'s.
+Lines are in ``line.py``, drawings in ``drawing.py``, and points in ``point.py``.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from submissions.criteria.places import Area, Part
 
 
 class Visits(Criterion):
-    """The robot comes through every place, in the order of the list unless ``in_order = false``.
+    """The robot visits every place, in the order of the list unless ``in_order = false``.
 
-    ``at_least`` is how many of them are enough. With ``without_stopping`` it must not stand still (for more
-    than half a second, nor at the end) in any of them. The score is the share of them that were reached.
+    ``at_least`` is the number of visits that is enough. With ``without_stopping``, the robot must not stop in any place
+    for more than half a second, or end there. The score is the share of places visited.
     """
 
     check: Literal["visits"]
@@ -36,9 +36,9 @@ class Visits(Criterion):
 
 
 class StaysInside(Criterion):
-    """At all times ``of`` is in one of the areas.
+    """``of`` is always in one of the areas.
 
-    ``drives`` is how far the robot must drive in all, mm, so that standing still earns nothing.
+    ``drives`` is the minimum total distance in mm, so that a robot that does not move gets no marks.
     """
 
     check: Literal["stays_inside"]
@@ -49,9 +49,9 @@ class StaysInside(Criterion):
 
 
 class KeepsOut(Criterion):
-    """At no time is ``of`` in any of the areas, nor nearer to one than ``clear_of`` mm.
+    """``of`` is never in any of the areas, and never closer to one than ``clear_of`` mm.
 
-    ``drives`` is how far the robot must drive in all, mm, so that standing still earns nothing.
+    ``drives`` is the minimum total distance in mm, so that a robot that does not move gets no marks.
     """
 
     check: Literal["keeps_out"]
@@ -63,7 +63,7 @@ class KeepsOut(Criterion):
 
 
 class TouchesNothing(Criterion):
-    """The robot's body touches no wall and no obstacle; ``at_most`` touches are forgiven."""
+    """The robot's body touches no wall and no obstacle; up to ``at_most`` touches are allowed."""
 
     check: Literal["touches_nothing"]
     measures: ClassVar[Texts] = ("touches",)

@@ -1,6 +1,6 @@
-"""How an assignment says where: areas of the floor, lines on it, and which part of the robot is meant.
+"""Places in an assignment: areas, lines, and the part of the robot that is measured.
 
-Coordinates are mm from the lower left corner of the floor; measuring against them is the service's.
+Coordinates are mm from the lower left corner of the floor. ``service`` measures distances.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 from sim.floors.centrelines import centrelines
 from submissions.strict_table import Entries, StrictTable
 
-#: The part of the robot whose way is looked at: the middle of its axle, what it drew, or a light sensor.
+#: The measured point: the middle of the axle, the pen's drawing, or a light sensor.
 Part = Literal["robot", "pen", "left_light", "right_light"]
 
 Point = Annotated[tuple[float, float], Entries("[x, y]")]
@@ -32,16 +32,16 @@ def _with_room(zone: tuple[float, float, float, float]) -> tuple[float, float, f
     return zone
 
 
-#: Least and most; both belong to it, and something must.
+#: Minimum and maximum, both inclusive. At least one value must fit.
 Range = Annotated[tuple[float, float], AfterValidator(_ordered), Entries("[least, most]")]
-#: mm; something must have room in it.
+#: In mm; the area must not be empty.
 Zone = Annotated[tuple[float, float, float, float], AfterValidator(_with_room), Entries("[left, bottom, right, top]")]
 
 
 class Area(StrictTable):
     """A ``rectangle``, a ``circle``, a ``polygon`` or a ``bar`` with round ends; ``name`` is for the feedback.
 
-    With ``outside`` it is all that lies outside of that shape.
+    With ``outside``, the area is everything outside the shape.
     """
 
     name: str = Field(default="", max_length=80)
@@ -68,7 +68,7 @@ class Area(StrictTable):
         return self
 
     def __str__(self) -> str:
-        """``the red circle``, ``the outside of the red circle``, or the shape with its figures."""
+        """Return ``the red circle``, ``the outside of the red circle``, or the shape with its dimensions."""
         return f"the outside of {self._shape()}" if self.outside else self._shape()
 
     def _shape(self) -> str:
@@ -88,12 +88,12 @@ class Area(StrictTable):
 
 
 class LineToFollow(StrictTable):
-    """A line to drive along, in the direction in which it is to be driven.
+    """A line to drive along, with its direction.
 
-    ``on`` names a line of a floor (``Line_Following_Test/141``, ``Thruxton_Circuit``); ``points`` lists its
-    corners; ``ellipse`` is [x, y, horizontal radius, vertical radius] and ``arc`` the part of it from one
-    angle to another, degrees anticlockwise from the right (the second less than the first: clockwise).
-    ``closed`` joins the end to the beginning; Thruxton's circuit is closed anyway.
+    ``on`` names a line of a floor (``Line_Following_Test/141``, ``Thruxton_Circuit``). ``points`` lists corners.
+    ``ellipse`` is [x, y, horizontal radius, vertical radius], and ``arc`` selects its part between two angles in
+    degrees anticlockwise from the right; it runs clockwise if the second angle is smaller. ``closed`` joins the end to
+    the beginning; Thruxton's circuit is always closed.
     """
 
     on: str | None = None
@@ -126,7 +126,7 @@ class LineToFollow(StrictTable):
         return self
 
     def corners(self) -> tuple[Point, ...]:
-        """The corners of the line; a closed one ends where it begins."""
+        """The corners of the line; a closed line repeats its first corner at the end."""
         if self.on is not None:
             return centrelines()[self.on]
         if self.points is not None:
@@ -138,13 +138,13 @@ class LineToFollow(StrictTable):
         return tuple((x + across * math.cos(angle), y + up * math.sin(angle)) for angle in angles)
 
     def length(self) -> float:
-        """Along all its corners, mm."""
+        """The length along all corners in mm."""
         corners = self.corners()
         return sum(math.dist(before, after) for before, after in itertools.pairwise(corners))
 
     @property
     def is_closed(self) -> bool:
-        """Whether one can drive on from the end to the beginning."""
+        """Whether the end of the line joins its beginning."""
         return (
             self.closed
             or self.on == "Thruxton_Circuit"

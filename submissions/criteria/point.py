@@ -1,6 +1,6 @@
-"""Criteria about a point of the floor: how near the path comes to it, how often it goes round, how far from it it ends.
+"""Criteria about a point on the floor: the path's distance from it, the turns round it, and the final distance.
 
-Places to come through or to keep out of are asked in ``path.py``.
+Criteria about places to visit or avoid are in ``path.py``.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from submissions.criteria.places import Range
 
 
 class Closest(Criterion):
-    """How near the path comes to the point (x, y): ``distance`` is [least, most] of the least distance, mm.
+    """Minimum distance of the path from the point (x, y): ``distance`` is [least, most] in mm.
 
-    ``than_straight`` compares it with driving straight on from the start; ``first_turn`` asks for the
-    direction of the first turn of more than 2 degrees.
+    ``than_straight`` compares it with straight driving from the start pose. ``first_turn`` is the required direction of
+    the first turn of more than 2 degrees.
     """
 
     check: Literal["closest"]
@@ -36,11 +36,11 @@ class Closest(Criterion):
 
 
 class Circuits(Criterion):
-    """How often the path goes round the point (x, y): ``times`` is [least, most], parts of a round included.
+    """Number of turns of the path round the point (x, y): ``times`` is [least, most], fractions included.
 
-    ``direction`` is on the screen; ``clear_of`` is how far from the point it must always be, mm, so that spinning
-    beside it is no round. ``gyro`` is [least, most] of how much the gyro changes in each whole
-    round, degrees, without regard to the direction; ``corners`` is in how many about equal steps it does so.
+    ``direction`` is as seen on the screen. ``clear_of`` is the minimum distance from the point in mm, so that spinning
+    beside it does not count. ``gyro`` is [least, most] of the gyro's absolute change in degrees per whole turn.
+    ``corners`` is the number of roughly equal steps of this change.
     """
 
     check: Literal["circuits"]
@@ -62,10 +62,10 @@ class Circuits(Criterion):
 
 
 class Spread(Criterion):
-    """An observation: how far from (x, y) the robot ended in each trial, and how much that varies.
+    """An observation: the final distances from (x, y) over all trials, and their spread.
 
-    The feedback gives least, mean and greatest distance for each level of motor noise. Without ``within``
-    nothing can be lost by it, so ``marks = 0`` fits; with it a trial passes that ends at most so many mm away.
+    The feedback gives the minimum, mean and maximum distance for each level of motor noise. Without ``within``, the
+    criterion cannot fail, so use ``marks = 0``. With it, trials pass if they end at most that many mm away.
     """
 
     check: Literal["spread"]

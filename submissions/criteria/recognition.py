@@ -1,6 +1,6 @@
-"""What criteria about naming images have in common: whence the truth, where the answer, which images count.
+"""Base class of criteria about image classification: source of truth, source of answers, and the images that count.
 
-What that is worth is asked in ``classification.py`` and ``robustness.py``; finding truths and answers is the service's.
+Marks are defined in ``classification.py`` and ``robustness.py``; ``service`` finds truths and answers.
 """
 
 from __future__ import annotations
@@ -15,37 +15,40 @@ from sim.errors import UsageError
 from submissions.assignment.truth_file import LabelledPlace, read_places
 from submissions.criteria.common import HOLDS_ANSWERS, NOT_EMPTY, Criterion, Misfit, Surroundings, TextOrTexts
 
-#: A grey level of a patch.
+#: Grey level of a patch.
 Grey = Annotated[int, Field(ge=0, le=255)]
-#: Patches whose greys are nearer to one another than this cannot be told apart.
+#: Minimum difference between the greys of two patches.
 _GREYS_APART = 6
 
 
 class Recognition(Criterion):
-    """How often the images that the robot sends are named rightly; all trials are pooled.
+    """Correctness of the answers to the robot's images, pooled over all trials.
 
-    ``truth`` is where the right answer comes from: ``"label"`` (what the floor has under the left sensor when
-    the image was taken), ``"grey"`` (the label patch in the right sensor's image, decoded as the course
-    does), ``"places"`` (the instructor's own: ``places`` is a list of [x, y, label] or a CSV file of such rows
-    beside the assignment, and counts where the left sensor's middle is ``within`` so many mm of it), or a
-    list, one label for each pose of the scenario. On an image of the instructor's own ``greys`` says what the label
-    patches stand for: ``"shapes"`` or ``"digits"`` as in the course, or the grey level of each label.
+    ``truth`` is the source of the right answer:
 
-    The answer is looked for in the reply to the image, at ``answer`` in its JSON if there is such a place,
-    else in the reply's text; with ``answer_from`` in what the robot said or printed between this image and
-    the next. Case, hyphens and ``aliases`` (label to other names for it) do not matter; an answer that names
-    two different labels is wrong. ``confidence`` is where the JSON has a number from 0 to 1; it is shown, and
-    never marked. ``late = "wrong"`` counts an answer as wrong that the robot had not got when it sent its
-    next image, or at its end.
+    - ``"label"``: the label of the floor under the left sensor.
+    - ``"grey"``: the label patch in the right sensor's image, decoded as in the course.
+    - ``"places"``: ``places``, a list of [x, y, label] or a CSV file with such rows beside the assignment. An entry
+      applies if the left sensor's centre is ``within`` this many mm.
+    - a list: one label for each pose of the scenario.
 
-    ``images`` says which of a trial's images count; those of the same thing from the same place under the
-    sensor are one, by the majority of the answers. With ``each_pattern`` all images of one pattern count as one,
-    wherever the robot stood: by the ``"first"`` of them, ``"any"`` that is right, or the ``"majority"``; a trial
-    that has images of fewer than ``patterns`` patterns gets a wrong answer for each that is missing. With
-    ``near_start`` only images count whose sensor was at most so many mm from where it was at the start, so that the
-    robot cannot drive or turn to one that is easier. With ``near_spot`` only images count whose sensor was at most so
-    many mm from the middle of what it shows. A trial without an image that counts is one wrong answer, so
-    that staying silent never helps.
+    On an instructor's own image, ``greys`` defines the label patches: ``"shapes"`` or ``"digits"`` as in the course, or
+    the grey level of each label.
+
+    The answer is at ``answer`` in the JSON of the reply, or otherwise in the text of the reply. With ``answer_from``,
+    it is in the robot's speech or printed text before the next image. Case, hyphens and ``aliases`` (label to other
+    names) are ignored. An answer that contains two different labels is wrong. ``confidence`` is the place of a number
+    from 0 to 1 in the JSON, which is shown but not marked. With ``late = "wrong"``, an answer is wrong if it arrives
+    after the next image or after the robot's end.
+
+    ``images`` selects the images of a trial that count. Images of the same object from the same place count as one,
+    decided by the majority of the answers. With ``each_pattern``, all images of one pattern count as one, from any
+    pose: the ``"first"``, ``"any"`` that is right, or the ``"majority"``. A trial with fewer than ``patterns`` patterns
+    gets a wrong answer for each missing pattern.
+
+    With ``near_start``, only images count whose sensor was at most that many mm from its place at the start, so that
+    the robot cannot move to an easier pattern. With ``near_spot``, only images at most that many mm from the middle of
+    their pattern count. A trial without counting images has one wrong answer, so that sending nothing is no advantage.
     """
 
     truth: Annotated[Literal["label", "grey", "places"] | tuple[str, ...], NOT_EMPTY] = "label"
@@ -56,7 +59,7 @@ class Recognition(Criterion):
     answer_from: Literal["reply", "speech", "print"] = "reply"
     confidence: str | None = Field(default=None, min_length=1)
     late: Literal["counts", "wrong"] = "counts"
-    labels: tuple[str, ...] = ()  # all that could be named; without it those that the floor and the truths have
+    labels: tuple[str, ...] = ()  # all possible labels; defaults to those of the floor and the truths
     aliases: dict[str, TextOrTexts] = Field(default_factory=dict)
     images: Literal["all", "first", "last"] = "all"
     near_start: float | None = Field(default=None, gt=0, le=5000)
@@ -86,11 +89,11 @@ class Recognition(Criterion):
 
     @property
     def asks_responder(self) -> bool:
-        """True: what images are taken for is what a responder answers."""
+        """True: the classifications are answers of a responder."""
         return True
 
     def completed(self, around: Surroundings) -> Self:
-        """With the assignment's aliases, and with the rows of its file of places in place of the name."""
+        """Return the criterion with the assignment's aliases, and with the rows of its places file in ``places``."""
         update: dict[str, object] = {"aliases": {**around.aliases, **self.aliases}}
         if isinstance(self.places, str):
             try:
@@ -100,7 +103,7 @@ class Recognition(Criterion):
         return self.model_copy(update=update)
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
-        """Labels on the floor, label patches to decode, a truth for every pose must be there."""
+        """Yield problems with the truth: no labels on the floor, no label patches, or no truth for a pose."""
         ground = around.ground
         if isinstance(self.truth, tuple):
             for scenario in around.looked_at_by(self):

@@ -1,6 +1,6 @@
-"""The criterion about how one thing in a run goes with another: slower when nearer, faster where it is brighter.
+"""Criterion about the relation of two series: slower when nearer, faster where it is brighter.
 
-Moves and where they lead are asked in ``motion.py`` and ``path.py``.
+Criteria about moves and places are in ``motion.py`` and ``path.py``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from submissions.criteria.common import Criterion, Texts
 
-#: What a run has a value of in every tick.
+#: Values that a recording has in every tick.
 Series = Literal[
     "time",
     "x",
@@ -29,13 +29,14 @@ Series = Literal[
 
 
 class Relation(Criterion):
-    """One series of the recording goes with another, or against it, while the robot moves.
+    """One series of the recording increases with another, or decreases with it, while the robot moves.
 
-    Any two moments are compared in which both series differ, each by more than a twentieth of its own range: in
-    ``at_least`` of these pairs (a share) the moment with the lower ``to`` has the lower ``of`` as well; the higher
-    with ``goes = "against"``. ``changes`` is by how much ``of`` must change in all, so that a robot that does the same
-    all the time earns nothing. Speeds are mm, or degrees of the wheel, a second, and turning degrees a second, none
-    with regard to the direction; light is percent, ultrasonic mm.
+    The criterion compares all pairs of moments in which each series differs by more than a twentieth of its range. In
+    ``at_least`` of these pairs (a share), the moment with the lower ``to`` must have the lower ``of``; the higher with
+    ``goes = "against"``. ``changes`` is the minimum total change of ``of``, so that constant behaviour gets no marks.
+
+    Speeds are mm per second, or wheel degrees per second; turning is in degrees per second. All are absolute values.
+    Light is in percent, ultrasonic in mm.
     """
 
     check: Literal["relation"]

@@ -1,6 +1,6 @@
-"""The criterion about what the responder answers.
+"""Criterion about the responder's answers.
 
-How often images are named rightly is asked in ``classification.py``.
+Criteria about the accuracy of image classification are in ``classification.py``.
 """
 
 from __future__ import annotations
@@ -16,15 +16,16 @@ from submissions.criteria.texts import TextConditions
 
 
 class Replies(BetweenAgents, TextConditions):
-    """What the responder answers, arrived in time or not.
+    """The responder's answers, whether or not they arrived in time.
 
-    ``expect`` maps a text of the robot's to its answer: each must have been sent, and answered so. An answer
-    ``{ one_of = [...] }`` lists several right ones. ``in_order`` lists the answers to the messages that reached the
-    responder, in the order of these messages: one answer for each, no more, no fewer.
-    Otherwise every message of the robot's that reached the responder must have an answer that meets the
-    conditions, and there must be ``at_least`` different ones of them (1); ``to`` and ``to_starts_with`` narrow down
-    which messages are looked at. ``is_json`` asks for ``JSON::`` and well-formed JSON; with ``path`` the conditions,
-    ``value`` and ``expect`` apply to what the JSON has there (``message.typ``), else to the whole answer.
+    ``expect`` maps a text of the robot to its answer. Each text must have been sent and answered as given. An answer
+    ``{ one_of = [...] }`` lists alternatives. ``in_order`` lists the exact answers to the messages that reached the
+    responder, in the order of these messages.
+
+    Otherwise, every robot message that reached the responder must have an answer that meets the conditions, and at
+    least ``at_least`` (default 1) different answers are required. ``to`` and ``to_starts_with`` select the messages.
+    ``is_json`` requires ``JSON::`` and valid JSON. With ``path``, the conditions, ``value`` and ``expect`` apply to
+    that place in the JSON (``message.typ``), otherwise to the whole answer.
     """
 
     check: Literal["replies"]
@@ -39,12 +40,12 @@ class Replies(BetweenAgents, TextConditions):
 
     @property
     def asks_responder(self) -> bool:
-        """True: nothing else is looked at."""
+        """True: only answers count."""
         return True
 
     @property
     def questions(self) -> Texts:
-        """Those of ``expect``, unless it is agents that ask."""
+        """The texts of ``expect``; empty if agents ask."""
         return () if self.agents else tuple(self.expect)
 
     @model_validator(mode="after")
@@ -64,7 +65,7 @@ class Replies(BetweenAgents, TextConditions):
 
 
 def right_answers(expected: object) -> Sequence[object]:
-    """The answers that an entry of ``expect`` allows: what ``one_of`` lists, otherwise the entry itself."""
+    """Return the answers that an entry of ``expect`` allows: the list in ``one_of``, or the entry itself."""
     if isinstance(expected, dict) and expected.keys() == {"one_of"} and isinstance(expected["one_of"], list):
         return expected["one_of"]
     return (expected,)

@@ -1,6 +1,6 @@
-"""Criteria about what a program reports: the right figures, in the right order, at the right place.
+"""Criteria about a program's reports: right values, right order, right place.
 
-Single texts and how often they come are asked in ``texts.py``, words one after the other in ``sequence.py``.
+Criteria about single texts are in ``texts.py``; word sequences are in ``sequence.py``.
 """
 
 from __future__ import annotations
@@ -19,18 +19,24 @@ _MOST_FOR_LABELS = 0.49  # less than half of the distance between the numbers of
 
 
 class Reports(AmongMany):
-    """Printed, said or answered figures and words are those that belong to the pose.
+    """Numbers and words in the output match the pose.
 
-    ``expected`` has a list for each pose of the scenario, or a single one for all poses; each entry, a number
-    or a text, must come in this order somewhere in what the program prints and says (``source`` narrows it
-    down; ``reply`` looks at the responder's answers). Numbers are met within ``tolerance``, texts as whole
-    words without regard to case; after a text, the next entry is one of the first numbers, or of the first texts
-    in ``expected``, that follow it. ``among`` lists the words to choose from: any of them that is not expected
-    is wrong, so that saying all of them does not help; so is a report that has the entries of other poses as well,
-    if it has those of more than half of all poses. ``only`` asks that no other number is reported.
-    ``expected = "label"`` is what the floor has under the left light sensor at the start; any other label of the
-    floor is wrong, as with ``among``. The entries before a missing one are worth nothing if as many entries of more
-    than half of all poses are reported, unless these poses have the same answer.
+    ``expected`` has a list for each pose of the scenario, or one list for all poses. The entries, numbers or texts,
+    must occur in this order in the program's printed and spoken output. ``source`` selects part of the output;
+    ``reply`` selects the responder's answers. Numbers may differ by ``tolerance``; texts match whole words, ignoring
+    case. After a text, the next entry must be among the first numbers, or the first texts in ``expected``, that follow
+    it.
+
+    Guessing does not help:
+
+    - Any other word of ``among`` is wrong.
+    - A report is wrong if it also has the entries of more than half of all poses.
+    - Entries before a missing one get no marks if the report has as many entries of more than half of all poses, unless
+      these poses have the same answer.
+    - With ``only``, no other number may be reported.
+
+    ``expected = "label"`` is the floor's label under the left light sensor at the start. Any other label of the floor
+    is wrong, as with ``among``.
     """
 
     check: Literal["reports"]
@@ -43,12 +49,12 @@ class Reports(AmongMany):
 
     @property
     def asks_responder(self) -> bool:
-        """Whether it looks at answers alone."""
+        """Return whether it judges answers alone."""
         return self.source == "reply"
 
     @property
     def leeway(self) -> float:
-        """How far off a number may be; for a label at most so far that no number is two labels."""
+        """The maximum difference of numbers. For labels, it is small enough that no number matches two labels."""
         return self.tolerance if self.expected != "label" else min(self.tolerance, _MOST_FOR_LABELS)
 
     @field_validator("expected", mode="plain")
@@ -62,7 +68,7 @@ class Reports(AmongMany):
         raise ValueError('is neither "label" nor a list of lists, expected [[100, "white"], ...], one for each pose')
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
-        """Lists for single poses must be as many as each scenario has poses."""
+        """Yield a problem for each scenario whose number of poses differs from the number of lists."""
         if self.expected == "label" or len(self.expected) == 1:
             return
         for scenario in around.looked_at_by(self):
@@ -77,24 +83,23 @@ class Reports(AmongMany):
     def _plain_rows(
         self, value: Literal["label"] | tuple[tuple[float | str, ...], ...]
     ) -> str | list[list[int | float | str]]:
-        # Pydantic's own takes neither the whole numbers nor the nesting.
+        # Pydantic's validation does not accept the integers or the nesting.
         return value if isinstance(value, str) else [list(row) for row in value]
 
 
 class EventAt(StrictTable):
-    """A text, and the zone that the sensor must be in when it comes."""
+    """A text, and the zone of the sensor at that time."""
 
     text: TextOrTexts = Field(min_length=1)  # any of these
     zone: Zone
 
 
 class Events(AmongMany):
-    """Each text is said or printed, in this order, while the sensor is where it belongs.
+    """Each text is said or printed, in this order, while the sensor is in its zone.
 
-    ``events`` are tables ``{ text = "1", zone = [left, bottom, right, top] }``; a text is found anywhere in
-    what is said, as whole words, number words counting as numbers. One that is said in the zone of another text
-    does not count. The sensor (``middle`` is the middle of
-    the axle) may be up to ``margin`` mm outside of the zone.
+    ``events`` are tables ``{ text = "1", zone = [left, bottom, right, top] }``. Texts match whole words anywhere in the
+    output; number words match numbers. A text said in the zone of another text does not count. The sensor (``middle``:
+    the middle of the axle) may be up to ``margin`` mm outside the zone.
     """
 
     check: Literal["events"]

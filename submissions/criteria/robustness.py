@@ -1,6 +1,6 @@
-"""The criterion about how long images are named rightly as conditions get harder.
+"""Criterion about image classification under harder conditions.
 
-The conditions that can be swept are in ``sweep.py``.
+The conditions are defined in ``sweep.py``.
 """
 
 from __future__ import annotations
@@ -16,12 +16,15 @@ from submissions.sweep import Condition
 
 
 class Robustness(Recognition):
-    """How long images are named rightly as one swept condition gets harder.
+    """Accuracy of image classification as one swept condition gets harder.
 
-    ``along`` is a condition of the scenario's sweep. ``marks_from = "area"``: the marks times the mean height
-    of the curve of accuracy (the area under it, by the width of the sweep). ``"falls_below"``: the marks times
-    the part of the sweep, from its easiest level outwards, over which the accuracy is at least ``level``. With
-    ``at_least``, all marks from that area or part on, and in proportion below it.
+    ``along`` is a condition of the scenario's sweep.
+
+    - ``marks_from = "area"``: the marks times the mean height of the accuracy curve (the area under it divided by the
+      width of the sweep).
+    - ``marks_from = "falls_below"``: the marks times the part of the sweep, from its easiest level, with an accuracy of
+      at least ``level``.
+    - With ``at_least``: full marks from that area or part, and proportional marks below it.
     """
 
     check: Literal["robustness"]
@@ -30,7 +33,7 @@ class Robustness(Recognition):
     level: float | None = Field(default=None, gt=0, le=1)
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
-        """What recognition needs, and a scenario that is swept over the condition."""
+        """Yield the problems of recognition, and a problem if no scenario has a sweep over the condition."""
         yield from super().misfits(around)
         if not any(scenario.varies(self.along) for scenario in around.looked_at_by(self)):
             yield Misfit(

@@ -1,6 +1,6 @@
-"""The criterion about words that have to come one after the other: counting, spelling, a countdown.
+"""Criterion about word sequences: counting, spelling, a countdown.
 
-Single texts and how often they come are asked in ``texts.py``.
+Criteria about single texts are in ``texts.py``.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from submissions.criteria.common import AmongMany, Texts, one_or_many
 
 
 class WordSequence(AmongMany):
-    """Words come one after the other, however they are spread over what is said or printed.
+    """Words in a given order, in any number of spoken or printed texts.
 
-    ``words`` are compared without regard to case and punctuation; one in a list of its own may be any of that
-    list: ``["T", ["M", "em"], "1"]``. Number words count as numbers ("ten" is 10). Before them, other words
-    may come with ``lead_in``; nothing may come between them, and after them only with ``more``. "TM" is one
-    word, "T M" are two. ``waits`` asks that none is said before the one before has been spoken to its end.
+    Comparison with ``words`` ignores case and punctuation. A nested list gives alternatives: ``["T", ["M", "em"],
+    "1"]``. Number words match numbers ("ten" is 10). With ``lead_in``, other words may come before the sequence, and
+    with ``more`` after it; none may come between. "TM" is one word, "T M" are two. With ``waits``, each word must start
+    after the end of the previous one.
     """
 
     check: Literal["sequence"]

@@ -1,6 +1,6 @@
-"""The criterion about what is under a light sensor when the robot stops.
+"""Criterion about the floor under a light sensor when the robot stops.
 
-Where the robot itself ends is ``ending.py``'s.
+Criteria about the robot's final pose are in ``ending.py``.
 """
 
 from __future__ import annotations
@@ -14,15 +14,17 @@ from submissions.criteria.places import Range, Zone
 
 
 class StopOn(Criterion):
-    """The robot stops by itself with a light sensor on the right thing; all that is given must hold.
+    """The robot stops by itself with a light sensor on the right place. All given conditions must hold.
 
-    ``reflected`` is [least, most] in percent, what ``reflected_light_intensity_pc`` reads; ``rgb`` is a
-    colour, each part of it met within ``rgb_tolerance``. ``zone`` is [left, bottom, right, top] in mm;
-    ``near`` is a point that the sensor is within ``within`` mm of. ``sensor = "either"``: one of the two
-    must do. What lies beside the floor is black and does not count, unless with ``off_floor``. ``still`` asks that
-    the robot stood for so many seconds before its program ended.
+    - ``reflected``: [least, most] in percent, as ``reflected_light_intensity_pc`` reads it.
+    - ``rgb``: a colour; each channel may differ by ``rgb_tolerance``.
+    - ``zone``: [left, bottom, right, top] in mm.
+    - ``near``: a point; the sensor must be ``within`` this many mm.
+    - ``sensor = "either"``: one of the two sensors is enough.
+    - ``off_floor``: black outside the floor counts too.
+    - ``still``: the time in seconds without motion before the program ends.
 
-    A program that still runs when its time is over has not stopped. One that stops by an error has.
+    A program that still runs at the time limit has not stopped. A program that ends with an error has.
     """
 
     check: Literal["stop_on"]

@@ -1,6 +1,6 @@
-"""Criteria about what is printed, said and sent.
+"""Criteria about printed, spoken and sent texts.
 
-What the responder answers is asked in ``replies.py``.
+Criteria about the responder's answers are in ``replies.py``.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from submissions.criteria.expressions import usable
 
 
 class TextConditions(Criterion):
-    """Which texts count. A text counts if every condition that is given holds for it."""
+    """Conditions on a text. A text counts if it meets all given conditions."""
 
-    equals: SomeTextOrTexts = ()  # the text is one of these
+    equals: SomeTextOrTexts = ()  # equals one of these
     starts_with: Annotated[SomeTextOrTexts, NotBlank] = ()  # begins with one of these
-    contains: Annotated[SomeTextOrTexts, NotBlank] = ()  # has all of these in it
-    among: Annotated[SomeTextOrTexts, NotBlank] = ()  # has one of these words in it, and no other of them
-    matches: str | None = None  # a regular expression that RE2 takes, found anywhere in the text
+    contains: Annotated[SomeTextOrTexts, NotBlank] = ()  # contains all of these
+    among: Annotated[SomeTextOrTexts, NotBlank] = ()  # contains one of these words and none of the others
+    matches: str | None = None  # an RE2 regular expression that matches anywhere in the text
     ignore_case: bool = False
 
     @field_validator("matches")
@@ -31,16 +31,16 @@ class TextConditions(Criterion):
 
     @property
     def has_conditions(self) -> bool:
-        """Whether it asks anything of a single text."""
+        """Return whether any condition on a single text is given."""
         return bool(self.equals or self.starts_with or self.contains or self.among or self.matches is not None)
 
 
 class TextSequence(TextConditions, AmongMany):
-    """How many texts must count, and in which order.
+    """Number and order of the texts that count.
 
-    Without a count at least one must; with ``in_order`` the listed texts must come in that order among
-    those that count (others may lie between them unless ``only``), compared as ``compare`` says. ``last``
-    looks at the last text alone.
+    Without a number, at least one text is required. With ``in_order``, the listed texts must occur in that order among
+    those that count. Other texts may come between them unless ``only`` is set. ``compare`` selects the comparison.
+    ``last`` uses the last text alone.
     """
 
     last: bool = False
@@ -89,9 +89,9 @@ class TextSequence(TextConditions, AmongMany):
 
 
 class Prints(TextSequence):
-    """What the program prints, one text a print call.
+    """The texts that the program prints, one text per print call.
 
-    With ``of = "responder"`` it is what the responder prints, or the cells of a notebook: one text a line.
+    With ``of = "responder"``, the texts are the lines printed by the responder or by the cells of a notebook.
     """
 
     check: Literal["prints"]
@@ -99,23 +99,23 @@ class Prints(TextSequence):
 
     @property
     def asks_responder(self) -> bool:
-        """Whether it looks at what the responder prints."""
+        """Return whether it uses the responder's output."""
         return self.of == "responder"
 
 
 class Says(TextSequence):
-    """What the robot says."""
+    """The texts that the robot says."""
 
     check: Literal["says"]
 
 
 class Messages(BetweenAgents, TextSequence):
-    """What the robot sends to the responder: texts like ``PY::0``; an image is the text ``IMG_DATA::...``.
+    """The texts that the robot sends to the responder, such as ``PY::0``; images are sent as ``IMG_DATA::...``.
 
-    With ``json = true`` it is, instead, the robot's queue that is looked at: every answer that began with
-    ``JSON::``, was well formed and arrived while the program ran, in order of arrival; ``path`` picks the
-    part that is compared (``message.shape``; a number picks from a list). ``queue_grows = true`` asks that
-    each ``PY::`` message made the queue longer by one, in the order in which the messages were sent.
+    With ``json = true``, the robot's queue counts instead: all valid answers that began with ``JSON::`` and arrived
+    while the program ran, in order of arrival. ``path`` selects the part that is compared (``message.shape``; a number
+    selects a list entry). With ``queue_grows = true``, each ``PY::`` message must add one entry to the queue, in the
+    order of sending.
     """
 
     check: Literal["messages"]
@@ -125,7 +125,7 @@ class Messages(BetweenAgents, TextSequence):
 
     @property
     def asks_responder(self) -> bool:
-        """Whether it looks at the queue, which only answers fill."""
+        """Return whether it uses the queue, which only answers fill."""
         return self.json_queue or self.queue_grows
 
     @model_validator(mode="after")

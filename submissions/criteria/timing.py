@@ -1,6 +1,6 @@
-"""Criteria about time, and about ranks: how long it took, and what a measured figure is worth.
+"""Criteria about time and about ranking by a measured value.
 
-Whether a program ends at all is asked in ``ending.py``.
+The criterion about the program's end is in ``ending.py``.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from submissions.strict_table import Entries
 
 
 class Timing(Criterion):
-    """How long it took, in seconds of simulated time: from ``between[0]`` to ``between[1]``.
+    """Duration in seconds of simulated time, from ``between[0]`` to ``between[1]``.
 
-    ``of = "program"`` is from the start to the program's end, ``"moving"`` the time in which the robot moved or
-    turned, ``"speech"`` until the last thing that was said had been spoken.
+    ``of = "program"`` is the time from the start to the program's end. ``"moving"`` is the time during which the robot
+    moved or turned. ``"speech"`` is the time until the end of the last speech.
     """
 
     check: Literal["timing"]
@@ -31,11 +31,11 @@ class Timing(Criterion):
 
 
 class Ranking(Criterion):
-    """A figure that another criterion measures is worth marks by steps: the fastest lap gets all of them.
+    """Marks by steps for a value that another criterion measures, for example the fastest lap.
 
-    ``of`` is the id of that criterion and ``measure`` the name of its figure, as reports show it. ``steps``
-    are [figure, share]: up to that figure (``highest = true``: from it on) the share of the marks is given.
-    A trial in which the other criterion failed is worth nothing. The figure is shown for a table of ranks.
+    ``of`` is the id of that criterion, and ``measure`` is the name of the value in reports. ``steps`` are [value,
+    share]: up to this value (``highest = true``: from this value) the trial gets that share of the marks. A trial that
+    fails the other criterion gets nothing. The value is also used for a ranking table.
     """
 
     check: Literal["ranking"]
@@ -47,12 +47,12 @@ class Ranking(Criterion):
 
     @property
     def result_needed(self) -> str:
-        """The criterion whose figure is ranked."""
+        """The criterion whose value is ranked."""
         return self.of
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
-        """The criterion that is ranked has to be there, and to need no other's result itself."""
-        # What is itself judged after another is judged too late to be ranked.
+        """Yield a problem if the ranked criterion does not exist, needs another's result, or lacks the value."""
+        # A criterion that needs another's result is judged too late to be ranked.
         others = {each.id: each for each in around.criteria if each.result_needed is None}
         if self.of not in others:
             hint = did_you_mean(self.of, others)

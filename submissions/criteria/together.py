@@ -1,6 +1,6 @@
-"""Criteria about two robots: how far they are apart, on the way and at the end.
+"""Criterion about two robots: their distance during the run and at the end.
 
-What one of them does is asked by the other criteria, with ``robot`` where it is the second.
+Other criteria judge each robot by itself; ``robot`` selects the second.
 """
 
 from __future__ import annotations
@@ -14,10 +14,11 @@ from submissions.criteria.common import Criterion, Misfit, Surroundings
 
 
 class Apart(Criterion):
-    """How far the middles of the two robots' axles are apart: ``at_least`` and ``at_most`` mm.
+    """Distance between the middles of the two robots' axles: ``at_least`` and ``at_most`` mm.
 
-    ``when`` is at the end, always from ``after`` seconds on (the score is the share of that time in which it was so,
-    and ``share`` of it is enough), or once from then on. A robot whose program has ended stands where it is.
+    ``when`` selects the time: at the end, always from ``after`` seconds on, or once from then on. For "always", the
+    score is the share of the time that meets the condition, and ``share`` of the time is enough. A robot stays in place
+    after its program has ended.
     """
 
     check: Literal["apart"]
@@ -36,7 +37,7 @@ class Apart(Criterion):
         return self
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
-        """It takes two, and looks at both."""
+        """Yield a problem if there is only one robot, or if ``robot`` selects one of the two."""
         if self.robot != 1:
             yield Misfit("robot", "robot is 2, but check looks at both robots, expected it without robot")
         if around.robots < 2:
