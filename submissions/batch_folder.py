@@ -1,6 +1,6 @@
-"""Reads a folder, zip or roster of submissions before anything is queued: what can be graded, and what not.
+"""Reader of a folder, zip or roster of submissions, which runs before anything is queued.
 
-Every bad row is named and stops no other. Nothing is stored here.
+A bad row is reported and does not affect other rows. This module stores nothing.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ _log = logging.getLogger(__name__)
 _PARTS = {"robot.py", "program.py", "responder.py"}
 _MOST_ENTRIES = 50_000
 _MOST_BYTES = 4_000_000_000
-#: How much a zip may unpack to, for its size: text is a tenth or a fifth when it is compressed, zeros a thousandth.
+#: Limit on the unpacked size of a zip, relative to its size. Text compresses to 10-20 %, zeros to 0.1 %.
 _ALWAYS_BYTES, _MOST_TIMES = 50_000_000, 30
 
 
 @dataclass(frozen=True, slots=True)
 class BatchContents:
-    """What a batch would take in, and what it would not."""
+    """Contents of a batch: submissions that can be graded, and rejected submissions."""
 
     grading_requests: tuple[GradingRequest, ...]
     refusals: tuple[Refusal, ...]
@@ -45,7 +45,7 @@ class BatchContents:
 
 @dataclass(frozen=True, slots=True)
 class _Row:
-    """A row by the name it is spoken of, its student as written, and how it is read; that raises UsageError."""
+    """One row: its displayed name, its student as written, and a function that reads it or raises UsageError."""
 
     name: str
     student: Student
@@ -57,16 +57,22 @@ class _Row:
 def read_batch(path: Path, assignment: str | None, people: People | None = None) -> BatchContents:
     """Read every submission of a folder, zip or CSV roster.
 
-    A folder or zip is a download of Moodle's, Gradescope's or nbgrader's, or has a subfolder, a .py or a .zip for each
-    student; without ``assignment`` each submission names its own. A roster names student and file; ``assignment`` is
-    for the rows that name none. Who it is that a row names is looked up in ``people``. Raises UsageError when
-    ``path`` or ``assignment`` itself cannot be used.
+    A folder or zip can be a download from Moodle, Gradescope or nbgrader. Otherwise it contains a subfolder, a .py or a
+    .zip for each student. Without ``assignment``, each submission names its own. A roster names students and files;
+    ``assignment`` applies to rows that name none. Students are looked up in ``people``.
+
+    Raises:
+        UsageError: ``path`` or ``assignment`` itself cannot be used.
     """
     return read_batch_for(path, None if assignment is None else find_assignment(assignment), people)
 
 
 def read_batch_for(path: Path, asked: Assignment | None, people: People | None = None) -> BatchContents:
-    """The same where the assignment is at hand. Raises UsageError when ``path`` itself cannot be used."""
+    """Read every submission as ``read_batch`` does, for an assignment that is already loaded.
+
+    Raises:
+        UsageError: ``path`` itself cannot be used.
+    """
     if path.is_file() and path.suffix.lower() == ".csv":
         find = cache(partial(_roster_assignment, path.parent))
         return _read(
@@ -127,7 +133,7 @@ def _read(rows: Iterable[_Row]) -> BatchContents:
         except UsageError as error:
             found.append(" ".join(str(error).split()).removeprefix(f"{row.name}: "))
         except Exception:
-            # One submission that we fail on is no reason to refuse those of a whole class.
+            # An internal error with one submission must not reject a whole class.
             _log.exception("%s could not be read", row.name)
             found.append("cannot be read because of a fault in Robomark; its log has the details. Report this fault.")
     found = _one_each(rows, found)
@@ -142,7 +148,7 @@ def _read(rows: Iterable[_Row]) -> BatchContents:
 
 
 def _one_each(rows: Sequence[_Row], found: Sequence[GradingRequest | str]) -> list[GradingRequest | str]:
-    """One submission of a student for an assignment; of several that differ nobody here knows which is meant."""
+    """Keep one submission per student and assignment. If several differ, reject all of them."""
     places: dict[tuple[str, str], dict[int, GradingRequest]] = {}
     for place, each in enumerate(found):
         if isinstance(each, GradingRequest):
@@ -200,7 +206,7 @@ def _roster_request(
 
 
 def _roster_assignment(folder: Path, name: str) -> Assignment:
-    """An id of the catalogue, or a folder that the roster names as it names files."""
+    """Read a catalogue assignment by its id, or an assignment folder relative to the roster."""
     if name in catalogue():
         return find_assignment(name)
     path = file_inside(folder, name)
@@ -208,7 +214,7 @@ def _roster_assignment(folder: Path, name: str) -> Assignment:
 
 
 def _found(folder: Path, asked: Assignment | None) -> list[DownloadedFiles]:
-    """What lies there; of several assignments that a platform keeps together, what is for the one asked for."""
+    """Return the submissions in a folder. If a platform exported several assignments, select the requested one."""
     found = student_files(folder)
     parts = [entry.name for entry in folder.iterdir() if entry.name.lower() in _PARTS]
     if parts:
@@ -235,7 +241,7 @@ def _opened(path: Path) -> Iterator[Path]:
         yield path
     elif path.is_file() and path.suffix.lower() == ".zip":
         with tempfile.TemporaryDirectory(prefix="robomark-batch-") as name:
-            # The name of the zip stands for the folder, so that sentences and assignments speak of it.
+            # The folder has the name of the zip, for use in messages and as the assignment's name.
             folder = Path(name) / (path.stem or "batch")
             folder.mkdir()
             unzip(path, folder, _MOST_ENTRIES, min(_MOST_BYTES, _ALWAYS_BYTES + _MOST_TIMES * path.stat().st_size))
@@ -249,7 +255,7 @@ def _opened(path: Path) -> Iterator[Path]:
 
 
 def _stepped_into(folder: Path) -> Path:
-    """The only folder inside, where archives have one around the submissions; but not a lone student's."""
+    """Return the only subfolder, if an archive has one around all submissions. A single student's folder is kept."""
     inside = [entry for entry in folder.iterdir() if entry.name not in IGNORED]
     if len(inside) != 1 or not inside[0].is_dir():
         return folder

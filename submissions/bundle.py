@@ -1,7 +1,6 @@
-"""From what a student submitted (a .py file, a notebook, a folder, a .zip) to one ``Submission``.
+"""Conversion of submitted files (a .py file, a notebook, a folder, a .zip) to a ``Submission``.
 
-Reading files safely is ``raw_files.py``, what is kept of a submission ``packed.py``; what it is marked against is the
-assignment's business.
+``raw_files.py`` reads files safely, ``packed.py`` stores submissions, and the assignment defines how they are marked.
 """
 
 from __future__ import annotations
@@ -55,13 +54,15 @@ UNNAMED = "unnamed"
 
 
 def read_submission(path: Path, *, student: str | None = None, asked: Parts | None = None) -> Submission:
-    """What one student submitted at ``path``: a .py file, an .ipynb notebook, a folder or a .zip.
+    """Read the submission at ``path``: a .py file, an .ipynb notebook, a folder or a .zip.
 
-    ``student`` says whose it is, else the name of the file or folder; what its own submission.toml says is noted.
-    With ``asked`` a lone .py is the part that the assignment asks for, and what has no such part is refused;
-    without it what a lone .py is follows from its name or its text.
+    ``student`` identifies the student; the default is the name of the file or folder. A name in the submission's own
+    submission.toml is noted. With ``asked``, a single .py file becomes the part that the assignment asks for, and a
+    submission without such a part is rejected. Without ``asked``, the name or the text of a single .py file decides its
+    part.
 
-    Raises UsageError, one sentence, for whatever cannot be read as a submission.
+    Raises:
+        UsageError: The path cannot be read as a submission.
     """
     path = Path(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow a link
     where = shown(path.name)
@@ -88,16 +89,17 @@ def read_submission(path: Path, *, student: str | None = None, asked: Parts | No
 
 
 def submission_of(raw: RawFiles, where: str, student: str, candidate: str, asked: Parts | None = None) -> Submission:
-    """The submission that these files are, for the assignment ``candidate`` unless they say another.
+    """Return the submission in these files, for the assignment ``candidate`` unless the files name another.
 
-    Raises UsageError as ``read_submission`` does; ``where`` names them in its sentence.
+    Raises:
+        UsageError: As for ``read_submission``; ``where`` names the files in the message.
     """
     submission = _assemble(raw, where, student, candidate)
     return submission if asked is None else fit_parts(submission, asked, where=where)
 
 
 def named_by(path: Path) -> str:
-    """The student that a file or folder names, as it is written there; a robot.py by itself, that of its folder."""
+    """Return the student named by a file or folder. For a part such as robot.py, use the name of its folder."""
     path = Path(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow a link
     if path.suffix.lower() == ".py" and path.name.lower() in _NAMES:
         return path.parent.name
@@ -105,11 +107,13 @@ def named_by(path: Path) -> str:
 
 
 def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None) -> Submission:
-    """The submission as an assignment with these parts takes it.
+    """Adapt the submission to an assignment with these parts.
 
-    A lone file that is not called robot.py or responder.py becomes the one part that is asked for; a part
-    that the assignment gives itself, or has no use for, is left out with a note, and so is one of two that is
-    missing. Raises UsageError if no part is there that is asked for.
+    A single file with another name than robot.py or responder.py becomes the one part that is asked for. Parts that the
+    assignment provides or does not use are omitted with a note. If one of two parts is missing, a note says so.
+
+    Raises:
+        UsageError: None of the parts is present.
     """
     where = where or submission.student
     if submission.notebook is not None:
@@ -132,7 +136,7 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
     if asked.second_program == "student":
         needed.append(_needed(SECOND_PROGRAM, Sentence("the second robot's program")))
         files += [SECOND_PROGRAM] if SECOND_PROGRAM not in submission.files else []
-    # Two robots are not marked by halves.
+    # With two robots, both programs are needed.
     if files and (len(missing) == len(wanted) or asked.second_program != "none"):
         raise UsageError(
             "%(where)s: has no %(names)s, expected %(expected)s%(renamed)s.",
@@ -152,14 +156,14 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
 
 
 def empty_parts(submission: Submission) -> Iterator[str]:
-    """The files of its parts that have nothing in them but blanks."""
+    """Yield the names of parts that contain only whitespace."""
     for code in (submission.program, submission.responder):
         if code is not None and not code.text.strip():
             yield shown(code.name)
 
 
 def missing_part(submission: Submission, asked: Parts) -> Part | None:
-    """The one part of two that was not submitted; with neither there is nothing to grade."""
+    """Return the missing part if one of two was submitted; None if both or neither were."""
     if (asked.program, asked.responder) == ("student", "student"):
         if submission.program is None and submission.responder is not None:
             return "program"
@@ -169,7 +173,7 @@ def missing_part(submission: Submission, asked: Parts) -> Part | None:
 
 
 def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, where: str) -> Submission:
-    """The notebook if it is needed, else the files beside it."""
+    """Keep the notebook if it is needed, otherwise the files beside it."""
     parts: dict[Part, Code | None] = {"program": submission.program, "responder": submission.responder}
     givers: dict[Part, str] = {"program": asked.program, "responder": asked.responder}
     if all(parts[part] is not None for part, who in givers.items() if who == "student"):
@@ -196,9 +200,12 @@ def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, wher
 
 
 def _with_agents(submission: Submission, asked: Parts, where: str) -> Submission:
-    """The submission with each agent among its files, whatever it was taken for.
+    """Return the submission with each agent among its files, including agents first read as another part.
 
-    A notebook can bring an agent in a cell that begins with ``%%writefile``. Raises UsageError if one is missing.
+    A notebook can contain an agent in a cell that begins with ``%%writefile``.
+
+    Raises:
+        UsageError: An agent is missing.
     """
     if not asked.agents:
         return submission
@@ -242,7 +249,7 @@ def _with_agents(submission: Submission, asked: Parts, where: str) -> Submission
 
 
 def _written_by_cells(notebook: Notebook, agents: Mapping[str, str]) -> dict[str, bytes]:
-    """The agents of the student that cells of the notebook write to files of their own."""
+    """Return the student's agents that cells of the notebook write to files."""
     written = {}
     for cell in notebook.cells:
         match = _WRITEFILE.match(cell.source)
@@ -296,7 +303,7 @@ def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submissio
 
 
 def _find_notebook(files: dict[str, bytes], where: str, notes: list[str]) -> Notebook | None:
-    """The one notebook among the files, or the file that nbconvert made of one; it is taken out of them."""
+    """Remove the only notebook, or the only script made by nbconvert, from the files and return it."""
     names = sorted(name for name in files if name.lower().endswith(_NOTEBOOK))
     parts = {part for name in files if (part := _NAMES.get(name.lower()))}
     if len(parts) == len(PART_FILES):
@@ -323,7 +330,7 @@ def _find_notebook(files: dict[str, bytes], where: str, notes: list[str]) -> Not
         sentence = error.said if named else Sentence("%(where)s: %(why)s", {"where": where, "why": error.said})
         if not parts:
             raise UsageError(sentence) from None
-        # What the assignment asks for may be in the .py file beside it.
+        # The .py file beside it may contain the requested parts.
         notes.append(str(sentence))
         for name in names:
             del files[name]
@@ -340,7 +347,7 @@ def _is_script(data: bytes, name: str) -> bool:
 
 
 def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alone: bool) -> dict[Part, str]:
-    """Which file is which part: by name, else, if ``alone``, by what a lone file (or one of a pair) looks like."""
+    """Assign files to parts by name; with ``alone``, also by the content of a single file or a pair."""
     parts: dict[Part, str] = {}
     for name in sorted(files):
         part = _NAMES.get(name.lower())

@@ -1,6 +1,6 @@
-"""Reads the rows of a CSV by the names of its columns, in whatever order and with whatever separator they come.
+"""CSV reader by column names, for any order of columns and any common separator.
 
-What the columns mean is for whoever asks; every row that cannot be read is named by its line.
+Callers interpret the columns. Rows that cannot be read are reported with their lines.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from sim.readers.unreadable import Unreadable
 
 _MOST_BYTES = 10_000_000
 _SEPARATORS = (",", ";", "\t")
-#: Lines that the first row may span.
+#: Maximum number of lines of the header row.
 _LONGEST_HEADING = 20
 _QUOTES = 'has quotation marks that do not match (one inside a cell is written "").'
 
 
 @dataclass(frozen=True, slots=True)
 class CsvRow:
-    """One row by its columns. ``line`` counts from 1 and is where it begins; with a ``problem`` there are no cells."""
+    """One row by its columns. ``line`` is its first line, from 1; a row with a ``problem`` has no cells."""
 
     line: int
     cells: Mapping[str, str] = field(default_factory=dict)
@@ -31,17 +31,20 @@ class CsvRow:
 
 @dataclass(frozen=True, slots=True)
 class CsvTable:
-    """The rows, and which of the columns asked for there are."""
+    """The rows, and the requested columns that exist."""
 
     columns: frozenset[str]
     rows: tuple[CsvRow, ...]
 
 
 def read_csv(path: Path, columns: Mapping[str, Sequence[str]], usual: str) -> CsvTable:
-    """The rows of a CSV. ``columns`` are asked for by their headings, of which each may have several.
+    """Read a CSV file. ``columns`` gives the accepted headings of each requested column.
 
-    Other columns are passed over. Comma, semicolon or tab; quoted cells; UTF-8 with or without a byte order mark.
-    Raises UsageError when the file as a whole cannot be read; ``usual`` says what its first line has.
+    Other columns are ignored. The separator is a comma, semicolon or tab; cells can be quoted; the text is UTF-8 with
+    or without a byte order mark. ``usual`` describes the header in error messages.
+
+    Raises:
+        UsageError: The file as a whole cannot be read.
     """
     lines = _text(path).splitlines(keepends=True)
     if not lines:
@@ -75,13 +78,13 @@ def _text(path: Path) -> str:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise UsageError(f"{path.name}: line {line} is not UTF-8; save it as CSV UTF-8.") from None
-    # Only these end a line of a CSV; splitlines() knows more, and would miscount.
+    # Only these characters end a CSV line. splitlines() accepts more, which would give wrong line numbers.
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     return text.translate({ord(character): " " for character in "\v\f\x1c\x1d\x1e\x85\u2028\u2029"})
 
 
 def _separator(lines: Sequence[str], by_heading: Mapping[str, str]) -> str:
-    """The separator by which the first line has most of the columns."""
+    """Return the separator with which the first line contains most of the requested columns."""
 
     def found(separator: str) -> int:
         cells = next(records(lines[:_LONGEST_HEADING], separator)).cells
@@ -91,7 +94,7 @@ def _separator(lines: Sequence[str], by_heading: Mapping[str, str]) -> str:
 
 
 def _places(header: CsvRecord, by_heading: Mapping[str, str], name: str) -> Mapping[str, int]:
-    """Where the columns stand."""
+    """Return the positions of the columns."""
     if header.broken:
         raise UsageError(f"{name}: line 1 {_QUOTES}")
     places: dict[str, int] = {}

@@ -1,6 +1,6 @@
-"""A block or sequence diagram as a notebook's ``%%blockdiag`` or ``%%seqdiag`` cell describes it.
+"""Block and sequence diagrams, as described by a notebook's ``%%blockdiag`` and ``%%seqdiag`` cells.
 
-Plain data; reading the text is ``diagram_text.py``'s, drawing it the service's.
+The classes are plain data. ``diagram_text.py`` parses the text and ``service`` draws the diagram.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _CHARACTERS_OF_PART = 200
 
 @dataclass(frozen=True, slots=True)
 class DiagramActor:
-    """A box or a lane. Colours are what the text says, a CSS name or ``#rrggbb``; empty for the usual ones."""
+    """A box or a lifeline. Colours are CSS names or ``#rrggbb`` as in the text; empty for the default."""
 
     name: str
     label: str
@@ -28,14 +28,14 @@ class DiagramActor:
 
 @dataclass(frozen=True, slots=True)
 class DiagramArrow:
-    """From one actor to another, by their names; ``note`` stands beside it, on the side that it names."""
+    """An arrow between two actors, given by name. ``note`` is a text on the side named by ``note_side``."""
 
     source: str
     target: str
     label: str = ""
     line: Line = "solid"
     heads: Heads = "target"
-    open_head: bool = False  # ->>, a message that nobody waits for
+    open_head: bool = False  # ->>, a message without waiting
     failed: bool = False
     colour: str = ""
     note: str = ""
@@ -44,7 +44,7 @@ class DiagramArrow:
 
 @dataclass(frozen=True, slots=True)
 class Divider:
-    """A line across all lanes; a ``delay`` is where time passes."""
+    """A line across all lifelines; a ``delay`` marks elapsed time."""
 
     text: str
     delay: bool = False
@@ -52,7 +52,7 @@ class Divider:
 
 @dataclass(frozen=True, slots=True)
 class ActorGroup:
-    """Actors that stand in one frame."""
+    """Actors in a common frame."""
 
     label: str
     members: tuple[str, ...]
@@ -61,7 +61,7 @@ class ActorGroup:
 
 @dataclass(frozen=True, slots=True)
 class Diagram:
-    """Actors in the order in which they are named first, and steps in the order of the text."""
+    """Actors in order of first mention, and steps in the order of the text."""
 
     kind: DiagramKind
     actors: tuple[DiagramActor, ...]
@@ -71,7 +71,7 @@ class Diagram:
 
     @property
     def parts(self) -> int:
-        """What drawing it takes: an actor, step, group or piece of text of 200 characters is one part."""
+        """The effort to draw it: one part per actor, step, group and 200 characters of text."""
         texts = sum(len(actor.label) for actor in self.actors)
         for step in self.steps:
             texts += len(step.text) if isinstance(step, Divider) else len(step.label) + len(step.note)

@@ -1,6 +1,6 @@
-"""The diagrams that a notebook draws: its ``%%blockdiag`` and ``%%seqdiag`` cells, read.
+"""Reader of a notebook's diagram cells (``%%blockdiag`` and ``%%seqdiag``).
 
-Nothing is run for it, and nothing is drawn here.
+The cells are parsed, but not executed or drawn.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from submissions.source_text import magic_place
 from submissions.submission import Notebook
 
 MOST_DIAGRAMS = 20
-#: Of all diagrams of a notebook together: six times what the course's largest notebook has; a part takes about 15 ms.
+#: Limit for all diagrams of a notebook: six times the course's largest notebook. Drawing a part takes about 15 ms.
 MOST_PARTS = 240
 _MAGIC = re.compile(r"%%(?P<kind>blockdiag|seqdiag)\b")
 
 
 @dataclass(frozen=True, slots=True)
 class DiagramCell:
-    """A cell, by its number, and what it draws."""
+    """A cell number and its diagram."""
 
     cell: int
     diagram: Diagram
@@ -31,16 +31,16 @@ class DiagramCell:
 
 @dataclass(frozen=True, slots=True)
 class NotebookDiagrams:
-    """A notebook's diagrams from the top, and a sentence on each cell that could not be read as one."""
+    """The diagrams of a notebook from the top, and a sentence for each cell that could not be read."""
 
     cells: tuple[DiagramCell, ...] = ()
     problems: tuple[str, ...] = ()
 
 
 def diagrams_in(notebook: Notebook | None) -> NotebookDiagrams:
-    """What the cells of a notebook draw; of more than ``MOST_DIAGRAMS`` the first ones. None without a notebook.
+    """Read the first ``MOST_DIAGRAMS`` diagrams of a notebook; without a notebook there are none.
 
-    One that does not fit into ``MOST_PARTS`` with those before it is left out.
+    A diagram is omitted if it exceeds ``MOST_PARTS`` together with the earlier ones.
     """
     left = MOST_PARTS
     found: list[DiagramCell] = []

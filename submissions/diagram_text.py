@@ -1,7 +1,7 @@
-"""From the text of a ``%%blockdiag`` or ``%%seqdiag`` cell to its diagram: the part of the language that teaching uses.
+"""Parser of ``%%blockdiag`` and ``%%seqdiag`` cells, for the part of the language used in teaching.
 
-The text is a student's: it is refused with a sentence that names the line, and what it may hold is counted. What sets
-sizes and types of letters is read and has no effect, for a report has its own.
+The text comes from students. Its size is limited, and error messages name the line. Settings for sizes and fonts are
+accepted and ignored, because reports have their own.
 """
 
 from __future__ import annotations
@@ -38,15 +38,16 @@ Attributes = dict[str, str]
 
 
 def read_diagram(kind: DiagramKind, text: str, first_line: int = 1) -> Diagram:
-    """The diagram that ``text`` describes; its lines are counted from ``first_line``.
+    """Parse ``text`` as a diagram; line numbers start from ``first_line``.
 
-    Raises UsageError, one sentence that begins with the line, for what is not in the language or is too much.
+    Raises:
+        UsageError: The text is not in the language or exceeds a limit. The message begins with the line.
     """
     return _Reader(kind, tokens_of(text, first_line), first_line).diagram()
 
 
 class _Reader:
-    """Where the reading is, and what it has found so far."""
+    """Parser state: the position in the text, and the elements found so far."""
 
     def __init__(self, kind: DiagramKind, tokens: Sequence[DiagramToken], first_line: int) -> None:
         self._kind = kind
@@ -60,7 +61,7 @@ class _Reader:
         self._settings: Attributes = {}
 
     def diagram(self) -> Diagram:
-        """All of the text, with or without a frame such as ``seqdiag { }`` round it."""
+        """Parse the whole text, with or without a frame such as ``seqdiag { }``."""
         framed = self._enter_frame()
         self._statements(0)
         if framed:
@@ -86,7 +87,7 @@ class _Reader:
                 return True
         return False
 
-    # What is next.
+    # Tokens.
 
     def _next(self) -> DiagramToken | None:
         return self._tokens[self._place] if self._place < len(self._tokens) else None
@@ -121,7 +122,7 @@ class _Reader:
         return mistake(token.line, f"{token.text[:40]!r} stands here, expected {expected}")
 
     def _line(self) -> int:
-        """The line of what was read last."""
+        """Return the line of the last token."""
         return self._tokens[max(0, self._place - 1)].line if self._tokens else self._last_line
 
     # Statements.
@@ -151,7 +152,7 @@ class _Reader:
         return token is not None and token.text == "group" and self._begins_braces()
 
     def _begins_braces(self) -> bool:
-        """Whether a keyword is followed by braces, with a name before them or not."""
+        """Return whether the keyword is followed by braces, with an optional name between them."""
         return self._is("{", 1) or (self._is("{", 2) and self._tokens[self._place + 1].kind in ("name", "text"))
 
     def _check_depth(self, depth: int) -> None:
@@ -184,7 +185,7 @@ class _Reader:
         self._settings[name] = value
 
     def _group(self, depth: int) -> list[str]:
-        """A frame round actors, with or without a name; those in frames inside it are its own too."""
+        """Parse a frame round actors, with an optional name. Actors in nested frames belong to the outer frame too."""
         self._word("group")
         self._check_depth(depth)
         label = "" if self._is("{") else self._word("{")
@@ -208,7 +209,7 @@ class _Reader:
         return members
 
     def _actors_or_arrows(self, depth: int) -> list[str]:
-        """``a;`` or ``a, b [shape = box];`` or ``a -> b <- c [label = "x"];``; the actors that were named."""
+        """Parse ``a;`` or ``a, b [shape = box];`` or ``a -> b <- c [label = "x"];`` and return the actors named."""
         chain = [self._names()]
         signs: list[DiagramToken] = []
         while (token := self._next()) is not None and token.kind == "arrow":
@@ -267,7 +268,7 @@ class _Reader:
     # Parts of statements.
 
     def _names(self) -> list[str]:
-        """One actor or several, with commas between; they are there from now on."""
+        """Parse one or more actors separated by commas, and add them to the diagram."""
         names = [self._name()]
         while self._take(","):
             names.append(self._name())
@@ -285,7 +286,7 @@ class _Reader:
         return name
 
     def _attributes(self, known: frozenset[str] | None, whose: str) -> Attributes:
-        """``[label = "x", failed]``, any number of times; with the class that they name taken apart."""
+        """Parse ``[label = "x", failed]`` any number of times, and replace a class by its attributes."""
         found: Attributes = {}
         while self._take("["):
             while not self._take("]"):
@@ -344,5 +345,5 @@ def _with_numbers(steps: Iterable[DiagramArrow | Divider]) -> Iterable[DiagramAr
 
 
 def _colour(text: str) -> str:
-    """The colour as it is written, if it is written as one."""
+    """Return the text if it is a valid colour, otherwise an empty text."""
     return text if _COLOUR.fullmatch(text) else ""

@@ -1,6 +1,6 @@
-"""The words and signs of a diagram's text, each with its line.
+"""Tokens of a diagram's text, each with its line.
 
-What they mean together is ``diagram_text.py``'s.
+``diagram_text.py`` combines them to a diagram.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _NEVER_ENDS = {'"': "a text in quotes", "'": "a text in quotes", "/": "a comment
 
 @dataclass(frozen=True, slots=True)
 class DiagramToken:
-    """A piece of the text: an arrow, a sign, a name, a text without its quotes, or a divider without its signs."""
+    """A token: an arrow, a sign, a name, a text without its quotes, or a divider without its markers."""
 
     kind: str
     text: str
@@ -39,12 +39,16 @@ class DiagramToken:
 
 
 def mistake(line: int, what: str) -> UsageError:
-    """What is wrong in a line, as an error."""
+    """Return an error for a line."""
     return UsageError(f"line {line}: {what}")
 
 
 def tokens_of(text: str, first_line: int = 1) -> list[DiagramToken]:
-    """The tokens of ``text``, without blanks and comments. Raises UsageError, naming the line, for other signs."""
+    """Return the tokens of ``text`` without whitespace and comments.
+
+    Raises:
+        UsageError: The text contains an unknown sign. The message has the line.
+    """
     if len(text) > MAX_CHARACTERS:
         raise mistake(first_line, f"the text is too long, expected at most {MAX_CHARACTERS} characters")
     found: list[DiagramToken] = []

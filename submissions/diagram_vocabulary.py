@@ -1,6 +1,6 @@
-"""What may be written in a diagram's text: attributes of actors, arrows, groups and diagrams, shapes, arrows.
+"""Vocabulary of diagram texts: attributes of actors, arrows, groups and diagrams, shapes, and arrow types.
 
-Most attributes set sizes or letters and have no effect here; they are known so that a misspelt one is not.
+Most attributes set sizes or fonts and have no effect. They are listed so that misspelt names can be reported.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ SHAPES = _words(
 LINES: Mapping[str, Line] = MappingProxyType(
     {"solid": "solid", "dashed": "dashed", "dotted": "dotted", "none": "solid"}
 )
-#: The arrow that an arrow's ``dir`` means.
+#: The arrow for each value of an arrow's ``dir``.
 DIRECTIONS = MappingProxyType({"forward": "->", "back": "<-", "both": "<->", "none": "--"})
 ARROWS = MappingProxyType(
     {
@@ -52,6 +52,6 @@ FRAGMENTS = ("alt", "loop")
 
 
 def meant(word: str, known: frozenset[str], otherwise: str) -> str:
-    """The end of a sentence on a word that is not known: what was probably meant, or else what was expected."""
+    """Return the end of a message about an unknown word: the probable meaning, or the expected words."""
     near = difflib.get_close_matches(word[:40], sorted(known), 1)
     return f"; did you mean {near[0]}?" if near else f", expected one such as {otherwise}"

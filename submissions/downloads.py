@@ -1,6 +1,6 @@
-"""Finds whose files are whose in what Moodle, Gradescope and nbgrader let download, and in plain folders.
+"""Assignment of files to students in downloads from Moodle, Gradescope and nbgrader, and in plain folders.
 
-Opens none of the files but Gradescope's list of them; reading submissions is ``bundle.py``'s.
+Only Gradescope's list is opened here; ``bundle.py`` reads the submissions.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from submissions.raw_files import shown
 from submissions.student_identity import NAMELESS, NOBODY, Student, told_apart
 
 IGNORED = {"__MACOSX", "__pycache__", "Thumbs.db", "desktop.ini"}
-#: Moodle makes blanks of the underscores in a name, so that the first number between underscores is its own.
+#: Moodle replaces underscores in a name by spaces, so the first number between underscores is Moodle's own.
 _MOODLE = re.compile(r"(?P<name>.+?)_(?P<number>\d+)_assignsubmission_(?P<plugin>[a-z]+)(?:_(?P<file>.*))?", re.DOTALL)
-#: What can only be a group; any other hyphen may be the student's own.
+#: Prefixes that must be a group. Other hyphens may belong to the student's name.
 _GROUP = re.compile(r"^(?:[^-]*\bgroup\b[^-]*|[^-]*\d)-(?=\D)", re.IGNORECASE)
 _SUFFIX = "assignsubmission_file_"
 _GRADESCOPE_LIST = "submission_metadata.yml"
@@ -26,26 +26,27 @@ _NBGRADER, _NBGRADER_TIME = "submitted", "timestamp.txt"
 
 @dataclass(frozen=True, slots=True)
 class DownloadedFiles:
-    """What lies there of one student, and who that is as it is written there; with a ``problem`` it cannot be used.
+    """One student's files and the student as named there. With a ``problem``, they cannot be used.
 
-    ``files`` is a file or folder, or files by the names that the student gave them.
+    ``files`` is a file or folder, or a mapping from the student's file names to files.
     """
 
     source: str
     student: Student
     files: Path | Mapping[str, Path]
-    number: str = ""  # Moodle's, of this person in this assignment
-    assignment: str = ""  # where the platform has several
+    number: str = ""  # Moodle's number of the student in this assignment
+    assignment: str = ""  # if the platform exports several
     submitted_at: datetime | None = None
     problem: str = ""
 
 
 def student_files(folder: Path) -> list[DownloadedFiles]:
-    """What lies in a folder, a row for each student.
+    """Return the content of a folder, one row per student.
 
-    Raises UsageError where the platform's own list of it cannot be read.
+    Raises:
+        UsageError: The platform's list of submissions cannot be read.
     """
-    # Who only wants the number in a name reads no submission.
+    # Imported here, because callers of ``moodle_number`` do not read submissions.
     from submissions.bundle import named_by
 
     entries = _visible(folder)
@@ -61,12 +62,12 @@ def student_files(folder: Path) -> list[DownloadedFiles]:
 
 
 def is_one_students(folder: Path) -> bool:
-    """Whether the folder is called as Moodle calls that of one student."""
+    """Return whether the folder name is one that Moodle gives to a single student's folder."""
     return _MOODLE.fullmatch(folder.name) is not None
 
 
 def moodle_number(source: str) -> str:
-    """The number that Moodle knows a submission by that came under this name; empty if it came from elsewhere."""
+    """Return Moodle's number in the name of a submission; empty for other sources."""
     found = _MOODLE.fullmatch(source)
     return found["number"] if found else ""
 
@@ -76,7 +77,7 @@ def _visible(folder: Path) -> list[Path]:
 
 
 def _moodle(found: Mapping[Path, re.Match[str]]) -> Iterator[DownloadedFiles]:
-    """A row for each number: its folder, or the files that begin with it."""
+    """Yield a row for each number, with its folder or with the files that begin with it."""
     by_number: dict[str, list[Path]] = {}
     for path, match in found.items():
         by_number.setdefault(match["number"], []).append(path)
@@ -90,15 +91,15 @@ def _moodle(found: Mapping[Path, re.Match[str]]) -> Iterator[DownloadedFiles]:
         files = {(found[path]["file"] or path.name): path for path in paths if found[path]["plugin"] == "file"}
         folders = [path for path in files.values() if path.is_dir()]
         problem = "" if files else "was typed into Moodle's text box, expected files."
-        # Its own name, so that sentences speak of that; shortened, it would lose the number.
+        # Messages use the folder's own name. A shortened name would lose the number.
         own_name = folders[0].name if len(folders) == 1 else ""
         source = own_name if own_name == shown(own_name) != "" else f"{shown(names[number])}_{number}_{_SUFFIX}"
         yield DownloadedFiles(source, student, folders[0] if len(folders) == 1 else files, number, problem=problem)
 
 
 def _gradescope(folder: Path, entries: Sequence[Path]) -> Iterator[DownloadedFiles]:
-    """A row for each of those who submitted something together."""
-    # Only for who has such a list.
+    """Yield a row for each student of a joint submission."""
+    # Imported here, because only Gradescope exports need it.
     from submissions.gradescope_list import read_list
 
     listed = read_list(folder / _GRADESCOPE_LIST)
@@ -128,7 +129,7 @@ def _text(table: object, key: str) -> str:
 
 
 def _moment(written: object) -> datetime | None:
-    """When, as Ruby writes it, in a table of its own if it knows its zone; None where it cannot be read."""
+    """Parse a Ruby timestamp, which is inside a table if it has a zone; None if it cannot be read."""
     text = _text(written, "utc") if isinstance(written, dict) else written
     found = re.match(r"(\d{4}-\d\d-\d\d)[ T](\d\d:\d\d:\d\d)(\.\d+)?\s*(Z|UTC|[+-]\d\d:?\d\d)?", str(text))
     if found is None:
@@ -141,7 +142,7 @@ def _moment(written: object) -> datetime | None:
 
 
 def _is_nbgrader(folder: Path, entries: Sequence[Path]) -> bool:
-    """Whether there are folders of students, and in each of those nothing but folders of assignments."""
+    """Return whether the folder has student folders that contain only assignment folders."""
     inside = [entry for student in entries if _is_folder(student) for entry in _visible(student)]
     folders_alone = all(_is_folder(entry) for entry in (*entries, *inside))
     timed = any((entry / _NBGRADER_TIME).is_file() for entry in inside)

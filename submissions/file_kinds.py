@@ -1,6 +1,6 @@
-"""Files that are no part of a submission: other kinds than a program, other names than a part's, compiled code.
+"""Detection of files that cannot be part of a submission: other file types, other names, compiled code.
 
-Each has a sentence on what to submit instead.
+For each of them, the module says which file to submit instead.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ _KINDS: Mapping[str, tuple[Sentence, Sentence]] = MappingProxyType(
 _COMPILED = (".pyc", ".pyo", ".pyd", ".so", ".egg", ".whl")
 _MODULES = (".py", *_COMPILED)
 _ELF = b"\x7fELF"
-#: The entries of an archive that are read; zipfile makes an object of each.
+#: Maximum number of archive entries read, because zipfile creates an object for each.
 _MOST_ENTRIES = 2000
 
 
 def advice_on_kind(names: Iterable[str]) -> Sentence | None:
-    """What to submit in place of the first file whose kind is known to be no program; None where none is."""
+    """Return advice for the first file of a type that is not a program; None if there is none."""
     for name in names:
         known = _KINDS.get(PurePosixPath(name.lower()).suffix)
         if known is not None:
@@ -65,7 +65,7 @@ def advice_on_kind(names: Iterable[str]) -> Sentence | None:
 
 
 def meant_as(part: Part, names: Iterable[str]) -> str:
-    """The file that is called nearly as the part has to be; empty if none is."""
+    """Return the file whose name is most similar to the part's name; empty if none is similar."""
     word = PART_FILES[part].removesuffix(".py")
     texts = ((name, name.lower().removesuffix(".txt")) for name in sorted(names) if name != SECOND_PROGRAM)
     stems = {name: text.removesuffix(".py") for name, text in texts if text.endswith(".py") or text == word}
@@ -74,7 +74,7 @@ def meant_as(part: Part, names: Iterable[str]) -> str:
 
 
 def advice_on_names(missing: Iterable[Part], files: Iterable[str]) -> str | Sentence:
-    """Return which of the files to rename to the missing parts; empty if none has a similar name."""
+    """Return advice to rename similar files to the missing parts; empty if no name is similar."""
     found = {part: meant_as(part, files) for part in missing}
     renamed = [
         Sentence("%(name)s to %(part)s", {"name": shown(name), "part": PART_FILES[part]})
@@ -85,15 +85,15 @@ def advice_on_names(missing: Iterable[Part], files: Iterable[str]) -> str | Sent
 
 
 def is_compiled(name: str, data: bytes) -> bool:
-    """Return whether a file is code that nobody can read: a compiled module, a library, an archive of modules.
+    """Return whether a file is compiled code: a compiled module, a library, or an archive of modules.
 
-    Python would import it from the folder like any module. Model files, archives of arrays among them, are none.
+    Python would import it like any module, but it cannot be reviewed. Model files and archives of arrays are allowed.
     """
     return name.lower().endswith(_COMPILED) or data.startswith(_ELF) or _has_modules(data)
 
 
 def _has_modules(data: bytes) -> bool:
-    """Whether it is an archive, however it begins, from which Python could import; one that is too large may be."""
+    """Return whether Python could import from this archive. Archives that are too large count as such."""
     if not is_zip(BytesIO(data)):
         return False
     try:

@@ -1,6 +1,6 @@
-"""Reads the list that Gradescope puts beside the submissions of an export: YAML as Ruby writes it, as plain data.
+"""Reader of the list of submissions in a Gradescope export, which is YAML written by Ruby.
 
-Who is meant by what it says is ``downloads.py``'s.
+``downloads.py`` finds the students.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from sim.readers.yaml_text import MOST_BYTES, read_yaml
 
 
 def read_list(path: Path) -> dict[str, Any]:
-    """The submissions by their folders. Every value is text, whatever Ruby calls it, and nothing is merged or made.
+    """Return the submissions by folder. All values are texts; YAML tags and merge keys have no effect.
 
-    Raises UsageError for what cannot be read as such a list.
+    Raises:
+        UsageError: The file is not such a list.
     """
     try:
         with path.open("rb") as stream:

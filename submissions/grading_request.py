@@ -1,4 +1,4 @@
-"""One submission and what it is to be marked against, as it was found; nothing of it is stored or graded yet."""
+"""Request to grade a submission against an assignment. Nothing has been stored or graded yet."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class GradingRequest:
-    """One submission and what it is marked against; ``source`` is the name it came under."""
+    """A submission and its assignment; ``source`` is the name under which it was submitted."""
 
     submission: Submission
     assignment: Assignment
     source: str
-    submitted_at: datetime | None = None  # by the student, where anybody said
-    whose: Student = NOBODY  # as it is written there, where anybody said
+    submitted_at: datetime | None = None  # time of submission by the student, if known
+    whose: Student = NOBODY  # as written in the source, if known
 
     @property
     def student(self) -> Student:
-        """Whose it is, by an id as it was written."""
+        """The student's id as written."""
         return self.whose if self.whose.id else replace(self.whose, id=self.submission.student)

@@ -1,7 +1,7 @@
-"""The flags of the notebook's magics, and the set-up that they give a simulator.
+"""Flags of the notebook magics, and the simulator settings that result from them.
 
-The order, the clamps and the side effects are the original's (robolab sections 1.2 and 8); a flag that does
-not mean what it seems to say is pointed out in ``notes``.
+Order, limits and side effects follow the original (robolab sections 1.2 and 8). ``notes`` explains flags whose effect
+may be unexpected.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _X_MOST, _Y_MOST, _ANGLE_MOST = 2362, 1143, 360
 _LIGHT_NOISE_MOST, _MOTOR_NOISE_MOST = 128, 500
 _PEN_COLOURS = ("red", "orange", "green")
 
-#: Where a robot is put by a fresh widget, and by choosing a robot.
+#: Pose of the robot in a new simulator, and after a robot is chosen.
 _FRESH = Pose(200, 800, 0)
 _AFTER_ROBOT = Pose(200, 943, 0)
 
@@ -60,7 +60,7 @@ _SWITCHES = {
     "m": "move",
     "F": "refresh",
 }
-#: What only ``%sim_magic`` has, and what it lacks.
+#: Flags that only ``%sim_magic`` has, and the flag it lacks.
 _PLAIN_ONLY = frozenset({"S", "m", "F"})
 _PREVIEW_CODE = "previewcode"
 _LONG = {long: short for short, long in (_VALUED | _SWITCHES).items()}
@@ -68,25 +68,25 @@ _LONG = {long: short for short, long in (_VALUED | _SWITCHES).items()}
 
 @dataclass(frozen=True, slots=True)
 class Flags:
-    """What a magic line says: the value of each valued flag, and the switches that are on."""
+    """Flags of a magic line: values by flag, and the switches that are on."""
 
     preamble: Preamble = "preloaded"
     values: dict[str, str] = field(default_factory=dict)
     switches: frozenset[str] = frozenset()
 
     def with_values(self, **values: str | None) -> Flags:
-        """These flags with some values replaced; None leaves one as it is."""
+        """Return these flags with some values replaced; None leaves a value unchanged."""
         given = {key: value for key, value in values.items() if value is not None}
         return replace(self, values=self.values | given)
 
     def without(self, flag: str) -> Flags:
-        """These flags but for one value."""
+        """Return these flags without one value."""
         return replace(self, values={key: value for key, value in self.values.items() if key != flag})
 
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """What the flags make of a fresh simulator."""
+    """Simulator settings after applying the flags of a magic line."""
 
     background: str
     robot: str
@@ -100,9 +100,10 @@ class Setup:
 
 
 def split_program(text: str) -> tuple[Flags, str]:
-    """The flags of a program's magic line and ``without_magic``; the preloaded preamble if it has none.
+    """Return the flags of a program's magic line and ``without_magic``; the preloaded preamble if it has none.
 
-    Raises UsageError for a magic or a flag that does not exist.
+    Raises:
+        UsageError: A magic or a flag does not exist.
     """
     place = magic_place(text)
     if place is None:
@@ -111,7 +112,7 @@ def split_program(text: str) -> tuple[Flags, str]:
 
 
 def without_magic(text: str) -> str:
-    """The program with its magic line as an empty comment, so that every other line keeps its number."""
+    """Return the program with its magic line as an empty comment, so that line numbers stay the same."""
     place = magic_place(text)
     return text if place is None else _without(place, text)
 
@@ -123,7 +124,11 @@ def _without(place: int, text: str) -> str:
 
 
 def parse_magic(line: str, number: int = 1) -> Flags:
-    """The flags of a ``%%sim_magic...`` line. Raises UsageError, naming line ``number``, for what does not exist."""
+    """Return the flags of a ``%%sim_magic...`` line.
+
+    Raises:
+        UsageError: A magic or a flag does not exist. The message has the line ``number``.
+    """
     name, *rest = line.lstrip("%").split(maxsplit=1) or [""]
     if name.startswith("%") and (meant := name.lstrip("%")[:40]):
         raise UsageError(f"line {number}: there is a blank between the percent signs; expected %%{meant}")
@@ -134,7 +139,11 @@ def parse_magic(line: str, number: int = 1) -> Flags:
 
 
 def parse_flags(name: str, arguments: str) -> Flags:
-    """The flags of the magic ``name``. Raises UsageError for a magic or a flag that does not exist."""
+    """Return the flags of the magic ``name``.
+
+    Raises:
+        UsageError: The magic or a flag does not exist.
+    """
     if name not in PREAMBLES:
         expected = ", ".join(f"%%{known}" for known in PREAMBLES)
         near = did_you_mean(f"%%{name[:40]}", (f"%%{known}" for known in PREAMBLES))
@@ -176,7 +185,7 @@ def _flags(words: list[str], preamble: Preamble) -> Flags:
 
 
 def _short_of(long: str) -> str:
-    """The letter of a long flag; the course's magics take any beginning of its name that no other has."""
+    """Return the letter of a long flag. Like the course's magics, accept any unambiguous prefix."""
     found = [long] if long in _LONG else [name for name in _LONG if long and name.startswith(long)]
     if len(found) == 1:
         return _LONG[found[0]]
@@ -187,7 +196,7 @@ def _short_of(long: str) -> str:
 
 
 def _short_flags(letters: str, waiting: list[str], values: dict[str, str], switches: set[str]) -> None:
-    """Single letters may stand together (-HWZ); one that takes a value takes the rest of the word, or the next word."""
+    """Parse combined short flags (-HWZ). A flag with a value takes the rest of the word, or the next word."""
     for place, letter in enumerate(letters):
         if letter in _SWITCHES:
             switches.add(letter)
@@ -208,14 +217,18 @@ def _next(waiting: list[str], flag: str) -> str:
 
 
 def setup(flags: Flags) -> Setup:
-    """What a fresh simulator looks like after these flags. Raises UsageError for a number that is none."""
+    """Return the settings of a new simulator with these flags.
+
+    Raises:
+        UsageError: A value is not a number.
+    """
     return Simulator().apply(flags)
 
 
 class Simulator:
-    """The original's page: sliders that clamp, and moves that read all three of them.
+    """Model of the original's page: sliders with limits, and moves that read all three sliders.
 
-    What a flag sets stays until another sets it; switches hold for one magic. It runs nothing.
+    Settings persist until another flag changes them; switches apply to one magic. No program runs here.
     """
 
     def __init__(self) -> None:
@@ -229,7 +242,11 @@ class Simulator:
         self._notes: list[str] = []
 
     def apply(self, flags: Flags) -> Setup:
-        """What the page shows after these flags. Raises UsageError for a number that is none."""
+        """Apply the flags and return the resulting settings.
+
+        Raises:
+            UsageError: A value is not a number.
+        """
         self._notes = []
         values = flags.values
         wanted = {flag: self._slider(flag, values, most) for flag, most in _SLIDERS.items()}
@@ -258,7 +275,7 @@ class Simulator:
         )
 
     def leave_at(self, pose: Pose) -> None:
-        """A run has ended: the robot stays where it is."""
+        """Set the robot's pose after a run."""
         self.pose = pose
 
     def _choose_robot(self, name: str) -> None:
@@ -280,7 +297,7 @@ class Simulator:
         self.pose, self.obstacles = start_of(name)
         if 0 <= self.pose.heading <= _ANGLE_MOST:
             self._angle_slider = round(self.pose.heading)
-        # The original would keep what this does to the robot for the rest of the session; nothing leaks here.
+        # The original keeps this change of the robot for the rest of the session; here it ends with the background.
         self.robot = self._chosen
         if usual_robot(name) == WIDENED["Default_Robot"]:
             self._note("-b Radial_grey also sets the light sensors 60 mm to either side, as in the simulator")
@@ -312,7 +329,7 @@ class Simulator:
             self._noise["M"] = motor if self._noise_is_heard else 0.0
 
     def _slider(self, flag: str, values: dict[str, str], most: int) -> int | None:
-        """A whole number, moved into the slider's range."""
+        """Return a whole number, clamped to the slider's range."""
         if flag not in values:
             return None
         try:
@@ -325,7 +342,10 @@ class Simulator:
         return value
 
     def _move(self, x: int | None, y: int | None, angle: int | None) -> None:
-        """Every move reads all three sliders; those of x and y follow the robot, that of the angle does not."""
+        """Move the robot to the values of all three sliders.
+
+        The x and y sliders follow the robot; the angle slider does not.
+        """
         if angle is not None:
             self._angle_slider = angle
         x = _on_slider(self.pose.x, _X_MOST) if x is None else x
@@ -343,5 +363,5 @@ _SLIDERS = {"x": _X_MOST, "y": _Y_MOST, "a": _ANGLE_MOST, "N": _LIGHT_NOISE_MOST
 
 
 def _on_slider(value: float, most: int) -> int:
-    """Where a slider that follows the robot stands; JavaScript rounds halves up."""
+    """Return the slider value for a coordinate. JavaScript rounds halves up."""
     return min(max(math.floor(value + 0.5), 0), most)

@@ -1,7 +1,7 @@
-"""Where a notebook starts robot programs, and which of these runs is marked.
+"""Detection of robot program runs in a notebook, and selection of the run that is marked.
 
-Decided by reading, before anything is run. ``[parts] cell`` of the assignment names the run; where it leaves the choice
-open, it is the run that the submission asks for, else the last that fits.
+The notebook is analysed without running it. ``[parts] cell`` of the assignment names the run. Otherwise the submission
+names it, and without a name the last run that fits is marked.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ _EXPANDED = re.compile(r"[{$]")
 _CALL = re.compile(r"""\.run_cell_magic\([ \t]*['"]sim_magic""")
 
 _SENDS = ("PY::", "IMG_DATA")
-#: A test of a sensor: how many statements it has, and characters, at most.
+#: Maximum number of statements and characters of a sensor test.
 _TEST_STATEMENTS, _TEST_LENGTH = 2, 300
 _MOST_SHOWN = 5
 
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """A line of a cell (both counted from 1) from which a robot program is loaded or started."""
+    """A line of a cell (both counted from 1) that loads or starts a robot program."""
 
     cell: int
     line: int
@@ -49,10 +49,10 @@ class Site:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A run of the notebook, counted from 1.
+    """A run of the notebook, numbered from 1.
 
-    ``program`` is the cell with its robot program: its own, or the last one loaded before it. ``floor`` is named by the
-    last ``-b`` at or above the site; None where none is, or where it follows from running.
+    ``program`` is the cell with its robot program: the run's own cell, or the last one loaded before. ``floor`` is the
+    last ``-b`` at or above the site; None if there is none or if it is only known at run time.
     """
 
     number: int
@@ -64,10 +64,10 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class RunChoice:
-    """The run that is marked, as far as can be read.
+    """The run that is marked, as far as static analysis can tell.
 
-    ``others`` take its place, in this order, where no cell comes to it, unless this is the ``only`` one that was asked
-    for; ``notes`` tell of the choice if there was one.
+    If no cell reaches it, ``others`` replace it in this order, unless ``only`` says that this exact run was requested.
+    ``notes`` explain the choice if there was one.
     """
 
     run: Run
@@ -77,15 +77,15 @@ class RunChoice:
 
     @property
     def site(self) -> Site:
-        """Where the run starts."""
+        """The start of the run."""
         return self.run.site
 
 
 @functools.lru_cache(maxsize=4)
 def runs_of(notebook: Notebook) -> tuple[Run, ...]:
-    """Every run, from the top: cells that begin with ``%%sim_magic...``, and lines that start their program again.
+    """Return all runs from the top: cells that begin with ``%%sim_magic...``, and lines that restart their program.
 
-    Kept for the notebooks that were read last: intake checks the run that grading marks.
+    The results for the last notebooks are cached, because intake and grading use the same ones.
     """
     found: list[Run] = []
     program: Cell | None = None
@@ -105,9 +105,10 @@ def runs_of(notebook: Notebook) -> tuple[Run, ...]:
 
 
 def choose_run(notebook: Notebook, assignment: Assignment, asked: str | None) -> RunChoice:
-    """The run that the assignment names; where it names none, the one ``asked`` for, else the last that fits.
+    """Return the run that the assignment names, otherwise the run ``asked`` for, otherwise the last one that fits.
 
-    Raises UsageError where there is no such run.
+    Raises:
+        UsageError: The run does not exist.
     """
     marked = named_run(notebook, assignment.parts.cell, asked)
     if assignment.parts.cell != LAST:
@@ -123,11 +124,12 @@ def choose_run(notebook: Notebook, assignment: Assignment, asked: str | None) ->
 
 
 def named_run(notebook: Notebook, which: str, asked: str | None = None) -> Run:
-    """The run that ``which`` means: ``last``, ``tag:NAME``, or the number of a robot program, from 1.
+    """Return the run for ``which``: ``last``, ``tag:NAME``, or the number of a robot program, from 1.
 
     ``last`` leaves the choice to the submission: ``asked`` is the number of a run, or a tag.
 
-    Raises UsageError with what the notebook has instead where there is no such run.
+    Raises:
+        UsageError: The run does not exist. The message lists the existing runs.
     """
     runs = runs_of(notebook)
     if not runs:
@@ -204,7 +206,7 @@ def _other_run(run: Run, misfits: Sequence[str]) -> str:
 
 
 def _misfits(run: Run, assignment: Assignment) -> Iterator[str]:
-    """Why a run does not fit the assignment."""
+    """Yield the reasons why a run does not fit the assignment."""
     world, answered = assignment.world, assignment.parts.responder != "none"
     text = run.program.source if run.program is not None else ""
     if world.image is None and run.floor is not None and run.floor != world.background:
@@ -218,7 +220,7 @@ def _misfits(run: Run, assignment: Assignment) -> Iterator[str]:
 
 @functools.lru_cache(maxsize=64)
 def _is_test(text: str) -> bool:
-    """Whether a program is one or two statements that call nothing but ``print``."""
+    """Return whether a program consists of one or two statements that call only ``print``."""
     code = text.strip("# \n")
     if len(code) > _TEST_LENGTH:
         return False
@@ -232,7 +234,7 @@ def _is_test(text: str) -> bool:
 
 
 def _program_line(cell: Cell) -> int | None:
-    """The line, from 1, of the magic that makes the cell a robot program."""
+    """Return the line, from 1, of the magic that makes the cell a robot program."""
     place = magic_place(cell.source)
     if place is None or not is_program_magic(cell.source.split("\n")[place]):
         return None
@@ -244,7 +246,7 @@ def _starts_again(line: str, flags: re.Match[str] | None) -> bool:
 
 
 def _floor(line: str, again: re.Match[str] | None, begins: bool) -> str | None:
-    """The background that a magic's line names."""
+    """Return the background named in a magic's line."""
     try:
         if begins:
             flags = parse_magic(line.lstrip("\ufeff").strip())

@@ -1,6 +1,6 @@
-"""Students' names: how one is shown, and which cannot be told from one another.
+"""Student names: their displayed form, and detection of names that look the same.
 
-Knows neither files nor courses; what happens to names that are alike is for whoever takes submissions in.
+Callers decide how to treat similar names.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from importlib import resources
 from submissions.raw_files import shown
 
 LONGEST_NAME = 100
-#: They count as control characters, but emoji and some scripts are written with them.
+#: Joiners are control characters, but emoji and some scripts need them.
 _JOINERS = "\u200c\u200d"
-#: Letters and symbols that are as wide as others and as empty as a space.
+#: Letters and symbols that look like spaces.
 _BLANKS = "\u115f\u1160\u2800\u3164\uffa0"
-#: Marks that Unicode leaves to a program to ignore; most of what is never seen counts as a control character.
+#: Invisible marks that Unicode lets programs ignore. Most other invisible characters are control characters.
 _NEVER_SEEN = frozenset(
     "\u034f\u17b4\u17b5" + "".join(map(chr, (*range(0x180B, 0x1810), *range(0xFE00, 0xFE10), *range(0xE0000, 0xE1000))))
 )
 
 
 def shown_name(text: str) -> str:
-    """The one normal form of a name, on one line and without control characters; empty where nothing can be seen.
+    """Return the normalised name on one line without control characters; empty if it has no visible character.
 
-    It is never a path, so a slash may stay.
+    The name is never used as a path, so it may contain slashes.
     """
     kept = "".join(" " if c.isspace() else c for c in text if c.isspace() or c in _JOINERS or not _is_control(c))
     name = " ".join(unicodedata.normalize("NFC", kept).split()).strip(" " + _JOINERS)
@@ -36,11 +36,11 @@ def shown_name(text: str) -> str:
 
 @lru_cache(maxsize=4096)
 def forms(name: str) -> frozenset[str]:
-    """What names that are alike have at least one of in common: two forms of a name, or one where they are the same.
+    """Return the comparison forms of a name. Names with a common form look the same.
 
-    In both, case, odd blanks and invisible characters are gone; the second has, for each letter that looks like a
-    Latin one or a digit, that one. Latin letters and digits stand for themselves: Kai and Kal are two students, as are
-    a1 and al.
+    Both forms ignore case, unusual spaces and invisible characters. The second also replaces letters that look like
+    Latin letters or digits. Latin letters and digits themselves do not change: Kai and Kal are different students, as
+    are a1 and al.
     """
     if name.isascii() and name.isprintable():
         return frozenset([_folded(name)])
@@ -50,7 +50,7 @@ def forms(name: str) -> frozenset[str]:
 
 
 def alike(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
-    """Of different names those that cannot be told from others, each with some of those."""
+    """Return the names that look like another name, each with some of the others."""
     by_form: dict[str, list[str]] = {}
     different = list(dict.fromkeys(names))
     for name in different:
@@ -65,7 +65,7 @@ def alike(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
 
 
 def cannot_be_told(others: Sequence[str]) -> str:
-    """``cannot be told from x``, and why."""
+    """Return ``cannot be told from x`` with the reason."""
     listed = " and ".join(f'"{shown(other)}"' for other in others)
     return f"cannot be told from {listed} (case, blanks, and letters that cannot be seen or look alike do not count)"
 
@@ -81,6 +81,6 @@ def _is_control(character: str) -> bool:
 
 @cache
 def _look_alikes() -> dict[int, str]:
-    """From Unicode's table of confusable characters (UTS 39): the letters that look like Latin ones or digits."""
+    """Return the letters that look like Latin letters or digits, from Unicode's table of confusables (UTS 39)."""
     table = json.loads(resources.files(__package__).joinpath("look_alikes.json").read_text("utf-8"))
     return {ord(letter): latin for latin, letters in table.items() for letter in letters}

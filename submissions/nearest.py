@@ -1,4 +1,4 @@
-"""What a misspelt name was perhaps meant to be, and lists of names, in words. Knows no kind of name by itself."""
+"""Suggestions for misspelt names, and lists of names in words."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ _LONGEST = 100
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """``; did you mean "x"?`` if there is a name like it."""
-    # Comparing takes the product of the lengths.
+    """Return ``; did you mean "x"?`` for a similar name, otherwise an empty text."""
+    # The time is proportional to the product of the lengths.
     if len(name) > _LONGEST:
         return ""
     by_lower = {k.lower(): k for k in known}
@@ -19,6 +19,6 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def listed(names: Iterable[str]) -> str:
-    """``"a", "b" or "c"``."""
+    """Return the names as ``"a", "b" or "c"``."""
     quoted = [f'"{name}"' for name in names]
     return quoted[0] if len(quoted) == 1 else f"{', '.join(quoted[:-1])} or {quoted[-1]}"

@@ -1,6 +1,6 @@
-"""Jupyter notebooks as submissions: the code cells of an .ipynb, or of the .py file that nbconvert makes of one.
+"""Reader of Jupyter notebooks: the code cells of an .ipynb, or of a .py file made by nbconvert.
 
-Only read here, never run; which run is marked is decided in ``marked_run.py``.
+Notebooks are not executed here. ``marked_run.py`` selects the run that is marked.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from submissions.source_text import MAX_SOURCE_BYTES, is_program_magic
 from submissions.submission import Cell, Notebook
 
 MAX_CELLS = 5000
-#: What a notebook may hold in lists and tables; each becomes an object in memory.
+#: Maximum number of entries in lists and tables of a notebook, because each becomes an object in memory.
 _MAX_VALUES = 3_000_000
 _MAX_NOTES = 10
 _MAX_LOOKED_AT = 20  # lines of a Markdown cell
 
 _SCRIPT = re.compile(r"^[ \t]*get_ipython\(\)\.run_(?:cell|line)_magic\([ \t]*['\"]sim_magic", re.MULTILINE)
-#: A line that was to begin a robot program.
+#: A line that looks like the start of a robot program.
 NEARLY_MAGIC = re.compile(r"[ \t\ufeff]*%*[ \t]?sim_?ma\w*(?:[ \t]+-|[ \t]*\r?$)")
-#: Its percent signs and its name, also where blanks are between them.
+#: Its percent signs and name, also with a space between them.
 _BEGIN = re.compile(r"%*[ \t]?sim_?ma\w*")
 _RESPONDER = re.compile(r"^def (?:\w+_)?responder\([^\n]{0,100}", re.MULTILINE)
 _MOST_RAW = 3
@@ -41,16 +41,17 @@ _CELL_MAGIC_CALL = re.compile(r"^get_ipython\(\)\.run_cell_magic\(")
 
 @dataclass(frozen=True, slots=True)
 class ReadNotebook:
-    """The notebook, and sentences on what of it was left out or mended."""
+    """A notebook, and notes on omitted or corrected content."""
 
     notebook: Notebook
     notes: tuple[str, ...] = ()
 
 
 def read_notebook(data: bytes, name: str) -> ReadNotebook:
-    """The code cells of an .ipynb file, of any version of the format that has cells.
+    """Read the code cells of an .ipynb file, in any version of the format that has cells.
 
-    Raises UsageError, one sentence, for bytes that are no notebook, or one without code, too large or not Python.
+    Raises:
+        UsageError: The file is not a notebook, has no code, is too large, or is not for Python.
     """
     text, note = _decoded(data, name)
     notes = [note] if note else []
@@ -77,7 +78,7 @@ def read_notebook(data: bytes, name: str) -> ReadNotebook:
 
 
 def _as_code_cell(place: int) -> Sentence:
-    """That the robot program in a Markdown cell is no code, and what to do about it."""
+    """Return a sentence that asks for a code cell, for a robot program in a Markdown cell."""
     return Sentence(
         "cell %(place)s from the top has a robot program, but is a Markdown cell. Change it to a code cell",
         {"place": place},
@@ -85,7 +86,7 @@ def _as_code_cell(place: int) -> Sentence:
 
 
 def near_program(notebook: Notebook) -> str | Sentence:
-    """A line that is nearly a program's magic, or is one in the wrong place, such as a Markdown cell."""
+    """Describe a line that is almost a program's magic, or is one in the wrong place such as a Markdown cell."""
     for place in notebook.markdown_programs:
         return Sentence("; %(near)s", {"near": _as_code_cell(place)})
     for cell in notebook.cells:
@@ -98,7 +99,7 @@ def near_program(notebook: Notebook) -> str | Sentence:
 
 
 def _why_not(line: str) -> Sentence:
-    """Why a line that is nearly a program's magic begins no program."""
+    """Return the reason why such a line does not start a program."""
     if is_program_magic(line):
         return Sentence("below other code: make it the first line")
     if is_program_magic(f"%{line.lstrip()}"):
@@ -109,12 +110,16 @@ def _why_not(line: str) -> Sentence:
 
 
 def is_script(text: str) -> bool:
-    """Whether a Python file is what nbconvert makes of a notebook with robot programs."""
+    """Return whether a Python file was made by nbconvert from a notebook with robot programs."""
     return _SCRIPT.search(text) is not None
 
 
 def read_script(text: str, name: str) -> Notebook:
-    """The notebook that nbconvert has made the file ``text`` of. Raises UsageError where it is too large."""
+    """Return the notebook from which nbconvert made the file ``text``.
+
+    Raises:
+        UsageError: The notebook is too large.
+    """
     chunks: list[list[str]] = [[]]
     for line in text.replace("\r\n", "\n").split("\n"):
         magic = _cell_magic(line)
@@ -130,9 +135,9 @@ def read_script(text: str, name: str) -> Notebook:
 
 
 def pack_notebook(notebook: Notebook) -> bytes:
-    """The notebook as an .ipynb file without outputs; ``read_notebook`` gives the same cells again.
+    """Return the notebook as an .ipynb file without outputs. ``read_notebook`` gives the same cells again.
 
-    Of Raw cells with a responder it has the line that defines it.
+    A Raw cell with a responder is reduced to the line that defines it.
     """
     cells: list[dict[str, Any]] = [
         {
@@ -150,7 +155,7 @@ def pack_notebook(notebook: Notebook) -> bytes:
 
 
 def _decoded(data: bytes, name: str) -> tuple[str, str]:
-    """The text, and a note on how it was read where that was not UTF-8."""
+    """Return the text, and a note on its encoding if it is not UTF-8."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         try:
             return data.decode("utf-16"), f"{name} was read as UTF-16; Jupyter saves UTF-8."
@@ -209,7 +214,7 @@ def _table(table: Mapping[str, Any], key: str) -> Mapping[str, Any]:
 
 
 def _raw_cells(document: Mapping[str, Any], name: str) -> list[Any]:
-    """The cells of nbformat 4, or those of all worksheets of the formats before."""
+    """Return the cells of nbformat 4, or of all worksheets in earlier formats."""
     if isinstance(document.get("cells"), list):
         return list(document["cells"])
     sheets = document.get("worksheets")
@@ -281,7 +286,7 @@ def _is_code(line: str) -> bool:
 
 
 def _cell_magic(line: str) -> str | None:
-    """The cell that ``get_ipython().run_cell_magic('name', 'flags', 'body')`` on a line of its own was."""
+    """Return the cell of a line ``get_ipython().run_cell_magic('name', 'flags', 'body')``."""
     if not _CELL_MAGIC_CALL.match(line):
         return None
     words = list(_constants(line))
@@ -292,7 +297,7 @@ def _cell_magic(line: str) -> str | None:
 
 
 def _constants(line: str) -> Iterator[str]:
-    """The arguments of a call of texts; none if it is something else."""
+    """Yield the arguments of a call if all are texts; nothing otherwise."""
     try:
         body = parse_module(line).body
     except (SyntaxError, Unreadable):

@@ -1,4 +1,4 @@
-"""What is kept of a submission: the bytes it is packed into, and the submission again. Reads nothing that was sent."""
+"""Storage format of a submission: packing to bytes and unpacking. Submitted files are not read here."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from submissions.submission import META, PART_FILES, Part, Submission, parse_met
 
 _KEPT = "the kept submission"
 _PACKED_NOTEBOOK = "notebook.ipynb"
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip archive can hold
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time in the zip format
 
 
 def pack_submission(submission: Submission) -> bytes:
-    """A zip archive, the same byte for byte for the same submission; it can be submitted again as it is.
+    """Return the submission as a zip archive, which is reproducible and can be submitted again.
 
-    The parts are called robot.py and responder.py; submission.toml keeps who, what for, the notes, and what
-    the parts were called.
+    The parts are called robot.py and responder.py. submission.toml stores the student, the assignment, the notes and
+    the original names of the parts.
     """
     meta = [f"student = {_toml_text(submission.student)}"]
     if submission.assignment is not None:
@@ -54,9 +54,12 @@ def pack_submission(submission: Submission) -> bytes:
 
 
 def unpack_submission(data: bytes) -> Submission:
-    """The submission that ``pack_submission`` packed. Raises UsageError for other bytes.
+    """Return the submission that ``pack_submission`` packed.
 
-    Nothing that intake accepted is refused: neither its limits nor its rules for names apply here.
+    Limits and name rules of intake do not apply here, so that every accepted submission can be read again.
+
+    Raises:
+        UsageError: The bytes are not a packed submission.
     """
     files = _entries(data)
     meta = parse_meta(files.pop(META, b""), _KEPT)
@@ -85,7 +88,7 @@ def unpack_submission(data: bytes) -> Submission:
 
 def _entries(data: bytes) -> dict[str, bytes]:
     try:
-        # Ours holds at most what intake accepted, and a few entries that packing adds.
+        # The archive contains at most the accepted files and a few entries added by packing.
         with open_zip(BytesIO(data), 2 * MAX_FILES) as archive:
             return {info.orig_filename: b"".join(entry_chunks(archive, info)) for info in archive.infolist()}
     except Unreadable:
@@ -93,6 +96,6 @@ def _entries(data: bytes) -> dict[str, bytes]:
 
 
 def _toml_text(text: str) -> str:
-    """A TOML basic string; JSON's escapes are TOML's, but for DEL."""
+    """Return a TOML basic string. JSON has the same escapes, except for DEL."""
     printable = text.encode("utf-8", "replace").decode("utf-8")
     return json.dumps(printable, ensure_ascii=False).replace("\x7f", "\\u007f")

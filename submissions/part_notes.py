@@ -1,6 +1,6 @@
-"""The notes on which file was taken for which part, and on parts that are not there.
+"""Notes on files that were used as a part, and on missing parts.
 
-Whoever drops or replaces such a note makes it again to find it, so no code reads its words.
+Code that removes or replaces a note creates it again for comparison, so that no code parses its text.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ PART_WORDS: Mapping[Part, Sentence] = MappingProxyType(
 
 
 def taken_for_note(name: str, part: Part) -> str:
-    """Return the note that a file was taken for a part although it is not called so."""
+    """Return the note that a file with another name was used as a part."""
     return f"{shown(name)} was taken for {PART_WORDS[part]}."
 
 
 def missing_part_note(part: Part, files: Mapping[str, bytes]) -> str:
-    """Return the note that a part is missing; ``files`` lie beside the parts."""
+    """Return the note that a part is missing; ``files`` are the other files of the submission."""
     others = [shown(name) for name in files if name.lower().endswith(".py")]
     beside = f" (beside it lies {', '.join(others[:3])})" if others else ""
     return f"There is no {PART_FILES[part]}{beside}; what needs {PART_WORDS[part]} has no marks."

@@ -1,6 +1,6 @@
-"""The plain Python of a notebook as one file, so that its functions can be called without executing it.
+"""Plain Python of a notebook as one file, for calls of its functions without running the notebook.
 
-Robot programs and magics are left out; playing a notebook with them is the responders' business.
+Robot programs and magics are omitted. ``responders`` runs whole notebooks.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ _RUN_LINE = re.compile(rf"%(?:{'|'.join(sorted(LINE_WRAPPERS))})[ \t]+(?P<rest>.
 
 
 def python_of(notebook: Notebook) -> str:
-    """All cells that are run as Python, one after the other; magic and shell lines are comments."""
+    """Return all Python cells in order, with magic and shell lines as comments."""
     cells = (_python(cell.source) for cell in notebook.cells)
     return "\n".join(_without_magics(source) for source in cells if source is not None)
 
 
 def _python(source: str) -> str | None:
-    """The cell with its lines in their places; None if it is for a magic that runs no Python."""
+    """Return the cell with unchanged line positions; None if its magic does not run Python."""
     lines = source.split("\n")
     above = 0
     for place, name in cell_magics(lines):
@@ -35,7 +35,7 @@ def _without_magics(source: str) -> str:
 
 
 def _commented(line: str) -> str:
-    """A magic in a block leaves a statement behind, so that the block is not empty."""
+    """Replace a magic by a comment and a ``pass`` statement, so that its block is not empty."""
     stripped = line.lstrip()
     indent = line[: len(line) - len(stripped)]
     timed = _RUN_LINE.match(stripped)

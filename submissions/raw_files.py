@@ -1,6 +1,6 @@
-"""The files of a submission, from a folder or a zip archive, by flat name: nothing trusted, everything capped.
+"""Files of a submission from a folder or zip archive, by flat name, with limits and without trust in the content.
 
-What the files mean is decided in ``bundle.py``; nothing here is unpacked to disk, followed or run.
+``bundle.py`` interprets the files. Nothing is unpacked to disk, followed or executed here.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ MAX_FILE_BYTES = 16 * MEGABYTE
 MAX_FILES = 256
 _MAX_NAME_BYTES = 200
 
-#: Leftovers of tools and systems; they are no part of a submission, in whatever folder they lie.
+#: Files that tools and systems create. They are ignored in every folder.
 _IGNORED_NAMES = {"__MACOSX", "__pycache__", "Thumbs.db", "desktop.ini", "Icon\r"}
 _EXPECTED_FLAT = Sentence("expected robot.py, responder.py and the files they use side by side")
 
 
 @dataclass(frozen=True, slots=True)
 class RawFiles:
-    """Flat names and bytes, and what was left out or stepped into on the way."""
+    """Flat names and bytes, and notes on files that were omitted or folders that were entered."""
 
     files: dict[str, bytes]
     notes: tuple[str, ...] = ()
@@ -41,20 +41,20 @@ class RawFiles:
 
 @dataclass(frozen=True, slots=True)
 class SentFile:
-    """A file as somebody sent it; the name is the sender's, and may be anything."""
+    """A file as submitted; its name is arbitrary."""
 
     name: str
     stream: BinaryIO
 
     @property
     def flat_name(self) -> str:
-        """The name without whatever folders it has."""
+        """The name without folders."""
         return self.name.replace("\\", "/").rpartition("/")[2]
 
 
 @dataclass(slots=True)
 class _Budget:
-    """What is left of the caps while a submission is read."""
+    """Size and number of the files read so far, compared with the limits."""
 
     where: str
     total: int = 0
@@ -68,11 +68,11 @@ class _Budget:
             )
 
     def read(self, name: str, stream: BinaryIO) -> bytes:
-        """All of ``stream``, counted while it comes, whatever size it claims to have."""
+        """Read all of ``stream``. Bytes are counted while reading, because its claimed size is not trusted."""
         return self.join(name, iter(lambda: stream.read(CHUNK), b""))
 
     def join(self, name: str, coming: Iterator[bytes]) -> bytes:
-        """All chunks of a file, counted while they come."""
+        """Join the chunks of a file and count them while reading."""
         chunks = []
         size = 0
         for chunk in coming:
@@ -100,7 +100,7 @@ class _Budget:
 
 
 def _within(where: str, name: str) -> str:
-    """A file, and what it is in; alone where that is the same."""
+    """Return the file with its container, or only the file if both names are the same."""
     return f"{where}:" if where == name else f"{where}: {name}"
 
 
@@ -111,22 +111,27 @@ def _twice(where: str, name: str) -> UsageError:
 
 
 def shown(name: str) -> str:
-    """A name of a student's making, safe and short enough for a sentence."""
+    """Return a student's file name in a safe and short form for messages."""
     clean = "".join("?" if unicodedata.category(c)[0] in "CZ" and c != " " else c for c in name)
     return clean if len(clean) <= 80 else clean[:77] + "..."
 
 
 def read_single_file(path: Path) -> bytes:
-    """The bytes of one regular file. Raises UsageError if it is none, or too large."""
+    """Return the bytes of one regular file.
+
+    Raises:
+        UsageError: It is not a regular file, or it is too large.
+    """
     budget = _Budget(shown(path.name))
     with _regular_file(path.name, os.fspath(path), None) as stream:
         return budget.read(path.name, stream)
 
 
 def read_folder(path: Path) -> RawFiles:
-    """The files that lie in a folder, or in the only folder in it. Links and devices are never opened.
+    """Read the files in a folder, or in the only folder inside it. Links and devices are never opened.
 
-    Raises UsageError for nested folders, and for more or larger files than a submission may have.
+    Raises:
+        UsageError: There are nested folders, or the submission exceeds a limit on number or size of files.
     """
     where = shown(path.name)
     notes: list[str] = []
@@ -168,7 +173,11 @@ def read_folder(path: Path) -> RawFiles:
 
 
 def read_listed(paths: Mapping[str, Path], where: str) -> RawFiles:
-    """The files at ``paths``, by the names that they go by here; raises UsageError as ``read_folder`` does."""
+    """Read the files at ``paths`` under the given names.
+
+    Raises:
+        UsageError: As for ``read_folder``.
+    """
     budget = _Budget(where)
     files = {}
     for name, path in paths.items():
@@ -180,7 +189,11 @@ def read_listed(paths: Mapping[str, Path], where: str) -> RawFiles:
 
 
 def read_sent(sent: Iterable[SentFile], where: str) -> RawFiles:
-    """The files that were sent, by their flat names; raises UsageError as ``read_folder`` does."""
+    """Read submitted files by their flat names.
+
+    Raises:
+        UsageError: As for ``read_folder``.
+    """
     budget = _Budget(where)
     files: dict[str, bytes] = {}
     for each in sent:
@@ -196,7 +209,7 @@ def read_sent(sent: Iterable[SentFile], where: str) -> RawFiles:
 
 
 def _with_archive_opened(raw: RawFiles) -> RawFiles:
-    """The files; where there is no code but what may lie in the one archive among them, with what lies there."""
+    """Replace a single archive by its files, unless there is code beside it."""
     archives = [name for name in raw.files if name.lower().endswith(".zip")]
     if len(archives) != 1 or any(name.lower().endswith((".py", ".ipynb")) for name in raw.files):
         return raw
@@ -207,16 +220,17 @@ def _with_archive_opened(raw: RawFiles) -> RawFiles:
 
 
 def read_zip(path: Path) -> RawFiles:
-    """The files in a zip archive, in the one top folder that all of them lie in, or in the one archive in it.
+    """Read the files in a zip archive, in its only top folder, or in the only archive inside it.
 
-    Raises UsageError for anything that is no plain archive of flat files: paths that lead elsewhere, links,
-    encrypted or nested entries, two of one name, too many, too large once they are decompressed.
+    Raises:
+        UsageError: The archive is not a plain archive of flat files. Examples are paths outside it, links, encrypted or
+            nested entries, repeated names, and files that exceed the limits once decompressed.
     """
     return _with_archive_opened(unzip(read_single_file(path), shown(path.name)))
 
 
 def unzip(data: bytes, where: str) -> RawFiles:
-    """Like ``read_zip``, from the archive's bytes; ``where`` names it in the sentences."""
+    """Read an archive's bytes as ``read_zip`` does; ``where`` names it in messages."""
     if not data:
         raise UsageError(
             "%(where)s: is an empty file, expected a zip archive with robot.py and responder.py.", where=where
@@ -256,7 +270,7 @@ def unzip(data: bytes, where: str) -> RawFiles:
 def _opened(data: bytes, where: str) -> Iterator[ZipFile]:
     with contextlib.ExitStack() as held:
         try:
-            # Entries that do not count, and those of archives in it, are entries too.
+            # The limit also covers ignored entries and those of stored archives.
             archive = held.enter_context(open_zip(BytesIO(data), 8 * MAX_FILES))
         except TooMany:
             raise UsageError(
@@ -270,7 +284,7 @@ def _opened(data: bytes, where: str) -> Iterator[ZipFile]:
 
 
 def _plain_entries(infos: Iterable[ZipInfo], where: str) -> list[tuple[tuple[str, ...], ZipInfo]]:
-    """The path, in parts, of every file that counts; the hostile ones are refused before any is read."""
+    """Return the path parts of every relevant file. Malicious entries are rejected before any is read."""
     entries = []
     for info in infos:
         original = info.orig_filename.replace("\\", "/")
@@ -339,7 +353,7 @@ def _check_name(where: str, name: str) -> None:
 
 
 def _list_folder(descriptor: int, where: str, notes: list[str]) -> tuple[list[str], list[str]]:
-    """Names of the regular files and of the folders, sorted; what is neither is noted and left out."""
+    """Return the names of regular files and of folders, sorted. Other entries are omitted with a note."""
     files, folders = [], []
     with os.scandir(descriptor) as found:
         for number, entry in enumerate(found):
@@ -361,7 +375,7 @@ def _list_folder(descriptor: int, where: str, notes: list[str]) -> tuple[list[st
 
 
 def _regular_file(where: str, name: str, folder: int | None) -> contextlib.AbstractContextManager[BinaryIO]:
-    """Open without following a link, and without waiting for anybody at the other end of a pipe."""
+    """Open a file without following links, and without blocking on a pipe."""
     try:
         descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=folder)
     except OSError as error:

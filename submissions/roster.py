@@ -1,6 +1,6 @@
-"""Reads a CSV roster: which student submitted which file, for which assignment. Every bad row is named by its line.
+"""Reader of CSV rosters: students, files and assignments. Bad rows are reported with their lines.
 
-Says where a file would lie, never outside the roster's folder; reading the submissions is `batch_folder.py``'s.
+Files are located inside the roster's folder only; ``batch_folder.py`` reads the submissions.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _USUAL = "student (or id), file, assignment"
 
 @dataclass(frozen=True, slots=True)
 class RosterRow:
-    """One row. ``line`` counts from 1 and is where the row begins; a ``problem`` means the rest is not usable."""
+    """One row. ``line`` is its first line, from 1. With a ``problem``, the other fields cannot be used."""
 
     line: int
     student: Student = NOBODY
@@ -32,9 +32,10 @@ class RosterRow:
 
 
 def read_roster(path: Path) -> list[RosterRow]:
-    """The rows of a roster: student (or id) and file and, where it has them, name, email, assignment, submitted_at.
+    """Read the rows of a roster: student (or id) and file; optionally name, email, assignment, submitted_at.
 
-    Raises UsageError when the file as a whole is no roster.
+    Raises:
+        UsageError: The file as a whole is not a roster.
     """
     table = read_csv(path, {**PERSON_COLUMNS, **{column: (column,) for column in _OWN_COLUMNS}}, _USUAL)
     missing = [said for column, said in (("id", "student"), ("file", "file")) if column not in table.columns]
@@ -47,12 +48,16 @@ def read_roster(path: Path) -> list[RosterRow]:
 
 
 def file_inside(folder: Path, name: str) -> Path:
-    """Where a file that a roster names lies. Raises UsageError for one that would lie outside ``folder``."""
+    """Return the path of a file that a roster names.
+
+    Raises:
+        UsageError: The path is outside ``folder``.
+    """
     parts = PurePosixPath(name.replace("\\", "/")).parts
     outside = not parts or parts[0] == "/" or ".." in parts or any(part.endswith(":") for part in parts)
     path = folder.joinpath(*parts)
     try:
-        # Links below the folder could lead out of it; whether the last part is one is for whoever opens it.
+        # Links in the path could lead outside the folder. The caller that opens the file checks its last part.
         outside = outside or not path.parent.resolve().is_relative_to(folder.resolve())
     except (OSError, ValueError):
         outside = True
@@ -78,9 +83,12 @@ def _row(row: CsvRow) -> RosterRow:
 
 
 def moment(text: str, *, end_of_day: bool = False) -> datetime:
-    """A date, or a date and time, in the zone of this machine unless it names its own.
+    """Parse a date, or a date and time, in this machine's time zone unless it names another.
 
-    A date alone is its first moment, or with ``end_of_day`` its last. Raises ValueError for anything else.
+    A date alone means its first moment, or its last with ``end_of_day``.
+
+    Raises:
+        ValueError: The text is not a date or time.
     """
     read = datetime.fromisoformat(text)
     if end_of_day and len(text.strip()) <= len("2026-11-30"):

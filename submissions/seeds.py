@@ -1,6 +1,6 @@
-"""Where the chance of a grading comes from: the installation's secret, and the seeds that are hashed from it.
+"""Seeds of a grading, computed as hashes of the installation's secret.
 
-It draws nothing and keeps nothing; streams of chance are ``sim.chance``'s, keeping the secret is the service's.
+``sim.chance`` draws random numbers, and ``service`` stores the secret.
 """
 
 from __future__ import annotations
@@ -11,39 +11,39 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class Secret:
-    """What keeps the worlds of an installation from being known elsewhere. Only its hash may be shown."""
+    """Secret that makes the worlds of an installation unpredictable. Only its hash may be shown."""
 
     text: str = field(repr=False)
 
     @property
     def sha256(self) -> str:
-        """Its hash, 64 hexadecimal digits, which may be shown."""
+        """The hash as 64 hexadecimal digits, which may be shown."""
         return hashlib.sha256(self.text.encode("utf-8", "surrogateescape")).hexdigest()
 
     @property
     def name(self) -> str:
-        """What it is called before people: the beginning of its hash."""
+        """The displayed name: the first digits of the hash."""
         return name_of(self.sha256)
 
 
-#: Of self-tests, examples and whatever else must be the same everywhere.
+#: For self-tests, examples and other results that must be the same on every installation.
 PUBLIC = Secret("")
 
 
 def name_of(secret_sha256: str) -> str:
-    """What a secret with this hash is called before people."""
+    """Return the displayed name of a secret with this hash."""
     return secret_sha256[:8]
 
 
 def world_seed(secret: Secret, named: str) -> int:
-    """63 bits for the world of what is so named, the same for every student of an installation."""
+    """Return 63 bits as the seed of the named world, the same for every student of an installation."""
     return _bits(f"{secret.text}{named}")
 
 
 def child_seed(seed: int, submission: str) -> int:
-    """63 bits for the chance that one submission's own processes see, which tells nothing of the world's ``seed``.
+    """Return 63 bits as the seed for a submission's own processes, from which ``seed`` cannot be inferred.
 
-    ``submission`` is its SHA-256. Another submission sees other chance, so chance does not tell a trial again.
+    ``submission`` is its SHA-256. Another submission gets another seed, so that random numbers do not identify a trial.
     """
     return _bits(f"{seed}\n{submission}")
 

@@ -1,7 +1,7 @@
-"""The text of a Python file: how its bytes are decoded, its magic line, and the modules that it can import.
+"""Text of Python files: decoding, the magic line, and the modules that a file can import.
 
-Whether the text is Python is for the interpreter to say, inside the sandbox. The flags of a magic are parsed in
-``magics.py``, which needs the floors and therefore numpy.
+The interpreter inside the sandbox checks the syntax. ``magics.py`` parses the flags, because it needs the floors and
+therefore numpy.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from sim.errors import UsageError
 
 MAX_SOURCE_BYTES = 1024 * 1024
 
-# PEP 263: only the first two lines can hold the cookie.
+# PEP 263: the cookie is in the first two lines.
 _COOKIE = re.compile(rb"^[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)", re.ASCII)
 _BLANK = re.compile(rb"^[ \t\f]*(?:#.*)?$")
-#: Encodings of text; a cookie must not reach those of Python's that decompress or interpret.
+#: Text encodings. A cookie must not select Python's codecs that decompress or interpret data.
 _TEXT_ENCODINGS = re.compile(
     r"utf-8|ascii|iso8859-\d+|cp\d+|koi8-[rut]|mac-\w+|big5|gbk|gb18030|gb2312|shift_jis|euc_\w+"
 )
@@ -30,29 +30,30 @@ _RICH_TEXT = rb"{\rtf"
 _NOTEBOOK_KEYS = (b'"cells"', b'"nbformat"')
 
 Preamble = Literal["none", "imports", "preloaded"]
-#: The magics that begin a robot program, and the names that each defines for it.
+#: The magics that start a robot program, and the names that each defines for it.
 PREAMBLES: Mapping[str, Preamble] = MappingProxyType(
     {"sim_magic": "none", "sim_magic_imports": "imports", "sim_magic_preloaded": "preloaded"}
 )
 
 _IMPORTING = re.compile(r"^.*import.*$", re.MULTILINE)
 _WORD = re.compile(r"[^\W\d]\w*")
-#: The modules of one program, characters; as much as one file may have.
+#: Limit on the modules of one program in characters, the same as for one file.
 _MOST_TEXT = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
 class DecodedText:
-    """The text, and a sentence on how it was read where that was not plain UTF-8."""
+    """The text, and a note on its encoding if it is not plain UTF-8."""
 
     text: str
     note: str = ""
 
 
 def decode_source(data: bytes, name: str) -> DecodedText:
-    """UTF-8, a byte order mark, a PEP 263 cookie, else Latin-1, in this order.
+    """Decode Python source: UTF-8, a byte order mark, a PEP 263 cookie, otherwise Latin-1.
 
-    Raises UsageError for more than 1 MB, for NUL characters, which no Python file has, for rich text and for notebooks.
+    Raises:
+        UsageError: The source is larger than 1 MB or contains NUL characters, or is rich text or a notebook.
     """
     if len(data) > MAX_SOURCE_BYTES:
         raise UsageError("%(name)s: is too large for a Python file, expected at most 1 MB.", name=name)
@@ -102,7 +103,7 @@ def _decode(data: bytes, name: str) -> DecodedText:
 
 
 def _cookie(data: bytes) -> str | None:
-    """The encoding that the first two lines ask for, if it is one of text."""
+    """Return the encoding named in the first two lines, if it is a text encoding."""
     for line in data.split(b"\n", 2)[:2]:
         match = _COOKIE.match(line)
         if match:
@@ -117,7 +118,7 @@ def _cookie(data: bytes) -> str | None:
 
 
 def magic_place(text: str) -> int | None:
-    """The index of the first line that is neither blank nor a comment, if it is a magic; of wrappers the last."""
+    """Return the index of the magic before any code; the last one after wrapper magics. None without a magic."""
     found = None
     for place, line in enumerate(text.split("\n")):
         stripped = line.lstrip("\ufeff").strip()
@@ -132,7 +133,7 @@ def magic_place(text: str) -> int | None:
 
 
 def is_program_magic(line: str) -> bool:
-    """Whether a line makes its cell a robot program, as ``%%sim_magic`` does and ``%sim_magic`` does not."""
+    """Return whether a line makes its cell a robot program: ``%%sim_magic`` does, ``%sim_magic`` does not."""
     stripped = line.lstrip("\ufeff").strip()
     return stripped.startswith("%%") and magic_name(stripped) in PREAMBLES
 
@@ -143,11 +144,10 @@ def magic_name(magic: str) -> str:
 
 
 def modules_of(text: str, read: Callable[[str], bytes | None]) -> Mapping[str, str]:
-    """Return the modules that a text can import, and those that they can, by their names.
+    """Return the modules that a text can import, directly or through other modules, by name.
 
-    A text can import only what it names on a line with an import, so these are also all that rules about its code
-    read. ``read`` gives a file's bytes by its name, or None. One that is no text, or too much with the others, is left
-    out.
+    A text can import only names on its import lines, so rules about code read no other files. ``read`` returns a file's
+    bytes by name, or None. Files that are not text or exceed the common limit are omitted.
     """
     found: dict[str, str] = {}
     looked: set[str] = set()

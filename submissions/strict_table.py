@@ -1,6 +1,6 @@
-"""The base of every table that an instructor writes: no unknown keys, and no texts where numbers belong.
+"""Base class of all tables that instructors write: unknown keys and texts in place of numbers are errors.
 
-What a table means is said where it is defined.
+Subclasses define the tables.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from pydantic import BaseModel, ConfigDict
 
 
 class StrictTable(BaseModel):
-    """Frozen, and refused where it has a key too many or a number that is none.
+    """Frozen table that rejects unknown keys and invalid numbers.
 
-    What checks it is made when it is first needed: of all kinds of criteria an assignment has a few.
+    Validators are built on first use, because an assignment uses only a few kinds of criteria.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
@@ -21,6 +21,6 @@ class StrictTable(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class Entries:
-    """Part of the type of a list of fixed length: what its entries are, in words, for who writes too few or many."""
+    """Annotation of a fixed-length list type: describes its entries in messages about a wrong length."""
 
     words: str

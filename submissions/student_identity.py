@@ -1,6 +1,6 @@
-"""Who students are: an id, a name, an e-mail address; the table in which a course has them; and who was refused.
+"""Identity of students: id, name, e-mail address, the course's table of people, and rejected submissions.
 
-Knows no files of theirs; which names can be told apart is ``names.py``'s.
+Files are handled elsewhere; ``names.py`` compares names.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from submissions.names import shown_name
 from submissions.nearest import did_you_mean
 from submissions.raw_files import shown
 
-#: What the columns of a table of people are called, here and in Moodle and Gradescope.
+#: Column names in a table of people, here and in Moodle and Gradescope.
 PERSON_COLUMNS: Mapping[str, Sequence[str]] = MappingProxyType(
     {
         "id": ("id", "student", "id number", "student id", "sid"),
@@ -32,13 +32,13 @@ _COLUMNS = {
     "last": ("last name", "surname"),
     "identifier": ("identifier",),
 }
-#: What Moodle calls everybody where names are hidden from who marks.
+#: Moodle's name for every student if names are hidden from markers.
 NAMELESS = "Participant"
 
 
 @dataclass(frozen=True, slots=True)
 class Student:
-    """Somebody in a course: what the course knows them by, and what else is known of them; empty where nobody said."""
+    """A student of a course: the course's id, and optional name and address. Unknown fields are empty."""
 
     id: str = ""
     name: str = ""
@@ -50,7 +50,7 @@ NOBODY = Student()
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """What was not taken in of a batch: the name it came under, why, and whose it is, as far as that is known."""
+    """A rejected submission of a batch: the submitted name, the reason, and the student if known."""
 
     source: str
     reason: str
@@ -59,22 +59,23 @@ class Refusal:
 
     @property
     def sentence(self) -> str:
-        """What came in and why it was refused, for where the student stands beside it."""
+        """The submitted name and the reason, for display beside the student."""
         return f"{self.source}: {self.reason}" if self.source != self.student.id else self.reason
 
 
 @dataclass(frozen=True, slots=True)
 class People:
-    """The people of a course by what other systems call them by; where several are called alike, all of them."""
+    """The people of a course by their names in other systems. A name can belong to several people."""
 
     file: str
-    numbers: Mapping[str, Student]  # Moodle's, of a person in one assignment
+    numbers: Mapping[str, Student]  # Moodle's number of a person in one assignment
     called: Mapping[str, tuple[Student, ...]]
 
     def find(self, written: Student, number: str = "") -> Student:
-        """Who is written so, in a system that may have given them a number.
+        """Return the person with this identity, optionally by a number from another system.
 
-        Raises UsageError where nobody is, or nobody can say which of several.
+        Raises:
+            UsageError: No person matches, or several do.
         """
         whole = {_key(each): each for each in (written.id, written.email, written.name) if each}
         known = self.numbers.get(number)
@@ -85,7 +86,7 @@ class People:
                 f"{self.file} has {shown(known.name)} as Participant {number}, not {shown(written.name)}; "
                 "expected the table of this very assignment."
             )
-        # Where students work in groups, Moodle puts the group before the name: Group 1-Ada.
+        # With group submissions, Moodle puts the group before the name: Group 1-Ada.
         for key in (*whole, *(key.partition("-")[2] for key in whole)):
             found = self.called.get(key, ())
             if len(found) == 1:
@@ -101,7 +102,11 @@ class People:
 
 
 def read_people(path: Path) -> People:
-    """The people of a CSV, Moodle's offline grading worksheet among them. Raises UsageError when it is none."""
+    """Read the people in a CSV file, for example Moodle's offline grading worksheet.
+
+    Raises:
+        UsageError: The file is not such a table.
+    """
     table = read_csv(path, _COLUMNS, "id, name, email")
     if not table.columns & {"id", "name", "email", "first", "last"}:
         raise UsageError(f"{path.name}: has no column id, name or email in its first line, expected one of them.")
@@ -116,19 +121,19 @@ def read_people(path: Path) -> People:
 
 
 def students_of(people: People) -> list[Student]:
-    """Everybody, once, in the order of the table."""
+    """Return every person once, in the order of the table."""
     return list(dict.fromkeys(each for several in people.called.values() for each in several))
 
 
 def told_apart(names: Iterable[tuple[str, str]]) -> list[str]:
-    """An id for each (name, number): the name itself, with the number where others have the name too."""
+    """Return an id for each (name, number): the name, with the number added if others have the same name."""
     names = list(names)
     times = Counter(name for name, _ in dict.fromkeys(names))
     return [f"{name} ({number})" if name and times[name] > 1 else name for name, number in names]
 
 
 def _students(rows: Sequence[CsvRow], file: str) -> Iterator[tuple[CsvRow, Student]]:
-    """Everybody with an id: their own, else their name, with address or number where others have that name."""
+    """Yield every person with an id: the given id, or the name, with address or number added if it is not unique."""
     for row in rows:
         if row.problem:
             raise UsageError(f"{file}: line {row.line} {row.problem}")

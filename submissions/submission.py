@@ -1,6 +1,6 @@
-"""What one student submitted, after reading: sources, model files, and what submission.toml says of them.
+"""A student's submission after reading: sources, model files, and the content of submission.toml.
 
-Reading archives and folders is ``bundle.py``, deciding what to do with a submission is the service's.
+``bundle.py`` reads archives and folders; ``service`` processes submissions.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from submissions.raw_files import shown
 from submissions.source_text import decode_source
 
 Part = Literal["program", "responder"]
-#: What the file of each part is called.
+#: File name of each part.
 PART_FILES: Mapping[Part, str] = MappingProxyType({"program": "robot.py", "responder": "responder.py"})
-#: The file with the second robot's program; it lies among the files beside the parts.
+#: File name of the second robot's program, which is among the additional files.
 SECOND_PROGRAM = "robot2.py"
 META = "submission.toml"
 _MOST_META_BYTES = 64 * 1024
@@ -31,7 +31,7 @@ _MOST_META_BYTES = 64 * 1024
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A code cell of a notebook; ``number`` is what Jupyter shows beside it after Restart & Run All."""
+    """A code cell of a notebook; ``number`` is the number that Jupyter shows after Restart & Run All."""
 
     number: int
     source: str
@@ -40,10 +40,10 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Notebook:
-    """A notebook of the student's: the name it was submitted under, and its code cells from the top.
+    """A student's notebook: its submitted name and its code cells from the top.
 
-    ``markdown_programs`` are the Markdown cells, counted among all cells, that begin a robot program; none is run.
-    ``raw_responders`` are the first lines of functions called responder that are in Raw cells.
+    ``markdown_programs`` are the numbers, among all cells, of Markdown cells that begin a robot program; they are not
+    run. ``raw_responders`` are the first lines of functions called responder in Raw cells.
     """
 
     name: str
@@ -54,20 +54,20 @@ class Notebook:
 
 @dataclass(frozen=True)
 class Submission:
-    """One submission. ``files`` are what lies beside the sources, by flat name; a notebook stands for both sources."""
+    """One submission. ``files`` are the additional files by flat name; a notebook replaces both sources."""
 
     student: str
     program: Code | None = None
     responder: Code | None = None
     files: Mapping[str, bytes] = field(default_factory=lambda: MappingProxyType({}))
-    assignment: str | None = None  # named by the submission's submission.toml or its parent folder
-    notes: tuple[str, ...] = ()  # what was ignored, stepped into or renamed while reading
+    assignment: str | None = None  # named in submission.toml or by the parent folder
+    notes: tuple[str, ...] = ()  # files ignored, folders entered and names changed during reading
     notebook: Notebook | None = None
-    run: str | None = None  # of the notebook: the number or the tag of the one to be marked, where anybody says so
+    run: str | None = None  # number or tag of the notebook run to be marked, if named
 
     @cached_property
     def python_files(self) -> Mapping[str, Code]:
-        """The Python files among ``files`` that can be read, by name: modules, agents, the second robot's program."""
+        """The readable Python files among ``files`` by name: modules, agents, the second robot's program."""
         found: dict[str, Code] = {}
         for name, data in self.files.items():
             if name.lower().endswith(".py"):
@@ -76,32 +76,41 @@ class Submission:
         return MappingProxyType(found)
 
     def code(self, name: str) -> Code | None:
-        """The file of this name among ``files``. Raises UsageError if it is no text."""
+        """Return the file with this name among ``files``, or None.
+
+        Raises:
+            UsageError: The file is not text.
+        """
         if name not in self.files:
             return None
         return self.python_files.get(name) or _decoded(name, self.files[name])
 
     def agent(self, agent: str) -> Code | None:
-        """The file of this agent: ``parser.py`` is that of ``parser``. Raises UsageError if it is no text."""
+        """Return the file of this agent, or None. The file of ``parser`` is ``parser.py``.
+
+        Raises:
+            UsageError: The file is not text.
+        """
         return next((self.code(name) for name in self.files if agent_of(name, (agent,))), None)
 
     def files_without(self, agents: Iterable[str]) -> Mapping[str, bytes]:
-        """The files but for those of these agents, which no other process can read."""
+        """Return the files without those of these agents, which other processes must not read."""
         agents = tuple(agents)
         return {name: data for name, data in self.files.items() if not agent_of(name, agents)}
 
     @property
     def sha256(self) -> str:
-        """Hash of what was submitted, whoever submitted it and however it was packed."""
+        """SHA-256 of the content, independent of the student and of the packing."""
         digest = hashlib.sha256()
         for piece in self.hashed():
             digest.update(piece)
         return digest.hexdigest()
 
     def hashed(self) -> Iterator[bytes]:
-        """What the hash is over: records of fields, each told how long it is before it comes.
+        """Yield the hashed data: records of fields, each preceded by its length.
 
-        No two submissions have the same bytes so. Names count, for a program and its report can tell them.
+        Different submissions therefore give different data. Names are included, because programs and reports can depend
+        on them.
         """
         yield b"robomark submission 2\n"
         for record in self._records():
@@ -126,7 +135,7 @@ class Submission:
 
 
 def agent_of(file: str, agents: Iterable[str]) -> str | None:
-    """The one of these agents that a file has the program of."""
+    """Return the agent whose program is in this file, or None."""
     return next((name for name in agents if file.lower() == f"{name}.py"), None)
 
 
@@ -135,7 +144,11 @@ def _decoded(name: str, data: bytes) -> Code:
 
 
 def read_meta(data: bytes, where: str) -> dict[str, object]:
-    """What the file says; nothing where there is none. Raises UsageError, naming ``where``, for what cannot be read."""
+    """Parse submission.toml; an empty file gives no entries.
+
+    Raises:
+        UsageError: The file cannot be read. The message has ``where``.
+    """
     if not data:
         return {}
     if len(data) > _MOST_META_BYTES:
@@ -144,7 +157,7 @@ def read_meta(data: bytes, where: str) -> dict[str, object]:
 
 
 def parse_meta(data: bytes, where: str) -> dict[str, object]:
-    """The same without a limit of size, for files written here: notes on many files are more than a few lines."""
+    """Parse submission.toml without a limit on its size, for stored files with many notes."""
     try:
         return read_toml(data.decode("utf-8-sig"))
     except ValueError as error:
@@ -158,7 +171,11 @@ def parse_meta(data: bytes, where: str) -> dict[str, object]:
 
 
 def text_of(meta: Mapping[str, object], key: str, where: str) -> str | None:
-    """A text of it, None where it says none. Raises UsageError for anything else."""
+    """Return a text of the file, or None if it is missing.
+
+    Raises:
+        UsageError: The value is not a text.
+    """
     value = meta.get(key)
     if value is not None and (not isinstance(value, str) or not value.strip()):
         raise UsageError(
@@ -171,7 +188,7 @@ def text_of(meta: Mapping[str, object], key: str, where: str) -> str | None:
 
 
 def run_of(meta: Mapping[str, object], where: str) -> str | None:
-    """Which run of a notebook is to be marked: a number, or the tag of a cell."""
+    """Return the run of a notebook that is to be marked: a number, or the tag of a cell."""
     value = meta.get("run")
     if isinstance(value, int) and not isinstance(value, bool):
         return str(value)

@@ -1,6 +1,6 @@
-"""Sweeps: the conditions that a scenario can vary one at a time, and the levels of each.
+"""Sweeps: the conditions that a scenario varies one at a time, and their levels.
 
-Plain data; what a trial does under a condition is the grader's, and what the trials show is judged elsewhere.
+The classes are plain data; trials and judging are in ``service``.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import Literal
 
 Condition = Literal["offset_x", "offset_y", "heading", "light_noise", "motor_noise", "loss", "delay"]
 
-#: One trial's levels of what is swept: at most one pair, empty in a scenario without a sweep.
+#: A trial's level of the swept condition: at most one pair; empty without a sweep.
 Coordinates = tuple[tuple[str, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Varied:
-    """What a condition is called, its unit, and the levels that make sense."""
+    """A condition: its name, its unit and the range of valid levels."""
 
     words: str
     unit: str
@@ -41,7 +41,7 @@ CONDITIONS: Mapping[str, Varied] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """The levels of each condition; a condition without levels is not varied."""
+    """The levels of each condition. Conditions without levels are not varied."""
 
     offset_x: tuple[float, ...] = ()
     offset_y: tuple[float, ...] = ()
@@ -58,11 +58,11 @@ class Sweep:
 
     @property
     def count(self) -> int:
-        """How many coordinates there are."""
+        """The number of coordinates."""
         return sum(len(getattr(self, condition)) for condition in self.conditions) or 1
 
     def coordinates(self) -> Iterator[Coordinates]:
-        """One condition after the other, each over its levels; a single empty one if nothing is varied."""
+        """Yield each level of each condition in turn; a single empty coordinate if nothing is varied."""
         if not self.conditions:
             yield ()
         for condition in self.conditions:

@@ -1,6 +1,6 @@
-"""Unpacks archives that strangers made, with bounds: so many files, so many bytes, none outside the folder.
+"""Extraction of untrusted archives, with limits on files and bytes, and only into the given folder.
 
-What is in the files is for others to look at.
+Callers interpret the files.
 """
 
 from __future__ import annotations
@@ -16,9 +16,13 @@ from submissions.raw_files import shown
 
 
 def unzip(path: Path, folder: Path, most_entries: int, most_bytes: int) -> None:
-    """Lay what is in a zip into a folder, as files and folders alone. Raises UsageError where that cannot be."""
+    """Extract a zip into a folder, as regular files and folders only.
+
+    Raises:
+        UsageError: The archive cannot be extracted.
+    """
     try:
-        # The entries of folders, and of archives in it, count here, too.
+        # The limit also counts folder entries and entries of stored archives.
         with path.open("rb") as source, open_zip(source, 2 * most_entries) as archive:
             _lay(archive, folder, path.name, most_entries, most_bytes)
     except FileExistsError as error:

@@ -1,1 +1,1 @@
-"""Assignments: their files, read, checked and put in the form that grading needs."""
+"""Assignments: readers, validation, and the form that grading uses."""

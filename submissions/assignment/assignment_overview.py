@@ -1,6 +1,6 @@
-"""What a list says of an assignment, read off its file without checking it: the catalogue's are in order.
+"""Short description of catalogue assignments for lists, read without validation.
 
-Reading one to mark by it, with every mistake named, is ``reader.py``'s, which takes longer.
+``reader.py`` reads and validates a whole assignment, which takes longer.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 from sim.readers.toml_text import read_toml
 from submissions.assignment.folder import FILE_NAME
 
-#: What the parts of the course's materials are called, by the number that sections begin with.
+#: Titles of the parts of the course, by the number at the start of a section.
 TOPICS: Mapping[str, str] = MappingProxyType(
     {
         "01": "Introducing notebooks and the RoboLab environment",
@@ -37,28 +37,28 @@ _LONGEST_SENTENCE = 200
 
 @dataclass(frozen=True, slots=True)
 class AssignmentOverview:
-    """One line of the list of assignments."""
+    """One row of the list of assignments."""
 
     section: str
     id: str
     title: str
-    sentence: str  # of its description
+    sentence: str  # from the description
     marks: Decimal
     trials: int
 
     @property
     def topic(self) -> str:
-        """The number of its part of the course's materials; empty where it stands in none."""
+        """The number of the assignment's part of the course; empty if it has none."""
         return self.section[:2] if self.section[:2] in TOPICS else ""
 
     def says(self, text: str) -> bool:
-        """Whether all words of the text are in what is said of it, in whatever case."""
+        """Return whether the overview contains every word of the text, ignoring case."""
         told = f"{self.section} {self.id} {self.title} {self.sentence} {TOPICS.get(self.topic, '')}".casefold()
         return all(word in told for word in text.casefold().split())
 
 
 def overview(folder: Path) -> AssignmentOverview:
-    """Of the assignment in this folder of the catalogue."""
+    """Read the overview of the catalogue assignment in this folder."""
     table = read_toml((folder / FILE_NAME).read_text(encoding="utf-8"), Decimal)
     return AssignmentOverview(
         table.get("section", ""),
@@ -71,7 +71,10 @@ def overview(folder: Path) -> AssignmentOverview:
 
 
 def _sentence(description: str) -> str:
-    """What is to be done, by the first sentence that asks for it, or says more than where the robot starts."""
+    """Return the first sentence of the task, skipping sentences about the start pose.
+
+    A sentence that begins with "Write" takes precedence.
+    """
     sentences = _SENTENCE_ENDS.split(" ".join(description.split()))
     asking = (each for each in sentences if each.startswith("Write "))
     others = (each for each in sentences if not _WHERE_IT_STARTS.match(each))
@@ -79,7 +82,7 @@ def _sentence(description: str) -> str:
 
 
 def _trials(scenario: Mapping[str, Any]) -> int:
-    """Poses x swept levels x noise levels x seeds."""
+    """Return the number of trials: poses x swept levels x noise levels x seeds."""
     poses = 1 if scenario.get("choose") == "random" else len(scenario["poses"])
     swept = sum(map(len, scenario.get("sweep", {}).values())) or 1
     noises = [scenario.get(name, 0) for name in ("light_noise", "motor_noise")]

@@ -1,6 +1,6 @@
-"""From the tables of an assignment file and the files beside it to an ``Assignment``: what has to fit together.
+"""Construction of an ``Assignment`` from the tables of its file and the files beside it.
 
-What a single table may hold is ``schema.py``; reading the folder is ``reader.py``.
+This module checks relations between tables. ``schema.py`` validates single tables, and ``reader.py`` reads the folder.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _HEAD = tuple(HeadTable.model_fields)
 _TABLES = ("world", "parts", "agents", "limits", "training", "scenario", "criterion")
 _IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 _MAX_TRIALS = 5000
-#: Entries of any list or table in the file: a list of poses is the longest, and each is a trial at least.
+#: Maximum entries of a list or table in the file. A list of poses is the longest, with at least one trial per pose.
 _MAX_ENTRIES = 5000
 _MAX_TABLES = 500
 
@@ -50,7 +50,7 @@ Files = Mapping[str, bytes]
 
 
 def build_assignment(document: Mapping[str, object], files: Files, problems: Problems) -> Assignment | None:
-    """The assignment, or None; whatever is wrong goes into ``problems``."""
+    """Build the assignment. Add mistakes to ``problems``, and return None if they prevent it."""
     _check_lengths(document, (), problems)
     if problems.found:
         return None
@@ -120,7 +120,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
 
 
 def _check_lengths(value: object, place: Place, problems: Problems) -> None:
-    """Names lists and tables that are so long that comparing their entries would take minutes."""
+    """Report lists and tables that are too long; comparing their entries would take minutes."""
     if not isinstance(value, list | dict):
         return
     most = _MAX_TABLES if isinstance(value, list) and any(isinstance(entry, dict) for entry in value) else _MAX_ENTRIES
@@ -133,7 +133,7 @@ def _check_lengths(value: object, place: Place, problems: Problems) -> None:
 
 
 def _version(files: Files, given: Files, packaged: Mapping[str, str]) -> str:
-    """SHA-256 over names and bytes, in the order of the names; packaged networks and responders count like files."""
+    """Return the SHA-256 over names and bytes, sorted by name. Packaged networks and responders count as files."""
     digest = hashlib.sha256()
     responders = {name: text.encode() for name, text in packaged.items()}
     for kind, group in (("file", files), ("given", given), ("responder", responders)):
@@ -143,7 +143,7 @@ def _version(files: Files, given: Files, packaged: Mapping[str, str]) -> str:
 
 
 def _background_alone(document: Mapping[str, object]) -> WorldTable:
-    """A world with the background of a table that has other mistakes, so that this one is looked at as well."""
+    """Return a world with only the background, so that other mistakes in the table don't prevent its check."""
     world = document.get("world")
     name = world.get("background") if isinstance(world, dict) else None
     return WorldTable(background=name) if isinstance(name, str) else WorldTable()
@@ -199,7 +199,7 @@ def _world(table: WorldTable, ground: Floor, files: Files, problems: Problems) -
 
 
 def _sheet(table: WorldTable) -> int | None:
-    """The seed of the digit sheet; None when each trial has one of its own."""
+    """Return the seed of the digit sheet; None if each trial has its own."""
     if table.sheet == "per-seed":
         return None
     return table.sheet if isinstance(table.sheet, int) else 0
@@ -247,7 +247,7 @@ def _scenario(table: ScenarioTable, ground: Floor | None, place: Place, problems
 
 
 def _clear_beacons(scenarios: Sequence[Scenario | None], world: WorldSpec | None, problems: Problems) -> None:
-    """Names a beacon that stands within an obstacle, which would block every way to it."""
+    """Report beacons inside an obstacle, which would block every path to them."""
     for number, scenario in enumerate(scenarios):
         beacon = scenario.channel.beacon if scenario and scenario.channel.blocked_by == "obstacles" else None
         if world and beacon and any(gap(box, *beacon) == 0 for box in world.obstacles):
@@ -315,13 +315,13 @@ def _given(document: Mapping[str, object], files: Files, problems: Problems) -> 
 
 
 def packaged_models() -> tuple[str, ...]:
-    """The names of the trained networks that come with Robomark: those of their cards."""
+    """Return the names of the packaged networks, as on their cards."""
     folder = _weights_folder()
     return tuple(sorted(card.stem for card in folder.glob("*.json"))) if folder.is_dir() else ()
 
 
 def packaged_model(name: str) -> bytes | None:
-    """The bytes of a packaged network, to be loaded by student code inside the sandbox; None if there is none."""
+    """Return the bytes of a packaged network, for use by student code inside the sandbox; None if it does not exist."""
     if name not in packaged_models():
         return None
     card = json.loads((_weights_folder() / f"{name}.json").read_text("utf-8"))
@@ -335,7 +335,7 @@ def _weights_folder() -> Path:
 def _training(
     table: TrainingTable, scenarios: Sequence[Scenario | None], ground: Floor | None, problems: Problems
 ) -> Training:
-    """The training table, if there are scenarios to train on and others to be tested on, over a floor with labels."""
+    """Return the training table. Report missing scenarios for training or for tests, and a floor without labels."""
     ids = [scenario.id for scenario in scenarios if scenario is not None]
     hidden = [scenario.id for scenario in scenarios if scenario is not None and scenario.visibility != "visible"]
     for number, name in enumerate(table.scenarios):
@@ -359,6 +359,6 @@ def _training(
 
 
 def _runs_no_robot(document: Mapping[str, object]) -> bool:
-    """Whether the assignment has neither scenarios nor a program: only functions and texts are looked at."""
+    """Return whether the assignment runs no robot: it has no scenarios and no program, only functions and texts."""
     parts = document.get("parts")
     return isinstance(parts, dict) and parts.get("program") == "none" and "scenario" not in document

@@ -1,6 +1,6 @@
-"""From the ``[[criterion]]`` tables of an assignment file to criteria that fit the rest of it.
+"""Reader of the ``[[criterion]]`` tables, which checks criteria against the rest of the assignment.
 
-What a criterion may hold and what it needs is its schema's; no kind of criterion is named here.
+Each criterion's schema defines its keys and requirements. This module does not depend on single kinds of criteria.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _WITHOUT_ROBOT = tuple(check for check, schema in SCHEMAS.items() if not schema.
 def read_criteria(
     document: Mapping[str, object], around: Surroundings, robotless: bool, problems: Problems
 ) -> tuple[Criterion, ...]:
-    """The criteria that could be read; ``robotless`` is an assignment in which nothing drives."""
+    """Return the criteria without mistakes; ``robotless`` marks an assignment in which no robot drives."""
     read: dict[Place, Criterion] = {}
     seen: dict[str, int] = {}
     scenarios = texts_in([raw.get("id") for raw in list_of_tables(document.get("scenario"))])
@@ -53,7 +53,7 @@ def read_criteria(
 
 
 def check_given(document: Mapping[str, object], problems: Problems) -> None:
-    """Names given files that hold answers: those of criteria, and what describes the assignment."""
+    """Report given files that contain answers: files of criteria, and the assignment's own description."""
     answers = {"assignment.toml", "expected.toml"}
     for raw in list_of_tables(document.get("criterion")):
         schema = SCHEMAS.get(str(raw.get("check")))
@@ -66,7 +66,7 @@ def check_given(document: Mapping[str, object], problems: Problems) -> None:
 
 
 def sources_of(criteria: Iterable[Criterion], files: Mapping[str, bytes], problems: Problems) -> dict[str, str]:
-    """The texts of the instructor's checks, by file name."""
+    """Return the source of the instructor's Python checks by file name."""
     sources = {}
     for name in (name for criterion in criteria for name in criterion.python_files if name in files):
         try:
@@ -96,7 +96,7 @@ def _marked(schema: type[Criterion], mark: str) -> set[str]:
 
 
 def _without_a_part(criterion: Criterion, around: Surroundings, robotless: bool) -> Iterator[Misfit]:
-    """What it judges must be there: runs of a robot, of a second one, and a responder that is asked."""
+    """Yield the parts that the criterion needs and the assignment lacks: a run, a second robot or a responder."""
     if criterion.robot > around.robots:
         yield Misfit("robot", "robot is 2, but there is one, expected robots = 2 in world")
     if criterion.robot > 1 and not criterion.judges_runs:

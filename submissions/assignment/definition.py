@@ -1,6 +1,6 @@
-"""An assignment: the world, the scenarios, what is marked and by how much; and the trials it asks for.
+"""Definition of an assignment: world, scenarios, criteria, marks, and the resulting trials.
 
-Plain data. Reading one from its folder, with every mistake named by file and line, is ``reader.py``.
+The classes are plain data. ``reader.py`` reads them from a folder and reports every mistake with file and line.
 """
 
 from __future__ import annotations
@@ -26,39 +26,39 @@ Visibility = Literal["visible", "hidden", "after_due_date", "after_published"]
 
 @dataclass(frozen=True, slots=True)
 class WorldSpec:
-    """What the robot is put into."""
+    """The world of the robot."""
 
     background: str = "Empty_Map"
-    image: bytes | None = None  # a floor image of the instructor's own, as the bytes of the file
+    image: bytes | None = None  # an instructor's own floor image, as the bytes of the file
     labels: bool = True
     obstacles: tuple[tuple[float, float, float, float], ...] = ()  # x, y, width, height
     robot: str = "Default_Robot"
     robots: Literal[1, 2] = 1
     solid: bool = False  # walls and obstacles stop the robot
-    drive: Literal["course", "wheels"] = "course"  # who moves it: the course's equations, or rigid-body wheels
-    noise: Literal["course", "both directions"] = "course"  # of the wheels: of positive speeds alone, or of all
-    tick: Literal["thirtieth", "browser"] = "thirtieth"  # of a second, or 33 ms as in the original's browser
-    sheet: int | None = 0  # the seed of the digits on a digit sheet; None: each trial's own seed
+    drive: Literal["course", "wheels"] = "course"  # motion of the robot: the course's equations, or rigid-body wheels
+    noise: Literal["course", "both directions"] = "course"  # wheel noise for all speeds, or only for positive ones
+    tick: Literal["thirtieth", "browser"] = "thirtieth"  # per second, or 33 ms as in the original's browser
+    sheet: int | None = 0  # seed of the digits on a digit sheet; None: the seed of each trial
 
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Who writes what: ``student``, ``none``, or the name of a file given beside the assignment."""
+    """Source of each part: ``student``, ``none``, or the name of a file beside the assignment."""
 
     program: str = "student"
     responder: str = "student"
-    cell: str = "last"  # of a notebook: which robot program is marked; ``last``, ``tag:NAME`` or a number from 1
-    second_program: str = "none"  # of the second robot, where there are two; ``same`` is the first one's
-    agents: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))  # by name, those the responder asks
+    cell: str = "last"  # the robot program of a notebook that is marked: ``last``, ``tag:NAME`` or a number from 1
+    second_program: str = "none"  # of the second robot, if there are two; ``same`` uses the first robot's program
+    agents: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))  # agents by name
 
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """Poses x swept levels x noise levels x seeds. A second robot starts from the second pose of the same number.
+    """Conditions of trials: poses x swept levels x noise levels x seeds.
 
-    ``choose = "random"`` draws one pose a trial, by the trial's seed; ``"shuffled"`` takes each once, in an order
-    that the seed of the scenario decides. ``start_jitter`` moves every start by up to so many mm in x and y and
-    degrees, drawn by the trial's seed.
+    A second robot starts from the second pose with the same number. ``choose = "random"`` draws one pose per trial,
+    from the trial's seed. ``"shuffled"`` uses each pose once, in an order from the scenario's seed. ``start_jitter`` is
+    the maximum random change of each start pose in x and y (mm) and heading (degrees), drawn from the trial's seed.
     """
 
     id: str
@@ -73,25 +73,25 @@ class Scenario:
     visibility: Visibility = "visible"
     start_jitter: tuple[float, float, float] = (0.0, 0.0, 0.0)
     sweep: Sweep = NO_SWEEP
-    second_poses: tuple[Pose, ...] = ()  # as many as poses, or none
+    second_poses: tuple[Pose, ...] = ()  # one per pose, or none
 
     @property
     def trial_count(self) -> int:
-        """Poses, swept levels, levels of noise and repetitions, multiplied."""
+        """The product of poses, swept levels, noise levels and repetitions."""
         poses = 1 if self.choose == "random" else len(self.poses)
         return poses * self.sweep.count * len(self.light_noise) * len(self.motor_noise) * self.trials
 
     def varies(self, condition: str) -> bool:
-        """Whether its trials differ in a condition that can be swept; noise that is listed counts as well."""
+        """Return whether the trials differ in this condition, through a sweep or a list of noise levels."""
         noises = {"light_noise": self.light_noise, "motor_noise": self.motor_noise}
         return len(getattr(self.sweep, condition) or noises.get(condition, ())) > 1
 
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """The submission trains a model: on the images of ``scenarios``, to name those of all others.
+    """Training of a model by the submission: train on the images of ``scenarios``, classify all others.
 
-    ``function`` is the student's ``train(images, labels)``; ``image`` says what of an image it is given.
+    ``function`` is the student's ``train(images, labels)``. ``image`` selects the part of each image that it receives.
     """
 
     scenarios: tuple[str, ...]
@@ -101,9 +101,9 @@ class Training:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What a trial may use, for each child: CPU seconds, MB, bytes of output; and all trials of a submission together.
+    """Limits for each child process of a trial (CPU seconds, MB, bytes of output), and for all trials together.
 
-    ``all_cpu`` is, where none is given, enough for ten trials at their limits and a second for each.
+    The default of ``all_cpu`` allows ten trials at their limits and one second for each trial.
     """
 
     program_cpu: float = 5.0
@@ -112,33 +112,33 @@ class Limits:
     responder_memory_mb: int = 512
     output_bytes: int = 1_000_000
     all_cpu: float | None = None
-    all_sleep: float = 20.0  # seconds of real time in which a process does nothing; half a second of each is free
-    all_output_mb: int = 64  # of what is kept: texts, messages, images, calls
+    all_sleep: float = 20.0  # seconds of real time in which a process is idle; the first half second of each is free
+    all_output_mb: int = 64  # of stored data: texts, messages, images, calls
 
     def all_cpu_of(self, trials: int) -> float:
-        """CPU seconds for ``trials`` trials together."""
+        """Return the CPU seconds for ``trials`` trials together."""
         return self.all_cpu if self.all_cpu is not None else 10 * (self.program_cpu + self.responder_cpu) + trials
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One run that an assignment asks for. ``pose`` is where the robot starts, offset and jitter included."""
+    """One run of an assignment. ``pose`` is the start pose, with offset and jitter applied."""
 
     scenario: Scenario
-    index: int  # counts within the scenario
+    index: int  # index within the scenario
     pose: Pose
     light_noise: float
     motor_noise: float
     seed: int
-    place: int  # which of the scenario's poses it starts from
+    place: int  # index of the scenario's pose
     channel: Channel
     sweep: Coordinates = ()
-    second_pose: Pose | None = None  # of the second robot
+    second_pose: Pose | None = None  # start pose of the second robot
 
 
 @dataclass(frozen=True, slots=True)
 class Assignment:
-    """Frozen by its content: two assignments with the same ``version`` mark alike."""
+    """A frozen assignment. Assignments with the same ``version`` give the same marks."""
 
     id: str
     title: str
@@ -147,26 +147,26 @@ class Assignment:
     scenarios: tuple[Scenario, ...]
     criteria: tuple[AnyCriterion, ...]
     limits: Limits = Limits()
-    section: str = ""  # where in the course's materials the task is set
+    section: str = ""  # section of the course that sets the task
     description: str = ""
-    given: Mapping[str, bytes] = field(default_factory=dict)  # files copied into the responder's folder
+    given: Mapping[str, bytes] = field(default_factory=dict)  # files that are copied into the responder's folder
     given_parts: Mapping[str, str] = field(default_factory=dict)  # name -> source of a given program or responder
     version: str = ""  # SHA-256 of the assignment's folder
     training: Training | None = None
-    secret: str = ""  # keeps the seeds of hidden scenarios from being guessed
+    secret: str = ""  # makes the seeds of hidden scenarios hard to guess
 
     @property
     def max_marks(self) -> Decimal:
-        """The marks that all criteria together can give."""
+        """The sum of the marks of all criteria."""
         return sum((criterion.marks for criterion in self.criteria), Decimal(0))
 
     @property
     def trial_count(self) -> int:
-        """How many trials there are, without making them."""
+        """The number of trials, computed without creating them."""
         return sum(scenario.trial_count for scenario in self.scenarios)
 
     def trials(self, secret: Secret = PUBLIC) -> Iterator[Trial]:
-        """Every trial as the installation with this secret has it, in an order that never changes."""
+        """Return all trials for the installation with this secret, in a fixed order."""
         for scenario in self.scenarios:
             levels = list(
                 itertools.product(
@@ -201,7 +201,7 @@ class Assignment:
                 )
 
     def _places(self, scenario: Scenario, secret: Secret) -> Sequence[int | None]:
-        """Numbers of the poses, in the order in which they are run; None where the trial draws one itself."""
+        """Return the pose numbers in the order of the trials; None if each trial draws its own."""
         places = range(len(scenario.poses))
         match scenario.choose:
             case "random":
@@ -213,19 +213,19 @@ class Assignment:
                 return places
 
     def seed(self, scenario: Scenario, index: int, secret: Secret = PUBLIC) -> int:
-        """Of the world of one trial, the same for every student."""
+        """Return the seed of a trial's world, the same for every student."""
         own = "" if scenario.visibility == "visible" else self.secret
         return world_seed(secret, f"{self.id}\n{scenario.id}\n{index}\n{own}")
 
 
 def _start(scenario: Scenario, place: int, varied: Mapping[str, float], seed: int) -> Pose:
-    """The pose of that number, moved by the swept offsets and by the jitter of the trial."""
+    """Return the pose with this number, with the swept offsets and the trial's jitter applied."""
     offsets = [varied.get(name, 0.0) for name in ("offset_x", "offset_y", "heading")]
     return _moved(scenario, scenario.poses[place], seed, "start jitter", offsets)
 
 
 def _moved(scenario: Scenario, pose: Pose, seed: int, chance: str, by: Sequence[float] = (0.0, 0.0, 0.0)) -> Pose:
-    """The pose, moved by offsets and by the jitter that this stream of chance has for the trial."""
+    """Return the pose with offsets and with the jitter drawn from this random stream."""
     offsets = list(by)
     if any(scenario.start_jitter):
         stream = Stream(seed, chance)

@@ -1,7 +1,7 @@
-"""The example submissions beside an assignment, and what each is expected to get: ``examples/`` and ``expected.toml``.
+"""Example submissions of an assignment and their expected results: ``examples/`` and ``expected.toml``.
 
-They are submissions like any other. An example that shares files with another names it as ``like``, and has only what
-differs.
+Examples have the format of ordinary submissions. With ``like``, an example uses the files of another and contains only
+the differences.
 """
 
 from __future__ import annotations
@@ -34,37 +34,41 @@ _Marks = Annotated[Decimal, BeforeValidator(str)]
 
 
 class Expectation(StrictTable):
-    """What an example must get. ``loses`` are the ids of the criteria, no more and no fewer, without full marks.
+    """Expected result of an example. ``loses`` lists exactly the ids of the criteria without full marks.
 
-    ``earns`` are the marks of single criteria, by id.
+    ``earns`` gives the marks of single criteria by id.
     """
 
     marks: _Marks
-    like: Annotated[str, Slug] = ""  # the example whose other files it has, too
+    like: Annotated[str, Slug] = ""  # the example whose files it also uses
     verdict: Verdict = Verdict.FINISHED
     loses: tuple[str, ...] | None = None
     earns: dict[str, _Marks] = Field(default_factory=dict)
-    feedback: tuple[str, ...] = ()  # each must be in what the student is told
+    feedback: tuple[str, ...] = ()  # each must occur in the feedback
 
 
 class OriginalMeasure(StrictTable):
-    """What a program reached in the original simulator, beside the reference's measure of that name."""
+    """A measured value of a program in the original simulator, compared with the reference's measure of this name."""
 
     measure: str
     value: float
     within: float = Field(default=0.01, ge=0)  # of the value
-    explained: str = ""  # why ours may be further away
+    explained: str = ""  # reason for a larger deviation
 
 
 class Expected(StrictTable):
-    """The file ``expected.toml``: a table for each example, and the original's measures."""
+    """The file ``expected.toml``: a table for each example, and the values measured in the original."""
 
     examples: dict[str, Expectation]
     original: tuple[OriginalMeasure, ...] = ()
 
 
 def examples(assignment: str) -> Path:
-    """The folder with the example submissions of an assignment. Raises UsageError if there are none."""
+    """Return the folder with the example submissions of an assignment.
+
+    Raises:
+        UsageError: There are no examples.
+    """
     folder = assignment_folder(assignment) / EXAMPLES
     if not folder.is_dir():
         raise UsageError(f"There are no examples for {assignment!r}, expected the folder {folder}.")
@@ -72,9 +76,10 @@ def examples(assignment: str) -> Path:
 
 
 def expected(assignment: str) -> Expected:
-    """What the examples of an assignment must get; empty without the file.
+    """Read the expected results of an assignment's examples; empty without the file.
 
-    Raises AssignmentProblems, with all mistakes, where the file cannot be used.
+    Raises:
+        AssignmentProblems: The file cannot be used. The error lists all mistakes.
     """
     path = assignment_folder(assignment) / EXPECTED
     if not path.is_file():
@@ -95,9 +100,11 @@ def expected(assignment: str) -> Expected:
 
 
 def read_example(assignment: str, name: str) -> Submission:
-    """Read the example ``name`` of an assignment, with the files of the example that it is like.
+    """Read the example ``name`` of an assignment, including the files of the example in its ``like``.
 
-    Raises UsageError as ``read_submission`` does, and AssignmentProblems as ``expected`` does.
+    Raises:
+        UsageError: As for ``read_submission``.
+        AssignmentProblems: As for ``expected``.
     """
     asked = find_assignment(assignment).parts
     folder = examples(assignment)
@@ -110,9 +117,12 @@ def read_example(assignment: str, name: str) -> Submission:
 
 
 def add_expected(assignment: str, new: Mapping[str, Expectation]) -> Path:
-    """Appends a table for each of these examples to ``expected.toml``, which is made where there is none.
+    """Append a table for each of these examples to ``expected.toml``, and create the file if necessary.
 
-    What stands there stays as it is. Raises UsageError for an example that has a table already.
+    The existing text does not change.
+
+    Raises:
+        UsageError: An example has a table already.
     """
     known = expected(assignment).examples
     again = [name for name in new if name in known]
@@ -141,5 +151,5 @@ def _key(name: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    # What JSON escapes, TOML's basic strings escape in the same way.
+    # TOML basic strings have the same escapes as JSON strings.
     return json.dumps(text, ensure_ascii=False)

@@ -1,6 +1,6 @@
-"""Makes folders of assignments: a new one to change, a copy of one, and what students may see of one.
+"""Creation of assignment folders: a new assignment, a copy, and the version for students.
 
-Nothing here grades or judges; what a folder must hold is ``reader.py``'s.
+``reader.py`` defines the content of a valid folder.
 """
 
 from __future__ import annotations
@@ -23,9 +23,10 @@ _SLUG = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}")
 
 
 def write_new(folder: Path, like: str | None = None) -> None:
-    """Make ``folder`` from the commented example, or from the assignment ``like``, with its own id.
+    """Create ``folder`` from the commented template, or from the assignment ``like``, with a new id.
 
-    Raises UsageError when the folder exists, cannot be made, or its name is no id.
+    Raises:
+        UsageError: The folder exists or cannot be created, or its name is not a valid id.
     """
     name = Path(os.path.abspath(folder)).name  # noqa: PTH100 - a link keeps the name it was given
     if not _SLUG.fullmatch(name):
@@ -40,23 +41,34 @@ def write_new(folder: Path, like: str | None = None) -> None:
 
 
 def export_whole(assignment: str, target: Path) -> int:
-    """Write the assignment's folder, examples and all; how many files. Raises UsageError when it cannot be written."""
+    """Write the whole folder of the assignment, with examples, and return the number of files.
+
+    Raises:
+        UsageError: The folder cannot be written.
+    """
     source = assignment_folder(assignment)
     read_assignment(source)
     return _write(target, _files(source))
 
 
 def export_for_grading(assignment: str, target: Path) -> int:
-    """Write what the assignment is marked by, without examples; how many files. Raises UsageError as above."""
+    """Write the files that decide the marks, without examples, and return the number of files.
+
+    Raises:
+        UsageError: The folder cannot be written.
+    """
     source = assignment_folder(assignment)
     read_assignment(source)
     return _write(target, {name: data for name, data in _files(source).items() if name.split("/")[0] not in ASIDE})
 
 
 def export_for_students(assignment: str, target: Path) -> int:
-    """Write what students get: the task with the visible criteria, the starter, the given files; how many files.
+    """Write the files for students, and return their number.
 
-    Raises UsageError when it cannot be written.
+    These are the task with the visible criteria, the starter files and the given files.
+
+    Raises:
+        UsageError: The folder cannot be written.
     """
     source = assignment_folder(assignment)
     found = read_assignment(source)
@@ -67,7 +79,7 @@ def export_for_students(assignment: str, target: Path) -> int:
 
 
 def _task(sheet: TaskSheet) -> str:
-    """The task in Markdown."""
+    """Return the task in Markdown."""
     lines = [f"# {sheet.title}", ""]
     if sheet.description:
         lines += [sheet.description, ""]
@@ -83,7 +95,7 @@ def _template() -> Path:
 
 
 def _files(folder: Path) -> Mapping[str, bytes]:
-    """Everything in the folder but what begins with a dot, and what Python leaves behind."""
+    """Return all files in the folder, except dot files and Python's caches."""
     files = {}
     for path in sorted(folder.rglob("*")):
         parts = path.relative_to(folder).parts
@@ -93,7 +105,7 @@ def _files(folder: Path) -> Mapping[str, bytes]:
 
 
 def _write(target: Path, files: Mapping[str, bytes]) -> int:
-    """Everything or nothing: written beside ``target``, then moved there."""
+    """Write all files or none: write them beside ``target``, then rename."""
     if target.exists() or target.is_symlink():
         raise UsageError(f"{target} is there already, expected a new folder or .zip")
     try:

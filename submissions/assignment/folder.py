@@ -1,6 +1,6 @@
-"""Where assignments lie: the catalogue, and the folder that a name or a path means.
+"""Locations of assignments: the catalogue, and the folder for a name or path.
 
-It opens no file; what one says is ``reader.py``'s.
+This module opens no files; ``reader.py`` reads them.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ REFERENCE = "reference"
 
 
 def catalogue() -> tuple[str, ...]:
-    """The ids of the assignments that come with Robomark, sorted."""
+    """Return the ids of the packaged assignments, sorted."""
     return tuple(sorted(folder.name for folder in _catalogue_folder().iterdir() if (folder / FILE_NAME).is_file()))
 
 
 def assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
-    """The folder of the assignment with this id in the catalogue, or this folder itself.
+    """Return the folder of the catalogue assignment with this id, or this folder itself.
 
-    Raises UsageError if there is neither.
+    Raises:
+        UsageError: Neither exists.
     """
     name = os.fspath(name_or_path)
     path = Path(name)

@@ -1,6 +1,6 @@
-"""The parts of an assignment beside robot program and responder: the ``[agents]`` table, and a second robot.
+"""Parts of an assignment besides robot program and responder: the ``[agents]`` table and a second robot.
 
-What a single table may hold is ``schema.py``; the rest of what has to fit together is ``assignment_parts.py``.
+``schema.py`` validates single tables; ``assignment_parts.py`` checks the remaining relations.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from submissions.assignment.problems import Problems, list_of_tables
 from submissions.assignment.schema import PartsTable, ScenarioTable, WorldTable
 from submissions.source_text import decode_source
 
-#: As ``second_program``: what runs on the first robot runs on the second as well.
+#: Value of ``second_program``: the second robot runs the program of the first.
 SAME = "same"
 _MOST = 8
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
-#: What a responder has under these names already, or a report calls otherwise.
+#: Names that a responder already uses, or that reports use with another meaning.
 _TAKEN = frozenset({"robot", "program", "responder", "bridge", "host", "assignment", "msg", "eds"})
 
 
 def read_agents(
     document: Mapping[str, object], parts: PartsTable | None, files: Mapping[str, bytes], problems: Problems
 ) -> tuple[Mapping[str, str], Mapping[str, str]]:
-    """Who gives each agent, by name, and the texts of the files given here; what is wrong goes into ``problems``."""
+    """Return the source of each agent by name, and the texts of the files given here. Add mistakes to ``problems``."""
     table = document.get("agents", {})
     if not isinstance(table, dict):
         problems.add(("agents",), 'agents is no table, expected [agents] and lines like parser = "student"')
@@ -71,7 +71,7 @@ def _source(name: str, files: Mapping[str, bytes], place: tuple[str, str], probl
 
 
 def check_robots(document: Mapping[str, object], world: WorldTable, parts: PartsTable, problems: Problems) -> None:
-    """Each robot has a program and a place to start from, and nobody has those of a robot that is not there."""
+    """Report missing programs or start poses of a robot, and settings for a robot that does not exist."""
     scenarios = list(list_of_tables(document.get("scenario")))
     linked = world.robots == 2 and parts.responder == "none"
     for number, raw in enumerate(scenarios):
@@ -101,7 +101,7 @@ def check_robots(document: Mapping[str, object], world: WorldTable, parts: Parts
 
 
 def second_poses_of(table: ScenarioTable, poses: int, place: Place, problems: Problems) -> tuple[Pose, ...]:
-    """Where the second robot starts for each pose of the first; one is meant for all."""
+    """Return the second robot's start pose for each pose of the first. A single pose applies to all."""
     found = tuple(Pose(*pose) for pose in table.second_poses)
     if len(found) == 1:
         return found * poses

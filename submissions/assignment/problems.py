@@ -1,6 +1,6 @@
-"""The lines and tables of an assignment file as it was written, and its mistakes, each with its line.
+"""Mistakes in an assignment file with their lines, and the positions of keys and tables in the file.
 
-What is a mistake is decided by those who read the tables.
+The modules that read the tables find the mistakes.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ T = TypeVar("T", bound=BaseModel)
 
 
 def find_lines(text: str) -> Mapping[Path, int]:
-    """Line numbers, from 1, by path: ``("scenario", 0, "poses", 2)`` is the third pose of the first scenario."""
+    """Return line numbers, from 1, by path: ``("scenario", 0, "poses", 2)`` is the third pose of the first scenario."""
     scanner = _Scanner(text)
-    with contextlib.suppress(IndexError):  # a text that ends too early: the lines found so far have to do
+    with contextlib.suppress(IndexError):  # If the text ends too early, the lines found so far are returned.
         scanner.document()
     return scanner.lines
 
 
 def line_of(lines: Mapping[Path, int], path: Path) -> int:
-    """The line of the path, else of the nearest thing around it that has one."""
+    """Return the line of the path, or of its nearest parent with a known line."""
     while path and path not in lines:
         path = path[:-1]
     return lines.get(path, 1)
@@ -47,7 +47,7 @@ class _Scanner:
         self._at = 0
         self._line_starts = [0, *accumulate(len(line) + 1 for line in self._text.split("\n"))]
         self.lines: dict[Path, int] = {}
-        self._tables_in: dict[Path, int] = {}  # how many [[tables]] each array has so far
+        self._tables_in: dict[Path, int] = {}  # number of [[tables]] found in each array
 
     def document(self) -> None:
         table: Path = ()
@@ -70,7 +70,7 @@ class _Scanner:
                 self._pair(table)
 
     def _resolve(self, key: list[str]) -> Path:
-        """A header's path: what lies in an array of tables lies in the last of them."""
+        """Return the path of a header. Keys in an array of tables refer to its last table."""
         path: Path = ()
         for part in key[:-1]:
             path = (*path, part)
@@ -137,7 +137,7 @@ class _Scanner:
             if self._at >= len(self._text):
                 raise IndexError
         self._at += len(marks)
-        while len(marks) == 3 and self._text[self._at] == quote:  # quotes may stand right before the closing ones
+        while len(marks) == 3 and self._text[self._at] == quote:  # quotes may come directly before the closing ones
             self._at += 1
 
     def _skip_comma(self) -> None:
@@ -150,7 +150,7 @@ class _Scanner:
             self._at += 1
 
     def _skip_blank(self) -> bool:
-        """Past spaces, newlines and comments; whether anything follows."""
+        """Skip spaces, newlines and comments. Return whether text remains."""
         while self._at < len(self._text):
             if self._text[self._at] in _BLANK:
                 self._at += 1
@@ -169,7 +169,7 @@ class _Scanner:
 
 
 class AssignmentProblems(AssignmentError):
-    """Everything that is wrong with an assignment; ``problems`` has one ``file:line: sentence`` each."""
+    """All mistakes in an assignment; ``problems`` has one ``file:line: sentence`` for each."""
 
     def __init__(self, problems: tuple[str, ...]) -> None:
         super().__init__("\n".join(problems))
@@ -181,28 +181,29 @@ class AssignmentProblems(AssignmentError):
 
 @dataclass(slots=True)
 class Problems:
-    """``where`` is the file as it is shown, ``lines`` where its keys stand."""
+    """Collected mistakes. ``where`` is the displayed file name, ``lines`` the line of each key."""
 
     where: str
     lines: Mapping[Path, int]
     found: list[tuple[int, str]] = field(default_factory=list)
 
     def add(self, path: Path, sentence: str) -> None:
-        """Note what is wrong at the line where this key stands.
+        """Add a mistake at the line of this key.
 
-        Raises AssignmentProblems where there are so many that nobody reads them: a file can have one in every key.
+        Raises:
+            AssignmentProblems: The number of mistakes exceeds its limit. A file can have one in every key.
         """
         self.found.append((line_of(self.lines, path), sentence))
         if len(self.found) > _MOST:
             raise AssignmentProblems((*self.sorted(), f"{self.where}:1: has more mistakes, which were not looked for"))
 
     def sorted(self) -> tuple[str, ...]:
-        """``file:line: sentence``, in the order of the lines."""
+        """Return ``file:line: sentence`` for each mistake, sorted by line."""
         return tuple(f"{self.where}:{line}: {sentence}" for line, sentence in sorted(dict.fromkeys(self.found)))
 
 
 def checked_table(schema: type[T], table: object, place: Path, problems: Problems) -> T | None:
-    """The table as the schema has it; None, and its mistakes in ``problems``, if it cannot be read."""
+    """Validate a table with the schema. Add mistakes to ``problems`` and return None if there are any."""
     result = read_table(schema, table)
     if isinstance(result, schema):
         return result
@@ -212,7 +213,7 @@ def checked_table(schema: type[T], table: object, place: Path, problems: Problem
 
 
 def tables_of(document: Mapping[str, object], key: str, problems: Problems) -> list[dict[str, Any]]:
-    """The tables of a list that must have at least one."""
+    """Return the tables of a list that must not be empty."""
     value = document.get(key)
     if value is None or value == []:
         problems.add((), f"there is no [[{key}]], expected at least one")
@@ -222,17 +223,17 @@ def tables_of(document: Mapping[str, object], key: str, problems: Problems) -> l
 
 
 def list_of_tables(value: object) -> list[dict[str, Any]]:
-    """The tables among what stands there."""
+    """Return the tables in a value of any type."""
     return [item for item in value if isinstance(item, dict)] if isinstance(value, list) else []
 
 
 def texts_in(value: object) -> list[str]:
-    """The texts among what stands there."""
+    """Return the texts in a value of any type."""
     return [item for item in value if isinstance(item, str)] if isinstance(value, list) else []
 
 
 def no_double(raw: Mapping[str, object], seen: dict[str, int], place: Path, kind: str, problems: Problems) -> None:
-    """Names an id that an earlier table of that kind has."""
+    """Report an id that an earlier table of this kind already has."""
     name = raw.get("id")
     if not isinstance(name, str):
         return

@@ -1,6 +1,6 @@
-"""From an assignment's folder (``assignment.toml`` and the files it gives) to an ``Assignment``.
+"""Reader of assignment folders: ``assignment.toml`` and its files to an ``Assignment``.
 
-All mistakes are found in one go, each with file, line and what was expected; nothing of the folder is run.
+All mistakes are reported together, each with file, line and expected form. Files in the folder are not executed.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from submissions.assignment.folder import FILE_NAME, assignment_folder, catalogu
 from submissions.assignment.problems import AssignmentProblems, Problems, find_lines
 from submissions.nearest import did_you_mean
 
-#: What lies in an assignment's folder beside what it is marked by: it may change without changing a mark.
+#: Files in an assignment's folder that do not affect marks.
 ASIDE = ("starter", "examples", "expected.toml")
 _MAX_FOLDER_BYTES = 128 * 1024 * 1024
 _MAX_TOML_BYTES = 1024 * 1024
 _SYNTAX = re.compile(r"^(?P<what>.*?) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)$")
-#: What the usual mistakes come to, by how ``tomllib`` begins its sentence.
+#: Plain explanations of common mistakes, by the start of the message from ``tomllib``.
 _PLAINER = MappingProxyType(
     {
         "invalid value": ": texts stand in quotes, numbers do not",
@@ -39,17 +39,20 @@ _PLAINER = MappingProxyType(
 
 
 def find_assignment(name_or_path: str | os.PathLike[str]) -> Assignment:
-    """The assignment with this id in the catalogue, or in this folder.
+    """Read the assignment with this id in the catalogue, or in this folder.
 
-    Raises UsageError if there is neither, AssignmentProblems for an assignment that cannot be used.
+    Raises:
+        UsageError: Neither exists.
+        AssignmentProblems: The assignment cannot be used.
     """
     return read_assignment(assignment_folder(name_or_path))
 
 
 def find_in_catalogue(name: str) -> Assignment:
-    """The assignment of the catalogue with this id, which a submission names; never a folder that it could bring.
+    """Read the catalogue assignment with this id, named by a submission. Paths are never accepted.
 
-    Raises UsageError if there is none.
+    Raises:
+        UsageError: The catalogue has no such assignment.
     """
     ids = catalogue()
     if name not in ids:
@@ -59,7 +62,11 @@ def find_in_catalogue(name: str) -> Assignment:
 
 
 def read_assignment(folder: Path) -> Assignment:
-    """The assignment in ``folder``. Raises AssignmentProblems, with all mistakes, if it cannot be used."""
+    """Read the assignment in ``folder``.
+
+    Raises:
+        AssignmentProblems: The assignment cannot be used. The error lists all mistakes.
+    """
     folder = Path(os.path.abspath(folder))  # noqa: PTH100 - resolve() would change the name that is shown
     where = f"{folder.name}/{FILE_NAME}"
     if not folder.is_dir():
@@ -76,7 +83,11 @@ def read_assignment(folder: Path) -> Assignment:
 
 
 def parse(data: bytes, where: str) -> tuple[str, dict[str, object]]:
-    """The text of a TOML file and what it says. Raises AssignmentProblems, with ``where`` and the line."""
+    """Return the text of a TOML file and its content.
+
+    Raises:
+        AssignmentProblems: The file cannot be parsed. The message has ``where`` and the line.
+    """
     if len(data) > _MAX_TOML_BYTES:
         raise AssignmentProblems((f"{where}:1: the file is too large, expected at most 1 MB",))
     try:
@@ -104,7 +115,7 @@ def _syntax_problem(message: str, where: str, text: str) -> str:
 
 
 def _folder_files(folder: Path) -> Mapping[str, bytes]:
-    """What the assignment is marked by, by its path in the folder; dot files and what Python leaves are left out."""
+    """Return the files that decide the marks, by path in the folder. Dot files and Python's caches are omitted."""
     files: dict[str, bytes] = {}
     size = 0
     for path in sorted(folder.rglob("*")):

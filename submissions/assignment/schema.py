@@ -1,6 +1,6 @@
-"""What may stand in an assignment file: one schema a table, and what is wrong with a table in words.
+"""Schemas of the tables in an assignment file, with error messages for invalid tables.
 
-A table by itself; what has to fit between tables, and the files beside them, is ``reader.py``.
+Each table is validated by itself. ``reader.py`` checks relations between tables, and the files beside them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from submissions.sweep import CONDITIONS
 
 T = TypeVar("T", bound=BaseModel)
 Levels = Annotated[tuple[float, ...], Field(max_length=100)]
-#: More of one table are not put into words; comparing them takes the square of their number.
+#: Maximum number of mistakes reported per table, because comparing them takes quadratic time.
 _MOST_PROBLEMS = 200
 Slug = Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=80)
 
@@ -34,16 +34,16 @@ class HeadTable(StrictTable):
 
     id: str = Slug
     title: str = Field(min_length=1, max_length=200)
-    section: str = Field(default="", max_length=80)  # of the course's materials: 02.2 §2.2.1
+    section: str = Field(default="", max_length=80)  # of the course: 02.2 §2.2.1
     description: str = Field(default="", max_length=20_000)
     given: tuple[str, ...] = ()
     given_models: dict[str, str] = Field(default_factory=dict)
     aliases: dict[str, tuple[str, ...]] = Field(default_factory=dict)  # of labels, for every classification
-    secret: str = Field(default="", max_length=200)  # decides the seeds of scenarios that are not visible
+    secret: str = Field(default="", max_length=200)  # contributes to the seeds of scenarios that are not visible
 
 
 class WorldTable(StrictTable):
-    """The floor, what stands on it, and the robot with its physics."""
+    """The floor with its objects, and the robot with its physics."""
 
     background: str = "Empty_Map"
     labels: bool = True
@@ -82,7 +82,7 @@ class WorldTable(StrictTable):
 
 
 class PartsTable(StrictTable):
-    """Whose program and responder are run, and which cell of a notebook is the program."""
+    """Source of the program and the responder, and the cell of a notebook that has the program."""
 
     program: str = Field(default="student", min_length=1)
     second_program: str = Field(default="student", min_length=1)
@@ -101,7 +101,7 @@ class PartsTable(StrictTable):
 
 
 class ChannelTable(StrictTable):
-    """What becomes of messages on their way: delays in seconds, shares as probabilities, an infrared link in mm."""
+    """Effects of the channel: delays in seconds, probabilities, and an infrared link in mm."""
 
     link: Literal["cable", "infrared", "between robots"] = "cable"
     beacon: Annotated[tuple[float, float], Entries("[x, y]")] | None = None
@@ -131,7 +131,7 @@ class ChannelTable(StrictTable):
 
 
 class SweepTable(StrictTable):
-    """One list of levels for each condition that is varied."""
+    """Lists of levels, one for each varied condition."""
 
     offset_x: Levels = ()
     offset_y: Levels = ()
@@ -151,7 +151,7 @@ class SweepTable(StrictTable):
 
 
 class ScenarioTable(StrictTable):
-    """Where and under what conditions trials begin, and how many there are."""
+    """Start poses, conditions and number of trials."""
 
     id: str = Slug
     title: str = Field(default="", max_length=200)
@@ -200,7 +200,7 @@ class ScenarioTable(StrictTable):
 
 
 class TrainingTable(StrictTable):
-    """Which scenarios' images a submitted function is trained with."""
+    """Scenarios whose images train a submitted function."""
 
     scenarios: tuple[str, ...] = Field(min_length=1)
     function: str = Field(default="train", pattern=r"^[A-Za-z_]\w*$", max_length=80)
@@ -208,7 +208,7 @@ class TrainingTable(StrictTable):
 
 
 class LimitsTable(StrictTable):
-    """What one trial, and what all of them together (``all_``), may take."""
+    """Limits for one trial, and for all trials together (``all_``)."""
 
     program_cpu: float = Field(default=5.0, gt=0, le=120)
     responder_cpu: float = Field(default=10.0, gt=0, le=120)
@@ -222,16 +222,16 @@ class LimitsTable(StrictTable):
 
 @dataclass(frozen=True, slots=True)
 class TableProblem:
-    """Where in the table, and what is wrong with it."""
+    """A mistake in a table: its path and a sentence."""
 
     path: tuple[str | int, ...]
     sentence: str
 
 
 def read_table(schema: type[T], table: object) -> T | list[TableProblem]:
-    """The table as the schema has it, or all that is wrong with it."""
+    """Validate a table with the schema. Return the model, or a list of all mistakes."""
     try:
-        # JSON is strict about types, and lets a list be a tuple.
+        # Pydantic's JSON mode is strict about types, but accepts a list for a tuple.
         return schema.model_validate_json(json.dumps(table, default=_foreign), strict=True)
     except ValidationError as error:
         found = error.errors(include_url=False)[:_MOST_PROBLEMS]
@@ -240,7 +240,7 @@ def read_table(schema: type[T], table: object) -> T | list[TableProblem]:
 
 
 def _follows(details: ErrorDetails, places: list[tuple[str | int, ...]]) -> bool:
-    """Whether a list is called too short only because its entries were refused."""
+    """Return whether a list counts as too short only because its entries were rejected."""
     place = details["loc"]
     return details["type"] == "too_short" and any(
         len(other) > len(place) and other[: len(place)] == place for other in places
@@ -259,7 +259,7 @@ def _in_range(values: tuple[float, ...], most: float, least: float = 0) -> tuple
 
 
 def _foreign(value: object) -> dict[str, str]:
-    """Dates and times, which no key takes: made into something that no key takes either."""
+    """Convert dates and times, which no key accepts, to a table that no key accepts either."""
     return {"date": str(value)}
 
 
@@ -286,7 +286,7 @@ _TYPES: Mapping[str, str] = {
 
 
 def problem_of(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
-    """One of pydantic's errors in our words, with its place in the table of that schema."""
+    """Convert a pydantic error to a sentence and its path in the table."""
     path = tuple(part for part in details["loc"])
     name = str(path[-1]) if path else ""
     context: Mapping[str, Any] = details.get("ctx", {})
@@ -326,7 +326,7 @@ def problem_of(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
 
 
 def _key_in(sentence: str, table: object) -> tuple[str, ...]:
-    """The key of the table that a sentence about the whole table names, to point at its line; none if it names none."""
+    """Return the key that a sentence about the whole table mentions, to locate its line; empty if it mentions none."""
     words = re.findall(r"\w+", sentence.partition(", expected")[0])
     return tuple([word for word in words if isinstance(table, dict) and word in table][:1])
 
@@ -342,14 +342,14 @@ def _unknown_key(schema: type[BaseModel], path: tuple[str | int, ...]) -> str:
 
 
 def _table_in(annotation: object) -> type[BaseModel] | None:
-    """The schema of the tables that a key takes, alone or in a list."""
+    """Return the schema of the tables that a key accepts, single or in a list."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return next((found for part in get_args(annotation) if (found := _table_in(part))), None)
 
 
 def _called(path: tuple[str | int, ...]) -> str:
-    """``poses[2]``, ``channel.delay``."""
+    """Return the path as text: ``poses[2]``, ``channel.delay``."""
     words = ""
     for part in path:
         words += f"[{part}]" if isinstance(part, int) else f".{part}" if words else part
@@ -357,7 +357,7 @@ def _called(path: tuple[str | int, ...]) -> str:
 
 
 def _shape(schema: type[BaseModel], path: tuple[str | int, ...]) -> str:
-    """What the entries of a list of fixed length are, as the type of its key says."""
+    """Describe the entries of a list of fixed length, from the type of its key."""
     shape = None
     for key in path:
         field = _fields(schema).get(str(key))

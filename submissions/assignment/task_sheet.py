@@ -1,6 +1,7 @@
-"""What students may read of an assignment: the task, the visible criteria, what to submit, and the given files.
+"""Task sheet: the parts of an assignment that students may read.
 
-The one place that decides it; pages, the API and exported folders lay it out.
+It has the task, the visible criteria, the files to submit and the given files. Pages, the API and exported folders all
+use it.
 """
 
 from __future__ import annotations
@@ -15,25 +16,25 @@ from submissions.submission import PART_FILES, SECOND_PROGRAM
 
 @dataclass(frozen=True, slots=True)
 class TaskSheet:
-    """An assignment for students. ``more_marks`` are for what is marked and not told."""
+    """An assignment for students. ``more_marks`` is the sum for criteria that are not visible."""
 
     id: str
     title: str
     section: str
     description: str
     asked: tuple[str, ...]  # files, by name
-    notebook: bool  # whether one notebook will do for all that is asked
+    notebook: bool  # one notebook can replace all files
     criteria: tuple[tuple[str, Decimal], ...]
-    max_marks: Decimal  # of these
+    max_marks: Decimal  # of the visible criteria
     more_marks: Decimal
     background: str
     robot: str
-    seconds: float | None  # of the longest trial that is shown
-    given: Mapping[str, bytes]  # their names and what is in them
+    seconds: float | None  # of the longest visible trial
+    given: Mapping[str, bytes]  # names and contents
 
 
 def task_sheet(assignment: Assignment) -> TaskSheet:
-    """Of what is not visible to students it says only that there is more."""
+    """Return the task sheet. Criteria that are not visible contribute only to ``more_marks``."""
     shown = tuple((each.title, each.marks) for each in assignment.criteria if each.visibility == "visible")
     marks = sum((marks for _, marks in shown), Decimal(0))
     seconds = [each.seconds for each in assignment.scenarios if each.visibility == "visible"]

@@ -1,6 +1,6 @@
-"""Reading an instructor's own truths from a CSV file beside the assignment: labelled places, or calls of a function.
+"""Reader of an instructor's CSV files of known answers: labelled places, or calls of a function.
 
-Only what is true; judging by it is the service's.
+``service`` compares submissions with these answers.
 """
 
 from __future__ import annotations
@@ -14,16 +14,17 @@ from sim.readers.csv_text import read_rows
 from sim.readers.unreadable import Unreadable
 from submissions.strict_table import Entries
 
-#: x, y (mm) and what is there.
+#: x and y in mm, and the label.
 LabelledPlace = Annotated[tuple[float, float, str], Entries("[x, y, label]")]
 _MOST_PLACES = 10_000
 _MOST_CALLS = 1000
 
 
 def read_places(name: str, files: Mapping[str, bytes]) -> tuple[LabelledPlace, ...]:
-    """The rows of the file: x and y (mm) and a label; a first row ``x,y,label`` and empty rows are passed over.
+    """Read rows of x and y (mm) and a label. A header row ``x,y,label`` and empty rows are skipped.
 
-    Raises UsageError, with the line, for a file or a row that cannot be used.
+    Raises:
+        UsageError: The file or a row cannot be used. The message has the line.
     """
     rows = _rows(name, files, "places", "x, y, label")
     if len(rows) > _MOST_PLACES:
@@ -38,9 +39,10 @@ def read_places(name: str, files: Mapping[str, bytes]) -> tuple[LabelledPlace, .
 
 
 def read_table(name: str, files: Mapping[str, bytes]) -> tuple[tuple[str, ...], ...]:
-    """The rows of the file below its headings, each as long as these.
+    """Read the rows below the header. Each must have as many cells as the header.
 
-    Raises UsageError, with the line, for a file or a row that cannot be used.
+    Raises:
+        UsageError: The file or a row cannot be used. The message has the line.
     """
     headings, *rows = _rows(name, files, "table", "an answer and arguments") or [[]]
     kept = [(number, row) for number, row in enumerate(rows, start=2) if any(row)]
