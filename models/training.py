@@ -23,7 +23,8 @@ def train(name: str, folder: Path) -> Card:
     """Train the classifier ``name`` and write its weights and card into ``folder``.
 
     Raises:
-        UsageError: The model cannot be trained on this computer, or the folder cannot be written.
+        UsageError: The name is unknown, a package with the training data is missing, or the folder cannot be created.
+        HostError: The training process failed.
     """
     known = tasks()
     if name not in known:

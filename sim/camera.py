@@ -243,7 +243,7 @@ class Cameras:
         self._cameras: OrderedDict[int, tuple[Bytes, CachedCamera]] = OrderedDict()
 
     def camera(self, pixels: Bytes) -> CachedCamera:
-        """Return the camera over ``image``, which must not change afterwards."""
+        """Return the camera over the floor ``pixels``, which must not change afterwards."""
         held = self._cameras.pop(id(pixels), None)
         self.close()
         if held is None:

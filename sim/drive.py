@@ -54,8 +54,8 @@ class Wheel:
     def change_speed(self, most: float, noise: float, both_directions: bool = False) -> None:
         """Move the speed towards its set point. Without ``both_directions``, negative speeds get no rounding or noise.
 
-        The original does not limit negative speeds either. A program that bypassed the brick's checks and asked for
-        more than the motor's maximum would win every race.
+        Unlike the original, this method limits negative speeds. Otherwise a program that bypasses the brick's checks
+        could ask for more than the motor's maximum and win every race.
         """
         if self.speed < self.speed_sp:
             self.speed = min(self.speed + most, self.speed_sp)

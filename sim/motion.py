@@ -41,7 +41,7 @@ class Motion(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Physics:
-    """Use of Bullet besides cameras and rays: contact with walls and obstacles, and the wheels."""
+    """Use of Bullet in addition to cameras and rays: contact with walls and obstacles, and the wheels."""
 
     solid: bool = False
     drive: Literal["course", "wheels"] = "course"

@@ -1,6 +1,6 @@
 """Plain floors: bands, gradients, loops and simple outlines, in image coordinates (both edges included).
 
-Shapes, tracks, digit sheets, the test card and competition mats have modules of their own.
+Shapes, tracks, digit sheets, the test card and competition mats are in other modules.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Parts of an assignment besides robot program and responder: the ``[agents]`` table and a second robot.
+"""Additional parts of an assignment: agents (the ``[agents]`` table) and a second robot.
 
 ``schema.py`` validates single tables; ``assignment_parts.py`` checks the remaining relations.
 """

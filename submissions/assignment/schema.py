@@ -1,6 +1,6 @@
 """Schemas of the tables in an assignment file, with error messages for invalid tables.
 
-Each table is validated by itself. ``reader.py`` checks relations between tables, and the files beside them.
+Each table is validated by itself. ``assignment_parts.py`` checks relations between tables, and the files beside them.
 """
 
 from __future__ import annotations

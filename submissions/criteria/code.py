@@ -93,7 +93,7 @@ class SourceRules(Criterion):
         return tuple(name for name in names if all(part.isidentifier() for part in name.split(".")))
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:
-        """Yield a problem if nobody writes the part whose source is analysed."""
+        """Yield a problem if the part whose source is analysed does not exist."""
         yield from _without("part", self.part, around)
 
     @model_validator(mode="after")

@@ -52,7 +52,7 @@ class Surroundings:
 
     scenarios: Sequence[Scenario] = ()
     ground: Floor | None = None
-    without: frozenset[str] = frozenset()  # parts (program, responder) that nobody writes
+    without: frozenset[str] = frozenset()  # parts (program, responder) set to ``none``
     agents: frozenset[str] = frozenset()
     robots: int = 1
     files: Mapping[str, bytes] = field(default_factory=dict)
@@ -144,9 +144,9 @@ class AmongMany(Criterion):
     """Base class of criteria that look for items among everything a program prints, says, sends or logs.
 
     A program that outputs every possible item would also output the expected ones. Therefore extra items count as
-    strays: an expected item in the wrong position, or another item of the same type. ``strays`` is the number allowed
-    without a penalty; the default is the number of expected items. Each further stray reduces the score as much as one
-    missing item.
+    strays. An expected item in the wrong position is one stray; 20 other items of the same type are one stray.
+    ``strays`` is the number allowed without a penalty; the default is the number of expected items. Each further stray
+    reduces the score as much as one missing item.
     """
 
     strays: int | None = Field(default=None, ge=0)

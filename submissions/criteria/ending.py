@@ -15,7 +15,7 @@ from submissions.strict_table import StrictTable
 
 
 class Finishes(Criterion):
-    """The program ends by itself and without a fault of its own, within ``seconds`` if given.
+    """The program ends by itself and without a fault in its code, within ``seconds`` if given.
 
     Errors of the responder do not count as a fault of the program. Exceeding the limits on time, CPU or memory does.
     """

@@ -90,10 +90,12 @@ class Area(StrictTable):
 class LineToFollow(StrictTable):
     """A line to drive along, with its direction.
 
-    ``on`` names a line of a floor (``Line_Following_Test/141``, ``Thruxton_Circuit``). ``points`` lists corners.
-    ``ellipse`` is [x, y, horizontal radius, vertical radius], and ``arc`` selects its part between two angles in
-    degrees anticlockwise from the right; it runs clockwise if the second angle is smaller. ``closed`` joins the end to
-    the beginning; Thruxton's circuit is always closed.
+    - ``on``: a line of a floor (``Line_Following_Test/141``, ``Thruxton_Circuit``).
+    - ``points``: the corners.
+    - ``ellipse``: [x, y, horizontal radius, vertical radius].
+    - ``arc``: the part of the ellipse between two angles, in degrees anticlockwise from the right. The arc runs
+      clockwise if the second angle is smaller.
+    - ``closed``: the end is joined to the beginning. Thruxton's circuit is always closed.
     """
 
     on: str | None = None
@@ -144,7 +146,7 @@ class LineToFollow(StrictTable):
 
     @property
     def is_closed(self) -> bool:
-        """Whether the end of the line joins its beginning."""
+        """True if the end of the line joins its beginning."""
         return (
             self.closed
             or self.on == "Thruxton_Circuit"

@@ -29,7 +29,7 @@ class Recognition(Criterion):
     - ``"label"``: the label of the floor under the left sensor.
     - ``"grey"``: the label patch in the right sensor's image, decoded as in the course.
     - ``"places"``: ``places``, a list of [x, y, label] or a CSV file with such rows beside the assignment. An entry
-      applies if the left sensor's centre is ``within`` this many mm.
+      applies within ``within`` mm of the left sensor's centre.
     - a list: one label for each pose of the scenario.
 
     On an instructor's own image, ``greys`` defines the label patches: ``"shapes"`` or ``"digits"`` as in the course, or

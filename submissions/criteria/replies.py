@@ -22,10 +22,10 @@ class Replies(BetweenAgents, TextConditions):
     ``{ one_of = [...] }`` lists alternatives. ``in_order`` lists the exact answers to the messages that reached the
     responder, in the order of these messages.
 
-    Otherwise, every robot message that reached the responder must have an answer that meets the conditions, and at
-    least ``at_least`` (default 1) different answers are required. ``to`` and ``to_starts_with`` select the messages.
-    ``is_json`` requires ``JSON::`` and valid JSON. With ``path``, the conditions, ``value`` and ``expect`` apply to
-    that place in the JSON (``message.typ``), otherwise to the whole answer.
+    Otherwise, every robot message that reached the responder must have an answer that meets the conditions, and there
+    must be ``at_least`` (default 1) different messages. ``to`` and ``to_starts_with`` select the messages. ``is_json``
+    requires ``JSON::`` and valid JSON. With ``path``, the conditions, ``value`` and ``expect`` apply to that place in
+    the JSON (``message.typ``), otherwise to the whole answer.
     """
 
     check: Literal["replies"]

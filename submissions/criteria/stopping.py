@@ -19,7 +19,7 @@ class StopOn(Criterion):
     - ``reflected``: [least, most] in percent, as ``reflected_light_intensity_pc`` reads it.
     - ``rgb``: a colour; each channel may differ by ``rgb_tolerance``.
     - ``zone``: [left, bottom, right, top] in mm.
-    - ``near``: a point; the sensor must be ``within`` this many mm.
+    - ``near``: a point; the sensor's maximum distance is ``within`` mm.
     - ``sensor = "either"``: one of the two sensors is enough.
     - ``off_floor``: black outside the floor counts too.
     - ``still``: the time in seconds without motion before the program ends.
