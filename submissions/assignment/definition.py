@@ -112,7 +112,7 @@ class Limits:
     responder_memory_mb: int = 512
     output_bytes: int = 1_000_000
     all_cpu: float | None = None
-    all_sleep: float = 20.0  # seconds of real time in which a process is idle; the first half second of each is free
+    all_sleep: float = 20.0  # seconds of real time in which processes are idle, after half a second for each
     all_output_mb: int = 64  # of stored data: texts, messages, images, calls
 
     def all_cpu_of(self, trials: int) -> float:

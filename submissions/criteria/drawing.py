@@ -23,7 +23,7 @@ class Drawing(Criterion):
     ``angle`` can then be a list too.
 
     - ``shortest``: the minimum length of a leg, mm.
-    - ``equal_within``: the maximum difference between legs of a figure, as a share of their mean.
+    - ``equal_within``: the maximum deviation of a leg from the mean leg of its figure, as a share of the mean.
     - ``angle``, ``angle_within``: the angle between successive legs and its tolerance, degrees.
     - ``closes``: the figure ends at its start, within ``closes_within`` mm or a tenth of a leg, whichever is more.
     - ``sizes``: [least, most] of the mean leg, one for each figure.
