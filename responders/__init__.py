@@ -1,1 +1,1 @@
-"""Programs and what answers them: the bridge between a running robot and a responder, and the messages between."""
+"""Robot programs and responders: the bridge between a running robot and its responder, and the message formats."""

@@ -1,6 +1,7 @@
-"""The agents of a submission during one trial: a process each, and what they and the responder tell one another.
+"""The agents of a submission during one trial, and the questions that they and the responder ask each other.
 
-Agents speak through here alone, one question at a time; which texts of the robot's start it all is the bridge's.
+Each agent runs in its own process. All questions pass through this module, one at a time. The bridge decides which
+robot messages reach the responder in the first place.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from sim.readers.json_text import read_json
 from sim.recording import SECOND, AgentMessage, AgentOutput, Fault, Recording, Verdict
 from sim.world import Chain
 
-#: How many questions a trial may have between the responder and its agents.
+#: Maximum number of questions per trial between the responder and its agents.
 _MOST_QUESTIONS = 10_000
 _MOST_NOTES = 200
 _LONGEST_TYPE = 100
@@ -34,7 +35,7 @@ _NOT_JSON = object()
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What an asker is told: a value as JSON, or a sentence that is raised there; and how long that took."""
+    """Reply to a question: a JSON value or an error message to raise in the asker, and how long the agent slept."""
 
     kind: Literal["value", "error"]
     text: str
@@ -43,7 +44,7 @@ class Told:
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """How much the agents had said, done wrong and called at some moment."""
+    """Counts of agent messages, faults and calls at one point in the trial."""
 
     messages: int = 0
     faults: int = 0
@@ -51,7 +52,10 @@ class Position:
 
 
 class Agents:
-    """All agents of one trial or notebook. ``ask`` never raises for what an agent does."""
+    """All agents of one trial or notebook.
+
+    ``ask`` raises no exception for faults of an agent; it records them and returns an error.
+    """
 
     def __init__(
         self,
@@ -61,16 +65,16 @@ class Agents:
         meter: JobMeter,
         stack: contextlib.ExitStack,
     ) -> None:
-        """Their processes and folders end with ``stack``."""
+        """Start one process and one private folder per agent; both are closed with ``stack``."""
         self.messages: list[AgentMessage] = []
         self.faults: list[Fault] = []
         self.notes: list[str] = []
         self._meter = meter
         self._chain = Chain()
         self._outputs: list[AgentOutput] = []
-        self._waiting: list[str] = []  # whose answer is waited for, the first that was asked first
+        self._waiting: list[str] = []  # agents that are waiting for an answer, outermost first
         self._loaded = False
-        self._unloadable = 0  # how many faults come of loading
+        self._unloadable = 0  # number of faults from loading
         self._processes: dict[str, AgentProcess] = {}
         for name, each in specs.items():
             folder = stack.enter_context(sandboxes.private_folder())
@@ -78,11 +82,11 @@ class Agents:
             stack.callback(self._processes[name].close)
 
     def others(self, asker: str) -> Sequence[str]:
-        """The names of those whom the responder, or an agent, may ask."""
+        """Return the names of the agents that ``asker`` (the responder or an agent) may ask."""
         return [name for name in self._processes if name != asker]
 
     def load(self) -> None:
-        """Run their modules; until all have been run, none can be asked."""
+        """Load the module of each agent. Questions are refused until all agents are loaded."""
         for name, process in self._processes.items():
             fault = process.load()
             if fault is not None and process.given:
@@ -94,13 +98,20 @@ class Agents:
         self._unloadable = len(self.faults)
 
     def faults_since(self, since: Position) -> Sequence[Fault]:
-        """Faults of agents that could not be loaded, and those of all since then."""
+        """Return all loading faults, and the other faults recorded since ``since``."""
         return (*self.faults[: self._unloadable], *self.faults[max(since.faults, self._unloadable) :])
 
     def ask(self, asker: str, question: wire.Frame, t: int, message: int) -> Told:
-        """What the agent says that ``question`` names, asked at ``t`` while the robot's ``message`` is answered.
+        """Ask the agent named in ``question`` and return its reply.
 
-        Raises ChildStopped for what no honest asker sends.
+        Args:
+            asker: The responder or the agent that asks.
+            question: The frame with the agent's name and the arguments.
+            t: The time of the question, in units of simulated time.
+            message: The index of the robot's message that is being answered.
+
+        Raises:
+            ChildStopped: If the frame is invalid, or the limit on questions is exceeded.
         """
         name = question["agent"]
         process = self._processes.get(name)
@@ -126,16 +137,16 @@ class Agents:
         return told
 
     def position(self) -> Position:
-        """How much they have said, done wrong and called so far."""
+        """Return the current counts of messages, faults and calls."""
         calls = {name: len(process.calls) for name, process in self._processes.items()}
         return Position(len(self.messages), len(self.faults), MappingProxyType(calls))
 
     def seal(self, chain: Chain, now: int) -> None:
-        """Add what was said so far to the chain of a run that ends."""
+        """Add the digest of all agent messages so far to the hash chain of a run that ends."""
         chain.add("agents", now, self._chain.hexdigest().encode())
 
     def finish(self) -> None:
-        """End their processes and read back what they have written."""
+        """End the agents' processes and collect their output, logs and notes."""
         for name, process in self._processes.items():
             process.close()
             log, unread = read_log(process.folder, self._meter, name)
@@ -145,7 +156,7 @@ class Agents:
             self.notes += process.notes
 
     def add_talk(self, recording: Recording, since: Position) -> Recording:
-        """The recording with what the agents have said and called since then."""
+        """Return the recording with the agent messages and calls since ``since``."""
         talk = [
             replace(each, reply_to=None if each.reply_to is None else each.reply_to - since.messages)
             for each in self.messages[since.messages :]
@@ -159,11 +170,15 @@ class Agents:
         )
 
     def add_outputs(self, recording: Recording) -> Recording:
-        """The recording with what the agents have printed and written until they were ended."""
+        """Return the recording with the output and logs of all agents. Call ``finish`` first."""
         return replace(recording, agent_outputs=tuple(self._outputs))
 
     def failed(self, name: str, fault: Fault, why: str, slept: int) -> Told:
-        """What an asker is told of an agent's fault, which is kept unless an asker may have brought it about."""
+        """Return the error that the asker receives when agent ``name`` fails.
+
+        Records the fault, unless a given agent failed but is still running: the asker may have caused that, so it
+        becomes a note.
+        """
         process = self._processes[name]
         sentence = f"{name} gave no answer: {why}"
         if not process.given or not process.alive:
@@ -182,7 +197,7 @@ class Agents:
 
     def _note(self, sender: str, receiver: str, value: Any, t: int, message: int, reply_to: int | None = None) -> None:
         text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
-        text = text.encode("utf-8", "replace").decode("utf-8")  # no halves of characters, which nobody can store
+        text = text.encode("utf-8", "replace").decode("utf-8")  # replace lone surrogates, which can't be stored
         self._meter.keep(len(text))
         self.messages.append(
             AgentMessage(t / SECOND, sender, receiver, text, message, reply_to, is_text=isinstance(value, str))
@@ -195,7 +210,7 @@ class Agents:
 def agents_beside(
     specs: Mapping[str, AgentSpec], seed: int, sandboxes: Sandboxes, meter: JobMeter
 ) -> Iterator[Agents | None]:
-    """These agents in fresh processes, loaded; None, and no cost, where there are none."""
+    """Yield the agents, loaded in fresh processes, or None if there are none."""
     with contextlib.ExitStack() as stack:
         if not specs:
             yield None
@@ -206,7 +221,7 @@ def agents_beside(
 
 
 class AgentProcess(ResponderProcess):
-    """The process of one agent, which is asked for values instead of texts."""
+    """The process of one agent. It answers questions with values instead of texts."""
 
     def __init__(
         self,
@@ -227,7 +242,7 @@ class AgentProcess(ResponderProcess):
         self.folder = folder
 
     def answer_question(self, question: wire.Frame, t: int, message: int) -> Told:
-        """What it makes of a question. Never raises for what the student's code does."""
+        """Return the agent's reply to a question. Raises no exception for errors in student code."""
         if self._child is None:
             return self._ended or Told("error", f"{self._who} gave no answer: it could not be loaded")
         self._message, self._asked_at, self._slept = message, t, 0
@@ -259,7 +274,7 @@ class AgentProcess(ResponderProcess):
                 return Told("value", text, self._slept)
             case {"kind": "error", "error": error}:
                 fault = error_fault(error, self._asked_at + self._slept, self._who)
-                # A RuntimeError tells an asker of another agent's fault; only the first cause is passed on.
+                # A RuntimeError reports the fault of another agent. Only the original cause is passed on.
                 why = str(error["text"] or fault.message) if error["type"] == "RuntimeError" else fault.message
                 return self._all.failed(self._who, fault, why, self._slept)
             case {"kind": "other", "type": kind}:
@@ -274,7 +289,11 @@ class AgentProcess(ResponderProcess):
 
 
 def _content(text: str, kind: type) -> Any:
-    """What a message holds. Raises ChildStopped where that is not JSON, or not of this kind."""
+    """Return the decoded JSON content of a message.
+
+    Raises:
+        ChildStopped: If the text is not valid JSON or not of type ``kind``.
+    """
     try:
         value = read_json(text, parse_constant=_no_constant)
     except ValueError:

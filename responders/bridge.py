@@ -1,7 +1,7 @@
-"""Serves a robot program in lock-step simulated time: its world, its output, its talk with the responder.
+"""The bridge: serves a robot program in lock-step simulated time, with its world, its output and its responder.
 
-The bridge owns the time and believes no child: programs ask and tell, and it alone moves the world and writes down
-what happened. Setting a trial up and taking it down is ``trial.py``'s.
+Only the bridge advances time, moves the world and records events. Requests from children are untrusted. ``trial.py``
+sets a trial up and tears it down.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from sim.world import Chain, World
 
 _READ = 10 * MILLISECOND
 _WORDS_A_MINUTE = 130
-#: How often a program may act without waiting; its own process counts too, and can name the line. What that takes for
-#: one act of a motor may come in two.
+#: Maximum number of actions without a wait. The child counts too and can report the line. One motor action there may
+#: arrive here as two.
 _FREE_ACTS = 200_100
 _MOST_NOTES = 200
 
 
 class _Cut(Exception):
-    """The trial ends here."""
+    """Ends the trial with a fault."""
 
     def __init__(self, fault: Fault) -> None:
         super().__init__(fault.message)
@@ -43,7 +43,7 @@ class _Cut(Exception):
 
 
 class Bridge:
-    """Serves one robot program from its first frame to its last. All that happened is in its lists afterwards."""
+    """Serves one robot program from its first frame to its last. Its list attributes then hold the recorded events."""
 
     def __init__(
         self,
@@ -72,13 +72,13 @@ class Bridge:
         self._said_until = 0
         self._arrived: list[str] = []
         self._free_acts = 0
-        self._entries: dict[str, bytes] = {}  # of each sensor that was read since, as it stands in the chain
-        self._told_until = 0  # the child has been told all readings up to then
+        self._entries: dict[str, bytes] = {}  # each sensor read since the last sensing, encoded for the hash chain
+        self._told_until = 0  # the child already has all readings until this time
         self._told_lines = self._told_images = 0
         self._output_left = spec.program.output_bytes
 
     def run(self) -> Fault | None:
-        """Serve the program until it ends. What cut it short or went wrong, if anything."""
+        """Serve the program until it ends. Return the fault that ended it, or None."""
         try:
             return self._run()
         except ChildStopped as stop:
@@ -113,14 +113,14 @@ class Bridge:
         return stopped(stop, "program", self.now)
 
     def _placed(self, fault: Fault) -> Fault:
-        """Add the line that the program waits in when the simulated time is up."""
+        """Return a time-limit fault with the line that the program was waiting in. Other faults are unchanged."""
         if fault.verdict is not Verdict.TIME_LIMIT:
             return fault
         place = self._child.last_place()
         return replace(fault, line=place["line"], file=place["file"] or "")
 
     def collected(self) -> Collected:
-        """What the program has logged since this was last asked, data and images."""
+        """Return the data and images that the program has logged since the last call."""
         lines, images = self.printed[self._told_lines :], self.image_log[self._told_images :]
         self._told_lines, self._told_images = len(self.printed), len(self.image_log)
         data = (message_format.datum(line.text, line.t) for line in lines)
@@ -178,7 +178,7 @@ class Bridge:
                 self._reply(None)
 
     def _advance(self, units: int) -> None:
-        """Let simulated time pass; a tick that is due at the very end of a wait still runs."""
+        """Advance simulated time by ``units``. A tick due exactly at the end of the wait still runs."""
         self._free_acts = 0
         end = self.now + units
         last = min(end, self._limit)
@@ -201,7 +201,7 @@ class Bridge:
         self.world.tick()
 
     def take_arrivals(self) -> None:
-        """What has arrived by now goes to the program with the next reply."""
+        """Collect the messages that have arrived by now. They are sent with the next reply to the program."""
         self._arrived += self.conversation.deliver(self.now)
 
     def _reply(self, value: Any) -> None:
@@ -209,9 +209,9 @@ class Bridge:
         self._arrived = []
 
     def _read(self, what: str, lasts: int) -> None:
-        """The value of every sensor; no answer when the child has been told them in this tick already."""
+        """Send the value of every sensor, unless the child already has the readings of this tick."""
         end = self.now + lasts
-        # A read that lasts beyond the limit is cut as any wait is, also where the child knows its value.
+        # A read that ends after the time limit is cut like any wait, even if the child already has the value.
         known = end < self._told_until and end <= self._limit
         if known:
             self._free_acts = 0
@@ -257,7 +257,7 @@ class Bridge:
         self._reply(value)
 
     def _until(self, frame: wire.Frame) -> None:
-        """Look every 10 ms, first at once; a time-out is over when strictly exceeded."""
+        """Check the condition now and then every 10 ms. The wait times out when its limit is strictly exceeded."""
         wheel = self._wheel(frame["port"])
         wanted = frame["state"] == "running"
         began = self.now
@@ -284,7 +284,7 @@ class Bridge:
             self._send_image()
 
     def _send(self, text: str) -> int:
-        """Hand ``text`` to the responder and its answer to the conversation. The index of the message."""
+        """Send ``text`` to the responder and queue its answer. Return the index of the message."""
         sent = self.conversation.send(text, self.now)
         for copy in range(sent.copies):
             if self._responder is not None:
@@ -328,7 +328,7 @@ class Bridge:
             self.image_log.append((side, pixels, self.world.clock))
 
     def _say(self, text: str) -> None:
-        """Utterances queue up; each lasts as long as its words at 130 a minute."""
+        """Queue an utterance. Its duration is its number of words at 130 words per minute."""
         self._free_act()
         self._spend(len(text.encode()) + 1, "said")
         self.chain.add("say", self.now, text.encode())
@@ -337,7 +337,7 @@ class Bridge:
         self._said_until = max(self._said_until, self.now) + length
 
     def _spend(self, size: int, did: str) -> None:
-        """Count what the program says, before it is kept; beyond its limit the trial ends."""
+        """Charge ``size`` to the program's output limit before the output is stored. Ends the trial at the limit."""
         self._output_left -= size
         if self._output_left < 0:
             sentence = f"the program {did} more than {self._spec.program.output_bytes} bytes"
@@ -356,21 +356,24 @@ class Bridge:
 
 
 def worded(reading: float | list[float]) -> str:
-    """Its ``repr``. To word a number takes long, and over a grey floor a light sensor's three are alike."""
+    """Return the ``repr`` of a reading.
+
+    Lists of three equal values are common over a grey floor and take a faster path, because formatting floats is slow.
+    """
     if isinstance(reading, list):
         first = reading[0]
-        if first and reading.count(first) == len(reading):  # the two zeros are equal, and are worded otherwise
+        if first and reading.count(first) == len(reading):  # 0.0 and -0.0 are equal but have different reprs
             return f"[{', '.join([repr(first)] * len(reading))}]"
     return repr(reading)
 
 
 def world_of(spec: TrialSpec, arena: Arena, camera: LightCamera, chain: Chain) -> World:
-    """The world that a trial begins in."""
+    """Return the world at the start of the trial."""
     return World(spec.robot, arena, camera, spec.pose, spec.noise, spec.seed, chain, spec.physics, spec.tick)
 
 
 def robot_state(world: World, spec: TrialSpec) -> dict[str, Any]:
-    """Where the robot is and what it senses, by the names of the original's ``%sim_robot_state``."""
+    """Return the robot's pose and sensor values, with the keys of the original ``%sim_robot_state``."""
     readings = world.readings()
     state: dict[str, Any] = {
         "x": world.pose.x,

@@ -1,6 +1,6 @@
-"""How texts travel between robot and responder: a seeded model of delay, loss, duplication, reordering, corruption.
+"""The channel between robot and responder: a seeded model of delay, loss, duplication, reordering and corruption.
 
-It moves no text itself; it says when each copy of one arrives. Whether the robot is in reach is ``link.py``'s.
+It computes arrival times and does not move texts. ``link.py`` decides whether the robot is in reach.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Literal
 from sim.chance import Stream
 from sim.recording import SECOND
 
-#: How much longer a text takes that is overtaken by others.
+#: Extra delay of a text that is reordered.
 _HELD_BACK = SECOND
 _MOST_CHANGED = 3
 _ALPHABETS = (digits, ascii_lowercase, ascii_uppercase)
@@ -20,10 +20,10 @@ _ALPHABETS = (digits, ascii_lowercase, ascii_uppercase)
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """Seconds, and chances between 0 and 1. The delay is of the whole way there and back.
+    """Options of a channel: times in seconds, probabilities from 0 to 1. ``delay`` is for the round trip.
 
     An infrared link, to a beacon or between robots, reaches ``range`` mm, and ``facing`` / 2 degrees to either side of
-    where the robot faces.
+    the robot's heading.
     """
 
     delay: float = 0.1
@@ -33,14 +33,14 @@ class Channel:
     reordering: float = 0.0
     corruption: float = 0.0
     link: Literal["cable", "infrared", "between robots"] = "cable"
-    beacon: tuple[float, float] | None = None  # where the responder's end of an infrared link stands
+    beacon: tuple[float, float] | None = None  # position of the beacon of an infrared link, mm
     range: float = 600.0
     facing: float = 90.0
     blocked_by: Literal["obstacles", "nothing"] = "obstacles"
 
 
 class ChannelOfTrial:
-    """One trial's channel; the chances of a text depend on its number alone."""
+    """The channel of one trial. The random draws for a text depend only on its number."""
 
     def __init__(self, channel: Channel, seed: int) -> None:
         self._channel = channel
@@ -48,18 +48,22 @@ class ChannelOfTrial:
         self._corruption = Stream(seed, "corruption")
 
     def copies(self, number: int, index: int = 0) -> int:
-        """How often the responder receives text ``number``: 0 when it is lost, 2 when it is doubled.
+        """Return how many copies of text ``number`` the responder receives: 0 if lost, 2 if duplicated, otherwise 1.
 
-        Each way has chances of its own, from ``index`` on.
+        The draws start at ``index``, so that each direction has its own.
         """
         if self._chance.uniform(number, index) < self._channel.loss:
             return 0
         return 2 if self._chance.uniform(number, index + 1) < self._channel.duplication else 1
 
     def arrivals(self, number: int, copy: int, sent: int, slept: int) -> tuple[int, ...]:
-        """When the answer to a copy of text ``number``, sent at ``sent``, joins the queue; empty when it is lost.
+        """Return the arrival times of the answer to one copy of text ``number``; empty if the answer is lost.
 
-        Times are units of simulated time; ``slept`` is how long the responder slept before it answered.
+        Args:
+            number: The number of the text among the robot's texts.
+            copy: Which copy of the text is answered.
+            sent: When the text was sent, in units of simulated time.
+            slept: How long the responder slept before it answered, in the same units.
         """
         index = 16 + 16 * copy
         return tuple(
@@ -67,13 +71,13 @@ class ChannelOfTrial:
         )
 
     def one_way(self, number: int, sent: int, copies: int) -> tuple[int, ...]:
-        """When each copy of text ``number``, sent at ``sent`` to somebody who answers nothing, joins their queue."""
+        """Return the arrival times of the copies of a text that needs no answer, sent to the other robot."""
         return tuple(sent + self._delay(number, 16 + 16 * copy) for copy in range(copies))
 
     def corrupted(self, text: str, number: int, index: int = 0) -> str | None:
-        """As what ``text`` arrives where it is corrupted, None where it is not.
+        """Return the corrupted form of ``text``, or None if it arrives unchanged.
 
-        One to three of the letters and digits after its prefix become others of their kind.
+        Corruption replaces one to three letters or digits after the prefix with others of the same kind.
         """
         chance = self._corruption
         if chance.uniform(number, index) >= self._channel.corruption:
@@ -90,7 +94,7 @@ class ChannelOfTrial:
         return "".join(letters)
 
     def corrupted_answer(self, text: str, number: int, copy: int, place: int) -> str | None:
-        """The same of the answer to a copy of text ``number``, which may itself be doubled."""
+        """Return the corrupted form of an answer to a copy of text ``number``, or None. ``place`` counts duplicates."""
         return self.corrupted(text, number, 16 + 16 * copy + 8 * place)
 
     def _delay(self, number: int, index: int) -> int:

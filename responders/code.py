@@ -1,6 +1,6 @@
-"""A piece of Python as it is handed over to be run: its name and its text.
+"""A Python source file as a value: its name and its text.
 
-It is never run here.
+Nothing here executes it.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """A Python file: its name, which its tracebacks show, and its text."""
+    """A Python source file: its text, and the name that tracebacks show."""
 
     name: str
     text: str

@@ -1,6 +1,6 @@
-"""The conversation of a robot and its responder: who said what when, and which answers are still under way.
+"""The conversation of a robot and its responder: all messages with their times, and the answers in transit.
 
-It lives in simulated time alone: it is told what was said, says when that arrives, and asks nobody for an answer.
+It works only in simulated time. It records messages and computes arrivals, but does not call the responder.
 """
 
 from __future__ import annotations
@@ -17,48 +17,48 @@ from sim.world import Chain
 
 @dataclass(frozen=True, slots=True)
 class Sent:
-    """A text of the robot's: its index in the messages, its number among the robot's, and when it was sent."""
+    """A text sent by the robot: its index in the messages, its number among the robot's texts, and its time."""
 
     message: int
     number: int
     t: int
-    text: str  # as it reaches the responder
-    copies: int  # how often it does
+    text: str  # as the responder receives it
+    copies: int  # number of copies that arrive
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What came of a text: the answer, if there is one; how long it took the responder; and what went wrong."""
+    """The responder's reaction to a text: the answer if any, the time that it slept, and the fault if any."""
 
     text: str | None = None
     slept: int = 0
     fault: Fault | None = None
-    entry: str | None = None  # what joins the robot's queue when it arrives, as JSON
+    entry: str | None = None  # the entry for the robot's message queue, as JSON
     note: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class _UnderWay:
-    """What arrives of an answer: what joins the queue, and its text where the channel corrupted it."""
+    """An answer in transit: its queue entry, and its text if the channel corrupted it."""
 
     entry: str | None
     corrupted: str | None
 
 
 class Conversation:
-    """All messages of one trial, and the answers that are still under way. Times are units of simulated time."""
+    """All messages of one trial, and the answers in transit. Times are units of simulated time."""
 
     def __init__(self, channel: Channel, seed: int, chain: Chain, link: ChannelLink) -> None:
         self._channel = ChannelOfTrial(channel, seed)
         self._chain = chain
         self.link = link
-        self._under_way: list[tuple[int, int, _UnderWay]] = []  # due, index of the message
+        self._under_way: list[tuple[int, int, _UnderWay]] = []  # arrival time, message index, content
         self._texts = 0
         self.messages: list[Message] = []
         self.faults: list[Fault] = []
 
     def send(self, text: str, now: int) -> Sent:
-        """The robot says ``text``; it reaches the responder at once, as often as it is copied on its way."""
+        """Record a text from the robot. It reaches the responder at once, in zero or more copies."""
         contact = self.link.contact()
         copies = 0 if contact.lost else self._channel.copies(self._texts)
         corrupted = self._channel.corrupted(text, self._texts) if copies else None
@@ -81,7 +81,7 @@ class Conversation:
         return sent
 
     def answer(self, sent: Sent, copy: int, answer: Answer) -> None:
-        """The responder's answer to one copy of a text sets out."""
+        """Record the responder's answer to one copy of a text and schedule its arrival."""
         if answer.fault is not None:
             self.faults.append(answer.fault)
         if answer.text is None:
@@ -97,9 +97,9 @@ class Conversation:
             self.messages.append(replace(said, note=said.note or ("duplicated" if place else "")))
 
     def pass_on(self, sent: Sent, entry: str | None, other: Conversation) -> tuple[int, ...]:
-        """A text of this robot's sets out to the other one; the indices of its copies among the other's messages.
+        """Send a text of this robot to the other robot. Return the indices of its copies in the other's messages.
 
-        ``entry`` is what joins the other's queue, as JSON.
+        ``entry`` is the entry for the other robot's queue, as JSON.
         """
         message = self.messages[sent.message]
         self.messages[sent.message] = replace(message, delivered=None, to_partner=True)
@@ -111,9 +111,9 @@ class Conversation:
         return tuple(range(first, len(other.messages)))
 
     def deliver(self, now: int) -> list[str]:
-        """Everything due at the tick at ``now`` arrives, in order; what joins the robot's queue of it, as JSON.
+        """Deliver everything that is due by ``now``, in order. Return the queue entries for the robot, as JSON.
 
-        What is due while the robot is out of the link's reach is lost.
+        Answers that are due while the robot is out of reach of the link are lost.
         """
         arrived = []
         while self._under_way and self._under_way[0][0] <= now:
@@ -123,7 +123,7 @@ class Conversation:
         return arrived
 
     def finish(self) -> None:
-        """The program has ended: what is still under way will never arrive."""
+        """Mark answers still in transit as undelivered, because the program has ended."""
         for _, index, _ in self._under_way:
             self.messages[index] = replace(self.messages[index], note="undelivered")
         self._under_way.clear()
@@ -140,7 +140,7 @@ class Conversation:
         return not contact.lost
 
     def _chain_befell(self, now: int, contact: Contact, corrupted: str | None) -> None:
-        """Into the chain goes what only an infrared link or a corrupting channel does to a text."""
+        """Add the effects of an infrared link or a corrupting channel to the hash chain."""
         if contact.lost:
             self._chain.add("lost", now, contact.lost.encode())
         elif corrupted is not None:
@@ -148,7 +148,7 @@ class Conversation:
 
 
 def _entry_of(corrupted: str) -> str | None:
-    """What joins the robot's queue of an answer that was JSON before it was corrupted; nothing if it no longer is."""
+    """Return the queue entry of a corrupted JSON answer, or None if it is no longer valid JSON."""
     try:
         return queue_entry(corrupted)
     except ValueError:

@@ -1,6 +1,6 @@
-"""From what a child did to a fault: an exception it told of, an end it came to, and what our own code stumbled over.
+"""Faults from the errors of child processes: reported exceptions, ended processes, and errors in our own code.
 
-It decides nothing over marks; when a child is stopped is decided where it is served.
+This module assigns no marks. The modules that serve a child decide when to stop it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _PYTHON_2 = (
 
 
 class Surprise(ChildStopped):
-    """A child that has sent what our own code stumbled over; ``cause`` is for staff."""
+    """Raised when a child's data caused an error in our own code. ``cause`` is for staff."""
 
     def __init__(self, error: Exception) -> None:
         super().__init__(Verdict.SANDBOX_VIOLATION, "its process sent something that cannot be handled")
@@ -33,7 +33,7 @@ class Surprise(ChildStopped):
 
 
 def surprise(error: Exception) -> Surprise:
-    """For whatever was raised while something of a child's was handled. Raises ``error`` if the machine is to blame."""
+    """Convert an exception that was raised while handling a child's data. Re-raises ``error`` for host faults."""
     if isinstance(error, RobomarkError | OSError | MemoryError):
         raise error
     _log.error("a child has sent what our own code stumbled over", exc_info=error)
@@ -41,9 +41,9 @@ def surprise(error: Exception) -> Surprise:
 
 
 def stopped(stop: ChildStopped, who: str, now: int) -> Fault:
-    """The fault of a child that was stopped, or ended, at ``now`` in units of simulated time.
+    """Return the fault of a child that was stopped or ended at ``now``, in units of simulated time.
 
-    ``who`` is the program, the responder, or the name of an agent; so it is below.
+    ``who`` is the program, the responder, or the name of an agent, as in the functions below.
     """
     verdict = stop.verdict
     if who != "program" and verdict is Verdict.PROGRAM_ERROR:
@@ -53,26 +53,26 @@ def stopped(stop: ChildStopped, who: str, now: int) -> Fault:
     return _fault(now, verdict, who, sentence, stop.line, staff=cause, file=stop.file or "")
 
 
-#: How the sentence begins of a responder that returns something else than a text.
+#: Start of the message for a responder that returns something other than a text.
 _RETURNED = "the responder returned "
 
 
 def returned_sentence(what: str) -> str:
-    """Return the sentence of the fault of a responder that returned ``what`` instead of a text."""
+    """Return the message for a responder that returned ``what`` instead of a text."""
     return f"{_RETURNED}{what}"
 
 
 def is_no_text(fault: Fault) -> bool:
-    """Return whether a responder gave something else than a text.
+    """Return whether the fault is that a responder returned something other than a text.
 
-    A stored recording has the sentence alone, and a further field would change its form: so it is read here, beside
-    where it is made, and nowhere else.
+    Stored recordings contain only the message, and another field would change their format. So the message is parsed
+    here, next to the function that creates it, and nowhere else.
     """
     return fault.verdict is Verdict.PROTOCOL_ERROR and fault.message.startswith(_RETURNED)
 
 
 def error_fault(error: Mapping[str, Any], now: int, who: str) -> Fault:
-    """What a child said of an exception, as a fault; running out of memory is a limit, not a mistake in a line."""
+    """Return the fault for an exception that a child reported. Running out of memory counts as a limit."""
     out_of_memory = error["type"] == "OSError" and error["text"].startswith(f"[Errno {errno.ENOMEM}]")
     if error["type"] == "MemoryError" or out_of_memory:
         sentence = f"the {who} asked for more memory than it may have"
@@ -87,7 +87,7 @@ def error_fault(error: Mapping[str, Any], now: int, who: str) -> Fault:
 
 
 def refusal(who: str, frame: wire.Frame) -> str:
-    """What the sandbox refused, as a sentence for the report."""
+    """Return the report's sentence about an operation that the sandbox refused."""
     where = f"line {frame['line']} of {frame['file'] or f'the {who}'}" if frame["line"] is not None else f"the {who}"
     return f"{where}: {frame['what'][:200]}"
 

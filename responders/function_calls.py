@@ -1,7 +1,6 @@
-"""Calls functions of a responder, or of an instructor's check, inside the sandbox and without a robot.
+"""Function calls into a responder or an instructor's check, inside the sandbox and without a robot.
 
-The module is loaded once in a fresh child and its functions are called one after the other; what the values are worth
-is judged elsewhere.
+The module is loaded once in a fresh child, then its functions are called in order. The values are judged elsewhere.
 """
 
 from __future__ import annotations
@@ -22,17 +21,17 @@ from responders.trial_spec import RanStatements, ResponderSpec
 from sim.readers.json_text import read_json
 from sim.recording import Fault, Verdict
 
-#: Tells the child that no function of the module has to be a responder.
+#: Tells the child that the module needs no responder function.
 _NO_RESPONDER = ""
 
 
-#: The field that each kind of value must have.
+#: The required field of each kind of value.
 _NEEDED = {"value": "text", "error": "error", "other": "type"}
 
 
 @dataclass(frozen=True, slots=True)
 class FunctionCall:
-    """A function's name and what it is called with; all of it has to have a form in JSON."""
+    """A function's name and its arguments, which must be JSON-serialisable."""
 
     function: str
     arguments: Sequence[Any] = ()
@@ -41,7 +40,7 @@ class FunctionCall:
 
 @dataclass(frozen=True, slots=True)
 class Returned:
-    """What a call gave: a value as JSON has it, or what went wrong instead."""
+    """The result of a call: a JSON value, or the fault."""
 
     value: Any = None
     fault: Fault | None = None
@@ -49,10 +48,10 @@ class Returned:
 
 @dataclass(frozen=True, slots=True)
 class Called:
-    """What all calls gave, in their order. ``fault`` is what kept the module from being loaded.
+    """The results of all calls, in order. ``fault`` is set if the module could not be loaded.
 
-    ``printed`` has what the module printed while it was loaded, and then what it printed in each call; ``notes`` what
-    had been noted by the end of each of these.
+    ``printed`` holds the output from loading the module, then the output of each call. ``notes`` holds the notes made
+    by the end of each of these.
     """
 
     returned: tuple[Returned, ...]
@@ -73,11 +72,21 @@ def call_functions(
     meter: JobMeter,
     ran: RanStatements | None = None,
 ) -> Called:
-    """Load ``code`` with ``files`` in its folder, and make the calls. ``limits`` are for all of them together.
+    """Load ``code`` with ``files`` in its folder and make the calls.
 
-    ``meter`` counts what their job costs; ``ran`` notes which statements are run, if it is there.
+    Args:
+        code: The module.
+        files: Files for the child's folder: name to content.
+        calls: The calls, in order.
+        limits: Limits for all calls together.
+        output_bytes: Limit for the printed output.
+        sandboxes: Starts the child.
+        seed: Seed for the child.
+        meter: Counts the costs of the job.
+        ran: Collects the executed statements, if given.
 
-    Raises HostError when the machine, not the module, fails.
+    Raises:
+        HostError: If the machine fails, not the module.
     """
     with sandboxes.private_folder() as folder:
         spec = ResponderSpec(code, files, limits, output_bytes, _NO_RESPONDER, ran)
@@ -97,7 +106,7 @@ def call_functions(
 
 
 class _Caller(ResponderProcess):
-    """A responder's process that is asked for functions by their names."""
+    """A responder process whose functions are called by name."""
 
     _schema = wire.CALLS
 
@@ -106,12 +115,15 @@ class _Caller(ResponderProcess):
         self._ended: Fault | None = None
 
     def taken(self) -> tuple[str, ...]:
-        """What has been printed since this was last asked."""
+        """Return the output printed since the last call of this method."""
         printed, self.output = tuple(self.output), []
         return printed
 
     def call(self, call: FunctionCall) -> Returned:
-        """Never raises for what the called code does; after its process has been stopped, every call has that fault."""
+        """Return the result of one call. Raises no exception for errors in the called code.
+
+        After the process has been stopped, every call returns the same fault.
+        """
         if self._child is None:
             return Returned(fault=self._ended)
         try:
@@ -131,7 +143,7 @@ class _Caller(ResponderProcess):
 
 
 def _read(frame: wire.Frame, function: str) -> Returned:
-    """What a frame says that has the field its kind needs."""
+    """Return the result in a frame that has the required field for its kind."""
     match frame["kind"]:
         case "value":
             try:
@@ -150,7 +162,7 @@ def _read(frame: wire.Frame, function: str) -> Returned:
 
 
 def no_function(name: str) -> str:
-    """The message of the fault where a module has no function of this name."""
+    """Return the fault's message for a module that has no function of this name."""
     return f"there is no function called {name}"
 
 

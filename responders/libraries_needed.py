@@ -1,7 +1,7 @@
-"""Whether a responder may need libraries, read from the syntax trees of all that it can run.
+"""Detection of responders that need no scientific libraries, from the syntax trees of all code they can run.
 
-Only one that surely needs none is said to need none: such a one is the same where libraries are loaded and where they
-are not. What it imports in spite of that is noticed by ``sandbox/inside/libraries.py``, when it does.
+The answer is False only if certain, so that the responder behaves the same with and without loaded libraries.
+``sandbox/inside/libraries.py`` detects imports that were missed, at run time.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from sim.readers.python_source import parse_module
 from sim.readers.unreadable import Unreadable
 
 _LOADED = ("nbev3devsim.load_nbev3devwidget", "inside.static_analysis.reader")
-#: Characters of one text; reading a longer one takes long.
+#: Maximum number of characters per text, because parsing longer texts is slow.
 _MOST_READ = 60_000
-#: Names by which a program can come to what is loaded, or to code that no tree shows, or by which it sees when memory
-#: is given back; and what of the course's needs libraries.
+#: Names that give access to loaded modules, to code outside the syntax trees, or to garbage collection; and course
+#: modules that need libraries.
 _LEADING_AWAY = re.compile(
     r"modules|meta_path|path_hooks|path_importer_cache|settrace|setprofile|eval|exec|compile|getattr|globals|locals"
     r"|vars|dir|help|breakpoint|attrgetter|methodcaller|get_type_hints|ForwardRef|Formatter|make_dataclass|image_data"
@@ -28,15 +28,15 @@ _LEADING_AWAY = re.compile(
     r"|_getframe|_current_frames|__(?!(?:name|main|init|str|repr|doc|class|len|call)__$)\w+"
 )
 _WORD = re.compile(r"\w+")
-#: In a notebook: what starts a robot, whose program is run elsewhere, and what does nothing here.
+#: Notebook magics that start a robot program, which runs in another process, or that do nothing here.
 _ROBOT_CELL = re.compile(r"\s*%%sim_magic")
 _HARMLESS_LINE = re.compile(r"^[ \t]*%(?:sim_magic|(?:re)?load_ext |matplotlib |config )[^{$\n]*$", re.MULTILINE)
 
 
 def may_need_libraries(text: str, files: Mapping[str, bytes]) -> bool:
-    """Of a module, with the files in its folder."""
+    """Return whether a module with these files in its folder may need libraries."""
     modules = {name.removesuffix(".py"): data for name, data in files.items() if name.endswith(".py")}
-    # One called like a part of a library could not be imported beside it.
+    # A module with the name of a library part would hide it on import.
     if any(name.startswith(("_", "cython")) for name in modules):
         return True
     try:
@@ -48,19 +48,19 @@ def may_need_libraries(text: str, files: Mapping[str, bytes]) -> bool:
 
 
 def notebook_source(cells: tuple[str, ...]) -> str:
-    """What of a notebook is run as Python in its own process; most magics stay in it, and are no Python."""
+    """Return a notebook's source that runs as Python in its own process. Most magics remain and don't parse."""
     return "\n".join(_HARMLESS_LINE.sub("pass", cell) for cell in cells if not _ROBOT_CELL.match(cell))
 
 
 @functools.lru_cache(maxsize=64)
 def _imports(text: str) -> frozenset[str] | None:
-    """Return all that a text imports; None where that cannot be known. Parses a text once, whoever has it."""
+    """Return all names that a text imports, or None if that is unknown. Parses each distinct text once."""
     if len(text) > _MOST_READ:
         return None
     try:
         nodes = list(ast.walk(parse_module(text)))
     except (SyntaxError, Unreadable):
-        # The error may be all there is to it, but then it costs little.
+        # The program may only report this error; loading libraries for it costs little.
         return None
     if any(map(_LEADING_AWAY.fullmatch, chain.from_iterable(map(_named, nodes)))):
         return None
@@ -85,5 +85,5 @@ def _named(node: ast.AST) -> Iterator[str]:
         case ast.MatchClass(kwd_attrs=names):
             yield from names
         case ast.Constant(value=str(text)) if "{" in text:
-            # What a format reaches of its values.
+            # Format strings can access attributes of their values.
             yield from _WORD.findall(text)

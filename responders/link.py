@@ -1,6 +1,7 @@
-"""Whether a text gets across between robot and receiver as they stand now: by cable always, by infrared in reach.
+"""The link between robot and receiver: whether a text gets through from where they are now.
 
-What chance does to a text on its way is ``channel.py``'s; when it arrives is ``conversation.py``'s.
+A cable always connects; infrared needs the receiver in reach. Random losses are in ``channel.py``, arrival times in
+``conversation.py``.
 """
 
 from __future__ import annotations
@@ -15,15 +16,15 @@ from sim.arena import Arena
 from sim.recording import LossReason, Pose
 from sim.trigonometry import sincos
 
-_DIGITS = 6  # of a distance or an angle: the last bits are the C library's
+_DIGITS = 6  # decimals of a distance or an angle; the last bits depend on the C library
 
-#: Says where the receiver is now, mm; a beacon stays, another robot may not.
+#: Returns the current position of the receiver, mm. A beacon is fixed; another robot may move.
 Receiver = Callable[[], tuple[float, float]]
 
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """How the robot stands to the receiver, mm and degrees to its left; ``lost`` is why nothing gets across."""
+    """Distance (mm) and bearing (degrees to the left) of the receiver; ``lost`` is the reason for no contact."""
 
     lost: LossReason = ""
     distance: float | None = None
@@ -31,25 +32,25 @@ class Contact:
 
 
 class ChannelLink(Protocol):
-    """The way between a robot and its receiver."""
+    """The link between a robot and its receiver."""
 
     def contact(self) -> Contact:
-        """Whether a text would get across now."""
+        """Return whether a text gets through now, with distance and angle."""
         ...
 
 
 class Cable:
-    """Reaches everywhere."""
+    """A link without limits."""
 
     def contact(self) -> Contact:
-        """Nothing is ever out of its reach."""
+        """Return an unrestricted contact."""
         return Contact()
 
 
 class InfraredLink:
-    """Reaches as far as the channel's range, in front of the robot, along a straight way that nothing blocks.
+    """A link with limited range and angle that obstacles can block.
 
-    All is measured from the middle of the robot's axle.
+    All distances and angles are measured from the middle of the robot's axle.
     """
 
     def __init__(self, channel: Channel, arena: Arena, robot: Callable[[], Pose], receiver: Receiver) -> None:
@@ -59,7 +60,7 @@ class InfraredLink:
         self._receiver = receiver
 
     def contact(self) -> Contact:
-        """Of several reasons the first of range, facing and what stands between."""
+        """Return the contact. The first failed test of range, facing and obstacles gives the reason."""
         channel, pose, (x, y) = self._channel, self._robot(), self._receiver()
         sine, cosine = sincos(math.radians(pose.heading))
         dx, dy = x - pose.x, y - pose.y
@@ -76,7 +77,7 @@ class InfraredLink:
 
 
 def link_of(channel: Channel, arena: Arena, robot: Callable[[], Pose]) -> ChannelLink:
-    """The link of a robot whose receiver is the channel's beacon, if it has one."""
+    """Return the link of a robot whose receiver, if any, is the channel's beacon."""
     beacon = channel.beacon
     if channel.link == "cable" or beacon is None:
         return Cable()

@@ -1,6 +1,6 @@
-"""Serves two robot programs in the same simulated time: each up to the next tick, the first robot's first.
+"""Serves two robot programs in the same simulated time, tick by tick, the first robot first.
 
-What one program may ask is ``bridge.py``'s; children are set up and recordings made in ``pair.py``.
+``bridge.py`` handles the requests of each program. ``pair.py`` creates the children and the recordings.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from sim.shared_arena import SharedArena
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A text for the responder, with what its robot had logged when it was sent."""
+    """A text for the responder, with the data that its robot had logged when it was sent."""
 
     sent: Sent
     collected: Collected
 
 
 class PairedBridge(Bridge):
-    """Serves one of two programs, and at each tick waits for the other one to come as far.
+    """Serves one of two programs and waits for the other one at each tick.
 
-    What it says to the responder is kept until then, as the other may have said something before; where there is
-    none, it goes to the other robot.
+    Texts for the responder are queued until the tick, because the other robot may have sent an earlier one. Without a
+    responder, texts go to the other robot.
     """
 
     def __init__(
@@ -46,10 +46,10 @@ class PairedBridge(Bridge):
         self.number = spec.number
         self.questions: list[Question] = []
         self.calls: list[Call] = []
-        self._passed_on: list[tuple[int, tuple[int, ...]]] = []  # a text, and its copies among the partner's messages
+        self._passed_on: list[tuple[int, tuple[int, ...]]] = []  # message index, indices at the partner
 
     def meet(self, partner: PairedBridge) -> None:
-        """From now on this robot and ``partner`` know of each other."""
+        """Connect this robot with its partner."""
         self.partner = partner
         channel = self._spec.channel
         if channel.link == "between robots":
@@ -61,7 +61,7 @@ class PairedBridge(Bridge):
             self.conversation.link = InfraredLink(channel, self.arena, lambda: self.world.pose, there)
 
     def settle(self) -> None:
-        """Both programs have ended: when did the partner hear each text, if it did?"""
+        """Set the delivery time of each text that went to the partner. Call it after both programs have ended."""
         messages = self.conversation.messages
         for index, copies in self._passed_on:
             heard = [self.partner.conversation.messages[copy] for copy in copies]
@@ -72,7 +72,7 @@ class PairedBridge(Bridge):
             messages[index] = message
 
     def _tick(self) -> None:
-        """Whatever a program makes our own code stumble over, it does in its own turn, and is its own fault."""
+        """Run one tick. Errors that a program causes in our own code occur in its own turn and count as its fault."""
         _wait_for_partner()
         self.take_arrivals()
         moved = self.world.move()
@@ -106,23 +106,23 @@ Faults = tuple[Fault | None, Fault | None]
 
 
 def serve_both(first: PairedBridge, second: PairedBridge, responder: ResponderProcess | None) -> Faults:
-    """Serve both programs until they have ended; what cut each short or went wrong, if anything.
+    """Serve both programs until they end. Return the fault of each, or None.
 
-    One that has ended leaves its robot standing, and the other goes on. Whatever is raised for the machine's sake, or
-    by the meter's heartbeat, comes from here, and leaves neither program half served.
+    A robot stands still after its program has ended, and the other program continues. Host faults and exceptions from
+    the meter's heartbeat are raised from here, and neither program is left running.
     """
     bridges = first, second
     first.meet(second)
     second.meet(first)
-    # Everything is done in this one thread, so that heartbeats, signals and locks are where they are for one robot.
+    # All work stays in this thread, so heartbeats, signals and locks behave as for one robot.
     turns = [greenlet(bridge.run) for bridge in bridges]
     faults: dict[int, Fault | None] = {}
     try:
         while len(faults) < len(turns):
-            _take_turns(turns, faults)  # both look round, and their programs are served until the next tick
+            _take_turns(turns, faults)  # both sense; their programs are served until the next tick
             if responder is not None:
                 _ask(responder, bridges)
-            _take_turns(turns, faults)  # both take what has arrived, and move
+            _take_turns(turns, faults)  # both receive arrivals and move
     finally:
         for turn in turns:
             turn.throw()
@@ -130,7 +130,7 @@ def serve_both(first: PairedBridge, second: PairedBridge, responder: ResponderPr
 
 
 def _take_turns(turns: Sequence[greenlet], faults: dict[int, Fault | None]) -> None:
-    """Each goes on until it waits for the other; one that has ended leaves what was its fault."""
+    """Resume each program until it waits for the other one. Store the fault of a program that ends."""
     for number, turn in enumerate(turns):
         if number not in faults:
             fault = turn.switch()
@@ -143,7 +143,7 @@ def _wait_for_partner() -> None:
 
 
 def _entry_of(corrupted: str) -> str | None:
-    """Nothing joins a queue of what was JSON before the channel corrupted it, and no longer is."""
+    """Return the queue entry of a corrupted text, or None if it was JSON and no longer is."""
     try:
         return message_format.passed_on(corrupted)
     except ValueError:
@@ -151,7 +151,7 @@ def _entry_of(corrupted: str) -> str | None:
 
 
 def _ask(responder: ResponderProcess, bridges: Sequence[PairedBridge]) -> None:
-    """What both robots have said since the last tick is answered, in the order in which it was said."""
+    """Answer the texts that both robots have sent since the last tick, in the order they were sent."""
     asked = [(bridge, question) for bridge in bridges for question in bridge.questions]
     for bridge, question in sorted(asked, key=lambda each: each[1].sent.t):
         sent, logged = question.sent, question.collected

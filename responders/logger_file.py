@@ -1,6 +1,6 @@
-"""Reads back what a process has written to its logger.txt; every other file of its folder goes with the folder.
+"""Reads the logger.txt that a process has written. All other files are deleted with the folder.
 
-When a process is gone, and what becomes of the log, is the trial's.
+``trial.py`` decides when the process has ended and how the log is used.
 """
 
 from __future__ import annotations
@@ -18,7 +18,10 @@ _LOG_BYTES = 1 << 20
 
 
 def read_log(folder: Path, meter: JobMeter, who: str = "responder") -> tuple[str, Fault | None]:
-    """The logger.txt in a process's folder, read when it is gone: a regular file only, no link, capped and paid for."""
+    """Return the content of logger.txt in the folder of an ended process, and the fault if it is unreadable.
+
+    Only a regular file is read, never a link. The size is capped and charged to the meter.
+    """
     directory = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         fd = os.open(LOG_FILE, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=directory)

@@ -1,6 +1,6 @@
-"""The texts that cross the bridge: which print is a message, what IMG_DATA carries, what an answer means.
+"""The formats of the texts that cross the bridge: which printed lines are messages, image data, JSON answers.
 
-Pure functions over text; when and whether a text arrives is ``channel.py``'s business.
+All functions are pure. ``channel.py`` computes arrivals.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _DATALOG = (
 
 
 def kind(text: str) -> Literal["py", "image", "log image", "text"]:
-    """What a printed text is; prefixes count only at its very start."""
+    """Return the kind of a printed text. Prefixes count only at the start."""
     if text.startswith(PY):
         return "py"
     if text.startswith(IMG_DATA):
@@ -40,17 +40,17 @@ def kind(text: str) -> Literal["py", "image", "log image", "text"]:
 
 
 def csv(rgba: bytes) -> str:
-    """Bytes of an image as the simulator writes them: decimal numbers, commas, nothing else."""
+    """Return image bytes in the simulator's format: decimal numbers separated by commas."""
     return ",".join(map(str, rgba))
 
 
 def image_message(left: bytes, right: bytes) -> str:
-    """``IMG_DATA::`` and both sensors' RGBA numbers as comma strings."""
+    """Return the ``IMG_DATA::`` message with the RGBA numbers of both sensors as comma-separated strings."""
     return f'{IMG_DATA}::{{"left":"{csv(left)}","right":"{csv(right)}"}}'
 
 
 def logged_sides(text: str) -> tuple[Literal["left", "right"], ...]:
-    """Which sensors ``image_data left|right|both`` logs."""
+    """Return the sensors that ``image_data left|right|both`` logs."""
     words = text.split(" ")
     which = words[1] if len(words) > 1 else ""
     if which == "both":
@@ -59,7 +59,7 @@ def logged_sides(text: str) -> tuple[Literal["left", "right"], ...]:
 
 
 def datum(text: str, t: float) -> Datum | None:
-    """The datalog entry in a printed line, None if it is not one or has no numbers that a sensor could have given."""
+    """Return the datalog entry in a printed line, or None if the line has none or its numbers are impossible."""
     if not text.startswith(_DATALOG):
         return None
     name, colon, rest = text.partition(": ")
@@ -70,7 +70,7 @@ def datum(text: str, t: float) -> Datum | None:
         numbers = [float(word) for word in words[:2]]
     except ValueError:
         return None
-    # Not what is infinite or no number, nor what becomes so when a few are added up.
+    # Rejects NaN, infinity, and numbers whose sum could overflow.
     if not all(abs(number) <= _MOST for number in numbers):
         return None
     return Datum(t, name, numbers[0], numbers[1] if len(numbers) > 1 else None)
@@ -81,7 +81,7 @@ def _no_constant(name: str) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Whole floats become ints, as they do on their way through JavaScript."""
+    """Return the value with whole floats as ints, as JavaScript does."""
     if isinstance(value, float) and value.is_integer() and abs(value) < 2**53:
         return int(value)
     if isinstance(value, list):
@@ -92,7 +92,11 @@ def _plain(value: Any) -> Any:
 
 
 def parsed_answer(text: str) -> Any:
-    """The object in an answer that starts with ``JSON::``. Raises ValueError with the reason if it is malformed."""
+    """Return the object in an answer that starts with ``JSON::``.
+
+    Raises:
+        ValueError: If the JSON is malformed, with the reason.
+    """
     try:
         return _plain(read_json(text[len(JSON) :], parse_constant=_no_constant))
     except JSONDecodeError as error:
@@ -100,15 +104,21 @@ def parsed_answer(text: str) -> Any:
 
 
 def queue_entry(text: str) -> str:
-    """The same object as JSON for the robot's queue, as short as the answer. Raises ValueError as ``parsed_answer``."""
+    """Return the object of a ``JSON::`` answer as compact JSON for the robot's queue.
+
+    Raises:
+        ValueError: If the JSON is malformed, with the reason.
+    """
     return json.dumps(parsed_answer(text), separators=(",", ":"), ensure_ascii=False)
 
 
 def passed_on(text: str) -> str:
-    """What a robot's text adds to the queue of the other robot, as JSON.
+    """Return the entry that a robot's text adds to the queue of the other robot, as JSON.
 
-    It is the object after ``PY::JSON::`` or ``IMG_DATA::``, else the text after ``PY::``. Raises ValueError as
-    ``parsed_answer``.
+    It is the object after ``PY::JSON::`` or ``IMG_DATA::``, otherwise the text after ``PY::``.
+
+    Raises:
+        ValueError: If the JSON is malformed, with the reason.
     """
     if text.startswith(IMG_DATA):
         return text.removeprefix(f"{IMG_DATA}::")

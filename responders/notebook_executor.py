@@ -1,6 +1,6 @@
-"""Executes a notebook from top to bottom: each magic that starts a robot is a run of its own, with its own recording.
+"""Executes a notebook from top to bottom. Each magic that starts a robot is a run with its own recording.
 
-What a magic comes to (floor, pose, noise, and which run is the marked one) is told by the caller's ``RunPlanner``.
+The caller's ``RunPlanner`` decides what each magic does: floor, pose, noise, and which run is marked.
 """
 
 from __future__ import annotations
@@ -27,49 +27,50 @@ from sim.world import Chain
 _MOST_RUNS = 300
 _LONGEST_LINE = 2000
 _MOST_CELL_ERRORS = 5
-#: What all unmarked runs of an execution may compute together, as a multiple of what one may.
+#: Limit on the processor time of all unmarked runs together, as a multiple of the limit for one program.
 _UNMARKED_CPU = 4
-#: And how long they may take together, in simulated seconds, or in the longest that one may take.
+#: Limits on the simulated time of all unmarked runs together: seconds, and multiples of the trial's time limit. The
+#: larger one applies.
 _UNMARKED_SECONDS, _UNMARKED_RUNS = 600, 20
 
 
 @dataclass(frozen=True, slots=True)
 class MagicCall:
-    """A ``%sim_magic...`` that a cell has called, with its place; nothing in it is trusted."""
+    """A ``%sim_magic...`` call by a cell, with its place. All of it is untrusted."""
 
     cell: int
     line: int | None
     name: str
     arguments: str
-    body: str | None  # the robot program, for ``%%sim_magic...``
+    body: str | None  # the robot program of a ``%%sim_magic...`` cell
 
 
 @dataclass(frozen=True, slots=True)
 class PlannedRun:
-    """What a magic comes to: a run or none, and sentences about it."""
+    """The planner's decision on a magic: a run or None, and notes for the report."""
 
     spec: TrialSpec | None = None
     obstacles: tuple[Rectangle, ...] = ()
-    program_cell: int | None = None  # where the program is that is run
+    program_cell: int | None = None  # the cell that holds the robot program
     marked: bool = False
-    needs_responder: bool = False  # the lack of one is a fault then
+    needs_responder: bool = False  # a missing responder is then a fault
     notes: tuple[str, ...] = ()
 
 
 class RunPlanner(Protocol):
-    """Decides what magics come to."""
+    """Decides what each magic does."""
 
     def standing(self) -> PlannedRun:
-        """How the robot stands that does not run."""
+        """Return the state of a robot that is not running."""
 
     def call(self, call: MagicCall) -> PlannedRun:
-        """Say what a magic comes to: a run, notes, or nothing."""
+        """Return the plan for a magic: a run, notes, or nothing."""
 
     def ran(self, recording: Recording) -> None:
-        """A run that was planned has ended."""
+        """Record that a planned run has ended."""
 
     def last(self) -> PlannedRun:
-        """What is run when all cells have been executed, if anything."""
+        """Return the run to make after all cells, if any."""
 
 
 Ground = Callable[[TrialSpec, tuple[Rectangle, ...]], tuple[Arena, LightCamera]]
@@ -77,9 +78,9 @@ Ground = Callable[[TrialSpec, tuple[Rectangle, ...]], tuple[Arena, LightCamera]]
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run of a robot. ``cell`` is the cell that started it, None after the last.
+    """One run of a robot. ``cell`` is the cell that started it, or None after the last cell.
 
-    ``printed`` is the number of characters of the notebook's output that came before it.
+    ``printed`` is the number of characters of notebook output before the run.
     """
 
     cell: int | None
@@ -90,7 +91,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class ExecutedNotebook:
-    """What came of a notebook. ``raised`` are the faults of single cells, ``stopped`` what ended the process."""
+    """The results of a notebook. ``raised`` holds the faults of single cells, ``stopped`` the fault that ended it."""
 
     runs: tuple[Run, ...]
     output: str
@@ -102,11 +103,11 @@ class ExecutedNotebook:
 
     @property
     def marked(self) -> Run | None:
-        """The run that marks are given for, if there was one."""
+        """Return the marked run, if there was one."""
         return next((run for run in self.runs if run.marked), None)
 
     def told(self, recording: Recording) -> Recording:
-        """A run's recording with what the whole notebook told: output, log and notes."""
+        """Return the recording of a run with the output, log and notes of the whole notebook."""
         return replace(
             recording,
             responder_output=self.output,
@@ -119,9 +120,10 @@ class ExecutedNotebook:
 def execute_notebook(
     spec: NotebookSpec, planner: RunPlanner, ground: Ground, sandboxes: Sandboxes, meter: JobMeter
 ) -> ExecutedNotebook:
-    """Execute the notebook in a fresh process and folder; ``meter`` counts what its job costs.
+    """Execute the notebook in a fresh process and folder. ``meter`` counts the costs of the job.
 
-    Raises HostError when the machine, not the student, fails.
+    Raises:
+        HostError: If the machine fails, not the student's code.
     """
     with sandboxes.private_folder() as folder, agents_beside(spec.agents, spec.seed, sandboxes, meter) as agents:
         process = NotebookProcess(spec, sandboxes, folder, meter, agents)
@@ -148,7 +150,7 @@ def execute_notebook(
 
 
 def never_ran(spec: TrialSpec, arena: Arena, camera: LightCamera, fault: Fault, sandbox: str) -> Recording:
-    """The recording of a run that did not come about: the robot stands where it would have started."""
+    """Return the recording of a run that did not start: the robot stays at its start pose."""
     chain = Chain()
     world = world_of(spec, arena, camera, chain)
     return Recording(
@@ -169,7 +171,7 @@ def never_ran(spec: TrialSpec, arena: Arena, camera: LightCamera, fault: Fault, 
 
 
 class _Execution:
-    """The runs of one execution."""
+    """The runs of one notebook execution."""
 
     def __init__(
         self,
@@ -187,11 +189,11 @@ class _Execution:
         self._sandboxes = sandboxes
         self._meter = meter
         self._unmarked_cpu = self._unmarked_seconds = 0.0
-        self._missing: str | None = None  # why nothing answered the run that needs it
+        self._missing: str | None = None  # reason for the missing responder of a run that needs one
         self.runs: list[Run] = []
 
     def perform(self, frame: wire.Frame) -> dict[str, Any]:
-        """Do what a magic asks, or say how the robot stands; the frame that lets the notebook go on."""
+        """Perform the request of a magic, or report the robot's state. Return the frame that resumes the notebook."""
         if frame["do"] == "state":
             return {"do": "state", "state": self._state()}
         cell, line = self._process.place(frame["line"])
@@ -216,7 +218,7 @@ class _Execution:
         return robot_state(world_of(standing.spec, *ground, Chain()), standing.spec)
 
     def finish(self) -> None:
-        """Run what the planner has for the end; a responder that came too late for its robot is told of."""
+        """Make the planner's final run. Add a hint to runs whose responder was defined too late."""
         since, missing = self._process.answers_since, self._missing
         if since is not None and missing is not None:
             self.runs = [_told_too_late(run, missing, since) if run.marked else run for run in self.runs]
@@ -259,7 +261,7 @@ class _Execution:
         if planned.needs_responder and process.missing is not None and not bridge.conversation.faults:
             faults.append(Fault(0.0, Verdict.RESPONDER_ERROR, "responder", process.missing, hint=self._why_missing()))
         faults = [self._placed(each, planned.program_cell) for each in faults]
-        # An agent that cannot be loaded counts in every run, other faults in the run that they belong to.
+        # Loading faults of agents count in every run, other faults only in the run where they occur.
         faults += [] if self._agents is None else self._agents.faults_since(since)
         faults.sort(key=lambda each: each.t)
         recording = recording_of(spec, bridge, tuple(faults), program.sandbox)
@@ -277,7 +279,7 @@ class _Execution:
         return self._process.placed(fault)
 
     def _why_missing(self) -> str:
-        """The first cell that failed may be why there is no responder."""
+        """Return the message of the first failed cell, a possible reason for the missing responder, or ""."""
         if not self._process.raised:
             return ""
         first = self._process.raised[0]
@@ -285,7 +287,7 @@ class _Execution:
 
 
 def _told_too_late(run: Run, missing: str, since: int) -> Run:
-    """The run, with the cell that defines what would have answered it in the place of what was ``missing`` then."""
+    """Return the run with a hint to the cell that defines the responder, in place of the ``missing`` message."""
     message = f"the responder is defined in cell {since}, after the robot of cell {run.cell} has run"
     hint = f"Move cell {since} above cell {run.cell}."
     faults = tuple(

@@ -1,6 +1,6 @@
-"""The process of a notebook: its cells are executed in it, and it answers the robots that they start.
+"""The process of a notebook: it executes the cells and answers the robots that they start.
 
-It keeps what the cells print and what becomes of them; the robots are ``notebook_executor.py``'s.
+It records the output and the errors of the cells. ``notebook_executor.py`` runs the robots.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from sim.recording import Fault, Verdict
 if TYPE_CHECKING:
     from responders.agents import Agents
 
-#: How often a notebook may call a magic that sets up or starts the robot.
+#: Maximum number of calls of magics that set up or start the robot.
 _MOST_MAGICS = 2000
 
 
 @dataclass(frozen=True, slots=True)
 class NotebookSpec:
-    """A notebook's cells from the top, and the files in its folder."""
+    """A notebook's cells in order, and the files in its folder."""
 
     name: str
     cells: tuple[str, ...]
@@ -45,12 +45,12 @@ class NotebookSpec:
 
     @property
     def as_responder(self) -> ResponderSpec:
-        """What is run as Python in its own process."""
+        """Return the responder spec for the Python code of the notebook's process."""
         return ResponderSpec(Code(self.name, notebook_source(self.cells)), self.files, self.limits, self.output_bytes)
 
 
 class NotebookProcess(ResponderProcess):
-    """A notebook's process during one execution. Cells and their lines are counted from 1."""
+    """The process of a notebook during one execution. Cells and their lines are counted from 1."""
 
     _schema = wire.NOTEBOOK
 
@@ -67,16 +67,16 @@ class NotebookProcess(ResponderProcess):
         self._cell = 1
         self._printed_in = 0
         self._magics = 0
-        #: Why nothing would answer the robot, if so; as of the last time that the cells told.
+        #: Reason for a missing responder, or None if there is one. Updated after each cell.
         self.missing: str | None = None
-        #: The cell by which something answers, if it does; None while nothing would.
+        #: The cell since which there is a responder, or None if there is none.
         self.answers_since: int | None = None
-        #: What ended single cells, in their order, and what ended the process before its time.
+        #: The faults that ended single cells, in order, and the fault that ended the process.
         self.raised: list[Fault] = []
         self.stopped: Fault | None = None
 
     def execute(self, perform: Callable[[wire.Frame], dict[str, Any]]) -> None:
-        """Execute all cells; ``perform`` does what a magic asks of the robot, and gives the reply."""
+        """Execute all cells. ``perform`` performs the request of a magic and returns the reply."""
         assert self._child is not None
         try:
             self._child.send(
@@ -105,21 +105,21 @@ class NotebookProcess(ResponderProcess):
             self._tell_what_was_not_run()
 
     def placed(self, fault: Fault) -> Fault:
-        """A fault of the process with the cell, and the line in it, where that is known."""
+        """Return a fault of the process with its cell and line, if known."""
         if fault.who != "responder" or fault.line is None or fault.cell is not None or fault.file:
             return fault
         cell, line = self.place(fault.line)
         return replace(fault, cell=cell, line=line)
 
     def place(self, line: int | None) -> tuple[int, int | None]:
-        """The cell, and the line in it, of a line of the whole notebook; the cell being executed if there is none."""
+        """Return the cell, and the line in it, for a line of the whole notebook. Without a line, the current cell."""
         if line is None or not 1 <= line < self._first_lines[-1]:
             return self._cell, None
         cell = bisect.bisect_right(self._first_lines, line)
         return cell, line - self._first_lines[cell - 1] + 1
 
     def note(self, line: int | None, sentence: str, file: str | None = None) -> None:
-        """Keep a sentence for the report, with the place that it is about; ``file`` lies beside the notebook."""
+        """Keep a note for the report with its place. ``file`` is a file beside the notebook."""
         cell, number = self.place(line) if file is None else (self._cell, line)
         where = f"cell {cell}" if number is None else f"cell {cell}, line {number}"
         self._note(f"{where}{f' of {file}' if file else ''}: {sentence}")
@@ -131,7 +131,7 @@ class NotebookProcess(ResponderProcess):
             self._note(f"{which} not run: the notebook was stopped in cell {self._cell}")
 
     def _take_cell(self, frame: wire.Frame, perform: Callable[[wire.Frame], dict[str, Any]]) -> None:
-        # Each costs output, so that a process cannot send these for ever.
+        # Each costs output, so a process can't send them without limit.
         self._spend("", "sent")
         match frame["do"]:
             case "cell":
@@ -156,7 +156,7 @@ class NotebookProcess(ResponderProcess):
                 self._take(frame)
 
     def _note_answering(self, answers: bool) -> None:
-        """What the cell that has just been executed has made of the responder."""
+        """Record whether there is a responder after the cell that has just been executed."""
         if not answers:
             self.answers_since = None
         elif self.answers_since is None:

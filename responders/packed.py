@@ -1,6 +1,6 @@
-"""The compact encoding of what a robot program does by the thousand: it reads a sensor, waits, sets a motor.
+"""Packets: the compact encoding of the robot program's frequent actions: sensor reads, waits and motor commands.
 
-A packet stands between the lines of the wire and is checked as strictly; every other frame is a line, in ``wire.py``.
+A packet stands between the lines of the wire format and is validated as strictly. ``wire.py`` handles all other frames.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from sim.recording import SENSORS
 
 
 class Read(NamedTuple):
-    """A sensor is read, which takes so many reading times."""
+    """Read a sensor. The number counts reading times."""
 
     what: str
 
 
 class Wait(NamedTuple):
-    """So much time is to pass, thirds of a microsecond."""
+    """Wait. The number is the time in thirds of a microsecond."""
 
 
 class MotorCommand(NamedTuple):
-    """A motor's set point becomes this (unless it is empty), then a command begins (unless it is None)."""
+    """Set a motor's set point to the number (unless it is empty), then send the command (unless it is None)."""
 
     port: str
     set_point: str
@@ -36,11 +36,11 @@ class MotorCommand(NamedTuple):
 Kind = Read | Wait | MotorCommand
 Act = tuple[Kind, float]
 
-#: What a packet begins with, where a line begins with a brace.
+#: First byte of a packet. A line begins with a brace.
 MARK = 0
-#: The mark, how many entries follow, and the packet's number among all frames.
+#: Mark, number of entries, and frame number.
 _HEADER = struct.Struct("<BxHxxxxQ")
-#: Of what kind it is, and a number.
+#: Code of the action, and its number.
 _ACT = struct.Struct("<Id")
 HEADER_BYTES = _HEADER.size
 _PORTS = ("outB", "outC")
@@ -53,7 +53,7 @@ def _code(what: int, part: int = 0, set_point: int = 0, command: int = 0) -> int
     return int.from_bytes((what, part, set_point, command), "little")
 
 
-#: Every kind that there is by its code, with the least and the greatest of its numbers, and whether they are whole.
+#: All actions by code: kind, smallest and largest number, and whether the number must be whole.
 _KINDS: dict[int, tuple[Kind, float, float, bool]] = {
     _code(_WAIT): (Wait(), 0, MOST_UNITS, True),
     **{_code(_READ, part): (Read(what), 1, 2, True) for part, what in enumerate(SENSORS)},
@@ -67,7 +67,11 @@ _KINDS: dict[int, tuple[Kind, float, float, bool]] = {
 
 
 def read_header(header: bytes) -> tuple[int, int]:
-    """How long the packet is that begins so, and its number. Raises WireError for one that is empty or too long."""
+    """Return the length of a packet and its frame number.
+
+    Raises:
+        WireError: If the packet is empty or too long.
+    """
     mark, count, number = _HEADER.unpack_from(header)
     size: int = HEADER_BYTES + count * _ACT.size
     if mark != MARK or count == 0 or size > MOST:
@@ -76,7 +80,11 @@ def read_header(header: bytes) -> tuple[int, int]:
 
 
 def acts_of(packet: bytes) -> list[Act]:
-    """What a whole packet asks for, in order. Raises WireError."""
+    """Return the actions in a packet, in order.
+
+    Raises:
+        WireError: If an action is invalid.
+    """
     acts = []
     for code, number in _ACT.iter_unpack(packet[HEADER_BYTES:]):
         known = _KINDS.get(code)
@@ -90,7 +98,7 @@ def acts_of(packet: bytes) -> list[Act]:
 
 
 def pack_readings(units: int, values: Sequence[float], number: int) -> bytes:
-    """Packet ``number`` for a child: the time, thirds of a microsecond, and what all sensors read."""
+    """Return packet ``number`` for a child: the time in thirds of a microsecond, and all sensor readings."""
     return _readings(len(values)).pack(MARK, 1 + len(values), number, units, *values)
 
 

@@ -1,6 +1,6 @@
-"""Runs one trial of two robots: fresh children for both programs and the responder, and a recording for each robot.
+"""Runs one trial of two robots with fresh children for both programs and the responder. Each robot has a recording.
 
-How the two share time is ``lockstep.py``'s; a trial of one robot is ``trial.py``'s.
+``lockstep.py`` shares the time between the two. ``trial.py`` runs trials of one robot.
 """
 
 from __future__ import annotations
@@ -30,9 +30,12 @@ def run_pair(
     sandboxes: Sandboxes,
     meter: JobMeter,
 ) -> Recording:
-    """One run of both programs from start to end: the first robot's recording, with its partner's.
+    """Run both programs and return the first robot's recording, which contains its partner's.
 
-    ``meter`` counts what their job costs. Raises HostError when the machine, not the student, fails.
+    ``meter`` counts the costs of the job.
+
+    Raises:
+        HostError: If the machine fails, not the student's code.
     """
     specs = spec, spec.of_partner(partner)
     for arena, other in zip(arenas, reversed(specs), strict=True):
@@ -81,7 +84,7 @@ def _in_order(faults: Iterable[Fault | None]) -> tuple[Fault, ...]:
 
 
 def _of_second(fault: Fault, partner: PartnerSpec) -> Fault | None:
-    """A fault of the second program by that name; None for one that is none of a given program."""
+    """Return the fault as one of the second program. None for a time limit of a given program, which is no fault."""
     if fault.who != "program":
         return fault
     if partner.given and fault.verdict is Verdict.TIME_LIMIT:

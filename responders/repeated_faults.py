@@ -1,11 +1,11 @@
-"""Spares trials a child that would only do again what it did before, up to the same fault.
+"""Replays a child that failed in earlier trials, instead of running it again up to the same fault.
 
-A child is told a seed, and then nothing but what the worker sends it. So one that uses no chance says the same again
-for as long as it is sent the same, and here it is not run but its part is read out; the world, the other children and
-the recording are what they always are. What is sent is compared each time, and where it differs the trial is run.
+A child receives a seed and then only data from the worker. A child without randomness therefore repeats its output for
+the same input. Its recorded output is replayed; the world, the other children and the recording work as usual. Each
+input is compared with the recorded one. If it differs, the trial is run again with a real child.
 
-A limit is met again for certain only by a child that is far from passing it: one that has said nothing since half of
-its processor time, and does the same at twice its limit. Near the limit every trial is run.
+A processor limit is replayed only if the child would certainly exceed it again. It must have sent nothing since half of
+its processor time, and must still not end at twice its limit. Near the limit, every trial is run.
 """
 
 from __future__ import annotations
@@ -27,25 +27,25 @@ from sim.errors import RobomarkError
 from sim.recording import Fault, Recording, Verdict
 
 _LIMITS = frozenset({Verdict.CPU_LIMIT, Verdict.STALLED})
-#: Faults that cost something, by the role of the child whose they are.
+#: Faults that are expensive to repeat, by the role of the child that caused them.
 _COSTLY = MappingProxyType({"robot": _LIMITS | {Verdict.PROGRAM_ERROR}, "responder": _LIMITS})
-#: What is kept of one child at most, and how often it may be tried in vain.
+#: Limits on the recorded steps of one child, and on failed attempts to replay it.
 _MOST_STEPS, _MOST_BYTES = 20_000, 8 << 20
 _MOST_MISSES = 3
-#: What can be imported without coming near a source of chance; everything else may lead there.
+#: Modules without access to randomness. Any other import may give access to it.
 _WITHOUT_CHANCE = frozenset(
     ["collections", "ev3dev2", "ev3dev2_glue", "functools", "itertools", "json", "math", "re", "string", "time"]
 )
 _IMPORT = re.compile(r"\bfrom\s+([\w.]+)\s+import\b|\bimport\b([^\n;#]*)")
-#: Names that chance, or another child's memory, is come to by from there, and ways to write a name that is not seen in
-#: the text: escapes, fields of a format, attributes that are copied by their names.
+#: Names that give access to randomness or to another child's memory, and constructs that can hide a name: escapes,
+#: format fields, copied attributes.
 _LEADING_AWAY = re.compile(
     r"\\[xuN0-7\n]|\b(?:v?format(?:_map|_field)?|get_field|Formatter|update_wrapper|wraps|metaclass)\b|\btype\s*\([^)]*,|"
     r"\b(?:_?random|urandom|_?sys|modules|eval|exec|compile|open|getattr|globals|locals|vars|id|hash|inspect"
     r"|(?:gi|cr|ag|tb)_frame|_getframe|f_\w+|__(?!(?:name|main|init|str|repr)__)\w+)\b"
 )
 
-#: What a recording notes, by the role of the child that was not run for it.
+#: Notes for the recording, by the role of the replayed child.
 SPARED = MappingProxyType(
     {
         "robot": "the robot program was not run again in this trial",
@@ -55,19 +55,19 @@ SPARED = MappingProxyType(
 
 
 class Diverged(RobomarkError):
-    """A child was told something else than when its part was written down: the trial has to be run."""
+    """Raised when a child's input differs from the recorded one: the trial has to be run."""
 
 
 @dataclass(slots=True)
 class _Part:
-    """What one child was told and what it said, in order; ``whole`` until there was too much of it."""
+    """The recorded input and output of one child, in order. ``whole`` is False if it grew too large."""
 
     first: wire.Frame
     sandbox: str
     steps: list[_Told | _Said] = field(default_factory=list)
     left: int = _MOST_BYTES
     whole: bool = True
-    repeats: bool = True  # whether it would come to the same limit again, however fast the machine is
+    repeats: bool = True  # whether the same limit is certain to be exceeded again
 
     def add(self, step: _Told | _Said, size: int) -> None:
         self.left -= size
@@ -87,22 +87,22 @@ class _Told:
 @dataclass(frozen=True, slots=True)
 class _Said:
     what: wire.Frame | ChildStopped
-    paid: int  # bytes that the job's meter took for it
+    paid: int  # bytes charged to the job's meter
 
 
 class RepeatedFaults:
-    """Follows the trials of one grading, in the order in which they are run."""
+    """Follows the trials of one grading in the order they are run."""
 
     def __init__(self) -> None:
         self._last: Fault | None = None
         self._heard: list[_Part] = []
         self._known: list[_Part] = []
         self._misses = 0
-        self._diverged = False  # whether this trial is run as it cannot be spared
-        self._by_heart = False  # whether some child of this trial has not been run
+        self._diverged = False  # whether this trial runs real children after a divergence
+        self._by_heart = False  # whether a child of this trial was replayed
 
     def child(self, role: str, folder: Path | None, meter: JobMeter | None, spawn: Callable[[], Child]) -> ServedChild:
-        """A child of this role, or what stands for it. ``spawn`` makes one."""
+        """Return a child of this role: a real one from ``spawn``, recorded or not, or a replayed one."""
         spared = self._last is not None and role.startswith(_role(self._last)) and self._misses < _MOST_MISSES
         if not spared or meter is None or self._diverged:
             return spawn()
@@ -111,7 +111,7 @@ class RepeatedFaults:
         return _Written(spawn(), folder, meter, self._heard)
 
     def ran(self, recording: Recording) -> Recording:
-        """A trial has ended; its recording, which says so if a child was not run."""
+        """Record that a trial has ended. Return its recording, with a note if a child was replayed."""
         fault, by_heart = _costly(recording.faults), self._by_heart
         self._by_heart = self._diverged = False
         if by_heart and self._last is not None:
@@ -119,7 +119,7 @@ class RepeatedFaults:
         if not self._known and fault is not None and self._last is not None and _alike(fault, self._last):
             self._known = [part for part in self._heard if part.whole]
             if not all(part.repeats for part in self._known):
-                # So near to the limit that another trial may end otherwise: all are run, and none is measured again.
+                # Too close to the limit, another trial may end differently. So all trials are run and measuring stops.
                 self._known, self._misses = [], _MOST_MISSES
         if not self._known:
             self._last = fault
@@ -127,7 +127,7 @@ class RepeatedFaults:
         return recording
 
     def again(self) -> None:
-        """The trial is begun anew, as it diverged."""
+        """Record that the trial diverged and is run again."""
         self._by_heart, self._diverged = False, True
         self._misses += 1
 
@@ -136,13 +136,13 @@ class RepeatedFaults:
 
 
 class _Written:
-    """A child whose part is written down."""
+    """A real child whose input and output are recorded."""
 
     def __init__(self, child: Child, folder: Path | None, meter: JobMeter, parts: list[_Part]) -> None:
         self._child, self._folder, self._meter, self._parts = child, folder, meter, parts
         self._part: _Part | None = None
         self._begun = False
-        self._spoke = 0.0  # what it had computed when it last said something, seconds
+        self._spoke = 0.0  # processor seconds at its last frame
         self.sandbox = child.sandbox
 
     def send(self, frame: wire.Frame, arrived: Sequence[str] = ()) -> None:
@@ -185,14 +185,14 @@ class _Written:
 
     def close(self) -> None:
         self._child.close()
-        # What it has left in its folder is looked at later, and would be missing.
+        # A log file is read later and can't be replayed, so such a child isn't.
         if self._part is not None and not (self._folder and os.path.lexists(self._folder / LOG_FILE)):
             self._parts.append(self._part)
             self._part = None
 
 
 class _ByHeart:
-    """Stands for a child that is told what one was told before; a real one, where none was told that at first."""
+    """A replayed child. If no recording starts with the same frame, it runs a real child."""
 
     def __init__(
         self,
@@ -279,7 +279,7 @@ def _role(fault: Fault) -> str:
 
 
 def _alike(one: Fault, other: Fault) -> bool:
-    """Where a program was when it had computed for too long is another line each time."""
+    """Return whether two faults are equal. For the processor limit, the line is ignored because it varies."""
     if one.verdict is Verdict.CPU_LIMIT:
         one, other = (replace(each, line=None, file="") for each in (one, other))
     return one == other
@@ -290,12 +290,12 @@ def _without_seed(frame: wire.Frame) -> wire.Frame:
 
 
 def _is_alone(frame: wire.Frame) -> bool:
-    """Neither a notebook nor one of several agents, who are told things by others."""
+    """Return whether the child is not a notebook and has no agents, which would send it other data."""
     return not frame.keys() & {"cells", "agents", "agent"}
 
 
 def _may_use_chance(frame: Mapping[str, Any], folder: Path | None) -> bool:
-    """Whether a text, or a module that it can import, has anything in it that leads to a source of chance."""
+    """Return whether a text, or a module that it can import, may access a source of randomness."""
     modules: dict[str, str] = dict(frame.get("modules", {}))
     if folder is not None:
         modules |= {file.stem: file.read_text("utf-8", "replace") for file in folder.glob("*.py")}
@@ -304,6 +304,6 @@ def _may_use_chance(frame: Mapping[str, Any], folder: Path | None) -> bool:
 
 
 def _imports(text: str) -> set[str]:
-    """The modules that are imported, and whatever else stands after that word."""
+    """Return the imported module names, and any other words that follow ``import``."""
     found = (source or names for source, names in _IMPORT.findall(text))
     return {name.strip().partition(" ")[0].partition(".")[0] for names in found for name in names.split(",")}

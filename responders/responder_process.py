@@ -1,6 +1,6 @@
-"""The process of a responder during one trial: it is sent a text, and gives an answer or a fault.
+"""The process of a responder during one trial. It receives texts and returns answers or faults.
 
-It knows no channel and no other message; which texts reach it and when its answers arrive is ``conversation.py``'s.
+It handles one message at a time. ``conversation.py`` decides which texts arrive and when the answers do.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from responders.agents import Agents
 
 _MOST_NOTES = 200
-#: Of the calls that are shown, and of the characters of each of their parts.
+#: Maximum number of recorded calls, and of characters in each of their parts.
 _MOST_CALLS, _MOST_SHOWN = 10_000, 200
 _FORGOT_RETURN = "A function returns nothing where it comes to its end, or to a bare return: return the answer."
 _MAKE_JSON = 'For an object return "JSON::" + json.dumps(the object).'
@@ -31,9 +31,9 @@ _MAKE_JSON = 'For an object return "JSON::" + json.dumps(the object).'
 
 @dataclass(frozen=True, slots=True)
 class Collected:
-    """What a robot has logged: name, value, the program's time or None, and the time; and images as the kit keeps them.
+    """Data and images that a robot has logged. A data entry is name, value, the program's time or None, and the time.
 
-    Images are texts ``left 245,226,... 30``: side, RGBA numbers, tick.
+    Images are texts ``left 245,226,... 30``: side, RGBA numbers, tick, as the course's kit stores them.
     """
 
     data: tuple[tuple[str, float, float | None, float], ...] = ()
@@ -41,7 +41,7 @@ class Collected:
 
 
 class ResponderProcess:
-    """A responder's process during one trial; ``answer`` never raises for what the student's code does."""
+    """The process of a responder during one trial. ``answer`` raises no exception for errors in student code."""
 
     _schema = wire.RESPONDER
     _who = "responder"
@@ -55,7 +55,7 @@ class ResponderProcess:
         meter: JobMeter,
         agents: Agents | None = None,
     ) -> None:
-        """``agents`` are the others that it may ask."""
+        """Start the process. ``agents`` are the agents that it may ask."""
         self._spec = spec
         self._agents = agents
         if agents is not None:
@@ -66,9 +66,9 @@ class ResponderProcess:
         self._output_left = spec.output_bytes
         self.calls: list[Call] = []
         self.notes: list[str] = []
-        self._message = -1  # the index of the one that is being answered
-        self._asked_at = 0  # when it was asked for that answer
-        self._slept = 0  # since then
+        self._message = -1  # index of the message that is being answered
+        self._asked_at = 0  # time of the request for that answer
+        self._slept = 0  # time slept since then
         for name, data in spec.files.items():
             (folder / name).write_bytes(data)
         self._child: ServedChild | None = sandboxes.spawn(spec.role, spec.limits, folder, meter)
@@ -76,7 +76,7 @@ class ResponderProcess:
         self._seed = seed
 
     def load(self) -> Fault | None:
-        """Run the module. The fault that kept it from answering, if any."""
+        """Load the module. Return the fault if it cannot answer, otherwise None."""
         assert self._child is not None
         try:
             self._child.send(self._beginning())
@@ -91,7 +91,7 @@ class ResponderProcess:
         return None
 
     def _beginning(self) -> dict[str, Any]:
-        """The first frame for the child."""
+        """Return the first frame for the child."""
         return {
             "name": self._spec.code.name,
             "text": self._spec.code.text,
@@ -102,18 +102,23 @@ class ResponderProcess:
         }
 
     def _agent_names(self) -> dict[str, Any]:
-        """The part of the first frame that names the agents, if there are any."""
+        """Return the agent names for the first frame, or nothing if there are no agents."""
         return {"agents": self._agents.others("responder")} if self._agents is not None else {}
 
     @property
     def alive(self) -> bool:
-        """Whether there is a child that can answer."""
+        """Return whether the child is running."""
         return self._child is not None
 
     def answer(self, text: str, t: int, message: int, collected: Collected, sender: int | None = None) -> Answer:
-        """What the responder makes of ``text``, told at ``t`` with what the robot has logged since the last one.
+        """Return the responder's answer to ``text``.
 
-        ``sender`` is the number of the robot that says it, where there are two.
+        Args:
+            text: The text as it arrived.
+            t: The time, in units of simulated time.
+            message: The index of the message.
+            collected: The data that the robot has logged since the last text.
+            sender: The number of the robot, in a trial of two.
         """
         if self._child is None:
             return Answer()
@@ -128,13 +133,13 @@ class ResponderProcess:
             return Answer(fault=self._stopped(surprise(error), t))
 
     def close(self) -> None:
-        """End the child, if there is one."""
+        """Close the child, if there is one."""
         if self._child is not None:
             self._child.close()
             self._child = None
 
     def _answer(self, frame: wire.Frame, t: int) -> Answer:
-        """What an answer's frame says; a text with ``JSON::`` brings what joins the robot's queue, if it is JSON."""
+        """Return the answer in a frame. A valid ``JSON::`` text also has an entry for the robot's queue."""
         said = frame["error"]["text"] if frame["kind"] == "error" else frame.get("text", "")
         self._spend(said, "printed and answered")
         hint = ""
@@ -171,7 +176,11 @@ class ResponderProcess:
             self._take(frame)
 
     def _take(self, frame: wire.Frame) -> None:
-        """A frame that waits for nothing. Raises ChildStopped for one that no honest child sends now."""
+        """Process a frame that needs no reply.
+
+        Raises:
+            ChildStopped: If the frame is not allowed now.
+        """
         match frame["do"]:
             case "print":
                 self._print(frame["text"])

@@ -1,6 +1,6 @@
-"""Trains a student's model inside the sandbox, and asks it to name images that it has not seen.
+"""Trains a student's model in the sandbox and lets it classify unseen images.
 
-The labels of those images never come here; whether the names are right is judged elsewhere.
+The labels of those images are not available here. The predictions are judged elsewhere.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
 from sim.recording import Fault, Verdict
 
-#: Images are sent in frames; one with more than this many pixels takes no other.
+#: Maximum number of pixels per frame. A larger image is sent alone.
 _PIXELS_A_CALL = 30_000
 
 Images = NDArray[np.uint8]
@@ -30,9 +30,9 @@ Images = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class TrainingSpec:
-    """A submission with ``function(images, labels)``; images are grey levels, (n, side, side).
+    """A submission with ``function(images, labels)``, and the images as grey levels of shape (n, side, side).
 
-    The groups of ``unseen`` are named one after the other, so what is told of the first knows nothing of the next.
+    The groups of ``unseen`` are predicted in order, so the output for one group depends on no later group.
     """
 
     code: Code
@@ -48,9 +48,9 @@ class TrainingSpec:
 
 @dataclass(frozen=True, slots=True)
 class Named:
-    """What the model called each image of a group, None where it gave no name.
+    """The predicted label of each image of a group, or None where the model gave no valid one.
 
-    ``fault`` is what had gone wrong by then, ``output`` all that had been printed, ``notes`` all that had been noted.
+    ``fault``, ``output`` and ``notes`` are those up to the end of the group.
     """
 
     names: tuple[str | None, ...]
@@ -60,9 +60,12 @@ class Named:
 
 
 def train_and_name(spec: TrainingSpec, sandboxes: Sandboxes, meter: JobMeter) -> tuple[Named, ...]:
-    """One child: the student's module is loaded, trained, and asked. The limits are for all of it together.
+    """Train the student's model in one child and return its predictions for each group of images.
 
-    Raises HostError when the machine, not the student, fails.
+    The limits apply to loading, training and prediction together.
+
+    Raises:
+        HostError: If the machine fails, not the student's code.
     """
     groups = [_chunks(images) for images in spec.unseen]
     calls = [
@@ -83,7 +86,7 @@ def train_and_name(spec: TrainingSpec, sandboxes: Sandboxes, meter: JobMeter) ->
 
 
 def _named(called: Called, groups: Sequence[Sequence[Images]], spec: TrainingSpec) -> Iterator[Named]:
-    """The names, each checked: what comes from a student's process may be anything."""
+    """Yield the predictions of each group, validated because they are untrusted."""
     fault = called.fault or (called.returned[0].fault if called.returned else None)
     trained, end = fault is None, 1
     for group in groups:
@@ -114,7 +117,7 @@ def _bad_answer() -> Fault:
 
 
 def _in_their_file(fault: Fault | None, spec: TrainingSpec) -> Fault | None:
-    """Without a line number that points below the end of the student's own text."""
+    """Return the fault without a line number that is beyond the end of the student's own text."""
     if fault is None or fault.line is None or fault.line <= spec.code.text.count("\n") + 1:
         return fault
     return replace(fault, line=None)

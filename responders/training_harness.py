@@ -1,6 +1,6 @@
-"""Inside the sandbox, below a student's own code: trains a model on images from a file, and asks it about others.
+"""Harness in the sandbox, appended to a student's code: trains a model on images in a file and runs predictions.
 
-Its text is joined to the student's, so that their functions are at hand; it holds no label that a model is marked by.
+The harness shares the student's module, so it can call their functions. It has no labels used for marking.
 """
 
 import typing
@@ -9,7 +9,7 @@ robomark_models: "list[typing.Any]" = []
 
 
 def robomark_train(function: "str") -> "str":
-    """Call the student's ``function`` with the images and labels of train.npz, and keep what it returns."""
+    """Call the student's ``function`` with the images and labels of train.npz, and keep the returned model."""
     import numpy
 
     with numpy.load("train.npz", allow_pickle=False) as data:
@@ -25,7 +25,7 @@ def robomark_train(function: "str") -> "str":
 
 
 def robomark_predict(pixels: "str", side: "int") -> "list[str]":
-    """The model's names for images that it has not seen; ``pixels`` are base64 of side x side bytes each."""
+    """Return the model's labels for unseen images. ``pixels`` is base64 with side * side bytes per image."""
     import base64
 
     import numpy
@@ -39,6 +39,6 @@ def robomark_predict(pixels: "str", side: "int") -> "list[str]":
 
 
 def robomark_rows(images: "typing.Any") -> "typing.Any":
-    """One row an image, each divided by its largest value, as the course does; shape (n, side * side), 0 to 1."""
+    """Return images as rows, each divided by its maximum, as in the course. Shape (n, side * side), values 0 to 1."""
     rows = images.reshape(len(images), -1).astype(float)
     return rows / rows.max(axis=1, keepdims=True).clip(1)

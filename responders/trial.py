@@ -1,6 +1,6 @@
-"""Runs one trial: fresh children and a private folder are set up, the bridge serves them, and a recording remains.
+"""Runs one trial: sets up fresh children and a private folder, serves them with the bridge, returns a recording.
 
-Nothing outlives a trial but its recording; what the program and the responder do meanwhile is ``bridge.py``'s.
+Only the recording remains after a trial. ``bridge.py`` serves the program and the responder.
 """
 
 from __future__ import annotations
@@ -29,9 +29,10 @@ def run_trial(
     sandboxes: Sandboxes,
     meter: JobMeter,
 ) -> Recording:
-    """One run of a program from start to end, in fresh children; ``meter`` counts what their job costs.
+    """Run a program once in fresh children. ``meter`` counts the costs of the job.
 
-    Raises HostError when the machine, not the student, fails.
+    Raises:
+        HostError: If the machine fails, not the student's code.
     """
     with sandboxes.private_folder() as folder, agents_beside(spec.agents, spec.child_seed, sandboxes, meter) as agents:
         responder = None
@@ -70,7 +71,7 @@ def run_trial(
 
 
 def recording_of(spec: TrialSpec, bridge: Bridge, faults: tuple[Fault, ...], sandbox: str) -> Recording:
-    """What a bridge that has served its program has seen, but for what the responder's process told of itself."""
+    """Return the recording of a bridge that has finished, without the data from the responder's process."""
     world = bridge.world
     data = (message_format.datum(line.text, line.t) for line in bridge.printed)
     return Recording(

@@ -1,6 +1,6 @@
-"""What a trial depends on, as plain values: the parts of a submission, the robot on its floor, channel and seeds.
+"""Trial specifications as plain values: parts of a submission, robot, floor, channel and seeds.
 
-Nothing here runs; ``trial.py`` makes a recording of it.
+Nothing here executes code. ``trial.py`` turns a specification into a recording.
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ Preamble = Literal["none", "imports", "preloaded"]
 
 
 class RanStatements:
-    """Which statements of a part its processes say that they have run: file (empty: the part itself), line, column."""
+    """The executed statements that a part's processes report: file (empty for the part itself), line, column."""
 
     def __init__(self) -> None:
         self.places: set[tuple[str, int, int]] = set()
 
     def add(self, frame: Mapping[str, Any]) -> None:
-        """Take note of a ``ran`` frame."""
+        """Add the statement of a ``ran`` frame."""
         if len(self.places) < _MOST_STATEMENTS:
             self.places.add((frame["file"] or "", frame["line"], frame["column"]))
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramSpec:
-    """A robot program and what it may use; ``modules`` are texts that it can import, by their names.
+    """A robot program and its resources. ``modules`` maps the names of importable modules to their source.
 
-    Which of its statements are run is noted in ``ran``, if there is one.
+    ``ran`` collects the executed statements, if given.
     """
 
     code: Code
@@ -58,7 +58,7 @@ class ProgramSpec:
 
     @property
     def role(self) -> Role:
-        """Its process has the libraries loaded where one is named on a line with an import."""
+        """Return the role of the process. It has libraries loaded if an import line names one."""
         texts = (self.code.text, *self.modules.values())
         lines = (line for text in texts for line in text.splitlines() if "import" in line)
         return "robot with libraries" if any(map(_A_LIBRARY.search, lines)) else "robot"
@@ -66,18 +66,18 @@ class ProgramSpec:
 
 @dataclass(frozen=True, slots=True)
 class ResponderSpec:
-    """What answers the robot: code and the files in its folder; ``ran`` as in a ``ProgramSpec``."""
+    """A responder: its code and the files in its folder. ``ran`` as in ``ProgramSpec``."""
 
     code: Code
     files: Mapping[str, bytes]
     limits: ChildLimits
     output_bytes: int
-    function: str | None = None  # the name of the responder; by the module's own choice if not given
+    function: str | None = None  # name of the responder function; None lets the module choose
     ran: RanStatements | None = None
 
     @property
     def role(self) -> Role:
-        """Its process has the libraries loaded unless it surely needs none."""
+        """Return the role of the process. It has libraries loaded unless the responder certainly needs none."""
         withheld = any(name.partition(".")[0] not in sys.stdlib_module_names for name in self.limits.without)
         needed = withheld or may_need_libraries(self.code.text, self.files)
         return "responder with libraries" if needed else "responder"
@@ -85,17 +85,17 @@ class ResponderSpec:
 
 @dataclass(frozen=True, slots=True)
 class AgentSpec(ResponderSpec):
-    """What the responder and the other agents ask: an agent of the student's, or one that is ``given``."""
+    """An agent that the responder and other agents can ask, written by the student or ``given``."""
 
     given: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class PartnerSpec:
-    """The second robot of a trial: its program, and where it starts. All else is as the first one has it.
+    """The second robot of a trial: its program and start pose. The other settings are those of the first robot.
 
-    A program that the assignment has ``given`` may run until the time is up, and its chance is the world's: the same
-    for every submission.
+    A ``given`` program, from the assignment, may run until the time is up. It uses the world's seed, so that it behaves
+    the same for every submission.
     """
 
     program: ProgramSpec
@@ -106,9 +106,9 @@ class PartnerSpec:
 
 @dataclass(frozen=True, slots=True)
 class TrialSpec:
-    """Everything a trial depends on. With ``collaborative`` and no responder, texts are answered ``pingpong``.
+    """All inputs of a trial. If ``collaborative`` without a responder, ``pingpong`` answers the texts.
 
-    With a ``partner`` there are two robots, and without a responder each has the other to talk to.
+    With a ``partner`` there are two robots. Without a responder, they send their texts to each other.
     """
 
     program: ProgramSpec
@@ -121,16 +121,16 @@ class TrialSpec:
     channel: Channel
     seconds: float
     seed: int
-    child_seed: int  # of the chance that the children see; the world's is ``seed``
+    child_seed: int  # seed of the children; ``seed`` is the world's
     pen_down: bool = False
     physics: Physics = COURSE_PHYSICS
-    tick: int = TICK  # how long one lasts, units of simulated time
+    tick: int = TICK  # duration of a tick, units of simulated time
     agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # by name
     partner: PartnerSpec | None = None
-    number: int = 1  # of the robot: what its program is told that it is
+    number: int = 1  # the robot's number, as its program sees it
 
     def of_partner(self, partner: PartnerSpec) -> TrialSpec:
-        """The same trial as the second robot has it, with chance of its own."""
+        """Return the trial as the second robot sees it, with its own seeds."""
         return replace(
             self,
             program=partner.program,

@@ -1,7 +1,7 @@
-"""The worker's end of the wire: frames from a child are read as if they came from the internet.
+"""The worker's end of the wire: strict parsing of untrusted frames from a child.
 
-One strict JSON object a line, of a closed schema; there is no frame that could carry a mark, a time or a verdict.
-What robot programs do by the thousand comes packed, which is ``packed.py``'s.
+Each line is one JSON object with a closed schema. No frame can carry a mark, a time or a verdict. ``packed.py`` handles
+the compact packets for a robot program's frequent actions.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from typing import Any
 
 Frame = dict[str, Any]
 
-#: The longest line that is read, bytes.
+#: Maximum line length, bytes.
 MOST = 65536
 
 
 class WireError(Exception):
-    """A frame that no honest child sends; the text says what is wrong with it."""
+    """Raised for an invalid frame; the message says why."""
 
 
 Check = Callable[[object], bool]
 
-#: The largest number that a frame can hold, either way.
+#: Largest absolute number in a frame.
 LARGEST = sys.float_info.max
 
 
@@ -42,12 +42,12 @@ def _flag(value: object) -> bool:
 
 
 def _number(value: object) -> bool:
-    # A whole number of hundreds of digits is finite and no float.
+    # A very large int is finite but doesn't fit a float.
     return type(value) in (int, float) and -LARGEST <= value <= LARGEST  # type: ignore[operator]
 
 
 def _packed_alone(_: object) -> bool:
-    """No line can say it."""
+    """Reject the field in JSON lines. Only packets may contain this action."""
     return False
 
 
@@ -77,16 +77,16 @@ def _module_file(value: object) -> bool:
 
 _line = _or_none(_whole(0, 10**7))
 _file = _or_none(_module_file)
-#: Where in the student's files: a line, and the file if it is not the one that is run.
+#: A place in the student's files: a line, and the file if it isn't the main one.
 _PLACE: Mapping[str, Check] = MappingProxyType({"line": _line, "file": _file})
 _port = _one_of("outB", "outC")
-#: The longest time that a program can ask for, thirds of a microsecond.
+#: Longest time that a program can request, thirds of a microsecond.
 MOST_UNITS = 10**15
 _units = _whole(0, MOST_UNITS)
 
 Schema = Mapping[str, tuple[Mapping[str, Check], Mapping[str, Check]]]
 
-#: The first frame of every child, before any student code: which layers stand round it.
+#: First frame of every child, before any student code: the active sandbox layers.
 SANDBOX: Schema = MappingProxyType(
     {
         "sandbox": (
@@ -104,7 +104,7 @@ SANDBOX: Schema = MappingProxyType(
     }
 )
 
-#: What a child says that tried the short battery instead of running student code.
+#: Frames of a child that runs the short battery of sandbox tests instead of student code.
 BATTERY: Schema = MappingProxyType(
     {
         "battery": (
@@ -115,15 +115,15 @@ BATTERY: Schema = MappingProxyType(
 )
 
 _REFUSED: tuple[Mapping[str, Check], Mapping[str, Check]] = ({"what": _text, **_PLACE}, {})
-#: A statement of the student's that was run for the first time.
+#: First execution of a student's statement.
 _RAN: tuple[Mapping[str, Check], Mapping[str, Check]] = (
     {"line": _whole(0, 10**7), "file": _file, "column": _whole(0, 10**7)},
     {},
 )
-#: The last word of a child without libraries that has imported one.
+#: Last frame of a child without libraries that has imported one.
 _LIBRARIES: tuple[Mapping[str, Check], Mapping[str, Check]] = ({}, {})
 
-#: What a robot program's process may say: for each ``do``, the fields it must and those it may have.
+#: Frames of a robot program's process: for each ``do``, the required and the optional fields.
 ROBOT: Schema = MappingProxyType(
     {
         "acts": ({"acts": _packed_alone}, {}),
@@ -146,7 +146,7 @@ ROBOT: Schema = MappingProxyType(
     }
 )
 
-#: What a responder's process may say.
+#: Frames of a responder's process.
 RESPONDER: Schema = MappingProxyType(
     {
         "refused": _REFUSED,
@@ -173,7 +173,7 @@ RESPONDER: Schema = MappingProxyType(
     }
 )
 
-#: What the process of a notebook may say.
+#: Frames of a notebook's process.
 NOTEBOOK: Schema = MappingProxyType(
     {
         **RESPONDER,
@@ -195,7 +195,7 @@ NOTEBOOK: Schema = MappingProxyType(
     }
 )
 
-#: What a process may say whose functions are called.
+#: Frames of a process for function calls.
 CALLS: Schema = MappingProxyType(
     {
         **RESPONDER,
@@ -208,13 +208,13 @@ CALLS: Schema = MappingProxyType(
 
 _ASK: tuple[Mapping[str, Check], Mapping[str, Check]] = ({"agent": _text, "arguments": _text, "named": _text}, {})
 
-#: What a responder's process may say whose submission has agents, and what such an agent's process may.
+#: Frames of a responder's process with agents, of a notebook's with agents, and of an agent's.
 RESPONDER_WITH_AGENTS: Schema = MappingProxyType({**RESPONDER, "ask": _ASK})
 NOTEBOOK_WITH_AGENTS: Schema = MappingProxyType({**NOTEBOOK, "ask": _ASK})
 AGENT: Schema = MappingProxyType({**CALLS, "ask": _ASK})
 
-#: Kinds that hold numbers and words of the schema alone, or are a child's last. Nothing else that a child has worded is
-#: kept of them, and honest programs send thousands; every other frame is paid for before it is handed on.
+#: Frames that are not charged to the meter. They hold only numbers and schema words, or are a child's last frame, so
+#: nothing of their text is stored. Honest programs send thousands of them.
 NOTHING_KEPT = frozenset(
     {
         "polarity",
@@ -231,7 +231,7 @@ NOTHING_KEPT = frozenset(
     }
 )
 
-#: The field that each kind of answer must have.
+#: The required field of each kind of answer.
 _ANSWER = {"text": "text", "error": "error", "other": "type", "long": "length"}
 
 
@@ -250,15 +250,18 @@ _decode = json.JSONDecoder(parse_constant=_no_constant, object_pairs_hook=_no_du
 
 
 _SURROGATE = re.compile(rb"\\u[dD][89a-fA-F]")
-#: What every line begins with, and nothing else in it can hold: a quotation mark inside of it is escaped.
+#: Start of every line. It can't occur elsewhere in the line, because inner quotation marks are escaped.
 BEGINNING = b'{"n":'
 _NUMBER = re.compile(re.escape(BEGINNING) + rb"(0|[1-9][0-9]{0,11}),")
 
 
 def unnumbered(line: bytes) -> tuple[int, bytes]:
-    """The number that every line begins with, and the frame without it. Raises WireError.
+    """Return the frame number and the rest of a line.
 
-    Frames are counted from 0 in each direction: one that was lost, repeated or slipped in shows.
+    Frames are numbered from 0 in each direction, so lost, repeated or inserted frames are detected.
+
+    Raises:
+        WireError: If the line has no valid number.
     """
     number = _NUMBER.match(line)
     if number is None:
@@ -267,7 +270,11 @@ def unnumbered(line: bytes) -> tuple[int, bytes]:
 
 
 def parse(line: bytes, schema: Schema) -> Frame:
-    """One frame of ``schema``, without its number. Raises WireError for anything else."""
+    """Return a validated frame of ``schema`` from a line without its number.
+
+    Raises:
+        WireError: If the line is invalid.
+    """
     if len(line) > MOST:
         raise WireError(f"a frame of more than {MOST} bytes")
     try:
@@ -297,7 +304,7 @@ def parse(line: bytes, schema: Schema) -> Frame:
 
 
 def _encodable(value: Any) -> Any:
-    """The same without halves of characters, which no file and no database takes."""
+    """Return the value with lone surrogates replaced, which files and databases reject."""
     if isinstance(value, str):
         return value.encode("utf-8", "replace").decode("utf-8")
     if isinstance(value, dict):
@@ -311,12 +318,12 @@ _encode = json.JSONEncoder(separators=(",", ":")).encode
 
 
 def encode(frame: Mapping[str, Any], number: int, arrived: Sequence[str] = ()) -> bytes:
-    """A frame for a child, as one line that begins with its number.
+    """Return a frame for a child as one line with its number.
 
-    What has ``arrived`` is JSON already, and goes into the list ``m`` as it is.
+    ``arrived`` holds JSON texts, which are inserted into the list ``m`` unchanged.
     """
     line = _encode({"n": number, **frame}).encode("ascii")
     if arrived:
-        # Halves of characters too: the child's JSON takes them.
+        # Keeps lone surrogates: the child's JSON parser accepts them.
         line = line[:-1] + f',"m":[{",".join(arrived)}]}}'.encode("utf-8", "surrogatepass")
     return line + b"\n"
