@@ -1,1 +1,1 @@
-"""The processes in which all student code runs, and the layers that keep it there."""
+"""The sandbox: the processes that run all student code, and the layers that isolate them."""

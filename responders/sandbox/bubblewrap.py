@@ -1,7 +1,7 @@
-"""Bubblewrap round a zygote, where it works: name spaces of its own, and only the folders that Python needs.
+"""Optional isolation with bubblewrap: a zygote in its own namespaces that sees only the folders that Python needs.
 
-It is an extra. What the sandbox promises it keeps without it; with it names outside cannot be found out either, nor
-processes, nor the machine's name.
+The sandbox keeps its guarantees without it. With it, student code also can't discover outside file names, processes or
+the host name.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ _PROGRAM = shutil.which("bwrap", path="/usr/bin:/bin:/usr/local/bin")
 _SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/etc/alternatives", "/etc/localtime", "/etc/ld.so.cache")
 _DEVICES = ("/dev/null", "/dev/zero")
 _SPACES = ("--unshare-ipc", "--unshare-pid", "--unshare-net", "--unshare-uts", "--unshare-cgroup-try")
-#: What a zygote of root's needs to make each child a user of its own, and to keep its addresses fixed (SETPCAP, which
-#: it drops when it begins); children drop them all.
+#: Capabilities for a zygote that runs as root. It needs them to run each child as a separate user, and SETPCAP to keep
+#: its addresses fixed; it drops SETPCAP at its start. Children drop all of them.
 _POWERS = ("CHOWN", "DAC_OVERRIDE", "KILL", "SETGID", "SETPCAP", "SETUID")
 _TRY_SECONDS = 20.0
 
 
 def wrapping(readable: list[str], writable: Path) -> list[str]:
-    """The beginning of a command that runs the interpreter in name spaces of its own.
+    """Return the command prefix that runs the interpreter in its own namespaces.
 
-    Beside the interpreter it sees ``readable`` and, to write in, ``writable``; it is the first process in there, so
-    that nothing outlives it.
+    Besides the interpreter, the process can read ``readable`` and write ``writable``. It is the first process in its
+    PID namespace, so no other process there outlives it.
     """
     command = [_PROGRAM or "bwrap", *_SPACES, "--die-with-parent", "--as-pid-1", "--new-session", "--hostname", "robot"]
     command += ["--cap-drop", "ALL"]
@@ -37,7 +37,7 @@ def wrapping(readable: list[str], writable: Path) -> list[str]:
         command.append("--unshare-user")
     shown = (*_interpreter(), *readable)
     for folder in _folders_above(*_SYSTEM, *_DEVICES, *shown, str(writable)):
-        # Left to bubblewrap, nobody but root could enter them.
+        # Folders that bubblewrap creates itself are accessible only to root.
         command += ["--dir", folder]
     for path in _SYSTEM:
         command += ["--ro-bind-try", path, path]
@@ -53,7 +53,7 @@ def _folders_above(*paths: str) -> list[str]:
 
 
 def why_not(wrapping: list[str]) -> str | None:
-    """Try it on an interpreter that does nothing: what keeps it from working here, or None if it works."""
+    """Run an interpreter that does nothing. Return the reason if that fails here, or None if it works."""
     if _PROGRAM is None:
         return "bwrap is not installed"
     try:
@@ -76,7 +76,7 @@ def why_not(wrapping: list[str]) -> str | None:
 
 
 def _interpreter() -> list[str]:
-    """Where the interpreter and its packages lie: of a virtual environment, and of what that was made from."""
+    """Return the folders of the interpreter and its packages, including the base of a virtual environment."""
     program = Path(sys.executable)
     found = {sys.prefix, sys.base_prefix, str(program.parent.parent), str(program.resolve().parent.parent)}
     return sorted(found - {"/", "/usr"})

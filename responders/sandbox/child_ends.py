@@ -1,6 +1,6 @@
-"""What the end of a child comes to: a verdict and a sentence, from its wait status and from its last word.
+"""The verdict and message for a child that has ended, from its wait status and its last frame.
 
-Watching a child and ending it is ``running_child.py``'s.
+``running_child.py`` watches children and ends them.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ _CLOSED = "its process ended without finishing the program"
 
 
 class KilledFromOutside(HostError):
-    """Something that is neither the worker nor the child has ended it: most likely this machine is out of memory."""
+    """Raised when neither the worker nor the child ended it: most likely the machine is out of memory."""
 
 
 def too_busy(cpu_seconds: float, place: wire.Frame) -> ChildStopped:
-    """It computed for longer than it may, and was at ``place`` then."""
+    """Return the fault of a child that exceeded its CPU limit at ``place``."""
     sentence = f"it computed for more than {cpu_seconds:g} seconds of CPU time"
     return ChildStopped(Verdict.CPU_LIMIT, sentence, place["line"], place["file"])
 
 
 def by_itself(status: int, used: float, cpu_seconds: float) -> ChildStopped | None:
-    """What the wait status says of a child that ``used`` so many of its CPU seconds; None if it was killed."""
+    """Return the fault for the wait status of a child that ``used`` this CPU time, or None if it was killed."""
     if not os.WIFSIGNALED(status):
         return ChildStopped(Verdict.PROGRAM_ERROR, _CLOSED)
     number = os.WTERMSIG(status)
-    # The kernel's own limit on processor time, a second or two behind ours, ends with SIGKILL too.
+    # The kernel's limit on processor time, a second or two above ours, also ends with SIGKILL.
     if number == signal.SIGXCPU or (number == signal.SIGKILL and used > cpu_seconds):
         return too_busy(cpu_seconds, NOWHERE)
     if number == signal.SIGSYS:
@@ -45,13 +45,18 @@ def by_itself(status: int, used: float, cpu_seconds: float) -> ChildStopped | No
 
 
 def killed(had_ended: bool, overran: bool, blamed: bool) -> ChildStopped:
-    """A child was killed: by us, unless it ``had_ended`` before. Raises KilledFromOutside if that is not its fault.
+    """Return the fault of a child that was killed: by the worker, unless it ``had_ended`` before.
 
-    ``overran``: with the other processes of its submission it has taken more than they may have. ``blamed``: it ran
-    alone on this machine and was killed before.
+    Args:
+        had_ended: The child had ended before the worker killed it.
+        overran: The processes of the submission together exceeded their memory limit.
+        blamed: The child ran alone on this machine and had been killed before.
+
+    Raises:
+        KilledFromOutside: If the child did not cause it.
     """
     if not had_ended:
-        # It was alive until we ended it ourselves just now: it had only closed the wire.
+        # The child was running until the worker killed it: it had only closed the wire.
         return ChildStopped(Verdict.PROGRAM_ERROR, _CLOSED)
     if overran:
         sentence = "the submission's processes took more memory together than they may have"
@@ -63,9 +68,9 @@ def killed(had_ended: bool, overran: bool, blamed: bool) -> ChildStopped:
 
 
 def place_of(unread: bytes) -> wire.Frame:
-    """Where a child that was asked says that it is, among what it had written before."""
+    """Return the place that a child reports when asked, from its unread output."""
     for line in reversed(unread.split(b"\n")):
-        # Packed acts may stand before it.
+        # Packets may precede it.
         start = max(line.rfind(wire.BEGINNING), 0)
         with contextlib.suppress(wire.WireError):
             return wire.parse(wire.unnumbered(line[start:])[1], {"busy": wire.ROBOT["busy"]})

@@ -1,7 +1,7 @@
-"""A control group (version 2) for each slot of a worker, where systemd or a container lets the worker have some.
+"""Optional control groups (version 2), one for each slot of a worker, where systemd or a container delegates them.
 
-An extra: it holds what no limit on a single process holds, and says whose fault it is when the kernel kills for want
-of memory. Which processes belong into one is ``zygote.py``'s.
+They limit what per-process limits can't, and show the cause when the kernel kills a process for lack of memory.
+``zygote.py`` decides which processes join a group.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from pathlib import Path
 
 from sim.errors import HostError
 
-#: Where the worker itself goes: a group that is divided may have no processes of its own.
+#: Group of the worker itself, because a group with subgroups may have no processes of its own.
 _SERVICE = "robomark-service"
 _SLOT = "robomark-slot-"
 _NEEDED = frozenset({"memory", "pids"})
 _WANTED = _NEEDED | {"io"}
 _MEGABYTE = 1 << 20
-#: What zygotes take, and their children beyond their limits.
+#: Memory of zygotes, and of children beyond their limits.
 _BESIDE_LIMITS = 400 * _MEGABYTE
-#: A zygote for each role, some inside bubblewrap, and their children; none of them may have a thread more.
+#: A zygote for each role, some inside bubblewrap, and their children. None of them may start a thread.
 _MOST_PROCESSES = 32
-#: Of a hundred, which is what others have.
+#: The default weight is 100.
 _DISK_WEIGHT = 10
-#: To the disk, and only there: honest students write a few kilobytes.
+#: Limit on disk writes, bytes per second. Honest students write a few kilobytes.
 _WRITTEN_A_SECOND = 32 * _MEGABYTE
 _WRITES_A_SECOND = 500
 _END_SECONDS = 2.0
@@ -35,13 +35,13 @@ _PROC = Path("/proc")
 
 
 class _NotDelegated(Exception):
-    """Why a worker can have no groups here: the end of a sentence."""
+    """Raised when a worker can't have groups here. The message is the end of a sentence."""
 
 
 def divide(proc: Path = _PROC) -> str | None:
-    """Make room for the groups of slots below that of this process, which goes into one of its own.
+    """Create space for slot groups below this process's group, and move the process into a group of its own.
 
-    To be called before it has children. What keeps it from doing so, in which case nothing has changed; else None.
+    Call it before the process has children. Return the reason if it fails, with nothing changed, otherwise None.
     """
     try:
         group = _delegated(proc)
@@ -62,7 +62,7 @@ def divide(proc: Path = _PROC) -> str | None:
 
 
 def why_not(proc: Path = _PROC) -> str | None:
-    """What keeps a worker that is started from here from having them; None if nothing does. Changes nothing."""
+    """Return why a worker started from here can't have groups, or None if it can. Changes nothing."""
     try:
         _delegated(proc)
     except _NotDelegated as reason:
@@ -71,10 +71,14 @@ def why_not(proc: Path = _PROC) -> str | None:
 
 
 class ControlGroup:
-    """That of one slot: its zygotes are started through ``joining``, and what they fork stays in."""
+    """The control group of one slot. Zygotes are started through ``joining``; the processes they fork stay in it."""
 
     def __init__(self, folder: Path, memory_mb: int) -> None:
-        """Raises HostError when it cannot be had."""
+        """Create the group.
+
+        Raises:
+            HostError: If it can't be created.
+        """
         self._folder = folder
         self._least = memory_mb * _MEGABYTE
         _remove_left_overs(folder.parent)
@@ -90,26 +94,26 @@ class ControlGroup:
             ("io.weight", f"default {_DISK_WEIGHT}"),
             ("io.max", f"{disk} wbps={_WRITTEN_A_SECOND} wiops={_WRITES_A_SECOND}"),
         ):
-            # Not every kernel has them, nor every disk.
+            # Not supported by all kernels and disks.
             with contextlib.suppress(OSError):
                 self._write(file, value)
 
     @property
     def joining(self) -> list[str]:
-        """The beginning of a command that runs in the group."""
+        """Return the command prefix that runs a process in the group."""
         return ["/bin/sh", "-c", 'echo 0 > "$0" && exec "$@"', str(self._folder / "cgroup.procs")]
 
     def make_room(self, limits_bytes: int) -> None:
-        """What an assignment allows its processes together, they can have: who takes more is at fault."""
+        """Set the group's limit so that its processes can have the memory that an assignment allows them together."""
         try:
             self._write("memory.max", max(self._least, limits_bytes + _BESIDE_LIMITS))
         except OSError as error:
             raise HostError(f"the control group {self._folder} cannot be changed: {error.strerror}") from None
 
     def watch(self) -> Callable[[], bool]:
-        """Whether the kernel has killed in it since, because this group, and not the machine, was out of memory.
+        """Return a predicate: whether the kernel has since killed a process for exceeding this group's memory limit.
 
-        ``oom_kill`` alone does not say so: it also counts who was killed because a group above was full.
+        The counter ``oom_kill`` is not enough, because it also counts processes killed for a full parent group.
         """
         killed, full = self._events()
 
@@ -120,7 +124,7 @@ class ControlGroup:
         return overran
 
     def close(self) -> None:
-        """End what is still in it, and remove it."""
+        """Kill the remaining processes and remove the group."""
         with contextlib.suppress(OSError):
             self._write("cgroup.kill", 1)
         until = time.monotonic() + _END_SECONDS
@@ -140,7 +144,11 @@ class ControlGroup:
 
 
 def for_this_process(memory_mb: int, proc: Path = _PROC) -> ControlGroup | None:
-    """That of this process's slot, in a worker that could ``divide`` its own; else None. Raises HostError."""
+    """Return the group of this process's slot if the worker could ``divide`` its own, otherwise None.
+
+    Raises:
+        HostError: If the group can't be created.
+    """
     try:
         own = _own(proc)
     except _NotDelegated:
@@ -151,7 +159,11 @@ def for_this_process(memory_mb: int, proc: Path = _PROC) -> ControlGroup | None:
 
 
 def _delegated(proc: Path) -> Path:
-    """The group that may be divided, or is. Raises _NotDelegated."""
+    """Return the group that can be divided or already is.
+
+    Raises:
+        _NotDelegated: If there is none.
+    """
     own = _own(proc)
     group = own.parent if own.name == _SERVICE else own
     try:
@@ -170,7 +182,11 @@ def _delegated(proc: Path) -> Path:
 
 
 def _own(proc: Path) -> Path:
-    """The folder of this process's group. Raises _NotDelegated."""
+    """Return the folder of this process's group.
+
+    Raises:
+        _NotDelegated: If there is none.
+    """
     try:
         groups = (proc / "self" / "cgroup").read_text().splitlines()
         mounts = (proc / "self" / "mountinfo").read_text().splitlines()
@@ -188,7 +204,7 @@ def _own(proc: Path) -> Path:
 
 
 def _remove_left_overs(group: Path) -> None:
-    """Remove the groups of slots whose process was killed before it could do so itself."""
+    """Remove the groups of slots whose process was killed before it could remove them."""
     for folder in group.glob(f"{_SLOT}*"):
         if not Path(f"/proc/{folder.name.removeprefix(_SLOT)}").exists():
             _removed(folder)
@@ -205,7 +221,7 @@ def _removed(folder: Path) -> bool:
 
 
 def _disk(folder: Path) -> str:
-    """The number of the whole disk on which a folder lies; of what is no disk, its own."""
+    """Return the device number of the whole disk with this folder, or the folder's own if it is on no disk."""
     number = folder.stat().st_dev
     name = f"{os.major(number)}:{os.minor(number)}"
     with contextlib.suppress(OSError):

@@ -1,6 +1,6 @@
-"""The zygotes of a worker: started when first needed, told apart by what their children do without, ended together.
+"""The zygotes of a worker: started when first needed, one per role and set of excluded packages, closed together.
 
-What a zygote is, and that every wall stands round its children, is ``zygote.py``'s.
+``zygote.py`` starts a zygote and checks that every layer isolates its children.
 """
 
 from __future__ import annotations
@@ -20,36 +20,36 @@ from responders.sandbox.private_folders import PrivateFolders
 from responders.sandbox.running_child import Child, ChildLimits, ServedChild
 from responders.sandbox.zygote import FULL, ROLES, WITH_LIBRARIES, Isolation, Role, Zygote, own_modules
 
-#: Of a role, its folder, its job's meter and what makes a child: the child, or what stands for it.
+#: Returns a real or a replayed child, from its role, its folder, its job's meter and a function that creates it.
 StandIn = Callable[[str, Path | None, JobMeter | None, Callable[[], Child]], ServedChild]
 
 
 class Sandboxes:
-    """The zygotes of one worker: started when first needed, ended together, and all in one ``group`` if given."""
+    """The zygotes of one worker: started when first needed, closed together, all in one ``group`` if given."""
 
     def __init__(self, isolation: Isolation = FULL, group: ControlGroup | None = None) -> None:
         self.isolation = isolation
         self._group = group
-        self._living: list[tuple[Child, int]] = []  # in the group, each with the bytes that it may have
+        self._living: list[tuple[Child, int]] = []  # children in the group, with their memory limit
         self._zygotes: dict[tuple[Role, tuple[str, ...]], Zygote] = {}
         self._folders = PrivateFolders()
         self._blamed = False
         self._stand_in: StandIn | None = None
         self._forgets_until = 0.0
         self._cpu_of_closed = 0.0
-        self._given_libraries: JobMeter | None = None  # the meter of the last job that had to have them
+        self._given_libraries: JobMeter | None = None  # the meter of the last job that needed them
 
     def begin(self, role: Role, without: tuple[str, ...]) -> None:
-        """Start what children of this role will come from, and wait for nothing; what is wrong with it shows then."""
+        """Start the zygote for this role without waiting for it. Errors appear when it is used."""
         with contextlib.suppress(OSError):
             self._zygote(role, without).begin()
 
     def spawn(
         self, role: Role, limits: ChildLimits, folder: Path | None = None, meter: JobMeter | None = None
     ) -> ServedChild:
-        """A fresh child for a robot program or a responder, in a ``private_folder`` or without one.
+        """Return a fresh child for a role, with or without a ``private_folder``.
 
-        What it costs is counted by ``meter``, that of its job.
+        ``meter``, the meter of its job, counts its costs.
         """
         if self._stand_in is not None:
             return self._stand_in(role, folder, meter, lambda: self._fork(role, limits, folder, meter))
@@ -67,12 +67,12 @@ class Sandboxes:
         return child
 
     def give_libraries(self, meter: JobMeter) -> None:
-        """From now on all children of the job that has this meter have libraries loaded."""
+        """Load libraries in all further children of the job with this meter."""
         self._given_libraries = meter
 
     @contextlib.contextmanager
     def blaming(self) -> Iterator[None]:
-        """Meanwhile a child that is killed from outside is to blame for it."""
+        """Within this context, a child that is killed from outside counts as the cause."""
         self._blamed = True
         try:
             yield
@@ -81,7 +81,7 @@ class Sandboxes:
 
     @contextlib.contextmanager
     def standing_in(self, stand_in: StandIn) -> Iterator[None]:
-        """Meanwhile ``stand_in`` says whether a child is needed, or what stands for it."""
+        """Within this context, ``stand_in`` decides between a real child and a replayed one."""
         self._stand_in = stand_in
         try:
             yield
@@ -89,23 +89,27 @@ class Sandboxes:
             self._stand_in = None
 
     def check(self, role: Role = "robot") -> str:
-        """Let a child try to get out of its sandbox; say which layers hold. Raises SandboxMissing if any does not."""
+        """Run escape attempts in a child and return the layers that blocked them.
+
+        Raises:
+            SandboxMissing: If a required layer fails.
+        """
         return self._zygote(role).try_isolation()
 
     def why_no_bubblewrap(self, role: Role = "robot") -> str | None:
-        """What keeps bubblewrap, an extra, from standing round children of ``role``; None if it does."""
+        """Return why bubblewrap, which is optional, does not isolate children of ``role``; None if it does."""
         self.check(role)
         return self._zygote(role).without_bubblewrap
 
     def remembers(self) -> str | None:
-        """Why a trial here could leave something for a later one to find; None for the next hours if it cannot."""
+        """Return how a trial could leave data for a later one here, or None if it can't for the next hours."""
         now = time.time()
         if not 0 < self._forgets_until - now <= reading_dates.HOLDS_SECONDS:
             zygote = self._zygote("robot")
             zygote.try_isolation()
             if zygote.without_doorkeeper is not None:
                 return f"nobody decides which paths it may name ({zygote.without_doorkeeper})"
-            if zygote.without_bubblewrap is not None:  # in there nothing is dated, as it is mounted for reading only
+            if zygote.without_bubblewrap is not None:  # bubblewrap mounts read-only, so access times don't change
                 own = [own_modules(role) for role in ROLES]
                 dated = reading_dates.read_beforehand(grants.readable(own), grants.listable(own))
                 if dated is not None:
@@ -114,13 +118,13 @@ class Sandboxes:
         return None
 
     def private_folder(self) -> contextlib.AbstractContextManager[Path]:
-        """A folder for one trial, removed afterwards whatever the student's code has put into it."""
+        """Return a context manager for the folder of one trial, which is removed afterwards with all its content."""
         return self._folders.one()
 
     def _zygote(self, role: Role, without: tuple[str, ...] = ()) -> Zygote:
-        """Beside the usual one of a role there is one without some packages, for the job at hand.
+        """Return the zygote for a role. Without some third-party packages, a second zygote is kept for the current job.
 
-        Python's own modules are loaded in both: they are put away in the child.
+        Modules of Python's standard library are loaded in both and hidden in the child.
         """
         packages = tuple(name for name in without if name.partition(".")[0] not in sys.stdlib_module_names)
         key = (role, packages)
@@ -133,11 +137,11 @@ class Sandboxes:
 
     @property
     def children_cpu_seconds(self) -> float:
-        """What all children that are gone have used."""
+        """Processor time of all ended children."""
         return self._cpu_of_closed + sum(zygote.children_cpu_seconds for zygote in self._zygotes.values())
 
     def close(self) -> None:
-        """End all zygotes, and remove the control group and the private folders."""
+        """Close all zygotes, and remove the control group and the private folders."""
         while self._zygotes:
             self._zygotes.popitem()[1].close()
         if self._group is not None:

@@ -1,7 +1,7 @@
-"""What all children of one job may cost the worker together: bytes it keeps of them, their processor time, their sleep.
+"""The costs of a job's children to the worker: stored bytes, processor time and real time asleep.
 
-Spent before anything is kept, so that the worker's own memory and time are bounded by it; what a single child may use
-is ``running_child.py``'s.
+Costs are charged before data is stored, so they bound the worker's own memory and time. ``running_child.py`` applies
+the limits of a single child.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ from dataclasses import dataclass
 from sim.errors import HostError, RobomarkError
 from sim.recording import Verdict
 
-#: What an object that is kept costs beside its text.
+#: Cost of a stored object in addition to its text.
 OBJECT_BYTES = 256
-#: What each child may sleep before it counts: answers are not fetched in no time, least of all on a busy machine.
+#: Sleep that is free for each child, because replies take time, especially on a busy machine.
 _FREE_SLEEP_SECONDS = 0.5
 
 
 class ChildStopped(Exception):
-    """A child that will say no more: why, in a sentence, and the line where that is known.
+    """Raised when a child has been stopped or has ended, with the reason and the line if known.
 
-    It is one of the file that is run, or of ``file`` beside it.
+    The line is one of the main file, or of ``file`` beside it.
     """
 
     def __init__(self, verdict: Verdict, message: str, line: int | None = None, file: str | None = None) -> None:
@@ -31,7 +31,7 @@ class ChildStopped(Exception):
 
 @dataclass(frozen=True, slots=True)
 class JobLimits:
-    """For all trials of a job together: bytes kept, seconds of processor time, and seconds asleep in real time."""
+    """Limits for all trials of a job together: bytes stored, processor seconds, and real seconds asleep."""
 
     kept_bytes: int = 64 << 20
     cpu_seconds: float = 150.0
@@ -40,7 +40,7 @@ class JobLimits:
 
 @dataclass(frozen=True, slots=True)
 class Spent:
-    """What a job has cost so far."""
+    """The costs of a job so far."""
 
     kept_bytes: int = 0
     cpu_seconds: float = 0.0
@@ -48,30 +48,30 @@ class Spent:
 
 
 class JobMeter:
-    """Counts what one job costs. ``heartbeat`` is called several times a second and may raise to end the job."""
+    """Counts the costs of one job. ``heartbeat`` runs several times a second and may raise to end the job."""
 
     def __init__(self, limits: JobLimits = JobLimits(), heartbeat: Callable[[], None] = lambda: None) -> None:
         self._limits = limits
         self._heartbeat = heartbeat
         self._kept = 0
-        self._cpu = self._sleep = 0.0  # of children that are gone
+        self._cpu = self._sleep = 0.0  # of ended children
 
     @property
     def spent(self) -> Spent:
-        """What the job has cost so far; seconds are counted of children that are gone."""
+        """The costs of the job so far. Seconds include only ended children."""
         return Spent(self._kept, self._cpu, self._sleep)
 
     @property
     def limits(self) -> JobLimits:
-        """What the job may cost."""
+        """The limits of the job."""
         return self._limits
 
     def extend(self, limits: JobLimits) -> None:
-        """Let the job cost this much from now on; what it has cost is kept."""
+        """Replace the limits. The costs so far remain."""
         self._limits = limits
 
     def heartbeat(self) -> None:
-        """Whatever it raises that is not ours to tell a user is the machine's fault, never a child's."""
+        """Call the heartbeat. An unexpected exception from it is a host fault, never a child's."""
         try:
             self._heartbeat()
         except RobomarkError:
@@ -80,7 +80,11 @@ class JobMeter:
             raise HostError(f"the job's heartbeat failed: {type(error).__name__}: {error}") from error
 
     def keep(self, size: int) -> None:
-        """Pay for an object with ``size`` bytes of text, before it is kept. Raises ChildStopped."""
+        """Charge for an object with ``size`` bytes of text before it is stored.
+
+        Raises:
+            ChildStopped: If the job exceeds its limit.
+        """
         self._kept += size + OBJECT_BYTES
         if self._kept > self._limits.kept_bytes:
             raise ChildStopped(
@@ -89,7 +93,11 @@ class JobMeter:
             )
 
     def check_cpu(self, running: float) -> None:
-        """``running`` is what a child has used so far that is still there. Raises ChildStopped."""
+        """Check the limit on processor time. ``running`` is the time of the current child.
+
+        Raises:
+            ChildStopped: If the job exceeds its limit.
+        """
         if self._cpu + running > self._limits.cpu_seconds:
             raise ChildStopped(
                 Verdict.CPU_LIMIT,
@@ -97,7 +105,11 @@ class JobMeter:
             )
 
     def check_sleep(self, running: float) -> None:
-        """``running`` is how long such a child has slept. Raises ChildStopped."""
+        """Check the limit on sleep. ``running`` is the sleep of the current child.
+
+        Raises:
+            ChildStopped: If the job exceeds its limit.
+        """
         if self._sleep + max(0.0, running - _FREE_SLEEP_SECONDS) > self._limits.sleep_seconds:
             raise ChildStopped(
                 Verdict.STALLED,
@@ -105,10 +117,10 @@ class JobMeter:
             )
 
     def child_ended(self, cpu_seconds: float, sleep_seconds: float) -> None:
-        """Count the seconds of a child that is gone; the first ones asleep are free."""
+        """Count the seconds of an ended child. The first seconds asleep are free."""
         self._cpu += cpu_seconds
         self._sleep += max(0.0, sleep_seconds - _FREE_SLEEP_SECONDS)
 
     def give_back(self, before: Spent) -> None:
-        """Forget what was spent since ``before``: the machine, not the submission, is why it was for nothing."""
+        """Refund the costs since ``before``, because the host caused the failure."""
         self._kept, self._cpu, self._sleep = before.kept_bytes, before.cpu_seconds, before.sleep_seconds

@@ -1,6 +1,7 @@
-"""Folders of single trials, all in one folder of the worker's, and removed whatever was put into them.
+"""Private folders of trials, all in one folder of the worker, and removed with their content.
 
-What a student's process may do in its own is decided by the sandbox; that it cannot grow is seen to while it runs.
+The sandbox decides which operations a student's process may perform in its folder. Its size is checked while the
+process runs.
 """
 
 from __future__ import annotations
@@ -16,25 +17,25 @@ from collections.abc import Iterator
 from pathlib import Path
 
 _PREFIX = "robomark-trials-"
-#: Others may pass through it, as a child that runs as a user of its own must, but not look round.
+#: Other users may traverse the folder, as children with their own user must, but not list it.
 _MODE = 0o711
-#: How many numbers each trial takes up, with those that are left out after it: several times what a child may use up.
+#: Number of inodes that each trial consumes where they are counted up: several times the limit for a child.
 _NUMBERS = 1024
-#: How many numbers are taken at most during a trial, several times what others make in the meantime.
+#: Maximum number of low inodes reserved during a trial, several times the number that others use meanwhile.
 _TAKEN = 64
 
 
 class PrivateFolders:
-    """The folder in which trials have theirs; made when first asked for, and locked as long as its worker lives."""
+    """The parent folder of private folders, created on first use and locked while its worker runs."""
 
     def __init__(self) -> None:
         self._path: Path | None = None
         self._lock = -1
-        self._counting = False  # whether files there are numbered on and on
+        self._counting = False  # whether the file system counts inode numbers up
 
     @property
     def path(self) -> Path:
-        """It, made again if somebody has tidied it away."""
+        """The parent folder, created again if it was deleted."""
         if self._path is None or not self._path.is_dir():
             self._make(self._path)
         assert self._path is not None
@@ -42,7 +43,7 @@ class PrivateFolders:
 
     @contextlib.contextmanager
     def one(self) -> Iterator[Path]:
-        """A folder for one trial."""
+        """Yield the folder of one trial and remove it afterwards."""
         with self._telling_nothing():
             folder = Path(tempfile.mkdtemp(dir=self.path))
             try:
@@ -52,11 +53,11 @@ class PrivateFolders:
 
     @contextlib.contextmanager
     def _telling_nothing(self) -> Iterator[None]:
-        """Keep the number of a trial's next file from saying how many files an earlier trial has made.
+        """Prevent inode numbers from revealing how many files an earlier trial has created.
 
-        Where files are numbered on and on (tmpfs, Btrfs), every trial takes up as many numbers, whatever it makes.
-        Where the lowest free number is taken (ext4) it would say whether others, who made files beside that trial,
-        found the low ones taken; so a number of low ones that nobody knows is taken meanwhile.
+        Some file systems count up (tmpfs, Btrfs): there every trial consumes the same number of inodes. Others reuse
+        the lowest free number (ext4), which would reveal the files created beside an earlier trial. There a random
+        number of low inodes is reserved during the trial.
         """
         folder = self.path
         if self._counting:
@@ -77,7 +78,7 @@ class PrivateFolders:
             _remove(taking)
 
     def close(self) -> None:
-        """Remove the folder and let go of its lock."""
+        """Remove the folder and release its lock."""
         if self._path is not None:
             _remove(self._path)
             self._path = None
@@ -94,7 +95,7 @@ class PrivateFolders:
 
 
 def _number(folder: Path) -> int:
-    """The number of a new file in ``folder``, which is gone again."""
+    """Return the inode number of a new file in ``folder``; the file is deleted."""
     path = folder / "number"
     path.touch(0o600)
     try:
@@ -104,8 +105,12 @@ def _number(folder: Path) -> int:
 
 
 def locked_folder(prefix: str, mode: int, path: Path | None = None) -> tuple[Path, int]:
-    """Make a temporary folder, at ``path`` if given. Returns it and its lock, a descriptor to be closed at the end."""
-    # Whoever looks for left-overs does not see it without its lock.
+    """Create a temporary folder, at ``path`` if given.
+
+    Returns:
+        The folder, and its lock: a descriptor to close at the end.
+    """
+    # The hidden name protects it from the removal of left-overs until it is locked.
     hidden = Path(tempfile.mkdtemp(prefix=f".{prefix}"))
     hidden.chmod(mode)
     path = path or hidden.with_name(hidden.name.removeprefix("."))
@@ -116,12 +121,12 @@ def locked_folder(prefix: str, mode: int, path: Path | None = None) -> tuple[Pat
 
 
 def remove_left_overs(prefix: str = _PREFIX) -> None:
-    """Remove the locked folders whose process was killed before it could do so itself.
+    """Remove the locked folders whose process was killed before it could remove them.
 
-    It may live in another name space, where process ids say nothing: only the lock says that it is gone.
+    The process may be in another namespace, where process ids mean nothing. So a released lock is the only criterion.
     """
     for folder in Path(tempfile.gettempdir()).glob(f"{prefix}*"):
-        # Another worker may be doing the same at this moment.
+        # Another worker may be removing it at the same time.
         with contextlib.suppress(OSError), _opened(folder) as descriptor:
             if os.fstat(descriptor).st_uid == os.getuid():
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -141,5 +146,5 @@ def _remove(folder: Path) -> None:
     try:
         shutil.rmtree(folder, ignore_errors=True)
     except RecursionError:
-        # rmtree recurses; a chain of a thousand folders is a student's doing.
+        # rmtree recurses, and student code can nest a thousand folders.
         subprocess.run(["rm", "-rf", "--", str(folder)], check=False)

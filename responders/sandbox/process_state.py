@@ -1,6 +1,6 @@
-"""What the kernel tells of a child: its time on processors and in their queue, how it ended, what is in its folder.
+"""The state of a child as the kernel reports it: processor time, time queued, wait status, folder content.
 
-Nothing here is asked of the process itself, and nothing is done to it.
+All functions only read. None relies on the process itself.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 
 
 def busy_seconds(pid: int) -> float:
-    """What it has run, and waited for a processor; endless where the kernel does not say."""
+    """Return the seconds that a process has run or waited for a processor; infinity if unknown."""
     try:
         return sum(_scheduled(pid))
     except (OSError, ValueError):
@@ -22,7 +22,7 @@ def busy_seconds(pid: int) -> float:
 
 
 def seconds_queued() -> float:
-    """For how long this thread has stood in the queue for a processor; 0 where the kernel does not say."""
+    """Return the seconds that this thread has waited for a processor; 0 if unknown."""
     try:
         return _scheduled("thread-self")[1]
     except (OSError, ValueError):
@@ -30,7 +30,7 @@ def seconds_queued() -> float:
 
 
 def runnable(pid: int) -> bool:
-    """Whether it would run if it got a processor: then a busy machine is to blame, not the program."""
+    """Return whether the process is runnable: then the machine is busy, and the program isn't waiting."""
     try:
         state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
     except (OSError, IndexError):
@@ -39,7 +39,7 @@ def runnable(pid: int) -> bool:
 
 
 def signal_name(number: int) -> str:
-    """What the signal is called, or its number."""
+    """Return the name of a signal, or its number."""
     try:
         return signal.Signals(number).name
     except ValueError:
@@ -47,7 +47,7 @@ def signal_name(number: int) -> str:
 
 
 def folder_content(folder: Path, most: int) -> tuple[int, int]:
-    """The bytes and the number of the files in a flat folder, of at most ``most`` files."""
+    """Return the total size in bytes and the number of files in a flat folder, up to ``most`` files."""
     size = count = 0
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in itertools.islice(entries, most):
@@ -58,6 +58,6 @@ def folder_content(folder: Path, most: int) -> tuple[int, int]:
 
 
 def _scheduled(process: int | str) -> tuple[float, float]:
-    """Seconds that a process has run, and stood in the queue for a processor, by ``/proc``."""
+    """Return the seconds that a process has run and has waited for a processor, from ``/proc``."""
     run, queued, _ = Path(f"/proc/{process}/schedstat").read_text().split()
     return int(run) / 1e9, int(queued) / 1e9

@@ -1,6 +1,6 @@
-"""One processor for all of a trial: a worker and a student's process take turns, each on caches that are still warm.
+"""Processor affinity: a worker and its student process share one processor during a trial, with warm caches.
 
-It is for speed alone. Where no processor is free of other trials, everything runs wherever the machine has it.
+This only improves speed. If every processor is taken by another trial, the processes stay unpinned.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ import os
 import socket
 from collections.abc import Iterator, Set
 
-#: Where a process of ours that is for more than one trial may run.
+#: Processors for worker processes that serve more than one trial.
 ALLOWED = frozenset(os.sched_getaffinity(0))
 _libc = ctypes.CDLL(None)
 
 
 @contextlib.contextmanager
 def one_processor() -> Iterator[None]:
-    """Meanwhile this thread, and the children forked for it, keep to one processor that no other trial keeps to."""
+    """Within this context, pin this thread and the children forked for it to a processor unused by other trials."""
     allowed = os.sched_getaffinity(0)
     if len(allowed) == 1:
         yield
@@ -32,12 +32,12 @@ def one_processor() -> Iterator[None]:
 
 
 def _free_one(allowed: Set[int], kept: contextlib.ExitStack) -> int | None:
-    """One that nobody has taken, until ``kept`` is closed: this one if it can be. None where there is none."""
+    """Reserve a free processor until ``kept`` is closed, preferably the current one. Return None if none is free."""
     here = _libc.sched_getcpu()
     for processor in sorted(allowed, key=lambda each: each != here):
         taking = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:
-            # A name of no file: it is free again as soon as whoever has it is gone, however that came about.
+            # An abstract socket name is released when its process ends, for whatever reason.
             taking.bind(f"\0robomark-processor-{processor}")
         except OSError:
             taking.close()

@@ -1,7 +1,7 @@
-"""Sees to it that reading leaves no trace: nothing that children may read is dated when one of them reads it.
+"""Access times: keeps reads by children from changing them, so that reading leaves no trace for later trials.
 
-Where the usual rule is in force (relatime), the date of the last reading stays as it is for a day once a file was read
-after its last change. So the worker reads everything beforehand, every half day. It changes nothing but those dates.
+With the usual relatime mount option, a file's access time stays unchanged for a day once it is newer than the last
+change. So the worker reads every file in advance, every half day. Only access times change.
 """
 
 from __future__ import annotations
@@ -13,26 +13,27 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-#: For so long nothing that was read beforehand is dated, whoever reads it, and for an hour more.
+#: Time for which reading in advance is effective, with an hour in reserve.
 HOLDS_SECONDS = 12 * 3600
 _FRESH_SECONDS = 11 * 3600
 _NEVER_DATED = os.ST_RDONLY | os.ST_NOATIME
 
 
 def read_beforehand(paths: Iterable[str], listed: Iterable[str] = ()) -> str | None:
-    """Read ``paths`` and all beneath them, list ``listed``, follow the links on the way to them.
+    """Read ``paths`` and everything below, list ``listed``, and follow the links to them.
 
-    What would be dated all the same, in a sentence; None if nothing would.
+    Return a sentence about a file whose access time would still change, or None.
     """
     alone = _and_links(listed)
     pending: list[tuple[str, int | None]] = [(path, None) for path in _and_links(paths) | alone]
     while pending:
         path, rule = pending.pop()
-        # A file may come and go, or not be for us to read: then it is not for a child of ours either.
+        # Files may disappear or be unreadable for the worker, and then they are for its children too.
         with contextlib.suppress(OSError):
             status = os.lstat(path)
             mode = status.st_mode
-            # A device's driver dates nothing, however it is mounted: containers have /dev with strictatime.
+            # Device drivers don't update access times, whatever the mount options: containers mount /dev with
+            # strictatime.
             if stat.S_ISCHR(mode):
                 continue
             if rule is None or stat.S_ISDIR(mode):
@@ -47,13 +48,13 @@ def read_beforehand(paths: Iterable[str], listed: Iterable[str] = ()) -> str | N
 
 
 def _and_links(paths: Iterable[str]) -> set[str]:
-    """Also where links lead, and the links that are passed on the way."""
+    """Return the paths, the targets of links, and the links on the way."""
     found = {each for path in paths for each in (path, os.path.realpath(path))}
     return found | {str(above) for path in found for above in Path(path).parents if above.is_symlink()}
 
 
 def _is_dated_again(path: str, before: os.stat_result) -> bool:
-    """Read it if that would be dated, and see whether it would be the next time too."""
+    """Read the path if that would update its access time. Return whether the next read would update it too."""
     if not _is_due(before):
         return False
     mode = before.st_mode
@@ -70,6 +71,6 @@ def _is_dated_again(path: str, before: os.stat_result) -> bool:
 
 
 def _is_due(status: os.stat_result) -> bool:
-    """As the kernel decides, but that to it only what is a whole day old is."""
+    """Return whether the kernel would update the access time, with a margin before its limit of a day."""
     changed = max(status.st_mtime_ns, status.st_ctime_ns)
     return status.st_atime_ns <= changed or abs(time.time() - status.st_atime) > _FRESH_SECONDS

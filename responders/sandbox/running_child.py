@@ -1,6 +1,6 @@
-"""One process with student code in it: listening to it, and ending it at its limits.
+"""A child process with student code: communication, limits and termination.
 
-A child's word is never taken for how it ended: that is read from the scheduler's clock and the wait status.
+The cause of its end is read from the scheduler's clock and the wait status, never from the child's own data.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from sim.errors import HostError, RobomarkError
 from sim.recording import Verdict
 
 _POLL_SECONDS = 0.02
-#: What is read of the wire at once, bytes; most of what comes is far shorter.
+#: Bytes per read. Most frames are far shorter.
 _AT_ONCE = 8192
-#: Seconds that a child is charged at least for a frame, for each of its bytes and for an act in a packet: a little more
-#: than reading it costs the worker. So a child that writes thousands or long ones pays for the worker's time.
+#: Minimum CPU seconds charged per frame, per byte and per action in a packet. They are slightly above the worker's
+#: costs for reading, so a child pays for the many or long frames that it sends.
 _FRAME_CPU_SECONDS, _BYTE_CPU_SECONDS, _ACT_CPU_SECONDS = 1e-5, 1e-8, 5e-6
 _STALLED_SECONDS = 5.0
-#: Of the child's own time, and of real time once it does not even wait for a processor.
+#: Limit for reporting the last place: the child's CPU seconds, and real seconds once it is not runnable.
 _LAST_WORD_CPU_SECONDS = 0.04
 _LAST_WORD_SECONDS = 0.1
-#: What is read at most while a child that is to be stopped has its last word.
+#: Maximum number of bytes read while a stopped child reports its last place.
 _UNREAD_BYTES = 1 << 20
-#: How long a process that has closed the wire may take to be gone.
+#: Time for a process to end after it has closed the wire.
 _END_SECONDS = 1.0
-#: Frames that a program sends thousands of times to the letter; each is checked once.
+#: Frames that programs repeat thousands of times; each distinct one is validated once.
 _REPEATED = frozenset({"motor_state", "until"})
 _MOST_KNOWN, _LONGEST_KNOWN = 100, 200
-#: What a responder may keep in its folder, beside the files that it was given.
+#: Space in a responder's folder, in addition to the given files.
 _FOLDER_BYTES = 16 << 20
 _FOLDER_FILES = 256
 _MOST_GIVEN = 10_000
@@ -46,7 +46,7 @@ _MOST_GIVEN = 10_000
 
 @dataclass(frozen=True, slots=True)
 class ChildLimits:
-    """CPU seconds, bytes of memory beyond the interpreter's own, and modules that it may not import."""
+    """Limits of a child: CPU seconds, bytes of memory beyond the interpreter's, modules that it may not import."""
 
     cpu_seconds: float
     memory_bytes: int
@@ -54,35 +54,39 @@ class ChildLimits:
 
 
 class LibrariesNeeded(RobomarkError):
-    """A child that was forked without libraries has imported one: all has to be done again with them."""
+    """Raised when a child without libraries has imported one: the trial must be run again with libraries."""
 
 
 class ServedChild(Protocol):
-    """What a bridge, a responder's process or a notebook's needs of a child."""
+    """The interface of a child for the code that serves it."""
 
     sandbox: str
 
     def send(self, frame: dict[str, Any], arrived: Sequence[str] = ()) -> None:
-        """Send one frame, with what has ``arrived`` as JSON."""
+        """Send one frame. ``arrived`` holds JSON texts."""
 
     def send_readings(self, units: int, values: Sequence[float]) -> None:
-        """Answer a reading to which nothing has arrived."""
+        """Send readings, without arrivals."""
 
     def receive(self, schema: wire.Schema) -> wire.Frame:
-        """The next frame. Raises ChildStopped."""
+        """Return the next frame.
+
+        Raises:
+            ChildStopped: If the child was stopped or has ended.
+        """
 
     def cpu_seconds(self) -> float:
-        """What the child has used so far."""
+        """Return the CPU seconds of the child so far."""
 
     def last_place(self) -> wire.Frame:
-        """Return the ``line`` and ``file`` that the child is at, and end its work: it serves nothing afterwards."""
+        """Return the current ``line`` and ``file`` of the child, and stop it: it can't be served afterwards."""
 
     def close(self) -> None:
         """End the child."""
 
 
 class Child:
-    """One forked process with student code in it. Always ``close`` it."""
+    """One forked process with student code. Always call ``close``."""
 
     def __init__(
         self,
@@ -93,14 +97,18 @@ class Child:
         limits: ChildLimits,
         folder: Path | None,
     ) -> None:
-        """``reap`` waits for the child's end and gives its wait status; ``ends`` are of pipes, to read and to write."""
+        """Wrap a forked process.
+
+        ``reap`` waits for the end of the child and returns its wait status. ``ends`` are the read and write ends of
+        pipes.
+        """
         self.sandbox = ""
         self._reap = reap
         self._folder = folder
         self._given = (0, 0) if folder is None else process_state.folder_content(folder, _MOST_GIVEN)
         self._pid = pid
         self._pidfd = pidfd
-        # Pipes: a turn costs little more than half of what it costs over a socket.
+        # A round trip over pipes costs little more than half of one over a socket.
         self._reading, self._writing = ends
         self._answered = select.poll()
         self._answered.register(self._reading, select.POLLIN)
@@ -109,35 +117,38 @@ class Child:
         self._meter = JobMeter()
         self._blamed = self._has_libraries = False
         self._overran: Callable[[], bool] | None = None
-        #: Whether it is watched on past its limits, which end it all the same, and whether it came to twice as much.
+        #: ``measured``: the child is watched beyond its limits, which still end it. ``outlasted``: it reached twice its
+        #: limit.
         self.measured = self.outlasted = False
         self._pending = b""
         self._sent = self._received = 0  # frames
-        self._charged = 0.0  # seconds, for frames and acts in packets
+        self._charged = 0.0  # seconds, for frames and actions in packets
         self._known: dict[bytes, wire.Frame] = {}
         self._closed = False
-        self._clock = (~pid << 3) | 2  # the scheduler's CPU clock of another process, see clock_getcpuclockid(3)
+        self._clock = (~pid << 3) | 2  # the CPU clock of another process, see clock_getcpuclockid(3)
         self._checked = 0.0
-        self._waited = 0.0  # seconds of real time in which the worker had nothing to do but wait for it
+        self._waited = 0.0  # real seconds in which the worker only waited for the child
         self._queued_before = process_state.seconds_queued()
 
     def begin(
         self, meter: JobMeter, blamed: bool, has_libraries: bool, overran: Callable[[], bool] | None = None
     ) -> None:
-        """From now on student code may run in it, and what it costs is counted by ``meter``.
+        """Allow student code in the child and charge its costs to ``meter``.
 
-        With ``blamed`` being killed is its own fault, as it runs alone on this machine and was killed before.
-        Unless it ``has_libraries`` it may ask for them. ``overran`` says whether it, with the other processes of its
-        submission, has taken more than they may have.
+        Args:
+            meter: The meter of the job.
+            blamed: The child counts as the cause if it is killed: it runs alone here and was killed before.
+            has_libraries: Libraries are loaded. Otherwise the child may ask for them.
+            overran: Returns whether the processes of the submission together exceeded their memory limit.
         """
         self._meter, self._blamed, self._has_libraries, self._overran = meter, blamed, has_libraries, overran
 
     def send(self, frame: dict[str, Any], arrived: Sequence[str] = ()) -> None:
-        """Send one frame, with what has ``arrived`` as JSON; a child that is deaf shows at the next ``receive``."""
+        """Send one frame. ``arrived`` holds JSON texts. Write errors appear at the next ``receive``."""
         self._send(wire.encode(frame, self._sent, arrived))
 
     def send_readings(self, units: int, values: Sequence[float]) -> None:
-        """Answer a reading to which nothing has arrived: the time, and what all sensors read."""
+        """Send readings, without arrivals: the time, and the values of all sensors."""
         self._send(packed.pack_readings(units, values, self._sent))
 
     def _send(self, frame: bytes) -> None:
@@ -152,7 +163,7 @@ class Child:
             self._send_slowly(frame)
 
     def _send_slowly(self, frame: bytes) -> None:
-        """The rest of a frame to a child that has not read what came before."""
+        """Send the rest of a frame to a child that has not yet read earlier data."""
         began = time.monotonic()
         while frame:
             select.select([], [self._writing], [], _POLL_SECONDS)
@@ -167,7 +178,12 @@ class Child:
         self._waited += time.monotonic() - began
 
     def receive(self, schema: wire.Schema) -> wire.Frame:
-        """The next frame, paid for if anything of it may be kept. Raises as it ends, or LibrariesNeeded."""
+        """Return the next frame, charged to the meter if any of its text may be stored.
+
+        Raises:
+            ChildStopped: If the child was stopped or has ended.
+            LibrariesNeeded: If it has imported a library and none are loaded.
+        """
         data = self._pending or self._more()
         try:
             if data[0] == packed.MARK and "acts" in schema:
@@ -181,7 +197,7 @@ class Child:
                 return frame
             frame = wire.parse(line, schema)
         except wire.WireError as error:
-            # One that was cut short by the end of its time is not the program's doing.
+            # A frame may be invalid because the CPU limit cut it short, which is reported instead.
             self._check_cpu()
             raise ChildStopped(
                 Verdict.SANDBOX_VIOLATION, f"the program's process sent {error}, which no allowed call does"
@@ -199,7 +215,7 @@ class Child:
         return frame
 
     def _acts(self, data: bytes) -> list[packed.Act]:
-        """Those of the packet that begins with ``data``. Nothing of them is kept, so nothing is paid."""
+        """Return the actions of the packet that begins with ``data``. They are not stored, so they cost nothing."""
         while len(data) < packed.HEADER_BYTES:
             data += self._more()
         size, number = packed.read_header(data)
@@ -212,7 +228,7 @@ class Child:
         return acts
 
     def _at_least(self, data: bytes, size: int) -> bytes:
-        """So many bytes or more that begin with ``data``."""
+        """Read until there are at least ``size`` bytes, beginning with ``data``."""
         pieces = [data]
         size -= len(data)
         while size > 0:
@@ -228,30 +244,30 @@ class Child:
 
     @property
     def cpu_limit(self) -> float:
-        """The seconds that it may compute."""
+        """The limit on the child's CPU seconds."""
         return self._limits.cpu_seconds
 
     @property
     def closed(self) -> bool:
-        """Whether it has been ended."""
+        """Whether the child has been closed."""
         return self._closed
 
     def cpu_seconds(self) -> float:
-        """What the child has used so far, by the scheduler's clock."""
+        """Return the CPU seconds of the child so far, by the scheduler's clock."""
         try:
             return time.clock_gettime(self._clock)
         except OSError:
             return 0.0
 
     def last_place(self) -> wire.Frame:
-        """Return the ``line`` and ``file`` that the child is at, and end its work: it serves nothing afterwards.
+        """Return the current ``line`` and ``file`` of the child, and stop it: it can't be served afterwards.
 
-        A child that waits for a reply is at the same line in every run.
+        A child that waits for a reply reports the same line in every run.
         """
         return self._last_word()
 
     def close(self) -> None:
-        """Kill the child and wait until it is gone."""
+        """Kill the child and wait until it has ended."""
         if self._closed:
             return
         self._leave()
@@ -259,7 +275,7 @@ class Child:
             self._reap()
 
     def _line(self, data: bytes) -> tuple[bytes, bytes]:
-        """The line that begins with ``data``, and what came after it."""
+        """Return the line that begins with ``data``, and the bytes after it."""
         pieces, size = [data], len(data)
         while b"\n" not in pieces[-1]:
             if size > wire.MOST:
@@ -270,7 +286,7 @@ class Child:
         return line, rest
 
     def _more(self) -> bytes:
-        """What the child sends next, a byte at least."""
+        """Return the next bytes from the child, at least one."""
         last_cpu, still_since = -1.0, time.monotonic()
         began = still_since
         while not self._answered.poll(_POLL_SECONDS * 1000):
@@ -299,7 +315,11 @@ class Child:
         return data
 
     def _check_cpu(self) -> float:
-        """CPU seconds used. Raises ChildStopped when it is too much, or when the folder has grown too large."""
+        """Return the CPU seconds used.
+
+        Raises:
+            ChildStopped: If they exceed the limit, or the folder has grown too large.
+        """
         self._check_folder()
         used = self.cpu_seconds()
         charged = max(used, self._charged)
@@ -311,7 +331,7 @@ class Child:
         return used
 
     def _watch_on(self, computing: bool) -> None:
-        """See whether a child at its limit goes on computing up to twice as much, or sleeping, and says nothing."""
+        """Check whether a child at its limit continues without output up to twice the limit, computing or asleep."""
         used, still_since = self.cpu_seconds(), time.monotonic()
         with contextlib.suppress(ChildStopped):
             while not self._answered.poll(_POLL_SECONDS * 1000):
@@ -330,10 +350,10 @@ class Child:
                     still_since = time.monotonic()
 
     def _check_sleep(self) -> None:
-        """Time in which neither it nor the worker ran or stood in the queue for a processor adds up.
+        """Limit the real time in which neither the child nor the worker ran or waited for a processor.
 
-        Nothing that is allowed sleeps in real time; who does, a little now and a little then, holds up the worker. But
-        what it has sent may lie there for as long as the worker itself stands in the queue.
+        No permitted function sleeps in real time, and repeated short sleeps delay the worker. Time in which the worker
+        waits for a processor is subtracted, because the child's frames may be unread then.
         """
         slept = self._slept_seconds()
         if slept > 2 * _STALLED_SECONDS:
@@ -349,7 +369,7 @@ class Child:
         )
 
     def _check_folder(self) -> None:
-        """One flat look: the sandbox lets no folder be made in it, and follow no link."""
+        """Check the size of the folder. It is flat, because the sandbox allows neither subfolders nor links."""
         if self._folder is None:
             return
         most_bytes, most_files = self._given[0] + _FOLDER_BYTES, self._given[1] + _FOLDER_FILES
@@ -361,7 +381,7 @@ class Child:
             )
 
     def _last_word(self) -> wire.Frame:
-        """Ask the child where it is, and give it a moment to say so."""
+        """Ask the child for its current place and wait briefly for the reply."""
         with contextlib.suppress(OSError):
             signal.pidfd_send_signal(self._pidfd, signal.SIGXCPU)
         deadline = time.monotonic() + _LAST_WORD_SECONDS
@@ -384,7 +404,11 @@ class Child:
         )
 
     def _gone(self) -> ChildStopped:
-        """Why a child has closed the wire. Raises KilledFromOutside."""
+        """Return why a child has closed the wire.
+
+        Raises:
+            KilledFromOutside: If neither the worker nor the child ended it.
+        """
         used = self.cpu_seconds()
         ended = self._has_ended()
         self._leave()
@@ -395,18 +419,18 @@ class Child:
         return child_ends.killed(ended, overran, self._blamed)
 
     def _has_ended(self) -> bool:
-        """Whether it is gone already: a process that dies closes the wire a moment before."""
+        """Return whether the child ends within a second: a dying process closes the wire a moment earlier."""
         began = time.monotonic()
         ended = bool(select.select([self._pidfd], [], [], _END_SECONDS)[0])
         self._waited += time.monotonic() - began
         return ended
 
     def _leave(self) -> None:
-        """End the child, and tell the meter what it has cost."""
+        """Kill the child and report its costs to the meter."""
         self._closed = True
         cpu_seconds, slept = max(self.cpu_seconds(), self._charged), self._slept_seconds()
         if self.measured:
-            # Being watched on is not its doing.
+            # The extra time for measuring is not charged.
             cpu_seconds, slept = min(cpu_seconds, self._limits.cpu_seconds), min(slept, _STALLED_SECONDS)
         self._meter.child_ended(cpu_seconds, slept)
         self._kill()

@@ -1,7 +1,7 @@
-"""A process with imports loaded, from which the children of one role are forked, and the sandbox round them.
+"""A zygote: a process with loaded imports that forks the children of one role, and the sandbox around them.
 
-Nothing of the worker's reaches it: it is a fresh process with a clean environment. Which zygotes a worker has is
-``manager.py``'s; listening to a child and stopping it is ``running_child.py``'s.
+It is a fresh process with a clean environment, without data of the worker. ``manager.py`` keeps a worker's zygotes.
+``running_child.py`` communicates with a child.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _END_SECONDS = 0.5
 _FILE_BYTES = 4 << 20
 _RECYCLE_AFTER = 1000
 _MOST_PROCESSORS = 1024
-#: How a zygote tells that a child has ended: the wait status, seconds and microseconds of the user's and the system's.
+#: Report of an ended child: wait status, and user and system time as seconds and microseconds.
 _ENDED = struct.Struct("=i4x4q")
 _BATTERY_LIMITS = ChildLimits(2.0, 64 << 20)
 _FOLDERS: dict[Role, tuple[str, str]] = {
@@ -53,7 +53,7 @@ _FOLDERS: dict[Role, tuple[str, str]] = {
     "responder with libraries": ("responders", "kit"),
 }
 ROLES: tuple[Role, ...] = tuple(_FOLDERS)
-#: Of each role, the one that has the libraries loaded too.
+#: Each role and its variant with loaded libraries.
 WITH_LIBRARIES: Mapping[Role, Role] = MappingProxyType(
     {
         "robot": "robot with libraries",
@@ -65,18 +65,18 @@ WITH_LIBRARIES: Mapping[Role, Role] = MappingProxyType(
 
 
 class SandboxMissing(HostError):
-    """This machine cannot put up the sandbox that student code needs."""
+    """Raised when this machine can't provide the sandbox that student code needs."""
 
 
 class _ZygoteEnded(KilledFromOutside):
-    """A zygote is gone, and with it every child of its."""
+    """Raised when a zygote has ended, and all of its children with it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Isolation:
-    """Which layers are asked for: Landlock up to a version of its interface (0: none), and the system call filter.
+    """The requested layers: Landlock up to a version of its interface (0 for none), and the system call filter.
 
-    The doorkeeper and bubblewrap are added where they work, and done without where they do not.
+    The doorkeeper and bubblewrap are optional: they are used where they work.
     """
 
     landlock: int = 99
@@ -85,14 +85,14 @@ class Isolation:
     bubblewrap: bool = True
 
 
-#: What every grading needs.
+#: Required for every grading.
 FULL = Isolation()
-#: Limits on the process and nothing else: for development only.
+#: Only limits on the process, for development.
 NONE = Isolation(landlock=0, seccomp=False, doorkeeper=False, bubblewrap=False)
 
 
 def stamp(standing: wire.Frame, bubblewrap: bool, control_group: bool) -> str:
-    """What grades and reports say of the layers that stood."""
+    """Return the sandbox layers as shown in grades and reports."""
     layers = [f"Landlock {standing['landlock']}"] * bool(standing["landlock"]) + ["seccomp"] * standing["seccomp"]
     layers += ["doorkeeper"] * (standing["without_doorkeeper"] is None) + ["own user"] * standing["own_user"]
     layers += ["bubblewrap"] * bubblewrap + ["control group"] * control_group
@@ -102,7 +102,7 @@ def stamp(standing: wire.Frame, bubblewrap: bool, control_group: bool) -> str:
 
 
 class Zygote:
-    """A process with the imports of one role loaded, but those that it is ``without``; children are forked from it."""
+    """A process with the imports of one role, except the packages in ``without``. Children are forked from it."""
 
     def __init__(
         self,
@@ -117,14 +117,14 @@ class Zygote:
         self._without = without
         self._sandbox = sandbox
         self._folders = folders
-        self._folders_inside = -1  # a descriptor of the folder of folders, as the zygote sees it
-        self._forks = self._living = 0  # children that were forked, and of them those that are not gone
-        #: Why bubblewrap does not stand round it; None when it does.
+        self._folders_inside = -1  # descriptor of the private folders' parent, opened inside the zygote
+        self._forks = self._living = 0  # forked children, and those not yet ended
+        #: Reason for running without bubblewrap, or None if it is used.
         self.without_bubblewrap: str | None = "not asked for"
-        #: Why its children can name any path; None when a doorkeeper decides about those.
+        #: Reason for running without a doorkeeper, so children can name any path, or None if it is used.
         self.without_doorkeeper: str | None = "no child has been forked"
-        self.children_cpu_seconds = 0.0  # of all children that are gone
-        self._sockets: tuple[socket.socket, ...] = ()  # to the zygote, for orders, and to children, for their specs
+        self.children_cpu_seconds = 0.0  # of all ended children
+        self._sockets: tuple[socket.socket, ...] = ()  # to the zygote for orders, and to children for specs
         self._process: subprocess.Popen[bytes] | None = None
 
     def spawn(
@@ -135,7 +135,11 @@ class Zygote:
         work: Work = "role",
         blamed: bool = False,
     ) -> Child:
-        """A fresh child in ``folder``, a private one, or with none. Raises HostError if the machine cannot give one."""
+        """Return a fresh child, in a private ``folder`` or with none.
+
+        Raises:
+            HostError: If the machine can't provide one.
+        """
         if folder is not None and folder.parent != self._folders.path:
             raise ValueError(f"{folder} is not a private folder")
         if self._forks >= _RECYCLE_AFTER and not self._living:
@@ -151,7 +155,11 @@ class Zygote:
         raise AssertionError
 
     def try_isolation(self) -> str:
-        """Let a child try the short battery of escapes; which layers held. Raises SandboxMissing if one did not."""
+        """Run the short battery of escape attempts in a child. Return the layers that blocked them.
+
+        Raises:
+            SandboxMissing: If a layer failed.
+        """
         if not self._sandbox.landlock and not self._sandbox.seccomp:
             child = self.spawn(_BATTERY_LIMITS)
             child.close()
@@ -169,7 +177,11 @@ class Zygote:
         return f"{child.sandbox} (battery {told['version']}: {refused} of {told['tried']} refused)"
 
     def reap(self, pid: int) -> int:
-        """The wait status of a child that has been killed or has ended. Raises HostError when the zygote is gone."""
+        """Return the wait status of a child that has ended.
+
+        Raises:
+            HostError: If the zygote has ended.
+        """
         try:
             ended, _ = self._order(pid)
             self._living -= 1
@@ -177,17 +189,17 @@ class Zygote:
             self.children_cpu_seconds += sum(used[0::2]) + sum(used[1::2]) / 1e6
             return int(status)
         except (OSError, EOFError, struct.error) as error:
-            # Its children died with it, and that is no fault of a student's.
+            # The children died with the zygote, which is not the student's fault.
             self.close()
             raise _ZygoteEnded(f"the {self._role} zygote ended while a program ran") from error
 
     def close(self) -> None:
-        """End the zygote, by force if it does not end by itself, and close what leads to it."""
+        """End the zygote, by force if necessary, and close its sockets."""
         for opened in self._sockets:
             opened.close()
         self._sockets = ()
         if self._process is not None:
-            # It ends by itself then, and its doorkeeper after it, unless it is stuck.
+            # The zygote ends by itself when its sockets close, and its doorkeeper after it, unless it hangs.
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(_END_SECONDS)
             self._process.kill()
@@ -202,7 +214,7 @@ class Zygote:
         self._start()
         folders = []
         if folder is not None:
-            # Opened as the zygote sees it: with name spaces of its own, our path to it leads nowhere there.
+            # Opened relative to the zygote's view: its namespaces don't contain our path.
             folders = [os.open(folder.name, os.O_RDONLY | os.O_DIRECTORY, dir_fd=self._folders_inside)]
         reading, their_writing = os.pipe()
         their_reading, writing = os.pipe()
@@ -232,7 +244,7 @@ class Zygote:
             _close(reading, writing)
             raise _sandbox_missing(answer["missing"])
         self._living += 1
-        inside = answer["pid"]  # what the zygote calls it
+        inside = answer["pid"]  # the id inside the zygote's namespace
         reap = functools.partial(self.reap, inside)
         child = Child(reap, _pid(received[0]), received[0], (reading, writing), limits, folder)
         try:
@@ -246,7 +258,7 @@ class Zygote:
         return child
 
     def _check_isolation(self, child: Child) -> None:
-        """The child's first words, before any student code: every layer asked for must stand."""
+        """Check the child's first frame, sent before any student code: every requested layer must be active."""
         try:
             standing = child.receive(wire.SANDBOX)
         except ChildStopped as stop:
@@ -259,7 +271,7 @@ class Zygote:
         child.sandbox = stamp(standing, self.without_bubblewrap is None, self._group is not None)
 
     def _start(self) -> None:
-        """Begin, if need be, and wait until it has imported."""
+        """Start the zygote if necessary and wait until its imports are loaded."""
         self.begin()
         if self._folders_inside >= 0 or self._comes_up():
             return
@@ -271,7 +283,11 @@ class Zygote:
         raise HostError(f"the {self._role} zygote did not start")
 
     def begin(self) -> None:
-        """Let it import meanwhile: the first child will wait for it. Raises OSError if it cannot be started at all."""
+        """Start the zygote without waiting: the first child waits for its imports.
+
+        Raises:
+            OSError: If it can't be started.
+        """
         if self._process is not None and self._process.poll() is None:
             return
         keep_bytecode(_HERE / "inside")
@@ -292,7 +308,7 @@ class Zygote:
         return True
 
     def _exec(self, wrapping: list[str]) -> None:
-        """Exec a clean process, with nothing of ours in its environment."""
+        """Start a clean process without our environment."""
         self.close()
         pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(2)]
         ours, theirs = zip(*pairs, strict=True)
@@ -314,14 +330,14 @@ class Zygote:
         self._sockets = ours
 
     def _fork(self, spec: dict[str, Any], descriptors: list[int]) -> tuple[bytes, list[int]]:
-        """Have a child forked, which reads its spec; its answer."""
+        """Fork a child with this spec and these descriptors. Return the zygote's reply."""
         _, specs = self._running()
         payload = array.array("i", descriptors)
         specs.sendmsg([json.dumps(spec).encode()], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, payload)])
         return self._order(0, answers=1)
 
     def _order(self, number: int, answers: int = 0) -> tuple[bytes, list[int]]:
-        """Send an order to the zygote: zero, or the child that is to be reaped. The answer, from one of the sockets."""
+        """Send an order to the zygote: 0 for a fork, or the child to reap. Return the reply from the socket."""
         self._running()[0].send(number.to_bytes(4, "little"))
         return self._answer(answers)
 
@@ -346,7 +362,7 @@ class Zygote:
 
 
 def _mask(processors: Set[int]) -> str:
-    """A bit each, as many digits whichever they are: how long a spec is shows in a child's addresses."""
+    """Return the processors as a bit mask of constant length, because the length of a spec affects addresses."""
     return sum(1 << number for number in processors).to_bytes(_MOST_PROCESSORS // 8, "little").hex()
 
 
@@ -356,7 +372,7 @@ def _close(*descriptors: int) -> None:
 
 
 def _pid(pidfd: int) -> int:
-    """What we call the process; in name spaces of its own it has another number."""
+    """Return the process id outside the zygote's namespaces, where it may have another number."""
     lines = Path(f"/proc/self/fdinfo/{pidfd}").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("Pid:"))
 
@@ -376,14 +392,14 @@ def _sandbox_missing(what: str) -> SandboxMissing:
 
 
 def own_modules(role: Role) -> str:
-    """The folder with what a role's children import of ours."""
+    """Return the folder of our modules that the children of a role import."""
     package, folder = _FOLDERS[role]
     return str(_package_folder(package) / folder)
 
 
 @functools.cache
 def keep_bytecode(folder: Path) -> None:
-    """Have Python keep what it compiles of these modules, as of any: zygotes keep nothing, each would do it anew."""
+    """Compile these modules to bytecode on disk, because zygotes write none and would compile them every time."""
     if sys.dont_write_bytecode:
         return
     for file in folder.rglob("*.py"):

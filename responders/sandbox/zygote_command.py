@@ -1,6 +1,6 @@
-"""The command and the environment that zygotes are started with: the same for all, so that their children are alike.
+"""The command and environment of a zygote, identical for all zygotes so that their children behave identically.
 
-Hashes, the order of sets, the kernels that compute and, where the machine allows it, addresses are fixed here.
+They fix hash seeds, the order of sets, numeric kernels and, where the machine allows it, addresses.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from responders.sandbox.processor import ALLOWED
 from sim.processes import python_command, same_arithmetic
 
-#: The beginning of a command whose memory lies at the same addresses each time, where the machine allows that: objects
-#: are hashed by theirs. What it sets is inherited, so a process of its own does it, and not the worker. An exec that
-#: gives root powers back undoes it; bubblewrap's root keeps the right to give that up (SECBIT_NOROOT) for this alone.
+#: Start of a command with fixed memory addresses, because objects are hashed by address. The setting is inherited, so
+#: it is made in a process of its own, not in the worker. An exec that restores root's capabilities resets it;
+#: bubblewrap's root process keeps the right to give them up (SECBIT_NOROOT) only for this.
 _FIXED_ADDRESSES = (
     sys.executable,
     *("-I", "-S", "-c"),
@@ -33,18 +33,18 @@ _BEGIN = (
 
 
 def command(sockets: Sequence[int], arguments: Sequence[str]) -> list[str]:
-    """Return the command of a zygote that has these two descriptors for its own sockets.
+    """Return the command of a zygote with these two socket descriptors.
 
-    ``arguments`` are the folder of its code, its role, the folder of private folders, the modules that it does without
-    and the folders that its children import from.
+    ``arguments`` are its code folder, its role, the parent of private folders, the excluded modules and the import
+    folders of its children.
     """
-    padded = [f"{number:05}" for number in sockets]  # how long a command is shows in addresses
-    # Not with -I, which would ignore the seed of hashes.
+    padded = [f"{number:05}" for number in sockets]  # constant length, because a command's length affects addresses
+    # -I would ignore the hash seed.
     return [*_FIXED_ADDRESSES, *python_command("-B", "-c", _BEGIN, *padded, *arguments)]
 
 
 def environment() -> dict[str, str]:
-    """Return all that a zygote finds in its environment: nothing of ours."""
+    """Return the environment of a zygote, which contains nothing of the worker's environment."""
     return {
         "PATH": "/usr/bin:/bin",
         "LANG": "C.UTF-8",
