@@ -1,1 +1,1 @@
-"""What runs on the student's side of the sandbox. It imports the standard library only, and is trusted by nobody."""
+"""Code that runs in the sandbox with the student's. It imports only the standard library, and no one trusts it."""

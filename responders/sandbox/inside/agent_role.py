@@ -1,6 +1,6 @@
-"""An agent at work: its module is run once, then its function is called with one message after the other.
+"""The role of an agent: loads its module once, then calls its function with one message after another.
 
-Who asks it, and whether it may, is decided on the other side of the wire.
+The worker decides who may ask the agent, and when.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .responder_role import ResponderRole
 
 
 class AgentRole(ResponderRole):
-    """A module of the student's that answers the responder and the other agents."""
+    """A student's module that answers the responder and the other agents."""
 
     def __init__(self, wire: Wire, grants: Grants, spec: Frame) -> None:
         super().__init__(wire, grants, spec)
@@ -36,7 +36,7 @@ class AgentRole(ResponderRole):
         return self._find()(*json.loads(asked["arguments"]), **json.loads(asked["named"]))
 
     def _find(self) -> Callable[..., Any]:
-        """What the agent's name is bound to; else the only function named ``*_parser``; else the only function."""
+        """Return the agent's function: the one with its name, else the only ``*_parser``, else the only function."""
         name = self._own_name
         own = self._namespace.get(name)
         if callable(own):

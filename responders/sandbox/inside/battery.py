@@ -1,6 +1,6 @@
-"""A short list of escapes that a child tries on its own sandbox when a worker starts; each must be refused.
+"""A short battery of escape attempts that a child makes when a worker starts. The sandbox must refuse each one.
 
-The long list is the tests'; this one is for the machine at hand, whose kernel the tests have never seen.
+The full set is in the tests. This one checks the machine at hand, with a kernel that the tests have never run on.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _SPACE = ctypes.create_string_buffer(256)
 
 
 def _system_call(number: int, *arguments: int) -> Callable[[], object]:
-    """A raw system call; it fails by returning a negative number."""
+    """Return a function that makes a raw system call, which fails with a negative number."""
 
     def attempt() -> object:
         if _libc.syscall(number, *arguments) < 0:
@@ -43,12 +43,12 @@ def _thread() -> None:
 
 
 def _random_hash() -> None:
-    """Whether texts are hashed alike in every child is decided when the zygote starts."""
+    """Fail if texts are not hashed identically in every child, which is decided when the zygote starts."""
     if not sys.flags.hash_randomization:
         raise OSError("refused")
 
 
-#: What is tried: every attempt must raise OSError.
+#: The attempts. Each must raise OSError.
 ATTEMPTS: dict[str, Callable[[], object]] = {
     "read a system file": lambda: os.open("/etc/passwd", os.O_RDONLY),
     "list the root folder": lambda: os.listdir("/"),
@@ -84,12 +84,12 @@ ATTEMPTS: dict[str, Callable[[], object]] = {
     "read the parent's clock": lambda: time.clock_gettime((~os.getppid() << 3) | 2),
 }
 
-#: Changes whenever what is tried changes.
+#: Version of the attempts, a hash of this file.
 VERSION = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
 
 
 def run(wire: Wire, _: Grants) -> None:
-    """Try everything, and report what was not refused."""
+    """Make all attempts and report those that were not refused."""
     through = []
     for name, attempt in ATTEMPTS.items():
         try:

@@ -1,6 +1,6 @@
-"""From a notebook's cell, as IPython takes it, to Python: magics, shell lines and questions become calls.
+"""Conversion of notebook cells from IPython syntax to Python: magics, shell lines and ``?`` become calls.
 
-Line numbers stay the cell's own. What the calls do is ``shell.py``'s.
+Line numbers don't change. ``shell.py`` implements the calls.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-#: Cell magics that run the rest of their cell as Python, whatever they show or measure of it.
+#: Cell magics that run the rest of their cell as Python.
 WRAPPERS = frozenset(
     ("capture", "heat", "lprun", "memit", "mprun", "nbtutor", "prun", "scalene", "snakeviz", "time", "timeit")
 )
-#: Line magics that do so with the rest of their line, after their options.
+#: Line magics that run the rest of their line as Python, after their options.
 LINE_WRAPPERS = frozenset(("time", "timeit", "prun", "memit"))
 
 _OPTIONS = re.compile(r"(?:-[nrpl][ \t]*\d+[ \t]+|-s[ \t]+\w+[ \t]+|-\w+[ \t]+)*")
@@ -29,16 +29,16 @@ _DOLLAR = re.compile(r"\$(?:(?P<escaped>\$[\w.]*)|(?P<name>[A-Za-z_][\w.]*))")
 
 @dataclass(frozen=True, slots=True)
 class CellMagic:
-    """A whole cell that is handed to a magic; ``line`` is what stands beside its name."""
+    """A cell with a cell magic. ``line`` is the text after its name."""
 
     name: str
     line: str
     body: str
-    number: int  # of the line with the name, from 1
+    number: int  # line number of the magic, from 1
 
 
 def cell_magic(source: str) -> CellMagic | None:
-    """The magic that the cell is for, if its first line (after blanks and comments) begins with ``%%``."""
+    """Return the cell magic if the first line, after blanks and comments, begins with ``%%``."""
     lines = source.split("\n")
     for place, line in enumerate(lines):
         stripped = line.lstrip("\ufeff").strip()
@@ -52,7 +52,7 @@ def cell_magic(source: str) -> CellMagic | None:
 
 
 def cell_magics(lines: Iterable[str]) -> Iterator[tuple[int, str]]:
-    """Index and name of each magic that the lines begin with: that of the cell, and those that it wraps in turn."""
+    """Yield the index and name of each cell magic at the start: the first one, and those that it wraps in turn."""
     for place, line in enumerate(lines):
         stripped = line.lstrip("\ufeff").strip()
         if not stripped or stripped.startswith("#"):
@@ -64,12 +64,12 @@ def cell_magics(lines: Iterable[str]) -> Iterator[tuple[int, str]]:
 
 
 def wrapped(line: str) -> str:
-    """The Python in the line of a magic that runs it."""
+    """Return the Python code in the line of a wrapping magic."""
     return python_source(line[_OPTIONS.match(line).end() :])  # type: ignore[union-attr]
 
 
 def python_source(source: str) -> str:
-    """The cell as Python, line by line."""
+    """Return the cell as Python with the same lines."""
     lines = source.lstrip("\ufeff").split("\n")
     for place in list(_logical_starts(lines)):
         line = lines[place]
@@ -86,7 +86,7 @@ def python_source(source: str) -> str:
 
 
 def expanded(line: str, names: Mapping[str, Any]) -> str:
-    """``line`` with ``{expression}`` and ``$name`` replaced by their values; as it is if one cannot be worked out."""
+    """Return ``line`` with ``{expression}`` and ``$name`` replaced by their values, or unchanged if one fails."""
     try:
         return "".join(_expanded(line, names))
     except Exception:
@@ -94,7 +94,7 @@ def expanded(line: str, names: Mapping[str, Any]) -> str:
 
 
 def expressions(line: str) -> Iterator[str]:
-    """The Python that ``expanded`` works out, as far as the line can be taken apart."""
+    """Yield the expressions that ``expanded`` evaluates, as far as the line can be parsed."""
     try:
         for literal, expression, _, _ in string.Formatter().parse(line):
             yield from (match["name"] for match in _DOLLAR.finditer(literal) if match["name"])
@@ -126,7 +126,7 @@ def _looks_assigned(stripped: str) -> bool:
 
 
 def _rewritten(text: str) -> str | None:
-    """The call that a line stands for; None if it is Python after all."""
+    """Return the call for a line with a magic, or None for a line of Python."""
     stripped = text.strip()
     indent = text[: len(text) - len(text.lstrip())]
     assigned = _ASSIGNED.match(stripped)
@@ -154,7 +154,7 @@ def _call(text: str, captured: bool) -> str | None:
 
 
 class _State:
-    """Where a reader of Python is after a line: inside a long string, inside brackets, or after a backslash."""
+    """State of a reader of Python after a line: in a long string, in brackets, or after a backslash."""
 
     def __init__(self) -> None:
         self.quote = ""
@@ -170,12 +170,12 @@ _TOKEN = re.compile(r"\\.|'''|\"\"\"|['\"#()\[\]{}]", re.DOTALL)
 
 
 def _logical_starts(lines: list[str]) -> Iterator[int]:
-    """Indices of the lines on which a statement may begin."""
+    """Yield the indices of the lines on which a statement may begin."""
     state = _State()
     for place, line in enumerate(lines):
         if state.at_start:
             yield place
-            # What is rewritten when it is handed out is a whole statement by now.
+            # The caller may have rewritten the line by now, which makes it a complete statement.
             line = lines[place]
         _read(line, state)
 

@@ -1,6 +1,6 @@
-"""From fork to student code: the layers go up in order, and nothing of the zygote's is left within reach.
+"""The start of a child, from the fork to the student code: activates the sandbox layers and drops the zygote's data.
 
-The role (robot program or responder) takes over once every layer stands.
+The role (robot program or responder) starts when all layers are active.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ _PR_SET_PDEATHSIG = 1
 _PR_SET_DUMPABLE = 4
 
 _WRITING, _READING, _DOOR = 3, 4, 5
-#: Where the numbers of users begin that exist for one child each; nothing on a machine should belong to them.
+#: User ids for children, one each. Nothing on a machine should belong to them.
 _USERS, _USERS_COUNT = 61_000, 4_000
-#: What Python ignores from its start, to raise an error instead.
+#: Signals that Python ignores from its start, to raise an error instead.
 _PYTHONS_OWN = frozenset((signal.SIGPIPE, signal.SIGXFSZ))
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """What a zygote finds out once for all its children."""
+    """Values that a zygote computes once for all its children."""
 
     grants: lockdown.Grants
-    rules: tuple[bytes, ...]  # what Landlock is told of the grants
+    rules: tuple[bytes, ...]  # Landlock rules for the grants
     changed_signals: tuple[int, ...]
-    zygote: int  # its process
-    door: int  # the descriptor on which the doorkeeper hears of a child
+    zygote: int  # process id of the zygote
+    door: int  # descriptor for registering a child with the doorkeeper
 
 
 def changed_signals() -> tuple[int, ...]:
-    """Those that do something else here than they do by default, but for what Python itself changes.
+    """Return the signals with a handling other than the default, except those that Python itself changes.
 
-    A worker that was started in the background of a shell ignores some, and what it forks would, too.
+    A worker that a shell started in the background ignores some signals, and its forks would inherit that.
     """
     numbers = signal.valid_signals() - _PYTHONS_OWN - {signal.SIGKILL, signal.SIGSTOP}
     return tuple(int(number) for number in numbers if signal.getsignal(number) is not signal.SIG_DFL)
@@ -52,7 +52,10 @@ def changed_signals() -> tuple[int, ...]:
 def start(
     spec: dict[str, Any], descriptors: list[int], role: Callable[[Wire, lockdown.Grants], None], prepared: Prepared
 ) -> None:
-    """Never returns. ``descriptors`` are the wire's two and, if the spec has a folder, the folder."""
+    """Run a child to its end; never returns.
+
+    ``descriptors`` are the wire's two and, if the spec has a folder, the folder.
+    """
     try:
         lockdown.run_on(bytes.fromhex(spec["processors"]))
         _own_session(prepared.changed_signals)
@@ -62,7 +65,7 @@ def start(
         wire = Wire(_WRITING, _READING)
         wire.send(_sandbox(spec, prepared))
         gc.enable()
-        gc.collect()  # from here on it collects after as many new objects in every child
+        gc.collect()  # so that the collector runs at the same allocations in every child
         role(wire, dataclasses.replace(prepared.grants, without=tuple(spec["without"])))
     finally:
         os._exit(0)
@@ -76,9 +79,10 @@ def _own_session(changed: tuple[int, ...]) -> None:
 
 
 def _first_to_go() -> None:
-    """When the machine runs out of memory, a child goes before its zygote.
+    """Let the kernel kill this child before its zygote when memory runs out.
 
-    Files of a process that is not to be read, as the zygote, are root's; so this one is to be, until it is locked.
+    The /proc files of a non-dumpable process, such as the zygote, belong to root. So this process is dumpable until it
+    is locked down.
     """
     lockdown.control(_PR_SET_DUMPABLE, 1)
     with contextlib.suppress(OSError):
@@ -88,7 +92,7 @@ def _first_to_go() -> None:
 
 
 def _own_user(spec: dict[str, Any], grants: lockdown.Grants) -> bool:
-    """Root makes each child somebody who owns nothing, where the interpreter can be read by such a user."""
+    """As root, switch to a user without any files, if the interpreter is readable for that user."""
     if not grants.open_to_others or not lockdown.may_change_user():
         return False
     user = _USERS + os.getpid() % _USERS_COUNT
@@ -100,7 +104,7 @@ def _own_user(spec: dict[str, Any], grants: lockdown.Grants) -> bool:
 
 
 def _end_with(zygote: int) -> None:
-    """A change of user forgets both of these, so they come after it."""
+    """End this process with the zygote. A change of user resets both settings, so call this afterwards."""
     lockdown.control(_PR_SET_PDEATHSIG, signal.SIGKILL)
     lockdown.control(_PR_SET_DUMPABLE, 0)
     if os.getppid() != zygote:
@@ -108,9 +112,9 @@ def _end_with(zygote: int) -> None:
 
 
 def _descriptors(descriptors: list[int]) -> None:
-    """The null device on 0 to 2, the wire and the door; a folder becomes the working folder.
+    """Set descriptors 0 to 2 to the null device, then the wire and the door. Change to the folder.
 
-    What the rules need stays open until the layers stand, and nothing else.
+    Descriptors for the rules stay open until the layers are active, and all others are closed.
     """
     high = [os.dup2(fd, 100 + place) for place, fd in enumerate(descriptors)]
     null = os.open(os.devnull, os.O_RDWR)
@@ -124,13 +128,13 @@ def _descriptors(descriptors: list[int]) -> None:
 
 
 def _limits(spec: dict[str, Any]) -> None:
-    """Address space beyond what the zygote maps already, CPU as a backstop, small files, few descriptors."""
+    """Limit the address space beyond the zygote's, CPU time as a backstop, file size, and descriptors."""
     with open("/proc/self/statm", "rb") as statm:
         mapped = int(statm.read().split()[0]) * resource.getpagesize()
     memory = mapped + spec["memory"]
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-    seconds = 2 * int(spec["cpu"]) + 2  # the worker may watch it for twice as long as it may compute
-    # The worker is there long before the second limit: a SIGKILL that it did not send is never this one's.
+    seconds = 2 * int(spec["cpu"]) + 2  # twice the limit, because the worker may watch it for that long
+    # The worker acts long before the hard limit, so a SIGKILL that it did not send has another cause.
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 60))
     resource.setrlimit(resource.RLIMIT_FSIZE, (spec["file_size"], spec["file_size"]))
     resource.setrlimit(resource.RLIMIT_NOFILE, (32, 32))
@@ -141,7 +145,7 @@ def _limits(spec: dict[str, Any]) -> None:
 
 
 def _sandbox(spec: dict[str, Any], prepared: Prepared) -> Frame:
-    """Put up the layers that the spec names, try each, and say what stands; nothing of the student's has run yet."""
+    """Activate the layers in the spec, test each, and report them. No student code has run yet."""
     missing = None
     landlock, seccomp, own_user = 0, False, False
     without_doorkeeper: str | None = "it was not asked for"
@@ -177,14 +181,14 @@ def _sandbox(spec: dict[str, Any], prepared: Prepared) -> Frame:
 
 
 def _own_memory() -> int | None:
-    """To be had only while this process may be read."""
+    """Return a descriptor of this process's memory. It can be opened only while the process is dumpable."""
     with contextlib.suppress(OSError):
         return os.open("/proc/self/mem", os.O_RDONLY)
     return None
 
 
 def _ask_about_paths(memory: int | None) -> str | None:
-    """Have the doorkeeper decide about every path from now on; why it cannot, or None."""
+    """Let the doorkeeper decide about every path. Return the reason if that fails, otherwise None."""
     if memory is None:
         return "/proc/self/mem cannot be opened"
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET, fileno=_DOOR) as door:

@@ -1,6 +1,6 @@
-"""Simulated time and seeded chance for student code: the same trial sees the same clock and the same dice.
+"""Simulated time and seeded randomness for student code, identical in every run of a trial.
 
-It changes modules of the child's own process only, after the fork and before any student code.
+It patches modules of the child's own process, after the fork and before any student code.
 """
 
 from __future__ import annotations
@@ -19,12 +19,15 @@ from typing import Any
 
 SECOND = 3_000_000  # units of a third of a microsecond
 EPOCH = 1_577_836_800  # 2020-01-01, UTC
-#: Clocks that count from 1970: CLOCK_REALTIME, the same in coarse, and CLOCK_TAI.
+#: Clocks that count from 1970: CLOCK_REALTIME, CLOCK_REALTIME_COARSE and CLOCK_TAI.
 _WALL_CLOCKS = frozenset({0, 5, 11})
 
 
 def install_clock(now: Callable[[], int], sleep: Callable[[int], None]) -> None:
-    """Let ``time`` and ``datetime`` read ``now()`` and sleep by ``sleep(units)``, both in units of simulated time."""
+    """Replace the clocks of ``time`` and ``datetime`` by ``now()``, and sleeping by ``sleep(units)``.
+
+    Both use units of simulated time.
+    """
 
     def sleep_seconds(seconds: float) -> None:
         units = round(seconds * SECOND)
@@ -85,9 +88,9 @@ def install_clock(now: Callable[[], int], sleep: Callable[[int], None]) -> None:
 
 
 def _change(kind: type, **methods: Callable[..., Any]) -> None:
-    """Give a built-in type other class methods; it stays the type that everybody has imported, tests for and derives.
+    """Replace class methods of a built-in type. It remains the same type for imports, type checks and subclasses.
 
-    Python refuses to set them, so they go into its dictionary, which only the collector hands out.
+    Python refuses to set them, so they are written into its dictionary, which only the garbage collector returns.
     """
     (attributes,) = gc.get_referents(kind.__dict__)
     for name, method in methods.items():
@@ -100,12 +103,12 @@ _seed_with = random.Random.seed
 
 
 def _seed(self: random.Random, a: Any = None, version: int = 2) -> None:
-    """Seed a generator; without a seed Python would ask the kernel for one, by no name that can be replaced."""
+    """Seed a generator. Without a seed, Python would ask the kernel for one through a name that can't be replaced."""
     _seed_with(self, int.from_bytes(os.urandom(32), "little") if a is None else a, version)
 
 
 def install_chance(seed: int) -> None:
-    """Seed ``random`` and numpy, and let everything that asks the system for chance draw from ``seed`` instead."""
+    """Seed ``random`` and numpy, and replace all system sources of randomness by draws from ``seed``."""
     drawn = 0
 
     def urandom(size: int) -> bytes:

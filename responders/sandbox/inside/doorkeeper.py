@@ -1,8 +1,8 @@
-"""A process above the zygote that children have to ask about every path they name: only what they may read has one.
+"""The doorkeeper: a process above the zygote that decides about each path in a child's system calls.
 
-It opens nothing for them and protects no content, which is Landlock's: it keeps names, dates and numbers of files and
-processes from them, in which one trial could leave something for another. Nothing is ever forked from it, as what it
-is asked would be found in a fork.
+It opens no files for children and does not protect content, which Landlock does. It hides names, dates and inode
+numbers of files and processes, in which one trial could leave data for another. Nothing is ever forked from it, because
+a fork would contain the paths of earlier requests.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ _GO_ON = 1
 _LONGEST = 4096
 _FROM_HERE = -100  # AT_FDCWD
 _PR_SET_PDEATHSIG = 1
-#: How many files a child may make, even if it removes them again: it uses up numbers, which others could see.
+#: Maximum number of files a child may create, including deleted ones, because inode numbers are visible to others.
 _MOST_FILES = 300
 
 
 @dataclass
 class _Guest:
-    """A child: where its questions come from, its memory, the folder it is in, and how many files it has made."""
+    """A child: the descriptor of its requests, its memory, its folder, and how many files it has created."""
 
     questions: int
     memory: int
@@ -45,9 +45,9 @@ class _Guest:
 
 
 def start(grants: lockdown.Grants, controls: Iterable[int]) -> socket.socket:
-    """Stay behind as the doorkeeper, and go on in a fork: through the socket its children make themselves known.
+    """Become the doorkeeper, and continue in a fork. Return the socket on which children register.
 
-    Whichever of the two ends takes the other along. The descriptors ``controls`` are the fork's alone.
+    When either of the two ends, so does the other. Only the fork keeps the descriptors ``controls``.
     """
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     keeper = os.getpid()
@@ -67,13 +67,13 @@ def start(grants: lockdown.Grants, controls: Iterable[int]) -> socket.socket:
 
 
 def make_known(door: socket.socket, questions: int, memory: int) -> None:
-    """Called in a child: from now on it is answered."""
+    """Register this child with the doorkeeper, which answers its requests from now on."""
     payload = array.array("i", [questions, memory])
     door.sendmsg([os.getcwdb()], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, payload)])
 
 
 class _Known:
-    """The paths that there are for children, as they are written and as they are with every link followed."""
+    """The paths that children may name, as written and with all links resolved."""
 
     def __init__(self, grants: lockdown.Grants) -> None:
         self._beneath = {os.fsencode(path) for path in grants.read}
@@ -83,7 +83,7 @@ class _Known:
         self._exactly |= {above for path in self._beneath | self._exactly for above in _above(path)}
 
     def has(self, path: bytes, folder: bytes) -> bool:
-        """Whether a child in ``folder`` may name ``path``, and what it leads to."""
+        """Return whether a child in ``folder`` may name ``path`` and its target."""
         parent, name = os.path.split(os.path.join(folder, path))
         itself = os.path.join(os.path.realpath(parent), name)
         if name in (b"", b".", b".."):
@@ -106,10 +106,10 @@ def _above(path: bytes) -> list[bytes]:
 
 
 def _serve(door: socket.socket, known: _Known) -> None:
-    """Answer until the zygote and its children are gone."""
+    """Answer requests until the zygote and its children have ended."""
     lockdown.forbid_new_privileges()
     with contextlib.suppress(lockdown.LayerMissing):
-        # Not from the version that keeps signals in: that of its death has to reach the zygote.
+        # Not a version that restricts signals: the signal of its death must reach the zygote.
         lockdown.restrict_files((), 5)
     guests: dict[int, _Guest] = {}
     poll = select.epoll()
@@ -121,7 +121,7 @@ def _serve(door: socket.socket, known: _Known) -> None:
                 guests[guest.questions] = guest
                 poll.register(guest.questions, select.EPOLLIN)
             elif event & select.EPOLLIN:
-                with contextlib.suppress(OSError):  # it may be gone
+                with contextlib.suppress(OSError):  # the child may have ended
                     _answer(guests[fd], known)
             else:
                 gone = guests.pop(fd)
@@ -142,7 +142,7 @@ def _new_guest(door: socket.socket) -> _Guest:
 
 
 def _answer(guest: _Guest, known: _Known) -> None:
-    """The child waits, and has no second thread that could change the path before the kernel reads it again."""
+    """Answer one request. The child waits and has no other thread that could change the path meanwhile."""
     question = bytearray(_QUESTION.size)
     fcntl.ioctl(guest.questions, _RECEIVE, question)
     identity, _, _, number, _, _, *arguments = _QUESTION.unpack(question)
@@ -155,13 +155,13 @@ def _answer(guest: _Guest, known: _Known) -> None:
 
 
 def _refusal(guest: _Guest, known: _Known, number: int, arguments: list[int]) -> int:
-    """The number of an error, or 0: what may not be named is not there, or may not be opened."""
+    """Return an error number, or 0. A forbidden path appears missing, or can't be opened."""
     for start, place in PATHS[number]:
         path, end, _ = os.pread(guest.memory, _LONGEST, arguments[place]).partition(b"\0")
         if not end:
             return errno.ENAMETOOLONG
         from_here = start is None or ctypes.c_int(arguments[start]).value == _FROM_HERE
-        # From a descriptor, which the child could open, nothing but a step up leads to what it could not.
+        # A relative path from a descriptor that the child could open is allowed, except with a step up.
         known_by_opening = not from_here and not path.startswith(b"/")
         if b".." in path.split(b"/") if known_by_opening else not known.has(path, guest.folder):
             return errno.EACCES if number in OPENS else errno.ENOENT

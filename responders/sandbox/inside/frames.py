@@ -1,6 +1,6 @@
-"""The child's end of the wire: one JSON object a line over two pipes, and packed acts of a robot program between.
+"""The child's end of the wire: JSON lines over two pipes, with packed actions of a robot program between them.
 
-The worker checks every frame as if it came from the internet; here there is nothing to defend.
+The worker validates every frame as untrusted input. Nothing here protects it.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ from typing import Any
 
 Frame = dict[str, Any]
 
-#: The longest line that the worker accepts, bytes.
+#: Maximum line length that the worker accepts, bytes.
 MOST = 65536
 _LONGEST_NUMBER = 20
-#: The bytes that a character takes at most: one of the first 65,536, and any.
+#: Maximum bytes per character: for the first 65,536 code points, and for all.
 _WIDE, _WIDEST = 6, 12
-#: A text of so many characters is never cut.
+#: Texts up to this length are never cut.
 _SHORT = 100
 
-#: What begins a packet, where a line begins with a brace: zero, how many entries follow, and the packet's number.
+#: Header of a packet: zero, where a line begins with a brace, then the number of entries and the frame number.
 _HEADER = struct.Struct("<BxHxxxxQ")
 _MOST_ACTS = 2000
-#: What may be read at once; longer frames come in pieces.
+#: Maximum bytes per read. Longer frames arrive in parts.
 _AT_ONCE = 8192
 
 _encode = json.JSONEncoder(separators=(",", ":"), ensure_ascii=True).encode
@@ -42,30 +42,30 @@ class Wire:
         self._acts: list[bytes] = []
 
     def act_later(self, packed: bytes) -> None:
-        """An act of a robot program is sent with the next frame that cannot wait."""
+        """Send an action of a robot program with the next frame that can't wait."""
         self._acts.append(packed)
         if len(self._acts) == _MOST_ACTS:
             self._write(b"")
 
     def act(self, packed: bytes) -> None:
-        """An act that asks for something: sent now, after what was held back."""
+        """Send an action that needs a reply now, after the delayed ones."""
         self._acts.append(packed)
         self._write(b"")
 
     def send_later(self, frame: Frame) -> None:
-        """Send with the next frame that cannot wait."""
+        """Send the frame with the next one that can't wait."""
         self._hold_acts()
         self._held += self._line(frame)
         if len(self._held) > MOST // 2:
             self._write(b"")
 
     def send(self, frame: Frame) -> None:
-        """Send now, after what was held back."""
+        """Send the frame now, after the delayed ones."""
         self._hold_acts()
         self._write(self._line(frame))
 
     def _line(self, frame: Frame) -> bytes:
-        """It, beginning with its number, both sides count; texts that are too long for a line are cut."""
+        """Return the numbered line of a frame. Texts that are too long for a line are cut."""
         number = self._sent
         self._sent += 1
         text = _encode(frame)
@@ -74,7 +74,7 @@ class Wire:
         return b'{"n":%d,%s\n' % (number, text.encode("ascii")[1:])
 
     def _hold_acts(self) -> None:
-        """What was done so far comes before what is sent next."""
+        """Add the actions so far to the delayed output, before the next frame."""
         acts = self._acts
         if acts:
             self._acts = []
@@ -89,7 +89,7 @@ class Wire:
             data = data[os.write(self._writing, data) :]
 
     def receive(self) -> Frame:
-        """The next frame. Ends the process when the worker has gone, or if somebody else has read what was sent."""
+        """Return the next frame. Ends the process if the worker is gone or other code has read from the pipe."""
         while not self._pending:
             self._read()
         if self._pending[0] == 0:
@@ -98,7 +98,7 @@ class Wire:
             line, newline, rest = self._pending.partition(b"\n")
             if newline:
                 self._pending = rest
-                number = self._counted()  # even if a program that calls itself too deeply cannot read it
+                number = self._counted()  # increment even if deep recursion prevents decoding
                 frame: Frame = json.loads(line)
                 if frame.pop("n") != number:
                     os._exit(0)
@@ -106,7 +106,7 @@ class Wire:
             self._read()
 
     def _receive_packed(self) -> Frame:
-        """The time and what the sensors read, as numbers alone."""
+        """Return a packet with the time and the sensor readings."""
         while len(self._pending) < _HEADER.size:
             self._read()
         _, count, number = _HEADER.unpack_from(self._pending)
@@ -133,18 +133,18 @@ class Wire:
 
 @functools.cache
 def _numbers(count: int) -> struct.Struct:
-    """A packet of the time and of what all sensors read, without what its header says."""
+    """Return the struct of a readings packet without its header."""
     return struct.Struct(f"<{_HEADER.size}xq{count - 1}d")
 
 
 def fits(text: str) -> bool:
-    """Whether a frame can carry ``text``."""
-    # Some room is left for the rest of the frame.
+    """Return whether a frame can carry ``text``."""
+    # Reserves space for the rest of the frame.
     return len(text) * _WIDEST < MOST - 200 or len(_encode(text)) < MOST - 200
 
 
 def fitted(frame: Frame) -> Frame:
-    """``frame`` with its long texts cut, the same length each, so that a line can carry it."""
+    """Return ``frame`` with its long texts cut to the same length, so that it fits a line."""
     texts = [value for value in _values(frame) if isinstance(value, str)]
     long = sum(len(text) > _SHORT for text in texts)
     space = MOST // max(long, 1) - _WIDEST * _SHORT * len(texts)
@@ -169,5 +169,5 @@ def _values(frame: Frame) -> Iterator[Any]:
 
 
 def clip(text: str, most: int = 2000) -> str:
-    """``text`` cut to ``most`` characters, saying so."""
+    """Return ``text`` cut to ``most`` characters, with a note."""
     return text if len(text) <= most else f"{text[:most]}… ({len(text)} characters)"

@@ -1,6 +1,6 @@
-"""Calls a function of a loaded module by its name, and hands back what it returns as JSON.
+"""Calls functions of a loaded module by name and returns the results as JSON.
 
-What is called and what the value is worth is the worker's business, on the other side of the wire.
+The worker chooses the calls and judges the results.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from typing import Any
 from .frames import Frame, fits
 from .student_code import StudentFiles
 
-#: In place of a responder's name: the module needs none.
+#: In place of a responder's name: the module needs no responder.
 NO_RESPONDER = ""
 
 
 def returned(namespace: dict[str, Any], files: StudentFiles, spec: Frame) -> Frame:
-    """The answer to one ``call`` spec."""
+    """Return the reply to one ``call`` spec."""
     function = namespace.get(spec["function"])
     if not callable(function):
         return {"do": "returned", "kind": "missing"}
@@ -25,7 +25,7 @@ def returned(namespace: dict[str, Any], files: StudentFiles, spec: Frame) -> Fra
 
 
 def value_frame(call: Callable[[], Any], files: StudentFiles) -> Frame:
-    """What a call of the student's gives, or what went wrong instead."""
+    """Return the frame with the result of a call into student code, or with its error."""
     try:
         value = call()
         text = as_json(value)
@@ -39,7 +39,7 @@ def value_frame(call: Callable[[], Any], files: StudentFiles) -> Frame:
 
 
 def as_json(value: Any) -> str | None:
-    """None for what JSON does not have; arrays are lists."""
+    """Return the value as JSON, with arrays as lists, or None if JSON can't represent it."""
     try:
         return json.dumps(value, allow_nan=False, default=_plain)
     except (TypeError, ValueError, RecursionError):

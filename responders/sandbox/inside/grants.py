@@ -1,6 +1,6 @@
-"""What student code may read: the standard library entry by entry, named packages, and its own role's modules.
+"""Paths that student code may read: entries of the standard library, named packages, and modules of its role.
 
-Never a whole ``lib/python3.x``: site-packages may lie beneath it, and Landlock cannot take back what a rule gives.
+A whole ``lib/python3.x`` is never granted, because site-packages may be below it and Landlock can't exclude subfolders.
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ _SYSTEM = (
 
 
 def readable(roots: list[str], closed: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Files and folders that may be read: nothing of what is ``closed``, not even where it lies in one of them."""
+    """Return the readable files and folders, except all that is ``closed``, even inside one of them."""
     granted = {*roots, *_standard_library(), *_packages(), *_system_libraries(), *_SYSTEM}
     return tuple({path for place in granted for path in _outside(place, {os.path.realpath(path) for path in closed})})
 
 
 def listable(roots: list[str], closed: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Folders whose names may be listed, as the import system does; those round what is ``closed`` can be no more."""
+    """Return the folders that may be listed, as the import system does. Parents of closed paths are only listable."""
     sites = _site_folders()
     tops = tuple(f"{folder}/" for folder in (*sites, *roots))
     round_closed = {folder for path in closed for folder in _folders_above(path) if f"{folder}/".startswith(tops)}
@@ -60,7 +60,7 @@ def listable(roots: list[str], closed: tuple[str, ...] = ()) -> tuple[str, ...]:
 
 
 def open_to_others(paths: tuple[str, ...]) -> bool:
-    """Whether a user who owns nothing here can read those of ``paths`` that there are, and reach them."""
+    """Return whether a user without privileges can read and reach those of ``paths`` that exist."""
     there = [path for path in paths if os.path.exists(path)]
     folders = {os.path.dirname(os.path.realpath(path)) for path in there}
     while more := {os.path.dirname(folder) for folder in folders} - folders:
@@ -78,7 +78,7 @@ def _has(path: str, bits: int) -> bool:
 
 
 def _system_libraries() -> Iterator[str]:
-    """Whole folders; but where Python keeps packages beneath one, only the libraries in it."""
+    """Yield the folders of system libraries; if Python's packages are below one, only the libraries in it."""
     for folder in _LIBRARIES:
         names = os.listdir(folder) if os.path.isdir(folder) else []
         if not any(name.startswith("python") for name in names):
@@ -96,7 +96,7 @@ def _standard_library() -> Iterator[str]:
 
 
 def _outside(place: str, closed: set[str]) -> Iterator[str]:
-    """``place``, or what lies in it and is not closed."""
+    """Yield ``place``, or its entries that are not closed."""
     real = os.path.realpath(place)
     if real in closed:
         return

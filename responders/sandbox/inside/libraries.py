@@ -1,6 +1,6 @@
-"""The libraries that student code may use, and their loading before any fork.
+"""The libraries available to student code, and their import before any fork.
 
-Which processes have them is the zygotes' to say; their files are opened by ``grants.py``.
+The zygotes decide which processes have them. ``grants.py`` makes their files readable.
 """
 
 from __future__ import annotations
@@ -15,18 +15,19 @@ from importlib.abc import MetaPathFinder
 from .frames import Wire
 from .lockdown import Grants
 
-#: As a program names them.
+#: Import names.
 LIBRARIES = ("joblib", "numpy", "pandas", "PIL", "scipy", "sklearn")
-#: And what cannot be had without them.
+#: Modules that need them.
 _NEED_THEM = ("nn_tools", "onnxruntime", "ai_edge_litert")
-#: What of Python's is loaded before any fork for every responder: these are the same whatever is loaded beside them.
+#: Standard modules that every responder's zygote imports before any fork, so that they are the same with and without
+#: libraries.
 BESIDE = (
     *("__future__", "abc", "ast", "base64", "bisect", "calendar", "collections", "collections.abc", "contextlib"),
     *("copy", "csv", "dataclasses", "datetime", "decimal", "enum", "fractions", "functools", "heapq", "io"),
     *("itertools", "json", "math", "numbers", "operator", "os", "os.path", "pprint", "random", "re", "statistics"),
     *("string", "struct", "sys", "textwrap", "time", "types", "typing"),
 )
-#: As a person does.
+#: Names for messages.
 WORDS = "numpy, pandas, scikit-learn, joblib, Pillow and the course's modules"
 _PRELOADED = (
     "joblib",
@@ -48,7 +49,7 @@ _PRELOADED = (
 
 
 def preload(without: list[str]) -> None:
-    """Import them, before any fork; some of it cannot be had where children are to do ``without``."""
+    """Import the libraries before any fork. Imports may fail if children don't have all of them (``without``)."""
     missing = (ImportError,) if without else ()
     for name in _PRELOADED:
         with contextlib.suppress(*missing):
@@ -58,11 +59,11 @@ def preload(without: list[str]) -> None:
 
 
 def run_without(run: Callable[[Wire, Grants], None], wire: Wire, grants: Grants) -> None:
-    """As ``run``, until one of them is imported after all: then the worker is told, and nothing more is run.
+    """Call ``run`` without libraries. An import of one is reported to the worker and ends the process.
 
-    Loaded this late they would take memory and time from what is the student's, and draw other chance.
+    Libraries loaded this late would use the student's memory and time, and other random draws.
     """
-    # Behind what refuses those that an assignment does without.
+    # After the finder that refuses modules excluded by the assignment.
     sys.meta_path.insert(1, _Stops(wire))
     run(wire, grants)
 
@@ -80,7 +81,7 @@ class _Stops(MetaPathFinder):
 
 
 def _ask_the_machine() -> None:
-    """What scikit-learn asks once about libraries and processors, where it may still open files: neighbours need it."""
+    """Trigger scikit-learn's queries about libraries and processors while files can be opened: neighbours need them."""
     import joblib
     from sklearn.utils.parallel import _get_threadpool_controller
 

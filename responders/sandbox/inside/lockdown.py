@@ -1,7 +1,7 @@
-"""The kernel's layers, put up by a process round itself: Landlock for files, a seccomp filter for everything else.
+"""Kernel layers that a process applies to itself: Landlock for files, and a seccomp filter for all system calls.
 
-Both are needed: Landlock knows files but not the network, seccomp knows system calls but not files. There is no way
-back, and neither needs a privilege. Which calls are allowed is in ``system_calls.py``.
+Both are needed: Landlock restricts files but not the network, seccomp restricts system calls but not files. They can't
+be undone and need no privileges. ``system_calls.py`` lists the allowed calls.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _libc = ctypes.CDLL(None, use_errno=True)
 _PR_SET_NO_NEW_PRIVS = 38
 _PERSONALITY_AS_IT_IS, _ADDR_NO_RANDOMIZE = 0xFFFFFFFF, 0x40000
 _SYS_CAPGET, _SYS_CAPSET = 125, 126
-_CAPABILITIES = struct.pack("=Ii", 0x20080522, 0)  # the third version of the interface, this process
+_CAPABILITIES = struct.pack("=Ii", 0x20080522, 0)  # version 3 of the interface, this process
 _CHOWN, _DAC_OVERRIDE, _KILL, _SETGID, _SETUID = 0, 1, 5, 6, 7
 _SYS_SECCOMP = 317
 _NEW_LISTENER, _ANSWERED_BEFORE_SIGNALS = 8, 32  # the second from Linux 5.19
@@ -35,65 +35,65 @@ _EXECUTE, _WRITE_FILE, _READ_FILE, _READ_DIR = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 _REMOVE_FILE, _MAKE_REG, _TRUNCATE = 1 << 5, 1 << 8, 1 << 14
 _FILE_ONLY = _EXECUTE | _WRITE_FILE | _READ_FILE | _TRUNCATE
 
-#: All file rights that each version of Landlock's interface knows (linux/landlock.h).
+#: All file rights in each version of Landlock's interface (linux/landlock.h).
 _FILE_RIGHTS = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1, 4: (1 << 15) - 1, 5: (1 << 16) - 1}
-_RULE = struct.Struct("=Qi")  # rights, and the descriptor of what they are on
-#: The first number of descriptors that stay open for ``reading_rules``.
+_RULE = struct.Struct("=Qi")  # rights, and the descriptor that they apply to
+#: Lowest descriptor number for ``reading_rules``.
 ABOVE = 256
 _NETWORK_RIGHTS = 0b11  # bind and connect TCP, from version 4
 _SCOPES = 0b11  # abstract sockets and signals, from version 6
 
 
 class LayerMissing(Exception):
-    """A layer that cannot be put up here; the text names it and what the system said."""
+    """Raised when a layer is not available here. The message has its name and the system's error."""
 
 
 @dataclass(frozen=True)
 class Grants:
-    """What stays reachable: files and folders to read, and folders to list."""
+    """The paths that stay accessible: to read, and only to list."""
 
     read: tuple[str, ...]
     list_only: tuple[str, ...] = ()
-    open_to_others: bool = False  # whether a user who owns nothing could read them
-    without: tuple[str, ...] = ()  # modules that student code does without
+    open_to_others: bool = False  # whether an unprivileged user could read them
+    without: tuple[str, ...] = ()  # modules excluded by the assignment
 
 
 def landlock_version() -> int:
-    """The version of Landlock's interface, 0 if the kernel has none or has it switched off."""
+    """Return the version of Landlock's interface, or 0 if it is missing or disabled."""
     version = _libc.syscall(_SYS_LANDLOCK_CREATE_RULESET, None, ctypes.c_size_t(0), ctypes.c_uint32(1))
     return max(int(version), 0)
 
 
 def control(option: int, value: int) -> None:
-    """One of the process's own settings, see prctl(2)."""
+    """Set an option of the process, see prctl(2)."""
     _libc.prctl(option, value, 0, 0, 0)
 
 
 def run_on(processors: bytes) -> None:
-    """Keep this process to some processors: a bit each, see sched_setaffinity(2)."""
+    """Restrict this process to some processors, given as a bit mask, see sched_setaffinity(2)."""
     _libc.sched_setaffinity(0, ctypes.c_size_t(len(processors)), processors)
 
 
 def has_fixed_addresses() -> bool:
-    """Whether this process has its memory at the same addresses as any other that did the same."""
+    """Return whether this process has memory addresses that are equal in identical processes."""
     personality = _libc.personality(ctypes.c_ulong(_PERSONALITY_AS_IT_IS))
     return personality >= 0 and bool(personality & _ADDR_NO_RANDOMIZE)
 
 
 def forbid_new_privileges() -> None:
-    """No set-uid program can lift the sandbox."""
+    """Prevent set-uid programs from gaining privileges."""
     if _libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0:
         raise LayerMissing(f"no_new_privs: {_last_error()}")
 
 
 def drop_capabilities() -> None:
-    """Root keeps its name and loses its powers: no mounts, no raw sockets, no pages taken from the machine."""
+    """Drop all capabilities. Root then can't mount, use raw sockets or reserve memory of the machine."""
     if _libc.syscall(_SYS_CAPSET, _CAPABILITIES, bytes(24)) != 0:
         raise LayerMissing(f"capset: {_last_error()}")
 
 
 def may_change_user() -> bool:
-    """Whether this process can become somebody else, and its parent can still end it and tidy up after it."""
+    """Return whether this process can change its user while its parent can still kill it and delete its files."""
     sets = ctypes.create_string_buffer(24)
     if os.geteuid() != 0 or _libc.syscall(_SYS_CAPGET, _CAPABILITIES, sets) != 0:
         return False
@@ -102,7 +102,11 @@ def may_change_user() -> bool:
 
 
 def become(user: int) -> None:
-    """Be ``user``, and in no group but its own. Raises LayerMissing."""
+    """Switch to ``user``, with only its own group.
+
+    Raises:
+        LayerMissing: If the system refuses.
+    """
     try:
         os.setgroups([])
         os.setresgid(user, user, user)
@@ -112,7 +116,7 @@ def become(user: int) -> None:
 
 
 def reading_rules(grants: Grants) -> tuple[bytes, ...]:
-    """``grants`` as Landlock is told of them. The files stay open, so that a fork need not look for them again."""
+    """Return the Landlock rules for ``grants``. The files stay open, so that forks need not look them up again."""
     rights = {**dict.fromkeys(grants.read, _READ_FILE | _READ_DIR), **dict.fromkeys(grants.list_only, _READ_DIR)}
     return tuple(rule for path, allowed in rights.items() for rule in _rules_for(path, allowed))
 
@@ -124,7 +128,7 @@ def _rules_for(path: str, rights: int) -> Iterator[bytes]:
 
 
 def _moved(fd: int) -> int:
-    """The descriptor under another number, above those that a child uses."""
+    """Return a duplicate of the descriptor, above the numbers that a child uses."""
     try:
         return fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, ABOVE)
     finally:
@@ -132,13 +136,13 @@ def _moved(fd: int) -> int:
 
 
 def writing_rule(folder: int, most: int = 99) -> bytes:
-    """That the flat folder with this descriptor may be written in, as version ``most`` is told at most."""
+    """Return the rule that allows writing in a flat folder, for Landlock up to version ``most``."""
     own = _READ_FILE | _READ_DIR | _WRITE_FILE | _MAKE_REG | _REMOVE_FILE | _TRUNCATE
     return _RULE.pack(own & _file_rights(min(landlock_version(), most)), folder)
 
 
 def restrict_files(rules: Iterable[bytes], most: int = 99) -> int:
-    """Let this process reach nothing but what ``rules`` allow; at most version ``most`` is used. That in force."""
+    """Restrict this process to the files that ``rules`` allow. Return the Landlock version in use, up to ``most``."""
     version = min(landlock_version(), most)
     if version < 1:
         raise LayerMissing(
@@ -165,7 +169,7 @@ def _create_ruleset(rights: int, version: int) -> int:
     attribute = struct.pack("=QQQ", rights, _NETWORK_RIGHTS, _SCOPES)
     wanted = [sizes.get(version, 24), 16, 8] if version >= 4 else [8]
     for size in wanted:
-        # Some kernels claim a version whose scopes they lack: then the same without them.
+        # Some kernels report a version but lack its scopes. Then the scopes are left out.
         ruleset = _libc.syscall(_SYS_LANDLOCK_CREATE_RULESET, attribute[:size], ctypes.c_size_t(size), 0)
         if ruleset >= 0:
             return int(ruleset)
@@ -179,14 +183,15 @@ def _last_error() -> str:
 
 
 def restrict_system_calls() -> None:
-    """Install the filter on this process, for ever."""
+    """Install the seccomp filter on this process permanently."""
     _install(program(os.getpid()), 0)
 
 
 def ask_about_paths() -> int:
-    """From now on every call that names a path waits for an answer; the descriptor from which they are answered.
+    """Let every system call with a path wait for a decision. Return the descriptor for the decisions.
 
-    Raises LayerMissing where the kernel cannot, or somebody further out answers for this process already.
+    Raises:
+        LayerMissing: If the kernel doesn't support it, or an outer process already decides for this one.
     """
     try:
         return _install(asking(), _NEW_LISTENER | _ANSWERED_BEFORE_SIGNALS)
@@ -203,5 +208,5 @@ def _install(code: bytes, flags: int) -> int:
     return int(result)
 
 
-#: Changes whenever what is allowed changes.
+#: Version of the policy, a hash of what is allowed.
 POLICY = hashlib.sha256(repr((sorted(_FILE_RIGHTS.items()), program(0), asking())).encode()).hexdigest()[:8]

@@ -1,6 +1,6 @@
-"""What loading students' models needs inside the sandbox: runtimes with one thread, and sentences for what goes wrong.
+"""Support for loading students' models in the sandbox: single-threaded runtimes, and readable error messages.
 
-The files themselves are read by the libraries that wrote them; nothing here trusts one.
+The libraries that wrote the model files read them. No file is trusted.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 
 def preload_runtimes() -> None:
-    """Import onnxruntime and ai-edge-litert, where they may be had; each does with one thread: there are no more."""
+    """Import onnxruntime and ai-edge-litert if available, with one thread each, because the sandbox allows no more."""
     for preload in (_preload_onnxruntime, _preload_litert):
         with contextlib.suppress(ImportError):
             preload()
@@ -45,7 +45,7 @@ def _preload_litert() -> None:
 
 
 def explain_joblib() -> None:
-    """Let ``joblib.load`` say which file could not be loaded, and why, in words."""
+    """Make errors of ``joblib.load`` name the file and the cause."""
     import joblib
     from joblib import numpy_pickle
 
@@ -76,7 +76,7 @@ def explain_joblib() -> None:
 
 
 def install_version_notes(tell: Callable[[str], None]) -> None:
-    """Tell, once for each version, that a model was saved by another scikit-learn; other warnings are shown as ever."""
+    """Report once per version that a model was saved by another scikit-learn. Other warnings are shown as usual."""
     if "sklearn" not in sys.modules:
         return
     from sklearn.exceptions import InconsistentVersionWarning

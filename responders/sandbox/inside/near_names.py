@@ -1,6 +1,6 @@
-"""What was probably meant where Python has stumbled over a name: one like it, or an import that is not there.
+"""Suggestions for name and import errors: a similar name, or a missing import.
 
-It looks at what the error itself knows and changes nothing; the worker believes none of it.
+They use only data of the error and change nothing. The worker doesn't trust them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from types import ModuleType
 _LONGEST = 60
 _MOST_KNOWN = 5000
 _CANNOT_IMPORT = re.compile(r"cannot import name '(\w+)' from '([\w.]+)'")
-#: How what is often used without it is imported.
+#: Import statements for names that are often used without one.
 _IMPORTS = {
     "np": "import numpy as np",
     "pd": "import pandas as pd",
@@ -26,21 +26,21 @@ _IMPORTS = {
     "pyState": "from ev3dev2_glue import pyState",
     "load": "from joblib import load",
 }
-#: Functions of modules under names that other languages and libraries have for them.
+#: Functions of modules by their names in other languages and libraries.
 _OTHER_NAMES = {
     "time": {"wait": "sleep", "pause": "sleep", "delay": "sleep", "now": "time"},
     "random": {"rand": "random", "number": "randint", "pick": "choice", "int": "randint"},
     "math": {"power": "pow", "root": "sqrt"},
     "json": {"parse": "loads", "stringify": "dumps", "encode": "dumps", "decode": "loads"},
 }
-#: What is imported more often than modules of the standard library with names like these.
+#: Modules that are suggested before standard modules with similar names.
 _LIBRARIES = ("joblib", "json", "matplotlib", "nbev3devsim", "nn_tools", "numpy", "pandas", "sklearn", "time")
-#: What of the brick a robot program may not have loaded yet.
+#: Brick modules that a robot program may not have loaded yet.
 _BRICK = ("ev3dev2", "ev3dev2.motor", "ev3dev2.sensor", "ev3dev2.sensor.lego", "ev3dev2.sound", "ev3dev2_glue")
 
 
 def meant_by(error: BaseException) -> str:
-    """A sentence on what was probably meant; empty where nothing is near, or the error is about something else."""
+    """Return a sentence with a suggestion, or "" if there is none."""
     try:
         if isinstance(error, UnboundLocalError):
             return ""
@@ -57,7 +57,7 @@ def meant_by(error: BaseException) -> str:
         found = _CANNOT_IMPORT.search(str(error)) if isinstance(error, ImportError) else None
         return _near(found[1], dir(sys.modules.get(found[2])), 0.7) if found else ""
     except Exception:
-        # It asks objects of the student's for their names.
+        # A suggestion would call code of the student's objects.
         return ""
 
 
@@ -82,7 +82,7 @@ def _of_module_function(error: AttributeError) -> str:
 
 
 def _near(name: str, known: Iterable[object], least: float) -> str:
-    """``Did you mean print?``, if one of ``known`` is like ``name``, which is none of them."""
+    """Return ``Did you mean print?`` for the best match of ``name`` among ``known``, or ""."""
     names = [each for each in known if type(each) is str and len(each) <= _LONGEST][:_MOST_KNOWN]
     if name in names or len(name) > _LONGEST:
         return ""

@@ -1,6 +1,6 @@
 """Executes a notebook from top to bottom in the responder's process, and answers the robots that its magics start.
 
-A cell that raises is told of and the next one is run. Which run is marked, and what becomes of it, is the worker's.
+An error in a cell is reported and the next cell runs. The worker decides which run is marked.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _ADDRESS = re.compile(r" at 0x[0-9A-Fa-f]+")
 
 
 class NotebookRole(ResponderRole):
-    """A notebook: its cells share one namespace, one clock and one file name; line numbers run on from cell to cell."""
+    """A notebook. Its cells share one namespace, clock and file name; line numbers continue from cell to cell."""
 
     def __init__(self, wire: Wire, grants: Grants, spec: Frame) -> None:
         super().__init__(wire, grants, spec)
@@ -38,7 +38,7 @@ class NotebookRole(ResponderRole):
 
     @property
     def namespace(self) -> dict[str, Any]:
-        """What all cells have bound, by its name."""
+        """The names that all cells have bound."""
         return self._namespace
 
     def run(self) -> None:
@@ -50,7 +50,7 @@ class NotebookRole(ResponderRole):
         roboSim.look = self._look
         unseen.install(self._shell)
         self._namespace.update(In=[], Out={})
-        # As in IPython, modules that a cell imports have these two as well.
+        # As in IPython, modules that a cell imports have these too.
         builtins.display = unseen.display  # type: ignore[attr-defined]
         builtins.get_ipython = lambda: self._shell  # type: ignore[attr-defined]
         builtins.exit = builtins.quit = _leave  # type: ignore[assignment]
@@ -68,13 +68,13 @@ class NotebookRole(ResponderRole):
         self._serve()
 
     def note(self, text: str) -> None:
-        """Tell the worker, with the line that is being run."""
+        """Send a note to the worker, with the current line."""
         self._notes += 1
         if self._notes <= _MOST_NOTES:
             self._wire.send({"do": "note", "text": clip(text, 300), **self._files.place(sys._getframe())})
 
     def expand(self, line: str) -> str:
-        """``{expression}`` and ``$name`` in a magic's line, by the names that the cell has there."""
+        """Return a magic's line with ``{expression}`` and ``$name`` replaced, using the names of the cell."""
         if "{" not in line and "$" not in line:
             return line
         frame = sys._getframe()
@@ -83,15 +83,15 @@ class NotebookRole(ResponderRole):
         return cell_source.expanded(line, self._namespace | (frame.f_locals if frame is not None else {}))
 
     def run_line(self, text: str) -> Any:
-        """More code in the line that is being run, as ``%time`` has it; its value, if it has one."""
+        """Run code from the current line, as ``%time`` does. Return its value, if it has one."""
         return self._evaluated(text, (self._files.line_in_main(sys._getframe()) or 1) - 1)
 
     def run_body(self, body: str) -> None:
-        """The rest of a cell whose magic runs it."""
+        """Run the rest of a cell for its magic."""
         self._run_source(body, self._body_above)
 
     def run_file(self, name: str) -> None:
-        """A Python file beside the notebook, among the cells' names, as ``%run`` has it."""
+        """Run a Python file beside the notebook in the cells' namespace, as ``%run`` does."""
         text = own_modules.in_folder(name.removesuffix(".py"))
         if text is None:
             raise FileNotFoundError(f"there is no file {name} beside the notebook")
@@ -99,7 +99,7 @@ class NotebookRole(ResponderRole):
         exec(student_code.compile_source(text, name), self._namespace)
 
     def captured(self, work: Callable[[], None]) -> str:
-        """Do ``work`` and give what is printed meanwhile."""
+        """Call ``work`` and return its output."""
         outer, self._captured = self._captured, []
         try:
             work()
@@ -108,7 +108,7 @@ class NotebookRole(ResponderRole):
             self._captured = outer
 
     def start_robot(self, name: str, arguments: str, body: str | None) -> None:
-        """Hand a robot program or its flags to the worker, and answer until the robot has come to its end."""
+        """Send a robot program or its flags to the worker, and answer until the robot has finished."""
         from nbev3devsim.load_nbev3devwidget import roboSim
 
         if self._robot_runs:
@@ -150,7 +150,7 @@ class NotebookRole(ResponderRole):
         return state
 
     def _execute(self, source: str, above: int) -> Frame | None:
-        """Run one cell, ``above`` being the lines of all before it. The error that ended it, if any."""
+        """Run one cell. ``above`` is the number of lines before it. Return the error that ended it, or None."""
         try:
             self._run_source(source, above)
         except BaseException as error:
@@ -181,11 +181,14 @@ class NotebookRole(ResponderRole):
         value = self._evaluated(text, above)
         if value is not None and not text.rstrip().endswith(";"):
             self._namespace["_"] = value
-            # Where in memory a thing lies is nobody's business, and another place each time.
+            # Memory addresses are removed, because they differ between runs.
             print(_ADDRESS.sub("", clip(repr(value), _SHOWN)))
 
     def _evaluated(self, text: str, above: int) -> Any:
-        """Run it, ``above`` being the lines before it; the value of its last line, if that is an expression."""
+        """Run the text and return the value of its last line, if it is an expression.
+
+        ``above`` is the number of lines before it.
+        """
         try:
             tree = ast.parse(text, self._name)
         except SyntaxError as error:
@@ -203,7 +206,7 @@ class NotebookRole(ResponderRole):
         return eval(compile(shown, self._name, "eval", dont_inherit=True), self._namespace)
 
     def _missing(self) -> str | None:
-        """Why there is nothing in force that could answer the robot, if so."""
+        """Return why there is no responder for the robot, or None if there is one."""
         try:
             self._find()
         except LookupError as error:
@@ -211,7 +214,7 @@ class NotebookRole(ResponderRole):
         return None
 
     def _fix_msg(self) -> None:
-        """A global ``msg`` of the notebook's own stays; else it is the last text received."""
+        """Set ``msg`` to the last text received, unless the notebook has its own global ``msg``."""
         mine = self._given_msg is not None and self._namespace.get("msg") == self._given_msg
         self._defines_msg = "msg" in self._namespace and not mine
 
@@ -229,5 +232,5 @@ class NotebookRole(ResponderRole):
 
 
 def _leave(code: object = None) -> None:
-    """``exit()`` in a cell ends that cell."""
+    """End the cell, as ``exit()`` does."""
     raise SystemExit(code)

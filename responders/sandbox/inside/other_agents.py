@@ -1,6 +1,6 @@
-"""The other agents of a submission as functions: what one is called with goes to its process, as JSON, and back.
+"""The other agents of a submission as functions. Arguments and results travel over the wire as JSON.
 
-It decides nothing: whether an agent can be asked now, and what its answer costs, is the worker's to say.
+The worker decides whether an agent can be asked, and counts the costs.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from .function_calls import as_json
 
 
 def functions(names: Iterable[str], wire: Wire, waited: Callable[[int], None]) -> dict[str, Callable[..., Any]]:
-    """A function for each of the agents; ``waited`` is told what the time is when an answer has come."""
+    """Return a function for each agent. ``waited`` is called with the time at which an answer arrives."""
     return {name: _asking(name, wire, waited) for name in names}
 
 

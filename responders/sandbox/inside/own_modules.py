@@ -1,7 +1,7 @@
-"""Lets student code import the Python files beside it, each as a module of its own name.
+"""Imports of the Python files beside the student's code, each as a top-level module.
 
-They come after everything else that can be imported, so that none stands in for a module of Python's, the brick's or a
-library's. There are no packages: what is submitted is flat.
+They come last in the search order, so none replaces a module of Python, the brick or a library. There are no packages,
+because submissions are flat.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ Source = Callable[[str], str | None]
 
 
 def install(source: Source, names: Iterable[str], files: StudentFiles, tell: Callable[[str], None]) -> None:
-    """Import from ``source``, which gives a module's text by its name, what nothing else has.
+    """Install an importer for modules that nothing else provides. ``source`` returns a module's text by name.
 
-    ``tell(sentence)`` for each of ``names`` that can never be imported, as another module is called so.
+    ``tell(sentence)`` is called for each of ``names`` that another module hides.
     """
     for name in sorted(names):
         if _is_taken(name):
@@ -34,12 +34,12 @@ def install(source: Source, names: Iterable[str], files: StudentFiles, tell: Cal
 
 
 def given(modules: Mapping[str, str]) -> Source:
-    """The texts that were handed over."""
+    """Return a source for these modules."""
     return modules.get
 
 
 def in_folder(name: str) -> str | None:
-    """The text of the file in the working folder, as it is now: cells write modules too."""
+    """Return the current text of a module in the working folder, because cells can write modules too."""
     try:
         with open(f"{name}.py", "rb") as file:
             return importlib.util.decode_source(file.read())
@@ -48,7 +48,7 @@ def in_folder(name: str) -> str | None:
 
 
 def names_in_folder() -> list[str]:
-    """The modules that lie in the working folder."""
+    """Return the names of the modules in the working folder."""
     return [file.removesuffix(".py") for file in os.listdir() if is_module_file(file)]
 
 
@@ -61,7 +61,7 @@ def _is_taken(name: str) -> bool:
 
 
 def _importer() -> CodeType:
-    """The code that has the import statement, or calls for it."""
+    """Return the code object with the import statement or call."""
     frame = sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename.startswith((__file__, "<frozen ")):
         frame = frame.f_back
@@ -87,7 +87,7 @@ class _OwnModules(MetaPathFinder, Loader):
         return found
 
     def create_module(self, spec: ModuleSpec) -> None:
-        """An ordinary module will do."""
+        """Return None for a standard module object."""
 
     def exec_module(self, module: ModuleType) -> None:
         found = module.__spec__

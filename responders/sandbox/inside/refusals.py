@@ -1,6 +1,6 @@
-"""Turns what the sandbox refuses into an ordinary Python error with a sentence, and tells the worker where it happened.
+"""Converts refusals of the sandbox into Python errors with a readable message, and reports the place to the worker.
 
-This is courtesy, not protection: the kernel refuses all the same.
+This only helps users. The kernel enforces the refusals.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _SENTENCES = {
 
 
 def install(grants: Grants, student: StudentFiles, tell: Callable[[str], None]) -> None:
-    """Refuse with a sentence from now on; ``tell(sentence)`` for the first few, from within what was refused."""
+    """Install the errors. ``tell(sentence)`` is called for the first few, inside the refused call."""
     here = os.getcwd()
     own = (here,) if here != "/" else ()
     libraries = tuple(path.rstrip("/") + "/" for path in grants.read)
@@ -64,7 +64,7 @@ def install(grants: Grants, student: StudentFiles, tell: Callable[[str], None]) 
             if path not in files and not path.startswith(folders):
                 if student.has(sys._getframe(1).f_code.co_filename):
                     raise refuse(FILES)
-                # A library that looks round by itself is refused too, but that is no news for a report.
+                # Libraries that explore the system are refused too, but the report doesn't mention it.
                 raise PermissionError(1, FILES)
 
     sys.addaudithook(hook)

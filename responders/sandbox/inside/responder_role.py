@@ -1,6 +1,6 @@
-"""A responder at work: the student's module is run once, then answers one message after the other.
+"""The role of a responder: loads the student's module once, then answers one message after another.
 
-Which texts reach it and what becomes of the answers is the bridge's business, on the other side of the wire.
+The bridge decides which texts arrive and how the answers are used.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _FUNCTIONS = (types.FunctionType, types.MethodType, types.BuiltinFunctionType, f
 
 
 class ResponderRole:
-    """The student's module, and the calls inside it that the sequence diagram shows."""
+    """The student's module, and its inner calls for the sequence diagram."""
 
     def __init__(self, wire: Wire, grants: Grants, spec: Frame) -> None:
         self._wire = wire
@@ -49,7 +49,7 @@ class ResponderRole:
         self._serve()
 
     def _prepare(self) -> None:
-        """Everything that stands before student code runs: output, clock, chance, and an empty module."""
+        """Prepare for student code: output, clock, randomness, and an empty module."""
         from nbev3devsim.load_nbev3devwidget import eds, roboSim
 
         signal.signal(signal.SIGXCPU, self._busy)
@@ -75,7 +75,7 @@ class ResponderRole:
                 self._hear(message, 0)
 
     def _hear(self, message: Frame, began: int) -> None:
-        """Answer one message of a run that began at ``began``; what the robot has logged by then comes with it."""
+        """Answer one message of the run that began at ``began``. The message contains the robot's new log entries."""
         from nbev3devsim.load_nbev3devwidget import roboSim
 
         self._units = max(self._units, began + message["t"])
@@ -85,7 +85,7 @@ class ResponderRole:
         self._wire.send(self._answer(message["text"]))
 
     def _load(self, text: str) -> Frame | None:
-        """Run the module; the error that stopped it, or that there is no responder in it."""
+        """Run the module. Return its error, also if it has no responder, or None."""
         try:
             self._files.execute(text, self._name, self._namespace)
             if self._function != function_calls.NO_RESPONDER:
@@ -96,7 +96,7 @@ class ResponderRole:
         return None
 
     def _find(self) -> Callable[[str], Any]:
-        """The function asked for; else ``roboSim.pyresponder``, ``responder``, or the only ``*_responder``."""
+        """Return the requested function, else ``roboSim.pyresponder``, ``responder``, or the only ``*_responder``."""
         from nbev3devsim.load_nbev3devwidget import roboSim
 
         if self._function is not None:
@@ -141,10 +141,10 @@ class ResponderRole:
         return {"do": "answer", "kind": "text", "text": str(answer)}
 
     def _note_calls(self) -> None:
-        """Wrap what parser, agent and logger are bound to now, and the predict of every bound network."""
+        """Wrap the current parser, agent and logger, and ``predict`` of every bound network, to record calls."""
         for name, value in list(self._namespace.items()):
             if name in _NOTED:
-                # An object that is called may keep something that a function in its place would not.
+                # Callable objects may have state that a wrapping function would lose.
                 if name != self._own_name and isinstance(value, _FUNCTIONS) and not hasattr(value, "_robomark_noted"):
                     self._namespace[name] = self._noted(name, value)
                 continue
@@ -207,7 +207,7 @@ class ResponderRole:
 
 
 def _shown(value: Any) -> str:
-    """A short text for a value; whatever its repr does, this does not fail."""
+    """Return a short text for a value. Never fails, even if its repr does."""
     try:
         return clip(repr(value), 80)
     except Exception:

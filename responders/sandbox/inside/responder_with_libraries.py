@@ -1,6 +1,6 @@
-"""The zygote of responders that may need libraries: as any other's, but they are loaded before the fork.
+"""The zygote of responders that may need libraries, which are loaded before the fork.
 
-Which responders those are is the worker's to say; the others need not wait for them.
+The worker decides which responders use it. The others start faster without it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _COURSE = ("nn_tools.network_views", "nn_tools.sensor_data", "nn_tools.weights")
 
 
 def preload(without: list[str]) -> None:
-    """Import what responders use, before any fork; some of it cannot be had where they are to do ``without``."""
+    """Import the modules of responders before any fork. Some may fail without the modules in ``without``."""
     responder_zygote.preload(without)
     libraries.preload(without)
     missing = (ImportError,) if without else ()

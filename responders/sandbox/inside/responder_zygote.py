@@ -1,7 +1,7 @@
-"""The responders' zygote: what is imported before any fork, and whether a module, an agent or a notebook is to be run.
+"""The zygote of responders: imports before any fork, and the choice between a module, an agent and a notebook.
 
-What runs then is in ``responder_role.py``, ``agent_role.py`` and ``notebook_role.py``; libraries are loaded in
-``responder_with_libraries.py`` alone.
+The roles are in ``responder_role.py``, ``agent_role.py`` and ``notebook_role.py``. Only ``responder_with_libraries.py``
+loads libraries.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from .notebook_role import NotebookRole
 from .responder_role import ResponderRole
 from .static_analysis import reader  # noqa: F401
 
-#: What answering takes.
+#: Modules needed for answering.
 NEEDED = ("nbev3devsim.load_nbev3devwidget", "nbev3devsim.unseen")
 
 
 def preload(without: list[str]) -> None:
-    """Import what of Python's responders use without needing a library."""
+    """Import the standard modules that responders use without a library."""
     for name in libraries.BESIDE:
         importlib.import_module(name)
 

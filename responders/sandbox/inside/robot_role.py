@@ -1,6 +1,6 @@
-"""Runs a robot program: the preamble, then the student's file, with the brick's modules for a robot.
+"""The role of a robot program: runs the preamble, then the student's file, with the brick's modules.
 
-It decides nothing: what the program asks of the world goes over the wire, and so does how it ended.
+Requests to the world and the end of the program are sent over the wire; the worker decides.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .frames import Frame, Wire, clip
 from .lockdown import Grants
 from .statement_watch import StatementWatch
 
-#: What every robot program needs.
+#: Modules needed by every robot program.
 NEEDED = ("brick_link", "brick_preambles", "ev3dev2_glue")
 
 
@@ -30,14 +30,14 @@ def preload(without: list[str]) -> None:
 
 @functools.cache
 def preamble_codes() -> Mapping[str, CodeType]:
-    """What is run before a program, by its name."""
+    """Return the compiled preambles by name."""
     from brick_preambles import PREAMBLES
 
     return {name: compile(text, "<preamble>", "exec", dont_inherit=True) for name, text in PREAMBLES.items()}
 
 
 def run(wire: Wire, grants: Grants) -> None:
-    """Receive a program, run it to its end, and report that."""
+    """Receive a program, run it, and report how it ended."""
     from brick_link import link
 
     spec = wire.receive()
@@ -80,7 +80,7 @@ def run(wire: Wire, grants: Grants) -> None:
 
 
 def _execute(spec: Frame, namespace: dict[str, Any], files: student_code.StudentFiles) -> Frame | None:
-    """The error that ended the program, or None."""
+    """Run the program. Return its error, or None."""
     try:
         exec(preamble_codes()[spec["preamble"]], namespace)
         files.execute(spec["text"], files.main, namespace)
@@ -94,7 +94,7 @@ def _execute(spec: Frame, namespace: dict[str, Any], files: student_code.Student
 
 
 def _leave(wire: Wire, frame: Frame) -> None:
-    """Say why, and end here and now: the student's code must not go on or catch this."""
+    """Send the reason and end the process at once, so that student code can't continue or catch it."""
     try:
         wire.send(frame)
     finally:

@@ -1,6 +1,6 @@
-"""Runs a robot program that imports libraries: as any other, but they are loaded before the fork.
+"""The role of a robot program that imports libraries, which are loaded before the fork.
 
-Which programs those are is the worker's to say; the others need not wait for them.
+The worker decides which programs use it. The others start faster without it.
 """
 
 from __future__ import annotations
@@ -12,6 +12,6 @@ run = robot_role.run
 
 
 def preload(without: list[str]) -> None:
-    """What any robot program is prepared with, and the libraries."""
+    """Make the preparations of ``robot_role`` and import the libraries."""
     robot_role.preload(without)
     libraries.preload(without)

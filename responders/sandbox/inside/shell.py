@@ -1,6 +1,6 @@
-"""What ``get_ipython()`` gives to a notebook's cells: magics by name, and refusals with a sentence.
+"""The object that ``get_ipython()`` returns to a notebook's cells: magics by name, and refusals with a message.
 
-The magics that start the robot only pass on what they were told; the worker does the rest.
+Magics that start the robot only forward their arguments. The worker does the rest.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from . import libraries, refusals
 from .cell_source import LINE_WRAPPERS, WRAPPERS, wrapped
 
 _ROBOT = ("sim_magic", "sim_magic_imports", "sim_magic_preloaded")
-#: Drawn from the text of their cells, by the report.
+#: Magics whose cells the report draws as diagrams.
 _DIAGRAMS = frozenset(("blockdiag", "seqdiag"))
 _NO_DIAGRAMS = frozenset(("actdiag", "nwdiag", "packetdiag", "rackdiag"))
-#: What only sets up or shows something in a browser.
+#: Magics that only set up or show something in a browser.
 _WITHOUT_EFFECT = frozenset(
     (
         *("load_ext", "reload_ext", "unload_ext", "matplotlib", "pylab", "config", "autoreload", "precision", "xmode"),
@@ -34,36 +34,36 @@ _NO_PACKAGES = f"packages cannot be installed here; {libraries.WORDS} are there"
 
 
 class RunRequester(Protocol):
-    """What the shell needs of the notebook that is being executed."""
+    """The interface of the running notebook for the shell."""
 
     @property
     def namespace(self) -> dict[str, Any]:
-        """What all cells have bound, by its name."""
+        """The names that all cells have bound."""
 
     def note(self, text: str) -> None:
-        """Tell the worker what was skipped or refused."""
+        """Report to the worker what was skipped or refused."""
 
     def start_robot(self, name: str, arguments: str, body: str | None) -> None:
-        """Run a robot program, or set its flags, as the magic ``%name`` asks; ``body`` is the rest of its cell."""
+        """Run a robot program or set its flags, for the magic ``%name``. ``body`` is the rest of its cell."""
 
     def run_line(self, text: str) -> Any:
-        """Run more code in the line that is being run; its value, if it has one."""
+        """Run code from the current line. Return its value, if it has one."""
 
     def run_body(self, body: str) -> None:
         """Run the rest of a magic's cell."""
 
     def run_file(self, name: str) -> None:
-        """Run a Python file beside the notebook among the cells' names."""
+        """Run a Python file beside the notebook in the cells' namespace."""
 
     def expand(self, line: str) -> str:
-        """Put values in the places of ``{expression}`` and ``$name`` in a magic's line."""
+        """Return a magic's line with ``{expression}`` and ``$name`` replaced by values."""
 
     def captured(self, work: Callable[[], None]) -> str:
-        """Do ``work`` and give what is printed meanwhile."""
+        """Call ``work`` and return its output."""
 
 
 class CapturedOutput:
-    """What ``%%capture name`` binds to the name."""
+    """The object that ``%%capture name`` binds to the name."""
 
     def __init__(self, stdout: str) -> None:
         self.stdout = stdout
@@ -71,7 +71,7 @@ class CapturedOutput:
         self.outputs: list[Any] = []
 
     def show(self) -> None:
-        """Print it after all."""
+        """Print the captured output."""
         if self.stdout:
             print(self.stdout.removesuffix("\n"))
 
@@ -82,7 +82,7 @@ class CapturedOutput:
 
 
 class Shell:
-    """The part of IPython's shell that notebooks of the course use."""
+    """The part of IPython's shell that the course's notebooks use."""
 
     def __init__(self, requester: RunRequester) -> None:
         self._requester = requester
@@ -104,11 +104,11 @@ class Shell:
 
     @property
     def user_ns(self) -> dict[str, Any]:
-        """What all cells have bound, where IPython has it."""
+        """The names that all cells have bound, as in IPython."""
         return self._requester.namespace
 
     def run_line_magic(self, magic_name: str, line: str, _stack_depth: int = 1) -> Any:
-        """``%name line``; what cannot be done is noted."""
+        """Run ``%name line``. An unsupported magic is reported."""
         name = str(magic_name).lstrip("%")
         line = self._requester.expand(str(line))
         if name in _ROBOT:
@@ -123,7 +123,7 @@ class Shell:
         return self._without(name, f"%{name}")
 
     def run_cell_magic(self, magic_name: str, line: str, cell: str) -> Any:
-        """``%%name line`` and the rest of the cell."""
+        """Run ``%%name line`` with the rest of the cell."""
         name = str(magic_name).lstrip("%")
         line, body = self._requester.expand(str(line)), str(cell)
         if name in _ROBOT:
@@ -137,16 +137,16 @@ class Shell:
         return self._without(name, f"%%{name}")
 
     def magic(self, arg_s: str) -> Any:
-        """``%name line`` in one text, as older notebooks write it."""
+        """Run ``%name line`` given as one text, as in older notebooks."""
         name, _, line = str(arg_s).lstrip("%").partition(" ")
         return self.run_line_magic(name, line)
 
     def system(self, cmd: str) -> None:
-        """``!cmd``: refused."""
+        """Refuse ``!cmd``."""
         self._requester.note(f"!{_short(cmd)} was refused: {refusals.PROGRAMS}")
 
     def getoutput(self, cmd: str, *_: Any, **__: Any) -> list[str]:
-        """``x = !cmd``: refused, and nothing comes of it."""
+        """Refuse ``x = !cmd`` and return an empty list."""
         self.system(cmd)
         return []
 
@@ -198,7 +198,7 @@ class Shell:
 def _data_magics() -> Mapping[str, Callable[[list[str]], Any]]:
     try:
         from nbev3devsim.data_magics import MAGICS
-    except ImportError:  # where an assignment does without pandas
+    except ImportError:  # pandas may be excluded by the assignment
         return {}
     return MAGICS
 

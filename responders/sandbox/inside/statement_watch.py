@@ -1,6 +1,7 @@
-"""Notes which statements of a student's files are run, each when it is run for the first time.
+"""Recording of the executed statements of a student's files, each at its first execution.
 
-Before each statement stands a look at a table, which tells of what it does not have yet. Lines stay as they are.
+A table lookup is inserted before each statement. It reports statements that are not in the table yet. Lines don't
+change.
 """
 
 from __future__ import annotations
@@ -20,17 +21,17 @@ _BLOCKS = ("body", "orelse", "finalbody")
 
 
 class StatementWatch:
-    """Compiles files, and sends a frame for each statement of them that is run; ``main`` is the file that is run."""
+    """Compiles files and sends a frame for each executed statement. ``main`` is the main file."""
 
     def __init__(self, send: Callable[[Frame], None], main: str) -> None:
         self._send = send
         self._main = main
 
     def compile(self, text: str, name: str, namespace: dict[str, Any]) -> CodeType:
-        """Code of a whole file that is going to be run in ``namespace``. The file compiles as it is."""
+        """Compile a whole file to run in ``namespace``. The file must compile without changes."""
         namespace[_TABLE] = _Table(self._send, None if name == self._main else name)
         limit = sys.getrecursionlimit()
-        # A tree takes deeper calls than the text that it is of.
+        # Compiling a syntax tree needs deeper recursion than compiling its text.
         sys.setrecursionlimit(_DEEPEST)
         try:
             tree = ast.parse(text, name)
@@ -42,7 +43,7 @@ class StatementWatch:
 
 
 class _Table(dict[int, None]):
-    """The statements of one file that have been run, by line and column in one number."""
+    """The executed statements of one file, by line and column in one number."""
 
     def __init__(self, send: Callable[[Frame], None], file: str | None) -> None:
         self._send, self._file = send, file
@@ -62,7 +63,7 @@ def _blocks(tree: ast.Module) -> Iterator[list[ast.stmt]]:
 
 
 def _mark(statement: ast.stmt) -> Iterator[ast.stmt]:
-    """A look at the table, but where nothing may stand before the statement."""
+    """Yield a lookup for a statement, except where no statement may come before it."""
     match statement:
         case ast.ImportFrom(module="__future__") | ast.Expr(value=ast.Constant(value=str())):
             return

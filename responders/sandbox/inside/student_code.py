@@ -1,6 +1,6 @@
-"""Compiling and running a student's files, and saying where in them something went wrong.
+"""Compiles and runs a student's files, and locates errors in them.
 
-Only frames of those files count: a line number is always one that the student can look up.
+Only frames of these files count, so students can look up every line number.
 """
 
 from __future__ import annotations
@@ -24,35 +24,35 @@ Namespace = dict[str, Any]
 
 
 def compile_source(text: str, name: str) -> CodeType:
-    """Code of a whole file; tracebacks can show its lines."""
+    """Compile a whole file. Tracebacks can show its lines."""
     linecache.cache[name] = (len(text), None, text.splitlines(keepends=True), name)
     return compile(text, name, "exec", dont_inherit=True)
 
 
 class StudentFiles:
-    """The file that is run, and those beside it that it has imported; what of them is meant by a frame or an error."""
+    """The main file and the imported files beside it. Maps frames and errors to places in them."""
 
     def __init__(self, main: str) -> None:
         self.main = main
-        self.watch: StatementWatch | None = None  # only where it is asked which statements are run
+        self.watch: StatementWatch | None = None  # only if executed statements are recorded
         self.imported: set[str] = set()
         here = os.getcwd()
         self._folder = f"{here}/" if here != "/" else None
         folders = {here, sys.prefix, sys.base_prefix, *sys.path, os.path.dirname(os.__file__)} - {"", "/"}
-        # The longest first: one may lie in another.
+        # The longest first, because one may contain another.
         self._folders = [f"{folder}/" for folder in sorted(folders, key=len, reverse=True)]
 
     def execute(self, text: str, name: str, namespace: Namespace) -> None:
-        """Run a whole file of this name."""
+        """Run a whole file under this name."""
         code = compile_source(text, name)
         exec(code if self.watch is None else self.watch.compile(text, name, namespace), namespace)
 
     def has(self, name: str) -> bool:
-        """Whether code with this file name is the student's."""
+        """Return whether a file name belongs to the student's code."""
         return name == self.main or self._beside(name) is not None
 
     def place(self, frame: FrameType | None) -> Frame:
-        """``line`` and ``file`` of what is being run, from an inner frame outwards; the main file is None."""
+        """Return ``line`` and ``file`` of the innermost student frame. ``file`` is None for the main file."""
         while frame is not None:
             if self.has(frame.f_code.co_filename):
                 return self._place(frame.f_code.co_filename, frame.f_lineno)
@@ -60,7 +60,7 @@ class StudentFiles:
         return {"line": None, "file": None}
 
     def line_in_main(self, frame: FrameType | None) -> int | None:
-        """The line of the main file that has led here."""
+        """Return the line of the main file that led to the frame."""
         while frame is not None:
             if frame.f_code.co_filename == self.main:
                 return frame.f_lineno
@@ -68,7 +68,7 @@ class StudentFiles:
         return None
 
     def described(self, error: BaseException) -> Frame:
-        """The error as a frame: its type, its words, the last line of the student's files on the way to it, a hint."""
+        """Return the error as a frame: type, text, last student line on its way, and a hint."""
         place: Frame = {"line": None, "file": None}
         if isinstance(error, SyntaxError) and error.filename is not None and self.has(error.filename):
             place = self._place(error.filename, error.lineno)
@@ -83,7 +83,7 @@ class StudentFiles:
         return {**told, "hint": hint} if hint else told
 
     def without_folders(self, text: str) -> str:
-        """``text`` without what leads to this machine's modules and to the working folder."""
+        """Return ``text`` without the paths of this machine's modules and of the working folder."""
         if "/" not in text:
             return text
         for folder in self._folders:
@@ -94,7 +94,7 @@ class StudentFiles:
         return {"line": line, "file": None if name == self.main else self._beside(name)}
 
     def _beside(self, name: str) -> str | None:
-        """The flat name of a file beside the main one."""
+        """Return the flat name of a file beside the main one, or None."""
         if name in self.imported:
             return name
         if self._folder is not None and name.startswith(self._folder):
@@ -104,7 +104,7 @@ class StudentFiles:
 
 
 def is_module_file(name: str) -> bool:
-    """Whether a file of this name can be imported by its stem."""
+    """Return whether a file of this name can be imported by its stem."""
     return name.endswith(".py") and name.removesuffix(".py").isidentifier()
 
 
@@ -116,7 +116,7 @@ def _words(error: BaseException) -> str:
 
 
 class Output:
-    """A standard stream: every write becomes one text."""
+    """A standard stream that sends each write as one text."""
 
     encoding = "utf-8"
     errors = "strict"
@@ -126,7 +126,11 @@ class Output:
         self._emit = emit
 
     def write(self, text: str) -> int:
-        """Hand on one text without its last line feed and return its length; raises TypeError for what is no text."""
+        """Send one text without its last line feed. Return its length.
+
+        Raises:
+            TypeError: If ``text`` is not a str.
+        """
         if not isinstance(text, str):
             raise TypeError(f"write() argument must be str, not {type(text).__name__}")
         stripped = text[:-1] if text.endswith("\n") else text
@@ -135,28 +139,28 @@ class Output:
         return len(text)
 
     def writelines(self, lines: Any) -> None:
-        """Hand on each line as one text."""
+        """Send each line as one text."""
         for line in lines:
             self.write(line)
 
     def flush(self) -> None:
-        """Nothing is held back."""
+        """Do nothing: no output is buffered."""
 
     def isatty(self) -> bool:
-        """False: what is written goes to no terminal."""
+        """Return False: the output is no terminal."""
         return False
 
     def writable(self) -> bool:
-        """True, as for any stream that is written to."""
+        """Return True."""
         return True
 
     def readable(self) -> bool:
-        """False; nothing can be read from it."""
+        """Return False."""
         return False
 
 
 def install_output(emit: Callable[[str], None]) -> None:
-    """Let one call of ``print`` be one text, without its end, and refuse ``input``."""
+    """Make each call of ``print`` send one text, without its end, and refuse ``input``."""
     stream = Output(emit)
     sys.stdout = sys.stderr = stream
     sys.stdin = None
@@ -181,9 +185,9 @@ def install_output(emit: Callable[[str], None]) -> None:
 
 
 def install_warnings(tell: Callable[[str], None]) -> None:
-    """Let a warning be no text of the student's, whoever it comes from: ``tell(sentence)``, once for each of the first.
+    """Report warnings with ``tell(sentence)`` instead of printing them, once for each of the first few.
 
-    It is told from within what has warned.
+    ``tell`` is called inside the code that warns.
     """
     told: set[str] = set()
 

@@ -1,6 +1,6 @@
-"""The system calls that student code may make (x86-64), and the seccomp filters that say so to the kernel.
+"""The system calls that student code may make (x86-64), and the seccomp filters that enforce them.
 
-What a path in one of them may be is not decided here: Landlock and the doorkeeper do.
+Landlock and the doorkeeper decide which paths may be used.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-#: System calls that student code and its libraries need, and that can do nothing outside the process (x86-64).
-#: What asks the kernel about more than the process is not among them: it would tell of trials before and beside it.
+#: System calls that student code and its libraries need and that have no effect outside the process (x86-64). Queries
+#: about the rest of the system are excluded, because they would reveal other trials.
 ALLOWED: dict[str, int] = {
     "read": 0,
     "write": 1,
@@ -92,7 +92,7 @@ ALLOWED: dict[str, int] = {
     "faccessat2": 439,
 }
 
-#: Calls that name paths: for each path the argument with the descriptor it may start from, if any, and its own.
+#: Calls with paths. For each path: the argument with its start descriptor, if any, and the argument with the path.
 PATHS: dict[int, tuple[tuple[int | None, int], ...]] = {
     **dict.fromkeys((2, 4, 6, 21, 87, 89), ((None, 0),)),  # open, stat, lstat, access, unlink, readlink
     82: ((None, 0), (None, 1)),  # rename
@@ -100,7 +100,7 @@ PATHS: dict[int, tuple[tuple[int | None, int], ...]] = {
     **dict.fromkeys((257, 262, 263, 267, 269, 332, 439), ((0, 1),)),
     **dict.fromkeys((264, 316), ((0, 1), (2, 3))),
 }
-#: Of these, those that may make a file: the argument with their flags.
+#: Those that may create a file, and the argument with their flags.
 OPENS = {2: 1, 257: 2}
 
 _LOAD, _JUMP_EQUAL, _JUMP_AT_LEAST, _JUMP_SET, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
@@ -115,7 +115,7 @@ _SPECIAL_MODES = 0o7000  # set-uid, set-gid, sticky
 
 
 def _argument(index: int) -> int:
-    """Where the low half of an argument lies in what the filter sees; the high half is four bytes on."""
+    """Return the offset of an argument's low half in the filter's data; the high half follows."""
     return 16 + 8 * index
 
 
@@ -124,25 +124,25 @@ Instruction = tuple[int, int, int, int]
 
 @dataclass(frozen=True)
 class Rule:
-    """A call that is allowed when the low 32 bits of each argument named are among its values."""
+    """A call that is allowed if the low 32 bits of each listed argument are among its values."""
 
     number: int
     values: Mapping[int, tuple[int, ...]]
-    zero: int | None = None  # an argument that has to be zero in all 64 bits
+    zero: int | None = None  # an argument that must be zero in all 64 bits
 
 
 def _rules(pid: int) -> tuple[Rule, ...]:
-    """Calls that depend on an argument; everything not named is refused."""
+    """Return the calls that depend on an argument. All others are refused."""
     tiocgwinsz, tcgets, fionread, fionbio, fioclex, fionclex = 0x5413, 0x5401, 0x541B, 0x5421, 0x5451, 0x5450
-    rename_noreplace, rename_exchange = 1, 2  # but not RENAME_WHITEOUT, which leaves a device behind
+    rename_noreplace, rename_exchange = 1, 2  # not RENAME_WHITEOUT, which creates a device
     f_dupfd, f_getfd, f_setfd, f_getfl, f_setfl, f_dupfd_cloexec = 0, 1, 2, 3, 4, 1030
     arch_get_fs, arch_set_fs = 0x1003, 0x1002
-    dontneed, free, hugepage, nohugepage = 4, 8, 14, 15  # the own memory, and no other's pages
-    # One's own death by SIGKILL would look like the machine's doing; queued signals are counted for a whole user.
+    dontneed, free, hugepage, nohugepage = 4, 8, 14, 15  # only for the process's own memory
+    # A SIGKILL to itself would look like a host fault; queued signals are counted per user.
     signals = tuple(number for number in range(32) if number != signal.SIGKILL)
     own = (0, pid)
-    clocks = tuple(range(12))  # those without a process or a device in their number
-    # Only at places of the own memory: others can wait at those of a file that they read too.
+    clocks = tuple(range(12))  # without clocks of processes or devices
+    # Only addresses in private memory: other processes can wait at those of a shared file.
     futex_private, clock_realtime = 128, 256
     waits = tuple(range(futex_private, futex_private + 14))
     return (
@@ -164,7 +164,7 @@ def _rules(pid: int) -> tuple[Rule, ...]:
 
 
 def instructions(pid: int) -> list[Instruction]:
-    """The filter for the process ``pid``: anything that is not allowed fails with EPERM, foreign ABIs kill."""
+    """Return the filter for the process ``pid``: calls that are not allowed fail with EPERM, foreign ABIs kill."""
     code: list[Instruction] = [
         (_LOAD, 0, 0, _AT_ARCH),
         (_JUMP_EQUAL, 1, 0, _ARCH_X86_64),
@@ -185,7 +185,7 @@ def instructions(pid: int) -> list[Instruction]:
 
 
 def asking() -> bytes:
-    """A filter beside the other, whose refusals count for more: who names a path has to wait for an answer."""
+    """Return the filter that makes calls with paths wait for a decision. A refusal of the other filter overrides it."""
     code: list[Instruction] = [(_LOAD, 0, 0, _AT_NUMBER)]
     for number in PATHS:
         code += _only_if(number, [(_RETURN, 0, 0, _RET_ASK)])
@@ -193,12 +193,12 @@ def asking() -> bytes:
 
 
 def packed(code: list[Instruction]) -> bytes:
-    """As the kernel takes them."""
+    """Return the instructions in the kernel's binary format."""
     return b"".join(struct.pack("=HBBI", *instruction) for instruction in code)
 
 
 def _only_if(number: int, body: list[Instruction]) -> list[Instruction]:
-    """``body`` for that call alone; the number is loaded before and, as a body always returns, still is after."""
+    """Return ``body`` for one call only. The call number is loaded before, and after because a body always returns."""
     return [(_JUMP_EQUAL, 0, len(body), number), *body]
 
 
@@ -216,7 +216,10 @@ def _equal_to(rule: Rule) -> list[Instruction]:
 
 
 def _never_set_uid(flags: int, mode: int) -> list[Instruction]:
-    """No file without a name is created. Where none is created nobody sets the mode, and anything may stand there."""
+    """Return instructions that refuse O_TMPFILE, and special mode bits when a file is created.
+
+    Without O_CREAT, the mode argument is unused and may have any value.
+    """
     return [
         (_LOAD, 0, 0, _argument(flags)),
         (_JUMP_SET, 0, 1, _O_TMPFILE),
@@ -229,9 +232,9 @@ def _never_set_uid(flags: int, mode: int) -> list[Instruction]:
 
 
 def _never_truncating(argument: int) -> list[Instruction]:
-    """Opening for reading, or for neither, with O_TRUNC empties a file where Landlock does not know truncation.
+    """Return instructions that refuse O_TRUNC without write access, which empties a file on old Landlock versions.
 
-    For neither (both bits set) Landlock asks for no right at all, so that is refused altogether.
+    The access mode with both bits set is always refused, because Landlock asks for no right then.
     """
     return [
         (_LOAD, 0, 0, _argument(argument)),
@@ -247,11 +250,11 @@ def _never_truncating(argument: int) -> list[Instruction]:
     ]
 
 
-#: More than any process has for its number.
+#: Larger than any process id.
 _NOBODY = 0x7FFF_FFFF
 _OF_NOBODY = packed(instructions(_NOBODY))
 
 
 def program(pid: int) -> bytes:
-    """``instructions``, packed: put together before any fork, but for the number."""
+    """Return ``instructions`` in binary form. All but the process id is computed before any fork."""
     return _OF_NOBODY.replace(_NOBODY.to_bytes(4, "little"), pid.to_bytes(4, "little"))

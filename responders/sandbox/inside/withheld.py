@@ -1,7 +1,6 @@
-"""Modules that an assignment does without: what can be absent is never loaded, what libraries need is put away.
+"""Modules excluded by an assignment. They are not loaded, or hidden from student code if a library needs them.
 
-The files of what is absent are closed by the kernel as well (``grants.py``); which modules these are is the worker's
-to say.
+``grants.py`` also makes the files of modules that are not loaded unreadable. The worker chooses the modules.
 """
 
 from __future__ import annotations
@@ -23,19 +22,19 @@ _IMPORT_STATEMENT = opcode.opmap["IMPORT_NAME"]
 
 
 def rule_for(module: str, names: tuple[str, ...]) -> str | None:
-    """The one of ``names`` that the module is, or belongs to; the C half of a module has its name with a ``_``."""
+    """Return the entry of ``names`` that covers the module. The C half of a module has its name with a ``_``."""
     top = module.partition(".")[0]
     halves = {module, module[1:]} if module.startswith("_") and top in sys.stdlib_module_names else {module}
     return next((name for name in names for half in halves if f"{half}.".startswith(f"{name}.")), None)
 
 
 def sentence(name: str) -> str:
-    """What a student is told when importing what the assignment withholds."""
+    """Return the message for importing an excluded module."""
     return f"this assignment does without {name}"
 
 
 class _Refuses(MetaPathFinder):
-    """The first to be asked for any module that is not loaded."""
+    """Import finder that refuses excluded modules. It comes first in the search order."""
 
     def __init__(self, refusal: Callable[[str], ImportError | None]) -> None:
         self._refusal = refusal
@@ -47,14 +46,14 @@ class _Refuses(MetaPathFinder):
 
 
 def keep_out(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Let none of these be loaded from now on; where their files are.
+    """Prevent the import of these modules. Return the paths of their files.
 
-    What is loaded by now, or by loading the package that it is in, is needed, and stays.
+    Modules that are already loaded, or that loading their package loads, are needed and stay.
     """
     absent: list[str] = []
     sys.meta_path.insert(0, _Refuses(lambda module: _error(module, tuple(absent))))
     places: list[str] = []
-    # A package is named before what is in it.
+    # Handle a package before its submodules.
     for name in sorted(names, key=lambda name: name.count(".")):
         specification = None
         with contextlib.suppress(ImportError):
@@ -67,7 +66,7 @@ def keep_out(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _places(specification: ModuleSpec | None) -> list[str]:
-    """The folder of a package, or the file of a module and the folder with what was compiled of it."""
+    """Return the folder of a package, or the file of a module and its bytecode folder."""
     if specification is None or specification.origin is None:
         return []
     if specification.submodule_search_locations:
@@ -76,9 +75,9 @@ def _places(specification: ModuleSpec | None) -> list[str]:
 
 
 def put_away(names: tuple[str, ...], libraries: tuple[str, ...], tell: Callable[[str], None]) -> None:
-    """Refuse these to student code; ``tell(sentence)`` each time.
+    """Hide these modules from student code. ``tell(sentence)`` is called for each refusal.
 
-    ``libraries`` are the folders of code that may still import, by a statement, what was loaded before.
+    ``libraries`` are the folders of code that may still import them by an ``import`` statement.
     """
     for name in names:
         with contextlib.suppress(ImportError):
@@ -120,7 +119,7 @@ def put_away(names: tuple[str, ...], libraries: tuple[str, ...], tell: Callable[
         raise error
 
     def hook(event: str, arguments: tuple[Any, ...]) -> None:
-        # Below Python, and whatever becomes of the two above: nobody can take a hook away.
+        # Audit hooks can't be removed, so this one works even if student code bypasses the other two.
         if event == "import" and isinstance(arguments[0], str):
             error = refusal(arguments[0])
             if error is not None:
@@ -137,7 +136,7 @@ def _error(module: str, names: tuple[str, ...]) -> ImportError | None:
 
 
 def _is_statement_of_a_library(frame: FrameType, libraries: tuple[str, ...]) -> bool:
-    """Whether the frame is in the middle of an ``import`` of its own, not of a call that imports what it is told."""
+    """Return whether the frame is at its own ``import`` statement, not in a call that imports a given name."""
     file = frame.f_code.co_filename
     if not file.startswith((*libraries, "<frozen ")):
         return False

@@ -1,6 +1,6 @@
-"""A process with the heavy imports loaded that forks one child a spec; it never holds anything secret.
+"""A process with loaded imports that forks one child per spec. It never holds secrets.
 
-It is exec'd with a clean environment, has one thread, and dies with its worker.
+It is executed with a clean environment, has one thread, and ends with its worker.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from .frames import Wire
 
 _PR_SET_PDEATHSIG = 1
 _PR_SET_DUMPABLE = 4
-_ENDED = (ctypes.c_char * 152)()  # the status and, from the eighth byte, what was used; zeroes but for a moment
+_ENDED = (ctypes.c_char * 152)()  # the status and, from byte 8, the resource usage; zero except briefly
 _STATUS, _USED = ctypes.byref(_ENDED), ctypes.byref(_ENDED, 8)
-_ANY_CHILD = b"\xff" * 4  # -1, as wait4(2) takes it
+_ANY_CHILD = b"\xff" * 4  # -1 for wait4(2)
 _PRACTICE = 2
 _wait4 = ctypes.CDLL(None).wait4
-#: What of its own environment student code finds, beside a home: libraries loaded late must not start threads either,
-#: nor compute otherwise.
+#: Environment variables for student code, besides a home. Libraries that are loaded late must not start threads or use
+#: other kernels either.
 _KEPT = (
     "LANG",
     "NPY_DISABLE_CPU_FEATURES",
@@ -42,11 +42,15 @@ _KEPT = (
 
 
 def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> None:
-    """Fork children as descriptor 3 orders until the worker closes it; their specs come on descriptor 4.
+    """Fork children as ordered on descriptor 3 until the worker closes it. Specs arrive on descriptor 4.
 
-    The worker may close it before it reads an answer.
+    The worker may close descriptor 3 before it reads a reply.
 
-    ``folders`` is where children have theirs, ``without`` are modules that none of them may have.
+    Args:
+        role_name: The role of the children.
+        folders: The parent of private folders.
+        without: Modules that no child may have.
+        roots: Folders for imports.
     """
     try:
         _start(role_name, folders, without, roots)
@@ -73,7 +77,7 @@ def _start(role_name: str, folders: str, without: list[str], roots: list[str]) -
         from . import responder_zygote as role  # type: ignore[no-redef]
     else:
         from . import responder_with_libraries as role  # type: ignore[no-redef]
-    determinism.install_chance(0)  # libraries draw as they are loaded, and what they draw decides what lies where
+    determinism.install_chance(0)  # libraries draw random numbers while loading, which affects addresses
     for name in role.NEEDED:
         importlib.import_module(name)
     closed = withheld.keep_out(tuple(without))
@@ -103,10 +107,10 @@ def _start(role_name: str, folders: str, without: list[str], roots: list[str]) -
 
 
 def _serve(control: socket.socket, become_child: Callable[[], object]) -> None:
-    """Fork a child for each order of zero, and wait for the end of the child that any other order names.
+    """Fork a child for each order of 0. For any other order, wait for the end of the child with that id.
 
-    A child reads its own spec and hands itself over. This process makes no object meanwhile that it keeps, so the
-    memory that children start from, and the addresses in it, do not depend on what was forked before.
+    A child reads its own spec. This process keeps no new objects meanwhile, so the initial memory and addresses of
+    children don't depend on earlier forks.
     """
     order = bytearray(4)
     while control.recv_into(order):
@@ -117,7 +121,7 @@ def _serve(control: socket.socket, become_child: Callable[[], object]) -> None:
 
 
 def _practise() -> None:
-    """Serve children that end at once: what is done for the first time leaves its traces in memory before any other."""
+    """Fork children that end at once, so that effects of first calls on memory occur before any other child."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     for _ in range(_PRACTICE):
         theirs.send(bytes(4))
@@ -131,7 +135,7 @@ def _practise() -> None:
 def _become_child(
     specs: socket.socket, roles: Mapping[str, Callable[[Wire, lockdown.Grants], None]], prepared: child.Prepared
 ) -> None:
-    """Never returns."""
+    """Run a child in this process; never returns."""
     try:
         spec, descriptors = _receive(specs)
         pidfd = os.pidfd_open(os.getpid())
@@ -143,7 +147,7 @@ def _become_child(
 
 
 def _reap(control: socket.socket, pid: int) -> None:
-    """Pass on how a child ended without looking: what this process has held once, the next child finds in its copy."""
+    """Report the end of a child without decoding it: any object kept here would be in the next child's memory."""
     if _wait4(pid, _STATUS, 0, _USED) < 0:
         raise ChildProcessError(f"no child {pid}")
     control.send(_ENDED)
@@ -151,7 +155,7 @@ def _reap(control: socket.socket, pid: int) -> None:
 
 
 def _before_the_worker() -> None:
-    """When the machine runs out of memory, children go first, then their zygote, and only then the worker."""
+    """Let the kernel kill children first when memory runs out, then the zygote, and the worker last."""
     with contextlib.suppress(OSError), open("/proc/self/oom_score_adj", "w") as score:
         score.write("700")
 

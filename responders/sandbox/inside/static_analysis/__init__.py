@@ -1,4 +1,4 @@
-"""The static analyser of student source: it reads the files of a submission and says what stands in them, and where.
+"""Static analysis of student source code: which names and constructs the files of a submission contain, and where.
 
-It runs in a child, as a parser can be made to crash; ``service/grading/static_analysis.py`` asks it.
+It runs in a child, because crafted source can crash a parser. ``service/grading/static_analysis.py`` calls it.
 """

@@ -1,6 +1,6 @@
-"""Finds the arguments of a call that may be texts to look up or run: names of methods, and files with pickled objects.
+"""Detection of call arguments that may be texts to look up or run: method names, and files with pickled objects.
 
-It reads the syntax only; ``walk.py`` decides which arguments are doubtful.
+It uses only the syntax. ``walk.py`` decides which arguments are doubtful.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ _MAKES_TEXT = frozenset({"str", "chr", "repr", "ascii", "join", "decode"})
 
 
 def name_arguments(call: ast.Call, calls: Set[str]) -> Iterator[tuple[str, ast.expr]]:
-    """Yield each argument that may be a name to look up, with words for it; ``calls`` are the names of the function.
+    """Yield each argument that may be a name to look up, with a description. ``calls`` are the function's names.
 
-    Lists, tuples and dictionaries are taken apart.
+    Elements of lists, tuples and dictionaries are separate arguments.
     """
     for name in sorted(calls & MAY_TAKE_NAME.keys()):
         starred = next((at for at, each in enumerate(call.args) if isinstance(each, ast.Starred)), len(call.args))

@@ -1,6 +1,6 @@
-"""What a piece of Python's syntax is by itself: its dotted name, the text it comes to, whether it is ever run.
+"""Properties of single syntax nodes: dotted name, constant text, bound names, reachability.
 
-Nothing is looked up and nothing is run; what a whole file has in it is ``walk.py``'s.
+Nothing is resolved or executed. ``walk.py`` analyses whole files.
 """
 
 from __future__ import annotations
@@ -17,7 +17,10 @@ _LEAVES = frozenset({"sys.exit", "os._exit", "os.abort"})
 
 
 def dotted(node: ast.AST) -> str:
-    """``tank_drive.on`` for a chain of names; the names behind the last call or index of any other chain."""
+    """Return the dotted name of a chain, such as ``tank_drive.on``.
+
+    For a chain with a call or an index, return the names after the last one.
+    """
     parts: list[str] = []
     while isinstance(node, ast.Attribute) and len(parts) < _MOST_PARTS:
         parts.append(node.attr)
@@ -28,16 +31,16 @@ def dotted(node: ast.AST) -> str:
 
 
 def root(node: ast.AST) -> str:
-    """The name that a chain begins with; empty if it begins with a call or the like."""
+    """Return the first name of a chain, or "" if it begins with a call or another expression."""
     while isinstance(node, ast.Attribute):
         node = node.value
     return node.id if isinstance(node, ast.Name) else ""
 
 
 def leads_to_doubt(name: str) -> bool:
-    """Whether a dotted name of something imported leads through its module to another that is doubtful.
+    """Return whether a dotted imported name reaches a doubtful module through another one.
 
-    What a plain module keeps for itself, with an underscore, may run a text or take any name.
+    Private names of a plain module count as doubtful too: they may run a text or look up any name.
     """
     top, *parts = name.split(".")
     if top in PLAIN_MODULES and any(map(_is_private, parts)):
@@ -48,7 +51,7 @@ def leads_to_doubt(name: str) -> bool:
 
 
 def _is_private(name: str) -> bool:
-    """Whether a name begins with an underscore and is none of Python's own, such as ``__name__``."""
+    """Return whether a name begins with an underscore and is not a special name such as ``__name__``."""
     return name.startswith("_") and not (name.startswith("__") and name.endswith("__"))
 
 
@@ -83,7 +86,7 @@ def _joined(nodes: Sequence[ast.AST]) -> str | bytes | None:
 
 
 def truth(node: ast.AST) -> bool | None:
-    """Whether a condition of constants holds; None where that is only known when it is run."""
+    """Return the value of a constant condition, or None if it is only known at run time."""
     match node:
         case ast.Constant(value=value):
             return bool(value)
@@ -124,7 +127,7 @@ def _compared(left: object, operator: ast.cmpop, right: object) -> bool | None:
 
 
 def is_empty(node: ast.AST) -> bool:
-    """Whether a loop over it is never entered."""
+    """Return whether a loop over the node has no iterations."""
     match node:
         case ast.Call(func=ast.Name(id="range"), args=arguments, keywords=[]):
             values = [each.value if isinstance(each, ast.Constant) else None for each in arguments]
@@ -138,7 +141,7 @@ def is_empty(node: ast.AST) -> bool:
 
 
 def ends(statement: ast.stmt) -> bool:
-    """Whether nothing below it in the same block is ever come to."""
+    """Return whether the statements after this one in its block are unreachable."""
     match statement:
         case ast.Return() | ast.Raise() | ast.Break() | ast.Continue():
             return True
@@ -153,7 +156,7 @@ def ends(statement: ast.stmt) -> bool:
 
 
 def blocks(statement: ast.AST) -> Iterator[tuple[list[ast.stmt], bool]]:
-    """The blocks of a compound statement, and whether each may be come to."""
+    """Yield the blocks of a compound statement, and whether each is reachable."""
     match statement:
         case ast.If(test=test, body=body, orelse=orelse):
             yield body, truth(test) is not False
@@ -171,9 +174,9 @@ def blocks(statement: ast.AST) -> Iterator[tuple[list[ast.stmt], bool]]:
 
 
 def bound_in(body: Sequence[ast.AST]) -> set[str]:
-    """The names that a scope's own code binds, wherever in it; not what is bound in functions and classes inside.
+    """Return the names that the code of a scope binds anywhere, without nested functions and classes.
 
-    Code that is never come to binds nothing.
+    Unreachable code binds no names.
     """
     names: set[str] = set()
     waiting = list(reversed(body))
@@ -191,7 +194,7 @@ def bound_in(body: Sequence[ast.AST]) -> set[str]:
 
 
 def bound_by(node: ast.AST) -> set[str]:
-    """The names that a single node binds."""
+    """Return the names that a single node binds."""
     match node:
         case ast.Name(id=name, ctx=ast.Store()):
             return {name}
@@ -211,9 +214,9 @@ def bound_by(node: ast.AST) -> set[str]:
 
 
 def made_in(tree: ast.Module) -> set[str]:
-    """The names that a text gives to something of its own: functions, classes, values.
+    """Return the names that a module gives to its own functions, classes and values.
 
-    Not to what it has from elsewhere: something imported by its name, an instance of a class that is not its own.
+    Excludes names imported under their own name, and instances of imported classes.
     """
     nodes = list(ast.walk(tree))
     made = {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)}
@@ -249,7 +252,7 @@ def _is_last(dotted_name: str, name: str) -> bool:
 
 
 def surely_bound(statement: ast.stmt) -> set[str]:
-    """The names that have a value once a statement has been run."""
+    """Return the names that have a value after a statement."""
     match statement:
         case ast.Assign(targets=targets):
             return bound_in(targets)
@@ -259,11 +262,11 @@ def surely_bound(statement: ast.stmt) -> set[str]:
 
 
 def arguments_of(function: ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda) -> set[str]:
-    """The names of all parameters, those with stars too."""
+    """Return the names of all parameters, including starred ones."""
     return {each.arg for each in ast.iter_child_nodes(function.args) if isinstance(each, ast.arg)}
 
 
 def declared_elsewhere(function: ast.FunctionDef | ast.AsyncFunctionDef) -> set[str]:
-    """The names that a function says are not its own."""
+    """Return the names that a function declares global or nonlocal."""
     found = (node.names for node in ast.walk(function) if isinstance(node, ast.Global | ast.Nonlocal))
     return {name for names in found for name in names}

@@ -1,6 +1,6 @@
-"""Reads the files of a submission, and says where they have what each rule names; a parser can be made to crash.
+"""Reads the files of a submission and finds the places that match each rule. It runs in a child.
 
-Whether a rule is broken, and what to tell of it, is the worker's to say.
+The worker decides whether a rule is broken and writes the messages.
 """
 
 from __future__ import annotations
@@ -25,27 +25,31 @@ _IMPORT = "import "
 _CONSTRUCTS = frozenset({*CONSTRUCTS.values(), "else"})
 _LONGEST_TEXT = 300_000
 _LONGEST_IN_ALL = 1_000_000
-#: Deep enough for all that the parser lets through.
+#: Sufficient for all source that the parser accepts.
 _DEEPEST_WALK = 30_000
 _MOST_DOUBTS = 4
 _LONGEST_NAME = 60
-#: What is there for robot programs, though not to be imported by them, and not on a responder's path.
+#: Modules of the course that robot programs use but don't import, and that responders don't have.
 _OF_THE_COURSE = frozenset({"brick_link", "brick_preambles"})
 
 Answer = list[Any] | None
-#: Of each kind of mention, the first place of each name.
+#: For each kind of mention, the first place of each name.
 Places = Mapping[str, Mapping[str, SourcePlace]]
 
 
 def read(
     files: Sequence[Mapping[str, Any]], asked: Mapping[str, Sequence[str]], ran: Sequence[Sequence[Any]] | None = None
 ) -> dict[str, Any]:
-    """The answers for rules ``asked``: lists of ``uses``, ``avoids``, ``in_loop``, ``defines``, ``shown``, ``entries``.
+    """Return the places for the rules in ``asked``.
 
-    Each of ``files`` has a ``name`` (empty: the part itself) and a ``text``, ``bytes`` (as Latin-1) or ``cells``.
-    ``ran`` are the statements that were run (file, line, column), where that is known: then nothing else is used, or
-    called in a loop. An answer is a file's name and a line, or None. ``unread`` is the first file that cannot be read,
-    and why; of files beside the part, and of cells, that are no Python it is not told, because they cannot be run.
+    Args:
+        files: Each has a ``name`` (empty for the main part) and a ``text``, ``bytes`` (as Latin-1) or ``cells``.
+        asked: Lists of rules: ``uses``, ``avoids``, ``in_loop``, ``defines``, ``shown`` and ``entries``.
+        ran: The executed statements (file, line, column), if known. Then only these count as used or called in a loop.
+
+    Returns:
+        For each rule the file name and line, or None. ``unread`` is the first unreadable file and the reason. Invalid
+        Python in cells, and in files beside the main part, is not reported there because it can't run.
     """
     reading = _Reading(files)
     units = reading.units
@@ -64,7 +68,7 @@ def read(
 
 
 class _Reading:
-    """All files, read one after the other, and those that a notebook writes."""
+    """All files, read in order, including those that a notebook writes."""
 
     def __init__(self, files: Sequence[Mapping[str, Any]]) -> None:
         self.units: list[Unit] = []
@@ -152,10 +156,10 @@ class _Reading:
 def _run(
     units: Sequence[Unit], entries: Sequence[str], ran: Set[tuple[Any, ...]] | None
 ) -> Iterable[tuple[Mention, SourcePlace]]:
-    """What is mentioned by code that can be run at all, or was ``ran``; ``looped`` is true where a loop leads to it.
+    """Yield the mentions in code that may run, or that ``ran``. ``looped`` is True if a loop reaches it.
 
-    A function is run if its name is used by what is run, whoever's function of that name it is; all are if something
-    may be taken by any name.
+    A function may run if reachable code uses its name, regardless of the object. If any name may be looked up, all
+    functions may run.
     """
     any_name = any(mention.kind == "any_name" for unit in units for mention in unit.mentions)
     by_name: dict[str, list[Unit]] = defaultdict(list)
@@ -164,10 +168,10 @@ def _run(
         if unit.owner and unit.name.startswith("__"):
             by_name[unit.owner].append(unit)
     used: dict[str, bool] = {}  # names, and whether in a loop
-    looped: dict[Unit, bool] = {}  # units that are run, and whether a loop leads there
+    looped: dict[Unit, bool] = {}  # reachable units, and whether through a loop
 
     def way_to(unit: Unit) -> bool | None:
-        """Whether a loop leads to the unit; None if nothing does."""
+        """Return whether a loop reaches the unit, or None if nothing does."""
         if not unit.made or (unit.made_in is not None and unit.made_in not in looped):
             return None
         names = (unit.name, unit.owner) if unit.name.startswith("__") else (unit.name,)
@@ -202,9 +206,9 @@ def _run(
             yield mention._replace(looped=way or mention.looped), place
 
 
-#: The kinds of mention that are of names.
+#: The kinds of mention that have a name.
 _NAMED = frozenset({"call", "looped", "name"})
-#: Which kinds of mention answer a call, a module and a name.
+#: The kinds of mention that match a rule for a call, a module or a name.
 _USED = {"()": ("call",), _IMPORT: ("import", "through"), "": ("name",)}
 _AVOIDED = {"()": ("call", "handed_on", "base"), _IMPORT: ("import", "through"), "": ("name", "taken")}
 
@@ -218,7 +222,7 @@ def _places(mentions: Iterable[tuple[Mention, SourcePlace]]) -> Places:
 
 
 def _without(places: Places, made: Set[str], own: Set[str]) -> Places:
-    """The places of what the submission has not made itself: names that begin with none of its own."""
+    """Return the places without names that the submission defines itself."""
 
     def is_made(name: str) -> bool:
         first, last = name.partition(".")[0], name.rpartition(".")[2]
@@ -260,7 +264,7 @@ def _module(rule: str) -> str:
 
 
 def _doubts(places: Places, rules: Sequence[str]) -> list[list[Any]]:
-    """What could be what a rule avoids, or hide it: the file, the line and the words, in the order of the files."""
+    """Return places that may match or hide what a rule avoids: file, line and description, in file order."""
     found: dict[SourcePlace, str] = {}
     for kind in ("doubt", "any_name"):
         for what, place in places[kind].items():

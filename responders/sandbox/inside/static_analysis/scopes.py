@@ -1,6 +1,6 @@
-"""What names mean in a Python file: other names of things, and which names the file itself has given to something.
+"""Names in a Python file: aliases of imported objects, and the names that the file defines itself.
 
-It follows assignments and imports as they stand, and knows nothing of values.
+It follows the text of assignments and imports, not values.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _MOST_NAMES = 8
 
 @dataclass(slots=True)
 class _Scope:
-    """``bound`` is what it binds somewhere, ``so_far`` above the place that is read, ``sure`` on every way to it."""
+    """A scope: names ``bound`` anywhere in it, ``so_far`` before the current place, ``sure`` on every path to it."""
 
     kind: str  # module, class, function, comprehension
     bound: set[str] = field(default_factory=set)
@@ -29,7 +29,7 @@ class _Scope:
 
 
 class Naming:
-    """The names of one file, while it is walked through."""
+    """The names of one file during a walk."""
 
     def __init__(self) -> None:
         self._scopes = [_Scope("module")]
@@ -37,11 +37,11 @@ class Naming:
         self._imported: set[str] = set()
         self._functions: set[str] = set()
         self._texts: set[str] = set()
-        #: Names that are bound or unbound from elsewhere.
+        #: Names that other scopes may bind or unbind.
         self._unsure: set[str] = set()
 
     def learn(self, tree: ast.Module) -> None:
-        """Take note of all assignments and imports in a tree, before it is walked through."""
+        """Record all assignments and imports of a tree, before the walk."""
         for node in ast.walk(tree):
             match node:
                 case ast.Import(names=aliases):
@@ -69,7 +69,7 @@ class Naming:
         self._scopes[0].bound |= bound_in(tree.body)
 
     def names(self, node: ast.AST) -> list[str]:
-        """The dotted name of a chain, and what it is where its first name stands for something else."""
+        """Return the dotted name of a chain, followed by its names with the first part replaced by known aliases."""
         found = [dotted(node)]
         waiting = list(found) if root(node) else []
         while waiting and len(found) < _MOST_NAMES:
@@ -78,24 +78,24 @@ class Naming:
                 whole = f"{other}{dot}{rest}"
                 if whole not in found:
                     found.append(whole)
-                    # What stands for a part of itself (x = x.next) would go on for ever.
+                    # A name assigned from its own part (x = x.next) would loop forever.
                     waiting += [whole] if other.partition(".")[0] != first else []
         return found
 
     def is_imported(self, node: ast.AST) -> bool:
-        """Whether a chain begins with something that was imported."""
+        """Return whether a chain begins with an imported name."""
         return root(node) in self._imported
 
     def may_be_imported(self, node: ast.AST) -> bool:
-        """Whether a chain begins with something that was imported, or with another name of it."""
+        """Return whether a chain begins with an imported name or an alias of one."""
         return any(name.partition(".")[0] in self._imported for name in self.names(node) if root(node))
 
     def is_text(self, node: ast.AST) -> bool:
-        """Whether an expression is a text, or the name of one."""
+        """Return whether an expression is a text, or the name of one."""
         return makes_text(node) or (isinstance(node, ast.Name) and not self._texts.isdisjoint(self.names(node)))
 
     def is_function(self, node: ast.AST) -> bool:
-        """Whether an expression is a lambda, or the name of a function of the text, of a module or of Python."""
+        """Return whether an expression is a lambda, or names a function of this file, of a module or of Python."""
         if not isinstance(node, ast.Name | ast.Attribute):
             return isinstance(node, ast.Lambda)
         names = self.names(node)
@@ -105,7 +105,7 @@ class Naming:
         return own or self.may_be_imported(node) or hasattr(builtins, root(node))
 
     def own(self, name: str) -> bool | None:
-        """Whether a name that is read here is one that the text gave to something itself; None if that is not sure."""
+        """Return whether a name read here is defined by this file; None if unknown."""
         later = False
         for scope in reversed(self._scopes[1:]):
             if scope.kind == "class":
@@ -123,21 +123,21 @@ class Naming:
 
     @contextlib.contextmanager
     def scope(self, kind: str, bound: set[str] | None = None) -> Iterator[None]:
-        """Code with names of its own: ``bound`` are those that it binds somewhere."""
+        """Enter a new scope. ``bound`` are the names that it binds anywhere."""
         self._scopes.append(_Scope(kind, bound or set()))
         yield
         self._scopes.pop()
 
     @contextlib.contextmanager
     def block(self) -> Iterator[None]:
-        """Code that may be passed by: what it binds is not sure below it."""
+        """Enter code that may not run. The names that it binds are not sure after it."""
         scope = self._scopes[-1]
         before = set(scope.sure)
         yield
         scope.sure = before
 
     def bind(self, names: set[str], *, sure: bool = True) -> None:
-        """From here on these names are bound, or may be."""
+        """Mark these names as bound from here on, or possibly bound."""
         scope = self._scopes[-1]
         scope.so_far |= names
         if sure:

@@ -1,6 +1,6 @@
-"""What is written down of a file that is read: what stands in it, where, and which code is run at one go.
+"""Data structures for the contents of a file: mentions, their places, and the units of code that run together.
 
-Finding it is ``walk.py``'s, and what the rules make of it ``reader.py``'s.
+``walk.py`` fills them. ``reader.py`` applies the rules.
 """
 
 from __future__ import annotations
@@ -10,12 +10,19 @@ from typing import NamedTuple
 
 
 class Mention(NamedTuple):
-    """Something that stands in a file; ``live`` if the code that is run with its unit can come to it.
+    """A name or construct in a file. ``live`` is True if it is reachable when its unit runs.
 
-    The kinds are ``construct``, ``function`` (it is defined), ``name``, ``call``, ``handed_on`` (kept or given away),
-    ``base`` (something of it is asked for), ``unsure`` (handed on, if it is not a name of the text's own), ``import``,
-    ``through`` (something of a module), ``taken`` (out of a module), ``doubt`` and ``any_name``, which is doubt about
-    what may take anything by its name.
+    The kinds are:
+
+    - ``construct``, ``name``, ``call``, ``import``
+    - ``function``: a definition
+    - ``handed_on``: stored or passed on
+    - ``base``: the object of an attribute
+    - ``unsure``: passed on, if it is not defined in the file
+    - ``through``: an attribute of a module
+    - ``taken``: imported from a module
+    - ``doubt``: code that the analysis can't follow
+    - ``any_name``: doubt about code that may look up any name
     """
 
     kind: str
@@ -25,7 +32,7 @@ class Mention(NamedTuple):
 
 
 class SourcePlace(NamedTuple):
-    """A file's name, as messages have it, and a line; and where the statement begins that has to be run for it."""
+    """A file name as shown in messages, a line, and the start of the statement that has to run for it."""
 
     file: str
     line: int
@@ -34,15 +41,15 @@ class SourcePlace(NamedTuple):
 
 @dataclass(eq=False, slots=True)
 class Unit:
-    """Code that is run at one go: a file's or a function's own. ``owner`` is the class that it is a method of.
+    """Code that runs together: of a file or a function. ``owner`` is the class of a method.
 
-    Of each mention the first places are kept.
+    For each mention, only the first places are kept.
     """
 
     name: str
     owner: str = ""
     made_in: Unit | None = None
-    made: bool = True  # its definition can be come to
-    always: bool = False  # it is run without being named
+    made: bool = True  # its definition is reachable
+    always: bool = False  # it runs without being named
     mentions: dict[Mention, list[SourcePlace]] = field(default_factory=dict)
     units: list[Unit] = field(default_factory=list)

@@ -1,6 +1,6 @@
-"""The words that a reader of student code looks out for: constructs, and what takes, imports or runs what a text says.
+"""Names with a meaning for the analysis: constructs, and functions that look up, import or run a text.
 
-Only the words; what follows from one is in ``walk.py``.
+``walk.py`` applies them.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ CONSTRUCTS: dict[type[ast.AST], str] = {
     ast.GeneratorExp: "comprehension",
 }
 
-#: Calls that take what a text names, and which of their arguments that is.
+#: Calls that look up a name, and the position of that argument.
 TAKES_NAME = {"getattr": 1, "__getattribute__": -1, "__getattr__": -1}
-#: Those all of whose arguments are names.
+#: Calls whose arguments are all names to look up.
 TAKES_NAMES = frozenset({"attrgetter", "methodcaller", "itemgetter"})
-#: Calls that look up a text if one of these positional arguments is one, and keywords that do so in every call.
+#: Calls that look up texts in these positional arguments, and in their keyword arguments.
 MAY_TAKE_NAME: dict[str, tuple[int, ...]] = {
     **dict.fromkeys(("agg", "aggregate", "apply"), (0,)),
     "NamedAgg": (1,),
@@ -49,13 +49,13 @@ MAY_TAKE_NAME: dict[str, tuple[int, ...]] = {
 NAME_KEYWORDS = frozenset(
     {"func", "aggfunc", "method", "stack_method", "response_method", "importance_getter", "assigned", "updated"}
 )
-#: Calls whose keywords are names of the student's own, and may each be given a text to look up.
+#: Calls whose keyword names are the student's own and whose values may be texts to look up.
 NAME_IN_ANY_KEYWORD = frozenset({"agg", "aggregate"})
-#: All of these; handed on instead of called, they may take any name.
+#: All of these. If passed on instead of called, they may look up any name.
 NAME_TAKERS = TAKES_NAME.keys() | TAKES_NAMES | MAY_TAKE_NAME.keys()
-#: Calls that load pickled objects if an argument behind this number of others is true.
+#: Calls that load pickled objects if an argument after this number of others is true.
 MAY_UNPICKLE = {"load": 2, "read_array": 1, "NpzFile": 2}
-#: Calls that import what a text names.
+#: Calls that import a module given as text.
 IMPORTERS = frozenset(
     {
         *("__import__", "import_module", "resolve_name", "locate", "safeimport", "run_module", "find_spec"),
@@ -63,16 +63,16 @@ IMPORTERS = frozenset(
         *("PyImport_ImportModuleNoBlock", "PyImport_ImportModuleLevel", "PyImport_AddModule", "PyImport_GetModule"),
     }
 )
-#: Tables that hold things by their names, the calls that give one, and how they are asked.
+#: Tables of objects by name, the calls that return one, and the methods for access.
 TABLE_CALLS = frozenset({"globals", "locals", "vars"})
 STATES = frozenset({"__getstate__", "__reduce__", "__reduce_ex__", "user_ns"})
 TABLES = TABLE_CALLS | STATES | {"__dict__", "__globals__", "__builtins__", "f_globals", "f_locals", "f_builtins"}
 GETTERS = frozenset({"get", "pop", "setdefault", "__getitem__"})
-#: Calls that run a text, and those that hand one to a notebook's magics.
+#: Calls that run a text, and those that pass one to a notebook's magics.
 RUNNERS = frozenset({"exec", "eval", "compile"})
 MAGICS = frozenset({"run_line_magic", "run_cell_magic", "magic"})
 
-#: What can do more than its text shows: names that stand alone, names anywhere, and modules.
+#: Names and modules whose effects the text doesn't show: stand-alone names, names anywhere, modules.
 DOUBTFUL_ALONE = RUNNERS | TABLE_CALLS | {"dir", "breakpoint"}
 DOUBTFUL = frozenset(
     {
@@ -80,22 +80,22 @@ DOUBTFUL = frozenset(
         *("__globals__", "__code__", "__closure__", "__dict__", "__getattribute__", "f_globals", "f_locals", "f_back"),
         *("f_builtins", "_getframe", "tb_frame", "gi_frame", "settrace", "setprofile", "meta_path", "path_hooks"),
         *("get_objects", "get_referrers", "get_referents", "read_pickle", "run_line_magic", "run_cell_magic"),
-        # What looks up or works out what a text says, and belongs to a module that is plain but for that.
+        # Names in otherwise plain modules that look up or evaluate a text.
         *("Formatter", "vformat", "get_type_hints", "ForwardRef", "singledispatch", "singledispatchmethod"),
         *("query", "safe_eval", "bltns", "all_estimators", "all_functions", "get_scorer", "check_scoring"),
         *("__setstate__", *STATES),
     }
 )
-#: Methods of which the same is true, whatever it is that has them.
+#: Methods for which the same is true, on any object.
 DOUBTFUL_METHODS = frozenset({"eval", "exec"})
-#: Parts of modules that lead to what is doubtful, whatever they are parts of.
+#: Parts of any module that give access to doubtful code.
 DOUBTFUL_PARTS = frozenset(
     {
         *("builtins", "code", "ctypes", "ctypeslib", "distutils", "externals", "f2py", "gc", "importlib", "inspect"),
         *("os", "pickle", "pydoc", "runpy", "subprocess", "sys", "testing", "types"),
     }
 )
-#: Modules of which everything that they can do is in the text that uses them. Any other is doubtful.
+#: Modules without hidden effects: the text that uses them shows all that they do. All others are doubtful.
 PLAIN_MODULES = frozenset(
     {
         *("__future__", "abc", "array", "base64", "binascii", "bisect", "calendar", "cmath", "collections"),
@@ -103,10 +103,10 @@ PLAIN_MODULES = frozenset(
         *("fractions", "functools", "hashlib", "heapq", "html", "itertools", "json", "keyword", "math", "numbers"),
         *("operator", "pprint", "queue", "random", "re", "secrets", "statistics", "string", "struct", "textwrap"),
         *("time", "typing", "unicodedata", "uuid", "zlib", "zoneinfo"),
-        # The course's.
+        # Modules of the course.
         *("ev3dev2", "ev3dev2_glue", "nbev3devsim", "nn_tools"),
         *("numpy", "pandas", "PIL", "scipy", "sklearn", "onnxruntime", "ai_edge_litert"),
-        # What notebooks show with, for which there are stand-ins.
+        # Display modules of notebooks, which have stand-ins.
         *("matplotlib", "seaborn", "IPython", "ipywidgets", "tqdm", "plotly", "pylab", "mpl_toolkits"),
     }
 )

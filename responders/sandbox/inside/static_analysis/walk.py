@@ -1,6 +1,6 @@
-"""Walks through a syntax tree and writes down what stands in it: where, whether it can be come to, whether in a loop.
+"""Walks through a syntax tree and records its contents: the place, reachability, and position in a loop.
 
-It runs nothing of what it reads, and judges nothing: what the rules make of it is ``reader.py``'s.
+It executes nothing and applies no rules. ``reader.py`` does.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from .vocabulary import (
 )
 
 _DEEPEST = 8
-#: How many places of one mention are kept.
+#: Maximum number of places kept per mention.
 _MOST_PLACES = 200
 
 
@@ -53,10 +53,10 @@ class _Here(NamedTuple):
 
 
 class Walk:
-    """What stands in one file, or in the cells of one notebook."""
+    """The contents of one file, or of the cells of one notebook."""
 
     def __init__(self, doubt_about: Callable[[str], str]) -> None:
-        """``doubt_about`` returns what is doubtful about importing a module, in words; empty if nothing is."""
+        """Start with no contents. ``doubt_about`` returns the doubt about importing a module as text, or ""."""
         self.units: list[Unit] = []
         #: Files that a notebook writes: names and texts.
         self.written: list[tuple[str, str]] = []
@@ -65,21 +65,21 @@ class Walk:
         self._file = ""
         self._unit = Unit("")
         self._owner = ""
-        self._understood: set[ast.AST] = set()  # pieces that are doubtful, but show what they take
+        self._understood: set[ast.AST] = set()  # doubtful nodes with visible arguments
         self._depth = 0
-        self._statement = (0, 0)  # where the one begins that is read
-        #: The names that the text gives to something of its own.
+        self._statement = (0, 0)  # start of the current statement
+        #: Names that the source defines itself.
         self.made: set[str] = set()
 
     def read(self, tree: ast.Module, file: str, unit: Unit) -> None:
-        """Add what stands in ``tree``; ``file`` is its name in messages."""
+        """Add the contents of ``tree``. ``file`` is its name in messages."""
         self._begin(file, unit)
         self._naming.learn(tree)
         self.made |= made_in(tree)
         self._statements(tree.body, _Here())
 
     def read_magic(self, magic: cell_source.CellMagic, file: str, unit: Unit) -> None:
-        """Add what the magic of a whole cell comes to."""
+        """Add the contents of a cell magic."""
         self._begin(file, unit)
         self._magic(magic.name, magic.line, magic.body, magic.number, _Here())
 
@@ -88,7 +88,7 @@ class Walk:
         self.units.append(unit)
 
     def _add(self, kind: str, name: str, node: ast.AST, here: _Here, statement: tuple[int, int] | None = None) -> None:
-        """``statement`` is where the one begins that has to be run for it, if not the one that is read."""
+        """Add a mention. ``statement`` is the start of the statement that has to run for it, or the current one."""
         if name:
             place = SourcePlace(self._file, getattr(node, "lineno", 0), statement or self._statement)
             places = self._unit.mentions.setdefault(Mention(kind, name, here.live, here.looped), [])
@@ -114,11 +114,11 @@ class Walk:
         self._statement = before
 
     def _beginning(self, statement: ast.stmt) -> tuple[int, int]:
-        """Line and column; of one in a text that is run those of the statement that runs it."""
+        """Return the line and column of a statement; inside a text that is run, those of the statement that runs it."""
         return self._statement if self._depth else (statement.lineno, statement.col_offset)
 
     def _block(self, body: Sequence[ast.stmt], here: _Here, bound: Sequence[ast.AST] = ()) -> None:
-        """A block that may be passed by; ``bound`` is what it begins with."""
+        """Walk through a block that may not run. ``bound`` are the nodes whose names it binds first."""
         with self._naming.block():
             if here.live:
                 self._naming.bind(bound_in(bound))
@@ -127,7 +127,7 @@ class Walk:
     def _visit(self, node: ast.AST, here: _Here) -> None:
         construct = CONSTRUCTS.get(type(node))
         if construct is not None:
-            # Of a loop the body has to be run, of everything else the statement itself.
+            # For a loop, its body has to run; for any other statement, the statement itself.
             body = node.body[0] if isinstance(node, ast.For | ast.AsyncFor | ast.While) else None
             self._add("construct", construct, node, here, self._beginning(body) if body else None)
         if isinstance(node, ast.If | ast.For | ast.AsyncFor | ast.While) and node.orelse:
@@ -184,7 +184,7 @@ class Walk:
         self._add("function", node.name, node, here)
         if node.name in DOUBTFUL and node.name.startswith("__"):
             self._add("doubt", node.name, node, here)
-        # Its arguments with their defaults and annotations are worked out where it is made.
+        # Defaults and annotations are evaluated where the function is defined.
         self._each([*node.decorator_list, node.args, node.returns], here)
         within = Unit(node.name, self._owner, self._unit, here.live, bool(node.decorator_list))
         self.units.append(within)
@@ -236,7 +236,7 @@ class Walk:
             here = here._replace(live=here.live and truth(value) is not decides)
 
     def _chain(self, node: ast.Name | ast.Attribute, here: _Here, kind: str = "handed_on") -> None:
-        """A name, or names with dots between; ``kind`` is what is done with it."""
+        """Add a name or a dotted name. ``kind`` says how it is used."""
         names = self._naming.names(node)
         own = self._naming.own(node.id) if isinstance(node, ast.Name) else False
         for name in names:
@@ -255,7 +255,7 @@ class Walk:
             self._doubt_chain(names, node, here)
 
     def _doubt_name_taker(self, names: list[str], node: ast.AST, here: _Here) -> None:
-        """``map(getattr, ...)``: handed on, it may be called with any name."""
+        """Add doubt for a function such as ``getattr`` passed on (``map(getattr, ...)``): it may look up any name."""
         for last in {name.rpartition(".")[2] for name in names} & NAME_TAKERS:
             self._add("any_name", last, node, here)
 
@@ -281,7 +281,7 @@ class Walk:
         self._parts(node, here)
 
     def _ask_table(self, table: ast.expr, key: ast.expr, node: ast.AST, here: _Here) -> None:
-        """``globals()["say"]``: what a table of names is asked for, if it is one and the text shows what for."""
+        """Add the name looked up in a table (``globals()["say"]``), or doubt if the text doesn't show it."""
         named = table.func if isinstance(table, ast.Call) else table
         names = self._naming.names(named)
         text = text_of(key)
@@ -329,7 +329,7 @@ class Walk:
         self._each([*node.args, *node.keywords], here)
 
     def _look_up_names(self, node: ast.Call, calls: set[str], here: _Here) -> None:
-        """``series.agg("mean")``: the text is known, or the argument is a function, or it may be any name."""
+        """Add the names that a call looks up (``series.agg("mean")``), or doubt if they are unknown."""
         if (
             isinstance(node.func, ast.Name)
             and self._naming.own(node.func.id)
@@ -342,7 +342,7 @@ class Walk:
                 self._by_text(text, node, here)
             elif not (isinstance(argument, ast.Constant) or self._naming.is_function(argument)):
                 self._add("any_name", words, node, here)
-        # In scikit-learn its argument is data, in pandas it may be a name.
+        # The argument is data in scikit-learn but may be a name in pandas.
         if "transform" in calls and node.args and self._naming.is_text(node.args[0]):
             self._take("transform", text_of(node.args[0]), node, here)
 
@@ -376,7 +376,7 @@ class Walk:
     # texts that are run
 
     def _run_text(self, source: str | bytes, line: int, here: _Here) -> bool:
-        """Read Python in a text as code in the place of the text; return whether it could be read."""
+        """Walk through a text that is run as Python, at its place. Return whether it could be parsed."""
         if self._depth >= _DEEPEST:
             return False
         try:
@@ -403,7 +403,7 @@ class Walk:
         self._magic(name.lstrip("%"), line, body if call == "run_cell_magic" else None, node.lineno, here)
 
     def _magic(self, name: str, line: str, body: str | None, number: int, here: _Here) -> None:
-        """What a magic runs: the expressions in its line; of some the line, or the rest of the cell."""
+        """Walk through the code that a magic runs: expressions in its line; for some magics the line or the cell."""
         place = ast.Pass(lineno=number)
         expressions = list(cell_source.expressions(line))
         readable = [self._run_text(expression.lstrip(" \t"), number, here) for expression in expressions]
