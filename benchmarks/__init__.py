@@ -1,1 +1,1 @@
-"""How fast Robomark is, beside what it should be; run with ``make bench``. Nothing here is a test."""
+"""Benchmarks: measurements of Robomark's speed and memory, with a budget for each. Run them with ``make bench``."""

@@ -34,7 +34,7 @@ from benchmarks import (
 )
 from benchmarks.measurement import Measurement
 
-#: Each measures so often as it is told, and gives its lines.
+#: The measurement groups. Each takes the number of repetitions and returns its rows.
 GROUPS: Mapping[str, Callable[[int], list[Measurement]]] = MappingProxyType(
     {
         "calibration": calibration.measure,
@@ -54,7 +54,7 @@ GROUPS: Mapping[str, Callable[[int], list[Measurement]]] = MappingProxyType(
         "web": web.measure,
     }
 )
-#: Those that ``--quick`` measures, under a minute in all.
+#: The groups of ``--quick``, which together take less than a minute.
 _QUICK = ("calibration", "commands", "grading", "simulator", "original", "growth")
 _OTHERS: Mapping[str, Callable[[list[str]], int]] = MappingProxyType(
     {"capacity": capacity.main, "chaos": chaos.main, "costs": costs.main, "plans": rows.main}
@@ -62,7 +62,7 @@ _OTHERS: Mapping[str, Callable[[list[str]], int]] = MappingProxyType(
 
 
 def main(arguments: list[str]) -> int:
-    """Measure, then print one table; 1 if a ratio misses its budget."""
+    """Run the measurements and print one table. Return 1 if a ratio misses its budget."""
     if arguments and arguments[0] in _OTHERS:
         return _OTHERS[arguments[0]](arguments[1:])
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)

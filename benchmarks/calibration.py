@@ -1,4 +1,4 @@
-"""What makes machines comparable: a loop of ten million additions, and a turn on a bare socket pair."""
+"""Calibration, for comparing machines: a loop of ten million additions, and a round trip over a socket pair."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import socket
 from benchmarks.measurement import MICROSECONDS, SECONDS, Measurement, cpu_seconds, median_of, wall_seconds
 
 LOOP = "a Python loop of ten million additions, CPU"
-#: At the top of a module, where names are looked up by their name, as ``python -c`` runs it.
+#: At module level, where variables are looked up by name, as in ``python -c``.
 _LOOP = compile("total = 0\nfor number in range(10_000_000):\n    total += number\n", "loop", "exec")
 _TURNS = 5000
 _BYTES = 80
 
 
 def measure(times: int) -> list[Measurement]:
-    """The loop, by which figures of two machines are compared, and the turn, which is the kernel's part."""
+    """Measure the loop, which is the scale between two machines, and the round trip, which shows the kernel's share."""
     return [
         Measurement(LOOP, loop_seconds(times), SECONDS),
         Measurement(
@@ -35,7 +35,7 @@ def _loop() -> None:
 
 
 def _turns() -> None:
-    """Between this process and one that only answers."""
+    """Make round trips between this process and an echo process."""
     here, there = socket.socketpair()
     pid = os.fork()
     if pid == 0:

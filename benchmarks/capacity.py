@@ -1,7 +1,7 @@
-"""How many workers a rate of submissions needs and what runs out first: on paper, and by a simulation of the queue.
+"""Capacity planning: the workers needed for a rate of submissions, by calculation and by a simulation of the queue.
 
-``python -m benchmarks capacity`` measures the costs here first. The simulation is of queues and cores alone: it
-runs no submission.
+``python -m benchmarks capacity`` measures the costs first. The simulation covers only queues and cores and grades no
+submission.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from rich.table import Table
 from benchmarks import costs, rows
 from benchmarks.calibration import loop_seconds
 
-#: A core that is busy for more than this part of its time lets queues grow long.
+#: Maximum utilisation of a core. Above it, queues become long.
 _BUSIEST = 0.8
 _HOUR = 3600.0
 _DAY = 86_400.0
-#: Of a database's machine.
+#: Cores of the database's machine.
 _DATABASE_CORES = 4
-#: How many submissions a simulation runs.
+#: Number of simulated submissions.
 _SUBMISSIONS = 20_000
 _RATES = ((10_000 / _HOUR, "10,000 an hour"), (1_000_000 / _DAY, "a million a day"), (100.0, "100 a second"))
 
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What one submission costs, CPU seconds: of a worker's core, and of the database's."""
+    """The costs of one submission in CPU seconds, on a worker's core and on the database's."""
 
     grading: float
     plotting: float
@@ -51,9 +51,9 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of a simulated hour or so."""
+    """The result of a simulation."""
 
-    waited: tuple[float, float]  # seconds from submission to marks: the median, and the 95th of a hundred
+    waited: tuple[float, float]  # seconds from submission to marks: median and 95th percentile
     workers_busy: float
     database_busy: float
     most_waiting: int
@@ -69,14 +69,15 @@ class _Step(Enum):
 
 
 def workers_needed(rate: float, load: Load) -> int:
-    """On paper: so many cores that none is too busy."""
+    """Return the calculated number of workers, one per core, for at most the maximum utilisation."""
     return math.ceil(rate * load.worker / _BUSIEST)
 
 
 def simulate(rate: float, workers: int, load: Load, submissions: int, seed: int = 0) -> Outcome:
-    """Submissions come by chance at ``rate`` a second; the database serves in order; marks go before plots.
+    """Simulate submissions that arrive at random, ``rate`` per second.
 
-    A grading takes from half to one and a half times what it costs, evenly by chance.
+    The database serves requests in order, and marks come before plots. The cost of a grading is uniformly distributed
+    from half to one and a half times its mean.
     """
     queue = _Queue(workers, load, random.Random(seed))
     arrivals, at = [], 0.0
@@ -95,7 +96,7 @@ def simulate(rate: float, workers: int, load: Load, submissions: int, seed: int 
 
 
 class _Queue:
-    """Workers and a database, from one event to the next."""
+    """An event simulation of workers and a database."""
 
     def __init__(self, workers: int, load: Load, chance: random.Random) -> None:
         self._load = load
@@ -168,7 +169,7 @@ class _Queue:
 
 
 def main(_arguments: list[str]) -> int:
-    """Measure the costs, then print what each rate needs on paper, and what the simulation makes of that."""
+    """Measure the costs, then print the calculated and the simulated need for each rate."""
     measured = costs.of_submission()
     claim = rows.claim_seconds()
     load = Load(

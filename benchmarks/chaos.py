@@ -1,6 +1,6 @@
-"""A thousand submissions through a service to which everything happens, on SQLite and on PostgreSQL.
+"""Chaos test: a thousand submissions through a service with injected faults, on SQLite and on PostgreSQL.
 
-Not part of the table: ``python -m benchmarks chaos [SUBMISSIONS]`` runs it and takes some minutes.
+It is not part of the table. Run it with ``python -m benchmarks chaos [SUBMISSIONS]``; it takes some minutes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _DISK_MEGABYTES = 2000
 
 
 def main(arguments: list[str]) -> int:
-    """Both databases, one after the other; 1 if anything was lost, doubled or other than on a quiet day."""
+    """Test both databases in turn. Return 1 if a job was lost, duplicated, or differs from an undisturbed run."""
     grading_requests = int(arguments[0]) if arguments else _SUBMISSIONS
     campaign = Campaign(
         grading_requests,

@@ -1,7 +1,7 @@
-"""Ten short submissions with reports, from nothing: services started, graded, drawn, written, ended.
+"""Ten short submissions with reports from a cold start: service start, grading, plots, reports and shutdown.
 
-Beside it, in turn, nbgrader grades ten trivial notebooks, without simulation and report. It is no part of this project:
-install it in a virtual environment of its own, outside the checkout, and name its command in ``NBGRADER``.
+For comparison, nbgrader grades ten trivial notebooks without simulation and reports. It is not part of this project:
+install it in a separate virtual environment outside the checkout, and set ``NBGRADER`` to its command.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ NBGRADER = os.environ.get("NBGRADER", "")
 
 
 def measure(times: int) -> list[Measurement]:
-    """The wall time, and what it is of nbgrader's where there is one."""
+    """Measure the wall time, and its ratio to nbgrader's if that is available."""
     count = min(times, _MOST)
     if not NBGRADER:
-        # The first one compiles.
+        # The first run compiles bytecode.
         _cold()
         seconds = median([_cold() for _ in range(count)])
         return [Measurement(_WHAT, seconds, SECONDS, told="against nbgrader: n/a, name its command in NBGRADER")]
@@ -59,7 +59,7 @@ def _cold() -> float:
         for number in range(_SUBMISSIONS):
             own = batch / f"student{number}"
             shutil.copytree(examples(_ASSIGNMENT) / REFERENCE, own)
-            # A text of its own, or it would be a copy of the one before, which is not run again.
+            # Each text differs, because identical submissions are graded only once.
             (own / "robot.py").write_text(f"# {number}\n" + (own / "robot.py").read_text())
         command = [*ROBOMARK, "batch", "submit", str(batch), "-a", _ASSIGNMENT, "--output", str(reports)]
         environment = users_environment() | {"ROBOMARK_HOME": str(home)}
@@ -67,7 +67,7 @@ def _cold() -> float:
 
 
 def _lay_course(course: Path) -> None:
-    """A course of nbgrader's with one assignment, and ten notebooks submitted for it."""
+    """Create an nbgrader course with one assignment and ten submitted notebooks."""
     source = course / "source" / "ps1"
     source.mkdir(parents=True)
     (source / "p1.ipynb").write_text(json.dumps(_notebook()))
@@ -101,7 +101,7 @@ def _autograde(course: Path) -> float:
 
 
 def _nbgrader(course: Path, *words: str) -> None:
-    # It calls programs that are installed with it.
+    # nbgrader calls programs from its own environment.
     path = f"{Path(NBGRADER).parent}{os.pathsep}{os.environ['PATH']}"
     environment = os.environ | {"PATH": path}
     ended = subprocess.run([NBGRADER, *words], cwd=course, env=environment, capture_output=True, text=True, check=False)

@@ -1,4 +1,4 @@
-"""What commands that only ask cost in CPU, against what importing Typer and Rich (and SQLAlchemy) costs."""
+"""CPU costs of query commands, compared with the import of Typer and Rich, and of SQLAlchemy where used."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from benchmarks.measurement import RATIO, Measurement, command_cpu_seconds, medi
 from service.settings import load_settings
 from service.store.engine import open_store
 
-#: The command, as it is installed.
+#: The installed command.
 ROBOMARK = (sys.executable, "-c", "from service.cli import main; main()")
 _BARE = "typer, rich"
 _WITH_DATABASE = "typer, rich, sqlalchemy"
 
 
 def measure(times: int) -> list[Measurement]:
-    """Each command in turn with what it is compared with, so that the machine's load meets both."""
+    """Measure each command alternately with its baseline, so that the machine's load affects both."""
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
         with open_store(load_settings(home=home)) as store:
@@ -28,7 +28,7 @@ def measure(times: int) -> list[Measurement]:
 
 
 def _commands(stored: GradedBatch) -> Sequence[tuple[str, str, tuple[str, ...]]]:
-    """What each is compared with, the command, and of which row."""
+    """Return the baseline, the command and the table row of each measurement."""
     return (
         (_BARE, "--help", ()),
         (_BARE, "--version", ()),
@@ -42,7 +42,7 @@ def _commands(stored: GradedBatch) -> Sequence[tuple[str, str, tuple[str, ...]]]
 
 def _against(imports: str, name: str, of: tuple[str, ...], home: Path, times: int) -> Measurement:
     environment = {"ROBOMARK_HOME": str(home)}
-    # The first one compiles.
+    # The first run compiles bytecode.
     command_cpu_seconds((*ROBOMARK, *name.split(), *of), environment)
     seconds = [
         (

@@ -1,4 +1,4 @@
-"""Where the CPU goes: one trial, one submission and one batch, each in its parts. ``python -m benchmarks costs``."""
+"""Breakdown of CPU costs: one trial, one submission and one batch. Run it with ``python -m benchmarks costs``."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ _TIMES = 7
 _ROOMS = 8
 TAKEN_IN, CLAIMED, STORED, DRAWN = "taking it in", "claiming it", "storing the grade", "drawing its plots"
 _GRADING = ("trials, in the worker", "judging", "program and responder, their processes")
-#: Paid once by each worker, not by each submission.
+#: Costs per worker, not per submission.
 STARTS = ("start of the clean processes with their imports, once",)
 Made = TypeVar("Made")
 
 
 @dataclass(slots=True)
 class Costs:
-    """CPU seconds of each part of grading one short submission, as often as it was measured."""
+    """CPU seconds of each part of grading one short submission, one value per repetition."""
 
     parts: dict[str, list[float]] = field(default_factory=dict)
 
@@ -60,12 +60,12 @@ class Costs:
         return made
 
     def of(self, *parts: str) -> float:
-        """The median of each, together."""
+        """Return the sum of the parts' medians."""
         return sum(median(self.parts[part]) for part in parts)
 
     @property
     def grading(self) -> float:
-        """What a worker spends on one submission before its marks are stored."""
+        """The CPU seconds that a worker uses for one submission before it stores the marks."""
         return self.of(*_GRADING, "packing the recordings")
 
 
@@ -82,7 +82,7 @@ def main(_arguments: list[str]) -> int:
 
 
 def of_trial() -> Mapping[str, float]:
-    """CPU seconds of each module of ours in the worker, with what libraries do for it."""
+    """Return the CPU seconds of each of our modules in the worker, including library calls."""
     wanted = spec(FOLLOWER)
     with TrialRunner() as runner:
         runner.run(wanted)
@@ -96,14 +96,14 @@ def of_trial() -> Mapping[str, float]:
         profile.runcall(runner.run, wanted)
     shares = _by_module(profile)
     worker = median(plain)
-    # A profile slows everything, so that only its shares are used.
+    # Profiling slows everything, so only the shares are used.
     rows = {f"worker: {name}": worker * share for name, share in shares[:_ROOMS]}
     rest = sum(share for _, share in shares[_ROOMS:])
     return rows | {"worker: all other modules": worker * rest, "program and responder, two children": median(children)}
 
 
 def _by_module(profile: cProfile.Profile) -> list[tuple[str, float]]:
-    """The share of each of our modules, the largest first; what is built in counts for who calls it."""
+    """Return each of our modules with its share, the largest first. Built-in functions count for their caller."""
     seconds: Counter[str] = Counter()
     for (file, _, _), (_, _, own, _, callers) in pstats.Stats(profile).stats.items():  # type: ignore[attr-defined]
         name = _module(file)
@@ -122,14 +122,14 @@ def _module(file: str) -> str | None:
 
 
 def of_submission() -> Costs:
-    """Each part of grading a short submission, on SQLite, without a queue."""
+    """Return the costs of each part of grading a short submission, on SQLite, without a queue."""
     costs = Costs()
     with (
         tempfile.TemporaryDirectory() as home,
         open_store(load_settings(home=Path(home))) as store,
         TrialRunner() as runner,
     ):
-        # The first one warms up.
+        # The first run is a warm-up.
         _one(store, runner, "nobody", Costs())
         for number in range(_TIMES):
             _one(store, runner, f"student {number}", costs)
@@ -150,7 +150,7 @@ def _one(store: Store, runner: TrialRunner, student: str, costs: Costs) -> None:
 
 
 def _graded(asked: GradingRequest, runner: TrialRunner, costs: Costs) -> Grade:
-    """The grade; trials and judging are told apart by the moment of the last trial's end."""
+    """Return the grade. Trials and judging are separated at the end of the last trial."""
     moments: list[float] = []
 
     def observe(_progress: GradingProgress) -> None:
@@ -167,7 +167,7 @@ def _graded(asked: GradingRequest, runner: TrialRunner, costs: Costs) -> Grade:
 
 
 def _cold_seconds() -> float:
-    """CPU of a grading that starts its own processes, theirs included once they have ended."""
+    """Return the CPU seconds of a grading that starts its own processes, including those processes."""
     before = os.times()
     asked = short_request("cold")
     grade(asked.submission, asked.assignment)

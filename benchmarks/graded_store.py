@@ -1,4 +1,4 @@
-"""Short submissions, and a database in which one of them has been graded."""
+"""Short submissions, and a database with one graded submission, for benchmarks."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ for turn in range(3):
 
 
 def short_request(student: str) -> GradingRequest:
-    """A short submission, with a text of its own, or it would be a copy of the one before, which is not run again."""
+    """Return a request for a short submission. Each text differs: identical submissions are graded only once."""
     program = Code("robot.py", f"# {student}\n{_PROGRAM}")
     return GradingRequest(
         Submission(student, program, Code("responder.py", _RESPONDER)), find_assignment(ASSIGNMENT), f"{student}.zip"
@@ -36,14 +36,14 @@ def short_request(student: str) -> GradingRequest:
 
 @dataclass(frozen=True, slots=True)
 class GradedBatch:
-    """A batch of one graded job."""
+    """A batch with one graded job."""
 
     batch: str
     job: str
 
 
 def graded_batch(store: Store) -> GradedBatch:
-    """Take in a batch of one submission, grade it, and store its grade, without a queue."""
+    """Add a batch of one submission, grade it, and store its grade, without a queue."""
     accepted = intake.accept_batch(store, "one", [short_request("ada")], [], max_attempts=3)
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None

@@ -1,4 +1,4 @@
-"""`robomark grade` of one short submission that imports nothing but the standard library, in CPU; and its report."""
+"""CPU costs of `robomark grade` for one short submission without third-party imports, and of its report."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from submissions.assignment.examples import examples
 from submissions.assignment.folder import REFERENCE
 
 _ASSIGNMENT = "echo-responder"
-#: One second where the loop takes 0.6.
+#: One second on a machine where the loop takes 0.6.
 _BUDGET, _BEYOND = 1.0 / 0.6, 0.6 / 0.6
 
 
 def measure(times: int) -> list[Measurement]:
-    """All processes of the command together, against the loop that calibrates."""
+    """Measure all processes of the command together, relative to the calibration loop."""
     submission = str(examples(_ASSIGNMENT) / REFERENCE)
     loop = loop_seconds(times)
     with tempfile.TemporaryDirectory() as home:
         command = (*ROBOMARK, "grade", submission, "-a", _ASSIGNMENT)
-        # The first one compiles.
+        # The first run compiles bytecode.
         command_cpu_seconds(command, {"ROBOMARK_HOME": home})
         seconds = median([command_cpu_seconds(command, {"ROBOMARK_HOME": home}) for _ in range(times)])
     return [

@@ -1,7 +1,7 @@
-"""How CPU grows with the length of a trial, its messages, the number of trials, and the size of a batch.
+"""Growth of CPU costs with the length of a trial, its messages, the number of trials, and the size of a batch.
 
-Each is taken at three sizes, each four times the one before; what the second step costs a piece, against the first, is
-1 where growth is even.
+Each has three sizes, and each size is four times the previous one. The result is the cost per item in the second step
+relative to the first: 1 for linear growth.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from service.settings import load_settings
 from service.store.batches import intake
 from service.store.engine import open_store
 
-#: What a step may cost a piece, more than the step before it.
+#: Budget for that ratio.
 _EVEN = 1.5
 _TALKER = "import time\nfor number in range({}):\n    print('PY::' + str(number))\n    time.sleep(0.005)\n"
 
 
 def measure(times: int) -> list[Measurement]:
-    """Each with what one piece costs in the last step."""
+    """Measure the growth, with the cost per item in the last step."""
     with TrialRunner() as runner, tempfile.TemporaryDirectory() as home:
 
         def trial(wanted: TrialSpec) -> float:
@@ -56,7 +56,7 @@ def measure(times: int) -> list[Measurement]:
 
 
 def _even(what: str, cost: Callable[[int], float], smallest: int, times: int) -> Measurement:
-    # The least of each: what else the machine does only adds.
+    # The minimum of each, because other load only adds to it.
     small, medium, large = (
         min(cost(size) for _ in range(min(times, 3) + 1)) for size in (smallest, 4 * smallest, 16 * smallest)
     )

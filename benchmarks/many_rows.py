@@ -1,6 +1,6 @@
-"""A database as it is after years: 100,000 grades of 2000 students, each an image of one that was graded.
+"""A database as after years of use: 100,000 grades of 2000 students, all copies of one graded job.
 
-The rows are made by the database itself, so that it takes seconds; what is asked of them is ``rows.py``'s.
+The database generates the rows itself, which takes seconds. ``rows.py`` runs the queries.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from service.store.states import JobState
 STUDENTS = 2000
 BATCHES = 50
 GRADES = STUDENTS * BATCHES
-#: Batches that nobody has begun to grade.
+#: Batches that no worker has started to grade.
 WAITING_BATCHES = 5
-#: Jobs begun within the last minute, of the batches before.
+#: Jobs started within the last minute, in the batches before those.
 RECENT = 300
-#: Numbers of rows begin here, above those that were there.
+#: First row number, above the existing ones.
 _FIRST = 1000
-#: Added to what a name ends with, so that none begins like another.
+#: Added to the number in a name, so that no name is a prefix of another.
 _WIDE = 1_000_000
 Changes = Mapping[str, ColumnElement[Any]]
 
@@ -45,7 +45,7 @@ def grade_name(number: int) -> str:
 
 
 def fill(store: Store, image_of: GradedBatch) -> None:
-    """Make the rows: all but the last batches are graded."""
+    """Create the rows. All but the last batches are graded."""
     with store.transaction() as session:
         if session.get_bind().dialect.name == "sqlite":
             session.connection().exec_driver_sql("PRAGMA defer_foreign_keys = ON")
@@ -85,13 +85,13 @@ def _let_the_last_wait(session: Session) -> None:
 
 
 def _numbers(count: int) -> Any:
-    """The numbers below ``count``, as a table."""
+    """Return the numbers below ``count`` as a table."""
     first = select(literal(0).label("number")).cte(f"below_{count}", recursive=True)
     return first.union_all(select(first.c.number + 1).where(first.c.number < count - 1))
 
 
 def _copy(session: Session, kind: type[Base], image_of: Any, numbers: FromClause, changes: Changes) -> None:
-    """A row for each number, like the one that is named but for what changes with the number."""
+    """Insert a copy of one row for each number, with the columns that depend on the number."""
     table = kind.__table__
     chosen = [changes.get(column.name, column).label(column.name) for column in table.columns]
     rows = select(*chosen).select_from(numbers.join(table, table.c.id == image_of))
@@ -99,7 +99,7 @@ def _copy(session: Session, kind: type[Base], image_of: Any, numbers: FromClause
 
 
 def _of_jobs(session: Session, kind: type[Base], image_of: str, numbers: FromClause) -> None:
-    """For each number all rows that belong to the job that is named."""
+    """Insert copies of all rows of one job for each number."""
     table = kind.__table__
     which = numbers.c.number
     own = {"id": _FIRST + which * 100 + table.c.position, "job_id": _text("j", _WIDE + which)}

@@ -1,4 +1,4 @@
-"""One line of the table, its unit, and the ways time is taken. Says nothing of what is measured."""
+"""Measurements: a row of the table, its unit, and ways of taking time."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """How a value is shown, and what a machine that is twice as slow makes of it."""
+    """The format of a value, and how it depends on the speed of the machine."""
 
     word: str
     decimals: int
-    slowness: int = 0  # 1: twice as much; -1: half; 0: it says nothing of the machine
+    slowness: int = 0  # 1: doubles on a machine of half the speed; -1: halves; 0: independent
     more_is_better: bool = False
 
     def shown(self, value: float) -> str:
@@ -36,25 +36,25 @@ COUNT = Unit("", 0)
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """What was measured, beside what it should be."""
+    """A measured value with its budget."""
 
     what: str
     value: float
     unit: Unit
     budget: float | None = None
     beyond: float | None = None
-    told: str = ""  # how it spreads
+    told: str = ""  # the spread, or another detail
 
     @property
     def misses(self) -> bool:
-        """Whether the budget is not kept."""
+        """Whether the value misses its budget."""
         if self.budget is None:
             return False
         return self.value < self.budget if self.unit.more_is_better else self.value > self.budget
 
     @property
     def gates(self) -> bool:
-        """Whether it is a ratio that misses its budget: the machine is then no excuse."""
+        """Whether a ratio misses its budget, which a slow machine does not explain."""
         return self.misses and self.unit in (RATIO, GAIN)
 
 
@@ -63,13 +63,13 @@ def median(values: Sequence[float]) -> float:
 
 
 def median_of(count: int, measure: Callable[[], float]) -> float:
-    """The middle one of ``count`` measurements, after one that only warms up."""
+    """Return the median of ``count`` measurements, after a warm-up."""
     measure()
     return median([measure() for _ in range(count)])
 
 
 def cpu_seconds(work: Callable[[], object]) -> float:
-    """CPU seconds of this process."""
+    """Return the CPU seconds of this process for ``work``."""
     start = time.process_time()
     work()
     return time.process_time() - start
@@ -82,12 +82,16 @@ def wall_seconds(work: Callable[[], object]) -> float:
 
 
 def users_environment() -> dict[str, str]:
-    """As a user has it, who lets Python keep the bytecode of what it has compiled."""
+    """Return a user's environment, in which Python stores bytecode."""
     return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
 
 
 def command_cpu_seconds(command: Sequence[str], environment: dict[str, str]) -> float:
-    """CPU seconds of a command and of all that it waited for. Raises RuntimeError when it fails."""
+    """Return the CPU seconds of a command and of all processes that it waited for.
+
+    Raises:
+        RuntimeError: If the command fails.
+    """
     process = subprocess.Popen(
         command, env=users_environment() | environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )

@@ -1,6 +1,6 @@
-"""What a worker holds in memory, with the processes that it forks from, and how that grows from trial to trial.
+"""Memory of a worker and of the processes that it forks from, and its growth per trial.
 
-Of memory that processes share each counts its part, which other processes change; growth is of what is each one's own.
+Shared memory counts in proportion, which depends on other processes. So growth counts only private memory.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ import sys
 
 from benchmarks.measurement import MEGABYTES, Measurement
 
-#: What fills up once, by two megabytes in all, has done so after a thousand and some.
+#: Caches, two megabytes in total, are full after somewhat more than a thousand trials.
 _WARM, _TRIALS = 1500, 1000
-#: Grades short submissions, and prints the megabytes held in the end, and its own after the first and after the last.
+#: Grades short submissions. Prints the total megabytes at the end, and the private ones before and after the trials.
 _WORKER = """
 import gc, json, os, sys
 from pathlib import Path
@@ -45,7 +45,7 @@ with TrialRunner() as runner:
 
 
 def measure(_times: int) -> list[Measurement]:
-    """About a minute."""
+    """Measure the memory, in about a minute."""
     command = [sys.executable, "-c", _WORKER, str(_WARM), str(_TRIALS)]
     try:
         held, before, after = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)

@@ -1,6 +1,6 @@
-"""The original's stepping loop in plain Python beside ours, with the same programs, in one run.
+"""The original's stepping loop in plain Python compared with ours, with the same programs, in one run.
 
-Both must end at the same place, or neither is timed.
+Both must end at the same pose, otherwise neither is timed.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ class _Wheel(Protocol):
     def run(self, command: str, clock: int, /) -> None: ...
 
 
-#: Sets the two wheels before the tick of a number, by what the left light sensor sees of red, 0 to 255.
+#: Sets both wheels before a numbered tick, from the red value of the left light sensor, 0 to 255.
 _Program = Callable[[_Wheel, _Wheel, float, int], None]
 
 
 def _follow(left: _Wheel, right: _Wheel, red: float, clock: int) -> None:
-    """Along the edge of the line."""
+    """Follow the edge of the line."""
     turn = (int(red) - 128) * 0.15
     left.speed_sp, right.speed_sp = 10.5 * (25 - turn), 10.5 * (25 + turn)
     if clock == 0:
@@ -46,7 +46,7 @@ def _follow(left: _Wheel, right: _Wheel, red: float, clock: int) -> None:
 
 
 def _square(left: _Wheel, right: _Wheel, _red: float, clock: int) -> None:
-    """Two seconds ahead, two on the spot, to positions."""
+    """Drive a square: two seconds ahead, two on the spot, to positions."""
     if clock % 60 == 0:
         ahead = clock % 120 == 0
         left.speed_sp = right.speed_sp = 315
@@ -63,7 +63,7 @@ _PROGRAMS: tuple[tuple[str, _Program, Noise], ...] = (
 
 
 def measure(times: int) -> list[Measurement]:
-    """How many times faster than the port ours is, in CPU."""
+    """Measure how many times less CPU ours needs than the port."""
     pixels = floor(FLOOR).pixels
     canvas = np.dstack((pixels, np.full(pixels.shape[:2], 255, np.uint8))).tobytes()
     arena, camera = Arena(), CachedCamera(pixels)

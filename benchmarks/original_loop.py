@@ -1,7 +1,7 @@
-"""The original simulator's stepping loop (``nbev3devsim`` 0.0.12) ported to plain Python, line by line.
+"""The original simulator's stepping loop (``nbev3devsim`` 0.0.12), ported to plain Python line by line.
 
-What it draws is left out; what it computes at each frame is all here, the text of each light sensor's pixels included.
-It is fast where plain Python can be: names are local, masks and offsets are made once.
+Drawing is left out. All calculations of a frame are included, even the text of each light sensor's pixels. Names are
+local, and masks and offsets are computed once, to make the port as fast as plain Python allows.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ _SIDE = 20
 _RADIUS = _SIDE / 2
 _RAYS = (0, 7, -7, 14, -14, 21, -21)
 _REACH = 2550
-#: Which of a sensor's pixels count, row by row.
+#: The pixels of a sensor that count, row by row.
 _MASK = [(row - _RADIUS) ** 2 + (column - _RADIUS) ** 2 < _RADIUS**2 for row in range(_SIDE) for column in range(_SIDE)]
 _SEEN = sum(_MASK)
 _OUTSIDE = ("245", "226", "225", "255")
 _SENSORS = ((-20, 30), (20, 30))
-#: Begin, end, and direction in degrees.
+#: Start, end, and direction in degrees.
 _WALLS = (
     (0, 0, 0, HEIGHT, 90),
     (0, HEIGHT, WIDTH, HEIGHT, 0),
@@ -32,7 +32,7 @@ _WALLS = (
 
 
 def _rounded(value: float) -> int:
-    """As JavaScript rounds."""
+    """Return the value rounded as in JavaScript."""
     return math.floor(value + 0.5)
 
 
@@ -79,7 +79,7 @@ class Motor:
 
 @dataclass(slots=True)
 class OriginalSimulator:
-    """A robot on a floor; ``pixels`` is RGBA, row by row from the top, as a canvas gives it."""
+    """A robot on a floor. ``pixels`` is RGBA, row by row from the top, as from a canvas."""
 
     pixels: bytes
     x: float
@@ -103,7 +103,7 @@ class OriginalSimulator:
         return self.means[0][0]
 
     def tick(self) -> None:
-        """One frame."""
+        """Simulate one frame."""
         self.clock += 1
         self.left.set_speed(self.wheel_noise)
         self.right.set_speed(self.wheel_noise)
@@ -133,7 +133,7 @@ class OriginalSimulator:
         self.texts = [text for _, text in seen]
 
     def _light(self, column: int, row: int) -> tuple[tuple[float, float, float], str]:
-        """The means, and the values of all pixels with commas between, from one window of the canvas."""
+        """Return the means, and the comma-separated values of all pixels, of one window of the canvas."""
         if 0 <= column <= WIDTH - _SIDE and 0 <= row <= HEIGHT - _SIDE:
             pixels, stride = self.pixels, 4 * WIDTH
             begin = row * stride + 4 * column
@@ -193,7 +193,7 @@ def _counts(heading: float, line: float) -> bool:
 def _hit(
     x: float, y: float, end_x: float, end_y: float, wall: tuple[float, float, float, float, float]
 ) -> float | None:
-    """How far the ray goes to the wall; None where it does not reach it."""
+    """Return the distance of the wall along the ray, or None if the ray misses it."""
     x3, y3, x4, y4, _ = wall
     below = (x - end_x) * (y3 - y4) - (y - end_y) * (x3 - x4)
     if below == 0:

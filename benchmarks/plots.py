@@ -1,4 +1,4 @@
-"""What plots cost beside marking, both in CPU, and how large a report with a replay is and how long it takes."""
+"""CPU costs of plots compared with marking, and the size and time of a report with a replay."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 from submissions.grading_request import GradingRequest
 
-#: Each with what it stands for; the last one drives for 60 s, and its report is measured.
+#: The assignments, with descriptions. The last one drives for 60 s, and its report is measured too.
 _FOLLOWER = "single-sensor-edge-follower"
 _ASSIGNMENTS = ("echo-responder", "shape-recognition", _FOLLOWER)
 Made = TypeVar("Made")
 
 
 def measure(times: int) -> list[Measurement]:
-    """Of the references, when all is warm."""
+    """Measure the reference submissions, after a warm-up."""
     with TrialRunner() as runner:
         rows = [_against_marking(name, runner, times) for name in _ASSIGNMENTS]
         return [*rows, *_of_report(_asked(_FOLLOWER), runner, times)]
@@ -59,7 +59,7 @@ def _marked(asked: GradingRequest, runner: TrialRunner) -> Grade:
 
 
 def _marking_seconds(asked: GradingRequest, runner: TrialRunner) -> float:
-    """Of the worker and of the students' processes."""
+    """Return the CPU seconds of the worker and of the students' processes."""
     before = runner.children_cpu_seconds
     own = cpu_seconds(lambda: _marked(asked, runner))
     return own + runner.children_cpu_seconds - before

@@ -1,6 +1,6 @@
-"""The rate of a batch and the latency of a single submission, with one and two workers against PostgreSQL.
+"""Throughput of a batch and latency of single submissions, with one and two workers and PostgreSQL.
 
-Real time, so a busy machine shows: run it alone. ``python -m benchmarks queue`` runs it by itself.
+It measures real time, so run it on an idle machine: ``python -m benchmarks queue``.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ _PATIENCE = 900.0
 
 @dataclass(frozen=True, slots=True)
 class _Bench:
-    """The service under test, and who submits."""
+    """The service under test, and the students who submit."""
 
     store: Store
     notifier: Notifier
     folder: Path
 
     def batch(self, name: str, count: int) -> str:
-        """Queue that many submissions, none of them a copy of another."""
+        """Queue this number of submissions, each with a different text."""
         accepted = intake.accept_batch(
             self.store, name, [short_request(f"{name}-{number}") for number in range(count)], [], max_attempts=3
         )
@@ -55,7 +55,7 @@ class _Bench:
             return batches.progress(session, batch).ended
 
     def single(self, student: str) -> float:
-        """Seconds from a submission to its report on the disk, with marks and without plots."""
+        """Return the seconds from a submission to its report on disk, with marks and without plots."""
         begun = time.perf_counter()
         job = intake.accept(self.store, short_request(student), max_attempts=3).job_id
         self.notifier.grade(Lane.INTERACTIVE)
@@ -78,7 +78,7 @@ class _Bench:
 
 
 def measure(_times: int) -> list[Measurement]:
-    """The rate of one worker and of two, then single submissions alone and behind a batch."""
+    """Measure throughput with one and two workers, then single submissions alone and behind a batch."""
     with PostgresqlServer() as server:
         with _service(server, workers=1) as bench:
             alone = _rate(bench)
@@ -88,7 +88,7 @@ def measure(_times: int) -> list[Measurement]:
 
 @contextmanager
 def _service(server: PostgresqlServer, workers: int) -> Iterator[_Bench]:
-    """On an empty database, when its workers look for work."""
+    """Yield a service on an empty database, when its workers are ready."""
     with tempfile.TemporaryDirectory() as folder:
         settings = load_settings(home=Path(folder), database_url=fresh_database(server.url), concurrency=1)
         with open_store(settings) as store, Supervisor(settings, store, workers=workers, listening=None) as service:
@@ -99,7 +99,7 @@ def _service(server: PostgresqlServer, workers: int) -> Iterator[_Bench]:
 
 
 def _rate(bench: _Bench) -> float:
-    """Submissions a minute, to marks, when all is warm."""
+    """Return the submissions per minute, up to their marks, after a warm-up."""
     warm = bench.batch("warm", 8)
     bench.until(lambda: bench.ended(warm) == 8)
     bench.until(lambda: _plots_drawn(bench))

@@ -1,6 +1,6 @@
-"""What a worker and all its processes cost until it has claimed its first job, in CPU: asked first, and spared.
+"""CPU costs of a worker and all its processes up to its first claim, with and without the known answer.
 
-It is asked for the known answer where this build has not given it on this machine, and soon after where it has.
+A worker grades the known answer first if this build has not done so on this machine, otherwise soon after.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _TICKS = os.sysconf("SC_CLK_TCK")
 
 
 def measure(times: int) -> list[Measurement]:
-    """Two workers, one after the other, in each new home."""
+    """Measure two workers in turn, in a new home for each repetition."""
     asked, spared = zip(*(_two() for _ in range(times)), strict=True)
     what = "a worker's start until it claims, all its processes, CPU"
     return [
@@ -69,7 +69,7 @@ def _claimed(store: Store, job: str) -> bool:
 
 
 def _cpu_seconds(pid: int) -> float:
-    """Of the process, and of those below it that it has seen end."""
+    """Return the CPU seconds of the process and of its ended children."""
     try:
         words = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except (FileNotFoundError, ProcessLookupError):

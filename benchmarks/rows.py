@@ -1,6 +1,6 @@
-"""What is asked of a database with 100,000 grades, on SQLite and on PostgreSQL, and how it finds the answers.
+"""Queries on a database with 100,000 grades, on SQLite and on PostgreSQL, and their query plans.
 
-``python -m benchmarks plans`` writes the plans of both into ``docs/query-plans.txt``.
+``python -m benchmarks plans`` writes the plans of both to ``docs/query-plans.txt``.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _WORKER = "worker"
 
 @dataclass(frozen=True, slots=True)
 class _Question:
-    """What somebody asks, and how long the answer may take."""
+    """A query, and the time allowed for it."""
 
     name: str
     ask: Callable[[Store], object]
@@ -79,7 +79,7 @@ _QUESTIONS = (
 
 
 def measure(times: int) -> list[Measurement]:
-    """Medians of nine or more, each on both databases."""
+    """Measure the medians of nine or more repetitions on both databases."""
     return [
         _asked(database, store, question, max(times, _TIMES))
         for database, store in _filled()
@@ -95,13 +95,13 @@ def _asked(database: str, store: Store, question: _Question, times: int) -> Meas
 
 
 def claim_seconds() -> float:
-    """How long a claim takes PostgreSQL where 10,000 jobs wait."""
+    """Return the seconds of a claim in PostgreSQL with 10,000 waiting jobs."""
     *_, seconds = (_seconds(_claim, store, _TIMES) for _, store in _filled())
     return median(seconds)
 
 
 def main(_arguments: list[str]) -> int:
-    """Write down how both databases find the answers."""
+    """Write the query plans of both databases."""
     parts = [f"How {many_rows.GRADES:,} grades are asked; written by python -m benchmarks plans.\n"]
     for database, store in _filled():
         for question in _QUESTIONS:
@@ -116,20 +116,20 @@ def _seconds(ask: Callable[[Store], object], store: Store, times: int) -> list[f
 
 
 def _filled() -> Iterator[tuple[str, Store]]:
-    """Both databases, one after the other; each is gone when the next is asked for."""
+    """Yield both databases in turn. Each is removed before the next."""
     with tempfile.TemporaryDirectory() as folder, PostgresqlServer() as server:
         for database, url in (("SQLite", ""), ("PostgreSQL", fresh_database(server.url))):
             with open_store(load_settings(home=Path(folder), database_url=url)) as store:
                 many_rows.fill(store, graded_batch(store))
                 if url:
-                    # As its autovacuum does within minutes; SQLite is never told in the service either.
+                    # Autovacuum does this within minutes. For SQLite, the service doesn't do it either.
                     with store.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
                         connection.exec_driver_sql("VACUUM ANALYZE")
                 yield database, store
 
 
 def _plans(store: Store, question: _Question) -> list[str]:
-    """The plan of each statement that the question comes to."""
+    """Return the plan of each statement of a query."""
     asked: dict[str, Any] = {}
 
     def note(_connection: object, _cursor: object, statement: str, parameters: Any, *_: object) -> None:

@@ -1,6 +1,6 @@
-"""What the sandbox costs and how exactly it holds: from the fork of a child to its end, beside what they should take.
+"""Costs and precision of the sandbox, from the fork of a child to its end, with their budgets.
 
-Times are real ones, medians and 95th percentiles; on a busy machine they say more about the machine.
+Times are real times, as medians and 95th percentiles. On a busy machine they mostly show its load.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _LIMITS = {"robot": ChildLimits(2, 128 << 20), "responder with libraries": Child
 _SCHEMAS = {"robot": wire.ROBOT, "responder with libraries": wire.RESPONDER}
 _CPU_LIMIT, _STALLED, _OUTPUT = 0.5, 5.0, 65536
 _ECHO = "def responder(text): return text"
-#: Counts what it has printed in a file that outlives it.
+#: Counts its printed bytes in a file that remains after its end.
 _FLOOD = """
 import mmap, os
 os.ftruncate(fd := os.open("count", os.O_RDWR | os.O_CREAT), 8)
@@ -53,7 +53,7 @@ input()
 
 
 def measure(_times: int) -> list[Measurement]:
-    """About twenty seconds."""
+    """Measure the sandbox, in about twenty seconds."""
     with Sandboxes() as sandboxes, sandboxes.private_folder() as folder:
         cold = wall_seconds(lambda: _spawn(sandboxes, "responder with libraries").close())
         light = _many(100, lambda: _until_locked(sandboxes, "robot"))
@@ -92,7 +92,7 @@ def _timed(what: str, seconds: list[float], budget: float, beyond: float | None 
 
 
 def _many(count: int, sample: Callable[[], float]) -> list[float]:
-    """Samples after a few that only warm up."""
+    """Return samples, after a few for warm-up."""
     for _ in range(5):
         sample()
     return [sample() for _ in range(count)]
@@ -150,7 +150,7 @@ def _turn(child: ServedChild) -> None:
 
 
 def _lockdown_alone() -> float:
-    """In a fork of this process, with the grants of a robot program."""
+    """Return the seconds for the lockdown of a fork of this process, with the grants of a robot program."""
     rules = _rules()
     reading, writing = os.pipe()
     pid = os.fork()
@@ -171,12 +171,15 @@ def _lockdown_alone() -> float:
 
 @functools.cache
 def _rules() -> tuple[bytes, ...]:
-    """As a zygote makes them ready, once."""
+    """Prepare the rules, as a zygote does once."""
     return lockdown.reading_rules(lockdown.Grants(grants.readable([]), grants.listable([])))
 
 
 def _memory(sandboxes: Sandboxes, folder: Path) -> tuple[float, float]:
-    """Megabytes that are a child's own, and its share of all when it is one of ten; not to be seen by everybody."""
+    """Return megabytes: a child's private memory, and its share of all when it is one of ten.
+
+    Not every user may read these values.
+    """
     children = [_echo(sandboxes, folder) for _ in range(10)]
     try:
         lines = Path(f"/proc/{children[0]._pid}/smaps_rollup").read_text().splitlines()  # type: ignore[attr-defined]
@@ -213,7 +216,7 @@ def _stall_overshoot(sandboxes: Sandboxes) -> float:
 
 
 def _output_overshoot(sandboxes: Sandboxes, folder: Path) -> int:
-    """What a program could still print after the worker had heard enough."""
+    """Return the bytes that a program could print after the worker had stopped reading."""
     child = _spawn(sandboxes, "robot", folder)
     _start(child, "robot", _FLOOD)
     heard = 0

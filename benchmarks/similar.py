@@ -1,7 +1,7 @@
-"""How well copies are told from honest work: false alarms among the catalogue's references, copies found, and the cost.
+"""Quality of copy detection: false alarms among the catalogue's references, detected copies, and the costs.
 
-``python -m benchmarks.similar``. The catalogue is by few hands, and some of its responders were made of one another;
-so each pair that is called alike is named.
+Run it with ``python -m benchmarks.similar``. The catalogue has few authors, and some of its responders are derived from
+others, so each pair that counts as similar is listed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from submissions.assignment.examples import examples
 from submissions.assignment.folder import REFERENCE, catalogue
 from submissions.assignment.reader import find_assignment
 
-#: Solutions of one assignment of which none was made of another, as their texts show; one of each hand and idea.
+#: Independent solutions of one assignment, as their texts show: one per author and idea.
 WRITTEN_ANEW = (
     ("coin-tosses", "responder.py", ("reference", "runs-off-the-end")),
     ("digits-on-a-sheet", "responder.py", ("reference", "learnt-by-heart", "echoes-the-patch")),
@@ -33,7 +33,7 @@ WRITTEN_ANEW = (
     ("shapes-off-centre", "responder.py", ("reference", "only-in-the-middle")),
     ("shapes-on-the-move", "responder.py", ("reference", "by-the-way-driven", "echoes-the-patch")),
 )
-#: Lines of the submissions that the cost is measured on, about 250 tokens.
+#: Lines of the submissions for measuring costs, about 250 tokens.
 _LINES = 25
 
 
@@ -57,7 +57,7 @@ def _references() -> Iterator[tuple[tuple[str, str], str]]:
 
 
 def _within(given: Mapping[str, tuple[str, ...]]) -> None:
-    """Among the solutions of one assignment that are not edits of each other."""
+    """Print the false alarms among independent solutions of the same assignment."""
     pairs, alarms, highest = 0, [], 0.0
     for name, file, written in WRITTEN_ANEW:
         texts = {each: (examples(name) / each / file).read_text(encoding="utf-8") for each in written}
@@ -72,7 +72,7 @@ def _within(given: Mapping[str, tuple[str, ...]]) -> None:
 
 
 def _between(references: Mapping[tuple[str, str], str], given: Mapping[str, tuple[str, ...]]) -> None:
-    """Between the references of all assignments: programs with programs, responders with responders."""
+    """Print the false alarms between all references: programs with programs, responders with responders."""
     for file in ("robot.py", "responder.py"):
         pairs, alarms = 0, []
         names = [name for name, which in references if which == file]
@@ -113,7 +113,7 @@ def _cost(students: int) -> None:
 
 
 def _program(chance: random.Random) -> str:
-    """Lines as students write them, each chosen of a few."""
+    """Return lines in students' style, each chosen from a few."""
     lines = []
     for _ in range(_LINES):
         motor = chance.choice(("tank_drive", "tank_turn", "left_motor", "right_motor"))

@@ -1,4 +1,4 @@
-"""The simulator by itself, and through the two sandboxed processes: a line follower of 60 simulated seconds."""
+"""Speed of the simulator, alone and with the two sandboxed processes: a line follower for 60 simulated seconds."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from sim.world import Chain, Noise, World
 SECONDS = 60
 START = Pose(320, 500, 90)
 FLOOR = "Loop"
-#: Stays at the edge of the loop for the whole minute.
+#: Follows the edge of the loop for the whole minute.
 FOLLOWER = """
 while True:
     turn = (colorLeft.reflected_light_intensity - 128) * 0.15
@@ -45,7 +45,7 @@ _LIMITS = ChildLimits(30, 512 << 20)
 
 
 def measure(times: int) -> list[Measurement]:
-    """Times real time, on one core, by CPU time; and what the two sandboxed processes add."""
+    """Measure the speed relative to real time on one core, by CPU time, and the costs of both sandboxed processes."""
     pixels = floor(FLOOR).pixels
     arena, cached, camera = Arena(), CachedCamera(pixels), BulletCamera(pixels)
     try:
@@ -76,7 +76,7 @@ def measure(times: int) -> list[Measurement]:
 
 
 def _follow(arena: Arena, camera: LightCamera) -> None:
-    """Both sensors read fifty times a second, as a program that only reads them does."""
+    """Read both sensors fifty times a second, as a program that only reads them."""
     world = World(robot("Default_Robot"), arena, camera, START, Noise(), 0, Chain())
     left, right = world.drive.left, world.drive.right
     left.run("run-forever", 0)
@@ -89,7 +89,7 @@ def _follow(arena: Arena, camera: LightCamera) -> None:
 
 
 def _differing_pixels(camera: LightCamera, pixels: NDArray[np.uint8]) -> int:
-    """In two hundred windows of twenty by twenty pixels, all over the floor."""
+    """Return the number of differing pixels in 200 windows of 20 by 20 pixels, spread over the floor."""
     chance = random.Random(0)
     places = [(chance.randrange(WIDTH - _SIDE), chance.randrange(HEIGHT - _SIDE)) for _ in range(200)]
     return sum(
@@ -99,7 +99,7 @@ def _differing_pixels(camera: LightCamera, pixels: NDArray[np.uint8]) -> int:
 
 
 def spec(program: str) -> TrialSpec:
-    """A trial of sixty seconds on the loop, with a responder that gives back what it hears."""
+    """Return a trial of sixty seconds on the loop, with an echo responder."""
     return TrialSpec(
         ProgramSpec(Code("robot.py", program), "preloaded", _LIMITS, 1 << 20),
         ResponderSpec(Code("responder.py", "def responder(text): return text"), {}, _LIMITS, 1 << 20),
@@ -116,7 +116,7 @@ def spec(program: str) -> TrialSpec:
 
 
 def through_processes(runner: TrialRunner, wanted: TrialSpec) -> float:
-    """CPU seconds of the worker and of both students' processes together."""
+    """Return the CPU seconds of the worker and of both students' processes."""
     before = runner.children_cpu_seconds
     own = cpu_seconds(lambda: runner.run(wanted))
     return own + runner.children_cpu_seconds - before

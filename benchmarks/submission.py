@@ -1,4 +1,4 @@
-"""One short submission through the embedded services, from submitting it to marks and to plots in the database."""
+"""Time of one short submission in the embedded service, until its marks and its plots are in the database."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _TIMES = 7
 
 
 def measure(_times: int) -> list[Measurement]:
-    """Medians, the worker being warm."""
+    """Measure the medians with a warm worker."""
     with tempfile.TemporaryDirectory() as folder:
         settings = load_settings(home=Path(folder))
         with open_store(settings) as store, EmbeddedServices(settings, store) as services:
@@ -40,11 +40,11 @@ def measure(_times: int) -> list[Measurement]:
 
 
 def _once(store: Store, notifier: Notifier, student: str) -> tuple[float, float]:
-    """Seconds until the marks are committed, and until the plots are."""
+    """Return the seconds until the marks are committed, and until the plots are."""
     assignment = find_assignment(_ASSIGNMENT)
     start = time.perf_counter()
     submission = read_submission(examples(_ASSIGNMENT) / "reference", student=student, asked=assignment.parts)
-    # A file of its own, or it would be a copy of the one before, which is not run again.
+    # One file differs, because identical submissions are graded only once.
     submission = replace(submission, files={**submission.files, "student.txt": student.encode()})
     job = intake.accept(store, GradingRequest(submission, assignment, student), max_attempts=3).job_id
     notifier.grade(Lane.INTERACTIVE)

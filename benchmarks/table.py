@@ -1,4 +1,4 @@
-"""The table on the screen, the JSON beside it, and the run that it is compared with. Measures nothing."""
+"""The table on the screen, its JSON file, and the comparison with a recorded run. Measures nothing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rich.text import Text
 from benchmarks.calibration import LOOP
 from benchmarks.measurement import Measurement
 
-#: The run that others are compared with, kept with the code.
+#: The recorded run for comparisons, in version control.
 RECORDED = Path(__file__).parent / "recorded.json"
 #: The last run on this machine.
 LATEST = Path(__file__).parent / "latest.json"
@@ -25,13 +25,13 @@ LATEST = Path(__file__).parent / "latest.json"
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What an earlier run measured, by what it is called."""
+    """The values of an earlier run by name."""
 
     at: str
     values: dict[str, float]
 
     def on_a_machine_like(self, loop_seconds: float | None, row: Measurement) -> float | None:
-        """What it would have measured where the loop takes so long; None where it did not measure that."""
+        """Return the earlier value, scaled to a machine with this loop time, or None if it was not measured."""
         value, then = self.values.get(row.what), self.values.get(LOOP)
         if value is None or not then or not loop_seconds or row.what == LOOP:
             return value
@@ -39,7 +39,7 @@ class Run:
 
 
 def recorded(path: Path = RECORDED) -> Run | None:
-    """The run in the file; None where there is none."""
+    """Return the run in the file, or None if there is none."""
     if not path.exists():
         return None
     written = json.loads(path.read_text())
@@ -47,7 +47,7 @@ def recorded(path: Path = RECORDED) -> Run | None:
 
 
 def write(path: Path, rows: Sequence[Measurement]) -> None:
-    """The rows in place of what the file has of the same name; its other lines stay."""
+    """Replace the rows with the same names in the file. Other rows stay."""
     lines = {line["what"]: line for line in json.loads(path.read_text())["lines"]} if path.exists() else {}
     lines |= {row.what: _line(row) for row in rows}
     written = {
@@ -59,7 +59,7 @@ def write(path: Path, rows: Sequence[Measurement]) -> None:
 
 
 def show(rows: Sequence[Measurement], before: Run | None) -> None:
-    """Each line beside its budget and beside the recorded run, as that would be on this machine."""
+    """Print each row with its budget and the recorded value, scaled to this machine."""
     loop = next((row.value for row in rows if row.what == LOOP), None)
     table = Table("what", box=None, pad_edge=False)
     for heading in ("measured", "budget", "beyond", "recorded"):

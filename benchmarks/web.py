@@ -1,6 +1,6 @@
-"""What people wait for on the web: the page of a batch of 2000, and a class of 200 that uploads within a minute.
+"""Web response times: the page of a batch of 2000, and uploads of a class of 200 within a minute.
 
-Real time, so a busy machine shows: run it alone. ``python -m benchmarks web`` runs it by itself.
+It measures real time, so run it on an idle machine: ``python -m benchmarks web``.
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ _BOUNDARY = "part"
 
 @dataclass(frozen=True, slots=True)
 class _Browser:
-    """Somebody who is signed in at a server on this machine."""
+    """A user who is signed in at a server on this machine."""
 
     port: int
     secret: str
 
     def get(self, path: str) -> tuple[int, float]:
-        """The status of an answer, and how many seconds it took to the last byte."""
+        """Return the status of a response, and the seconds until its last byte."""
         return self._ask("GET", path, b"", {})
 
     def upload(self, path: str, files: Sequence[tuple[str, str]]) -> tuple[int, float]:
@@ -80,7 +80,7 @@ class _Browser:
 
 
 def measure(times: int) -> list[Measurement]:
-    """The page, then the class; both on PostgreSQL."""
+    """Measure the page, then the class, both on PostgreSQL."""
     with PostgresqlServer() as server:
         return [*_page(server, max(times, 5)), *_class(server)]
 
@@ -103,7 +103,7 @@ def _page(server: PostgresqlServer, times: int) -> list[Measurement]:
 
 
 def _instructor(store: Store) -> int:
-    """An instructor of the first course."""
+    """Return the id of an instructor of the first course."""
     with store.transaction() as session:
         return membership.make_instructor(session, DEFAULT_COURSE, Student("instructor")).person_id
 
@@ -147,7 +147,7 @@ def _class(server: PostgresqlServer) -> list[Measurement]:
 
 
 def _served(held: ExitStack, server: PostgresqlServer, workers: int) -> tuple[Store, int]:
-    """The service on an empty database, when it is ready; and the port that its web server answers on."""
+    """Yield the service on an empty database when it is ready, with the port of its web server."""
     folder = held.enter_context(tempfile.TemporaryDirectory())
     settings = load_settings(home=Path(folder), database_url=fresh_database(server.url), concurrency=1)
     store = held.enter_context(open_store(settings))

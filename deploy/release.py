@@ -1,7 +1,7 @@
-"""Releases a version: checks the tree and the changelog, builds wheel and source archive twice, and sets the tag.
+"""Releases a version: checks the tree and the changelog, builds the wheel and source archive twice, sets the tag.
 
-``make release`` runs it; ``make release-check`` does the same without the tag and the image. It needs git, and makes
-the image only where docker or podman is installed.
+``make release`` runs it. ``make release-check`` does the same without the tag and the image. It needs git, and builds
+the image only if docker or podman is installed.
 """
 
 from __future__ import annotations
@@ -20,20 +20,21 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 _HEADING = re.compile(r"^## (?P<version>\S+)(?: – (?P<date>\d{4}-\d\d-\d\d))?$", re.MULTILINE)
-#: What has to pass before a release; the long tests are those of whoever decides on it.
+#: Checks that must pass before a release. The releaser decides about the long tests.
 _CHECKS = ("lint", "test-fast")
 
 
 class NotReady(Exception):
-    """The tree cannot be released as it is; the message says what to do."""
+    """Raised when the tree can't be released; the message says how to fix it."""
 
 
 def release(root: Path, *, is_dry_run: bool) -> list[Path]:
-    """Release the version that ``pyproject.toml`` names; returns the built files.
+    """Release the version in ``pyproject.toml`` and return the built files.
 
-    A dry run checks and builds, and sets no tag.
+    A dry run checks and builds, but sets no tag.
 
-    Raises NotReady.
+    Raises:
+        NotReady: If a check fails.
     """
     check_tree(root)
     version = version_of(root)
@@ -50,19 +51,27 @@ def release(root: Path, *, is_dry_run: bool) -> list[Path]:
 
 
 def version_of(root: Path) -> str:
-    """The version in ``pyproject.toml``."""
+    """Return the version in ``pyproject.toml``."""
     with (root / "pyproject.toml").open("rb") as source:
         return str(tomllib.load(source)["project"]["version"])
 
 
 def check_tree(root: Path) -> None:
-    """Raise NotReady for files that differ from the last commit, or that git does not know."""
+    """Check that no file is uncommitted or untracked.
+
+    Raises:
+        NotReady: If there is one.
+    """
     if changed := _run(root, "git", "status", "--porcelain"):
         raise NotReady(f"commit or remove these files first:\n{changed}")
 
 
 def check_changelog(text: str, version: str, today: date) -> None:
-    """Raise NotReady unless the newest section of the changelog is this version's, with a date that has come."""
+    """Check that the newest section of the changelog has this version, and a date that is not in the future.
+
+    Raises:
+        NotReady: If not.
+    """
     sections = [(found["version"], found["date"]) for found in _HEADING.finditer(text)]
     if not sections or sections[0][0] != version:
         raise NotReady(f"the first section of CHANGELOG.md has to be '## {version} – {today.isoformat()}'")
@@ -77,16 +86,23 @@ def check_changelog(text: str, version: str, today: date) -> None:
 
 
 def run_checks(root: Path) -> None:
-    """Raise NotReady if lint or the quick tests fail."""
+    """Run the linter and the quick tests.
+
+    Raises:
+        NotReady: If one fails.
+    """
     for target in _CHECKS:
         if subprocess.run(["make", target], cwd=root, stdout=sys.stderr, check=False).returncode:
             raise NotReady(f"make {target} fails")
 
 
 def build_twice(root: Path, into: Path) -> list[Path]:
-    """The wheel and the source archive of the last commit, in ``into``.
+    """Build the wheel and the source archive of the last commit in ``into``.
 
-    Both are built twice, from copies in two folders. Raises NotReady if the bytes differ.
+    Both are built twice, from copies in two folders.
+
+    Raises:
+        NotReady: If the bytes differ.
     """
     with tempfile.TemporaryDirectory(prefix="robomark-release-") as made:
         first, second = (_build(root, Path(made) / name) for name in ("first", "second"))
@@ -100,7 +116,11 @@ def build_twice(root: Path, into: Path) -> list[Path]:
 
 
 def check_wheel(root: Path, wheel: Path, version: str) -> None:
-    """Raise NotReady unless the wheel is of this version and has exactly the committed files of its packages."""
+    """Check that the wheel has this version and exactly the committed files of its packages.
+
+    Raises:
+        NotReady: If not.
+    """
     with (root / "pyproject.toml").open("rb") as source:
         packages = tomllib.load(source)["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
     committed = set(_run(root, "git", "ls-files", "-z", "--", *packages).split("\0")) - {""}
@@ -116,7 +136,7 @@ def check_wheel(root: Path, wheel: Path, version: str) -> None:
 
 
 def build_image(root: Path) -> None:
-    """Make the container's image, where there is a program for it."""
+    """Build the container image if a program for it is installed."""
     if shutil.which("docker") is None and shutil.which("podman") is None:
         print("no image: neither docker nor podman is installed", file=sys.stderr)
         return
@@ -124,7 +144,7 @@ def build_image(root: Path) -> None:
 
 
 def _build(root: Path, folder: Path) -> list[Path]:
-    """What hatchling builds of a copy of the last commit, whose time is that of every file."""
+    """Return the files that hatchling builds from a copy of the last commit, with its time as file times."""
     tree, built = folder / "tree", folder / "dist"
     tree.mkdir(parents=True)
     archive = folder / "tree.tar"
@@ -143,7 +163,7 @@ def _run(root: Path, *command: str) -> str:
 
 
 def main() -> None:
-    """Release this checkout; exit status 1 if it is not ready."""
+    """Release this checkout. Exits with status 1 if it is not ready."""
     parser = argparse.ArgumentParser(description="Release the version that pyproject.toml names.")
     parser.add_argument("--dry-run", action="store_true", help="check and build, and set no tag")
     is_dry_run = parser.parse_args().dry_run

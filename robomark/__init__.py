@@ -1,6 +1,6 @@
 """Grade and run robot programs from Python: load an assignment and a submission, grade, render a report.
 
-Every name in ``__all__`` is stable within a minor release; everything else in the distribution may change.
+Every name in ``__all__`` is stable within a minor release. Everything else in the distribution may change.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Load an assignment and a submission, and grade the one against the other, as the command ``grade`` does."""
+"""Load assignments and submissions and grade them, as the command ``grade`` does."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ from submissions.submission import Submission
 
 
 def load_assignment(name_or_folder: str | os.PathLike[str]) -> Assignment:
-    """The assignment of the catalogue with this id, or the one in a folder.
+    """Load an assignment from the catalogue, by its id, or from a folder.
 
     Raises:
-        UsageError: there is none, or its files have mistakes.
+        UsageError: If it doesn't exist, or its files have errors.
     """
     return find_assignment(name_or_folder)
 
 
 def load_submission(path: str | os.PathLike[str], assignment: Assignment, *, student: str | None = None) -> Submission:
-    """What a student submitted to an assignment: a ``.py`` file, a notebook, a folder or a ``.zip``.
+    """Load a student's submission to an assignment: a ``.py`` file, a notebook, a folder or a ``.zip``.
 
     Args:
-        path: Where the submission is.
-        assignment: What it is marked against, which says which parts it must have.
-        student: Who submitted it; the name of the file or folder unless given.
+        path: The path of the submission.
+        assignment: The assignment, which defines the required parts.
+        student: The student's name. By default, the name of the file or folder.
 
     Raises:
-        UsageError: it cannot be read, or lacks a part that the assignment asks for.
+        UsageError: If it can't be read, or lacks a part that the assignment requires.
     """
     return read_submission(Path(path), student=student, asked=assignment.parts)
 
@@ -46,7 +46,7 @@ def load_submission(path: str | os.PathLike[str], assignment: Assignment, *, stu
 class Grader(AbstractContextManager["Grader"]):
     """Grades many submissions with the same sandboxed processes, which take a second to start.
 
-    Close it, or use it in a ``with`` statement.
+    Call ``close`` when done, or use it in a ``with`` statement.
     """
 
     def __init__(self) -> None:
@@ -54,16 +54,16 @@ class Grader(AbstractContextManager["Grader"]):
         self._secret = secret_here(load_settings())
 
     def grade(self, submission: Submission, assignment: Assignment) -> Grade:
-        """The grade of a submission, with every trial's recording.
+        """Grade a submission and return the grade, with the recording of every trial.
 
         Raises:
-            UsageError: the submission has no part that the assignment asks for.
-            HostError: this machine cannot run student code safely, or fails.
+            UsageError: If the submission has no part that the assignment requires.
+            HostError: If this machine can't run student code safely, or fails.
         """
         return grader.grade(submission, assignment, secret=self._secret, runner=self._runner)
 
     def close(self) -> None:
-        """End the processes."""
+        """Stop the processes."""
         self._runner.close()
 
     def __enter__(self) -> Self:
@@ -76,11 +76,11 @@ class Grader(AbstractContextManager["Grader"]):
 
 
 def grade(submission: Submission, assignment: Assignment) -> Grade:
-    """The grade of one submission; a ``Grader`` is quicker for many.
+    """Grade one submission and return the grade. For many submissions, a ``Grader`` is faster.
 
     Raises:
-        UsageError: the submission has no part that the assignment asks for.
-        HostError: this machine cannot run student code safely, or fails.
+        UsageError: If the submission has no part that the assignment requires.
+        HostError: If this machine can't run student code safely, or fails.
     """
     with Grader() as own:
         return own.grade(submission, assignment)

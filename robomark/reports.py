@@ -1,4 +1,4 @@
-"""Render the report on a grade, as its student or staff may see it."""
+"""Render the report on a grade, for its student or for staff."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ def render_report(
     reader: Literal["student", "staff"] = "student",
     language: str = "en",
 ) -> str:
-    """The report on a grade: one HTML page that needs no other file.
+    """Return the report on a grade as one self-contained HTML page.
 
     Args:
-        grade: What the report is on.
-        submission: What was graded, for the lines of code and the diagrams in the report.
-        reader: Who reads it; students do not see what is hidden from them.
+        grade: The grade.
+        submission: The graded submission, for the code lines and diagrams in the report.
+        reader: The reader of the report. For students, hidden content is left out.
         language: The code of the report's language, such as ``de``.
 
     Raises:
-        UsageError: there is no such language.
+        UsageError: If the language is not available.
     """
     from service.reports.html import report
     from service.reports.plots.drawn import draw_all

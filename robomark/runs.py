@@ -1,4 +1,4 @@
-"""Run a robot program without marking it, and read the replays of runs and grades."""
+"""Run robot programs without marking, and read the replays of runs and grades."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ def run_program(
     seconds: float = 60.0,
     seed: int = 0,
 ) -> Recording:
-    """Run a robot program in the sandbox and return everything that happened.
+    """Run a robot program in the sandbox and return its recording.
 
     Args:
         path: The robot program, a ``.py`` file.
-        flags: Flags of ``%sim_magic`` in the place of those in the program's first line: ``-b Lollipop -x 400``.
-        responder: ``FILE`` or ``FILE:NAME`` that answers the program's messages.
-        seconds: How much simulated time it may take.
-        seed: Of everything that is left to chance.
+        flags: Flags of ``%sim_magic`` that replace those in the program's first line, such as ``-b Lollipop -x 400``.
+        responder: ``FILE`` or ``FILE:NAME`` of the responder that answers the program's messages.
+        seconds: Limit on the simulated time.
+        seed: Seed for everything random.
 
     Raises:
-        UsageError: a file cannot be read, or a flag has a wrong value.
-        HostError: this machine cannot run student code safely, or fails.
+        UsageError: If a file can't be read, or a flag has an invalid value.
+        HostError: If this machine can't run student code safely, or fails.
     """
     options = RunOptions(flags=parse_flags("sim_magic", flags), seconds=seconds, seed=seed)
     answering = None if responder is None else standalone.find_responder(responder, options.limits)
@@ -52,10 +52,10 @@ def run_program(
 
 
 def read_replay(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The data of a replay or a report, from its page or its ``.json``, as ``docs/replay.md`` describes it.
+    """Return the data of a replay or a report, from its page or its ``.json``, as described in ``docs/replay.md``.
 
     Raises:
-        UsageError: the file cannot be read, or is no replay.
+        UsageError: If the file can't be read, or is not a replay.
     """
     file = Path(path)
     content = standalone.read_file(file)
@@ -69,7 +69,11 @@ def read_replay(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _unpacked(page: bytes) -> bytes:
-    """The data of a page. Raises ValueError, KeyError, TypeError or zlib.error where the page is no replay."""
+    """Return the data of a page.
+
+    Raises:
+        ValueError: If the page has no data, or too much. Invalid data may also raise KeyError, TypeError or zlib.error.
+    """
     found = _ISLAND.search(page)
     if found is None:
         raise ValueError("the page has no data")

@@ -1,4 +1,4 @@
-"""What tests and benchmarks share: a database server, harm done to a service, people who copy.
+"""Helpers shared by tests and benchmarks: a database server, fault injection, disguised copies.
 
-Neither of the two imports the other.
+Tests and benchmarks don't import each other.
 """

@@ -1,6 +1,6 @@
-"""Copies of Python programs as they are disguised: each takes a source and gives one that does much the same.
+"""Disguises for copies of Python programs: each takes a source and returns an altered one that does much the same.
 
-``COPYISTS`` has them by what they do; a magic line at the top stays where it is.
+``COPYISTS`` maps names to disguises. A magic line at the top stays in place.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from typing import cast
 
 
 def laid_out_anew(source: str) -> str:
-    """Other comments, other spaces, other empty lines; no docstrings."""
+    """Return the source with other comments, spaces and empty lines, and without docstrings."""
     lines = ast.unparse(_without_docstrings(ast.parse(source))).split("\n")
     return "\n".join(f"{line}\n\n{line[: len(line) - len(line.lstrip())]}# now {line.strip()}" for line in lines)
 
 
 def renamed(source: str) -> str:
-    """Every name that the source binds is another; what the responder is found by stays."""
+    """Return the source with all its own names replaced, except those that mark the responder."""
     tree = ast.parse(source)
     bound = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
     bound |= {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}
@@ -27,12 +27,12 @@ def renamed(source: str) -> str:
 
 
 def other_constants(source: str) -> str:
-    """Every number and every text is another."""
+    """Return the source with every number and text replaced."""
     return ast.unparse(ast.fix_missing_locations(_Changer().visit(ast.parse(source))))
 
 
 def reordered(source: str) -> str:
-    """In every block each second statement changes places with the one before, whether it works or not."""
+    """Return the source with the statements of every block swapped in pairs, even if it no longer works."""
     tree = ast.parse(source)
     for node in ast.walk(tree):
         for field in ("body", "orelse"):
@@ -43,12 +43,12 @@ def reordered(source: str) -> str:
 
 
 def respelled(source: str) -> str:
-    """Operands change places, comparisons are turned round, and sums of two are those of a list."""
+    """Return the source with swapped operands, reversed comparisons, and two-term sums written as ``sum`` of a list."""
     return ast.unparse(ast.fix_missing_locations(_Respeller().visit(ast.parse(source))))
 
 
 def extracted(source: str) -> str:
-    """The bodies of loops, the first halves of functions and all that is left are functions of their own."""
+    """Return the source with loop bodies, first halves of functions, and remaining code moved to functions."""
     tree = ast.parse(source)
     defined = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom | ast.FunctionDef)]
     rest = [node for node in tree.body if node not in defined]
@@ -64,7 +64,7 @@ def extracted(source: str) -> str:
 
 
 def all_of_it(source: str) -> str:
-    """One after the other, all of the above."""
+    """Return the source with all disguises except ``respelled``."""
     return extracted(reordered(other_constants(renamed(laid_out_anew(source)))))
 
 

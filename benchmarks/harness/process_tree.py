@@ -1,4 +1,4 @@
-"""What processes there are below one, read from ``/proc``; starts and ends none."""
+"""Process trees, read from ``/proc``. Starts and ends no process."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def command_line(pid: int) -> str:
-    """What the process was started as; empty when it has ended."""
+    """Return the command line of a process, or "" if it has ended."""
     try:
         return Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
     except (FileNotFoundError, ProcessLookupError):
@@ -14,7 +14,7 @@ def command_line(pid: int) -> str:
 
 
 def children(pid: int) -> list[int]:
-    """Those that the main thread of the process has started."""
+    """Return the child processes that the main thread of a process has started."""
     try:
         return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
     except (FileNotFoundError, ProcessLookupError):
@@ -22,5 +22,5 @@ def children(pid: int) -> list[int]:
 
 
 def descendants(pid: int) -> list[int]:
-    """All below the process."""
+    """Return all processes below a process."""
     return [each for child in children(pid) for each in (child, *descendants(child))]

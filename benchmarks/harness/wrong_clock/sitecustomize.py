@@ -1,4 +1,4 @@
-"""A Python whose clock is a day ahead. First on a worker's path, it shows that a worker's clock decides nothing."""
+"""Sets Python's clock a day ahead. First on a worker's import path, it tests that no decision uses a worker's clock."""
 
 import datetime
 import time
