@@ -257,7 +257,7 @@ class Bridge:
         self._reply(value)
 
     def _until(self, frame: wire.Frame) -> None:
-        """Check the condition now and then every 10 ms. The wait times out when its limit is strictly exceeded."""
+        """Check the condition at once, then every 10 ms. The wait times out when its limit is strictly exceeded."""
         wheel = self._wheel(frame["port"])
         wanted = frame["state"] == "running"
         began = self.now

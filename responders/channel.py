@@ -61,7 +61,7 @@ class ChannelOfTrial:
 
         Args:
             number: The number of the text among the robot's texts.
-            copy: Which copy of the text is answered.
+            copy: The copy of the text that is answered, from 0.
             sent: When the text was sent, in units of simulated time.
             slept: How long the responder slept before it answered, in the same units.
         """

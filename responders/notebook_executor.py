@@ -61,7 +61,7 @@ class RunPlanner(Protocol):
     """Decides what each magic does."""
 
     def standing(self) -> PlannedRun:
-        """Return the state of a robot that is not running."""
+        """Return a plan with the state of the robot while it is not running."""
 
     def call(self, call: MagicCall) -> PlannedRun:
         """Return the plan for a magic: a run, notes, or nothing."""

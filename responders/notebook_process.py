@@ -67,7 +67,7 @@ class NotebookProcess(ResponderProcess):
         self._cell = 1
         self._printed_in = 0
         self._magics = 0
-        #: Reason for a missing responder, or None if there is one. Updated after each cell.
+        #: Reason for a missing responder, or None if there is one. Updated at each magic and at the end.
         self.missing: str | None = None
         #: The cell since which there is a responder, or None if there is none.
         self.answers_since: int | None = None

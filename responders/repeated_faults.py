@@ -5,7 +5,7 @@ the same input. Its recorded output is replayed; the world, the other children a
 input is compared with the recorded one. If it differs, the trial is run again with a real child.
 
 A processor limit is replayed only if the child would certainly exceed it again. It must have sent nothing since half of
-its processor time, and must still not end at twice its limit. Near the limit, every trial is run.
+its processor time, and still nothing at twice its limit. Near the limit, every trial is run.
 """
 
 from __future__ import annotations
@@ -290,7 +290,7 @@ def _without_seed(frame: wire.Frame) -> wire.Frame:
 
 
 def _is_alone(frame: wire.Frame) -> bool:
-    """Return whether the child is not a notebook and has no agents, which would send it other data."""
+    """Return whether the child gets data only from the worker: it is no notebook and has no agents."""
     return not frame.keys() & {"cells", "agents", "agent"}
 
 

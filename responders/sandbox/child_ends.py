@@ -70,7 +70,7 @@ def killed(had_ended: bool, overran: bool, blamed: bool) -> ChildStopped:
 def place_of(unread: bytes) -> wire.Frame:
     """Return the place that a child reports when asked, from its unread output."""
     for line in reversed(unread.split(b"\n")):
-        # Packets may precede it.
+        # Packets may precede the frame.
         start = max(line.rfind(wire.BEGINNING), 0)
         with contextlib.suppress(wire.WireError):
             return wire.parse(wire.unnumbered(line[start:])[1], {"busy": wire.ROBOT["busy"]})

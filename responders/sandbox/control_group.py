@@ -15,7 +15,7 @@ from pathlib import Path
 
 from sim.errors import HostError
 
-#: Group of the worker itself, because a group with subgroups may have no processes of its own.
+#: Group of the worker itself, because a group with subgroups may not contain processes.
 _SERVICE = "robomark-service"
 _SLOT = "robomark-slot-"
 _NEEDED = frozenset({"memory", "pids"})
@@ -39,7 +39,7 @@ class _NotDelegated(Exception):
 
 
 def divide(proc: Path = _PROC) -> str | None:
-    """Create space for slot groups below this process's group, and move the process into a group of its own.
+    """Create space for slot groups below this process's group, and move the process into a separate one.
 
     Call it before the process has children. Return the reason if it fails, with nothing changed, otherwise None.
     """
@@ -100,7 +100,7 @@ class ControlGroup:
 
     @property
     def joining(self) -> list[str]:
-        """Return the command prefix that runs a process in the group."""
+        """The command prefix that runs a process in the group."""
         return ["/bin/sh", "-c", 'echo 0 > "$0" && exec "$@"', str(self._folder / "cgroup.procs")]
 
     def make_room(self, limits_bytes: int) -> None:

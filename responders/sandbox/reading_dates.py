@@ -28,7 +28,7 @@ def read_beforehand(paths: Iterable[str], listed: Iterable[str] = ()) -> str | N
     pending: list[tuple[str, int | None]] = [(path, None) for path in _and_links(paths) | alone]
     while pending:
         path, rule = pending.pop()
-        # Files may disappear or be unreadable for the worker, and then they are for its children too.
+        # Files may disappear, or be unreadable. Children can't read those either.
         with contextlib.suppress(OSError):
             status = os.lstat(path)
             mode = status.st_mode

@@ -215,7 +215,7 @@ class Child:
         return frame
 
     def _acts(self, data: bytes) -> list[packed.Act]:
-        """Return the actions of the packet that begins with ``data``. They are not stored, so they cost nothing."""
+        """Return the actions of the packet that begins with ``data``. They are not stored, so no bytes are charged."""
         while len(data) < packed.HEADER_BYTES:
             data += self._more()
         size, number = packed.read_header(data)

@@ -12,7 +12,7 @@ from responders.sandbox.processor import ALLOWED
 from sim.processes import python_command, same_arithmetic
 
 #: Start of a command with fixed memory addresses, because objects are hashed by address. The setting is inherited, so
-#: it is made in a process of its own, not in the worker. An exec that restores root's capabilities resets it;
+#: it is made in a separate process, not in the worker. An exec that restores root's capabilities resets it;
 #: bubblewrap's root process keeps the right to give them up (SECBIT_NOROOT) only for this.
 _FIXED_ADDRESSES = (
     sys.executable,

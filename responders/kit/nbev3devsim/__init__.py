@@ -1,1 +1,1 @@
-"""What a responder imports in the place of the notebook's simulator widget."""
+"""Modules for responders that replace the notebook's simulator widget."""

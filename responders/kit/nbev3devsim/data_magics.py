@@ -15,7 +15,7 @@ from nn_tools.sensor_data import generate_bw_image, get_sensor_image_pair
 
 
 class RobotState:
-    """What the simulator knows of the robot as it stands, in ``state``."""
+    """The robot's current state in the simulator, as ``state``."""
 
     def __init__(self, state: dict[str, Any]) -> None:
         self.state = dict(state)

@@ -60,7 +60,7 @@ class RoboSim:
         return self._rows[entry, mode]
 
     def collect(self, data: list[list[Any]], images: list[str]) -> None:
-        """What the robot has logged: each of ``data`` is name, value, the program's time or None, and the time."""
+        """Add the robot's log entries: each of ``data`` is name, value, the program's time or None, and the time."""
         for name, value, simtime, seconds in data:
             moment = _EPOCH + datetime.timedelta(seconds=seconds)
             self.results_log.append({"index": moment, "simtime": simtime, name: value})

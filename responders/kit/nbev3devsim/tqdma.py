@@ -33,11 +33,11 @@ class tqdm:
         return None
 
     def update(self, n: float = 1) -> None:
-        """Count on."""
+        """Advance the count by ``n``."""
         self.n += n
 
     def reset(self, total: float | None = None) -> None:
-        """Begin again."""
+        """Reset the count."""
         self.n = 0
         self.total = self.total if total is None else total
 
@@ -69,7 +69,7 @@ def _each_of(function: Any, *iterables: Iterable[Any], **_: Any) -> list[Any]:
 
 
 tqdm_notebook = tqdma = tqdm
-#: What notebooks import of tqdm's modules.
+#: Names of tqdm's modules that notebooks import.
 BARS = {
     **dict.fromkeys(("tqdm", "tqdm_notebook"), tqdm),
     **dict.fromkeys(("trange", "tnrange"), trange),

@@ -18,7 +18,7 @@ _SHOWING = ("matplotlib", "seaborn", "IPython", "ipywidgets", "tqdm", "plotly", 
 
 
 class Unseen:
-    """Whatever is asked of it, it gives another of its kind."""
+    """Stand-in object: every call, attribute or item returns another one."""
 
     def __call__(self, *args: Any, **kwargs: Any) -> Unseen:
         return Unseen()
@@ -32,7 +32,7 @@ class Unseen:
         return Unseen()
 
     def __setitem__(self, key: Any, value: Any) -> None:
-        """Forgotten."""
+        """Ignore the value."""
 
     def __iter__(self) -> Iterator[Unseen]:
         # As in ``figure, axes = plt.subplots()``.
@@ -69,7 +69,7 @@ def _subplots(nrows: int = 1, ncols: int = 1, *args: Any, squeeze: bool = True, 
     return Unseen(), axes.item() if axes.size == 1 else axes.squeeze()
 
 
-#: What is unpacked into something else than two.
+#: Functions that don't return a single stand-in.
 _RETURNS: dict[str, Any] = {
     "subplots": _subplots,
     "plot": lambda *args, **kwargs: [Unseen()],
@@ -103,12 +103,12 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
 
 
 def _interact(function: Any = None, *args: Any, **kwargs: Any) -> Any:
-    """As a decorator or not, it gives back the function that a widget would call."""
+    """Return the function that a widget would call, also when used as a decorator."""
     return function if callable(function) else lambda decorated: decorated
 
 
 def display(*values: Any, **kwargs: Any) -> None:
-    """What a notebook shows becomes what it prints."""
+    """Print the values that a notebook would display."""
     for value in values:
         print(repr(value))
 

@@ -209,7 +209,7 @@ def test_and_report_image_data(
     test_labels: Any,
     loss: bool = False,  # noqa: PT028
 ) -> None:
-    """The same for images, or for arrays of them."""
+    """Print the classification report and the confusion matrix for images, or arrays of them."""
     rows = [np.asarray(image).ravel() for image in test_images]
     test_and_report(MLP, normalize(rows, norm="max"), test_labels)
 
@@ -320,7 +320,7 @@ def cnn_load(
 
 
 def cnn_get_details(cnn: CNN, report: bool = False) -> Details | None:
-    """What goes in and comes out, whether that is floats, and height and width; only printed with ``report``."""
+    """Return input, output, whether inputs are floats, height and width; with ``report``, print only."""
     details = _details(cnn)
     if not report:
         return details
@@ -345,7 +345,7 @@ def cnn_rank_results(results: NDArray[Any], tf_labels: Sequence[str] | None = No
 def cnn_test_with_image(
     cnn: CNN, img: Image.Image, tf_labels: Sequence[str] = "", retval: bool = False, rank: int | None = None
 ) -> NDArray[Any] | None:
-    """What the network makes of the image in its own size, with ``retval``; prints the ``rank`` likeliest classes."""
+    """Return the network's output for the resized image, with ``retval``. Prints the ``rank`` likeliest classes."""
     interpreter, labels = cnn
     inputs, outputs, is_float, height, width = _details(cnn)
     shape, kind = inputs[0]["shape"], inputs[0]["dtype"]

@@ -50,7 +50,7 @@ def report_light_sensor(state: Any, side: str = "left") -> None:
 
 
 def sensor_image_focus(img: Image.Image, centre: Box = _FOCUS, resize: Any = None, bw: bool = False) -> Image.Image:
-    """The part of a sensor image that lies inside the round window: 14 x 14 pixels unless told otherwise."""
+    """The part of a sensor image that lies inside the round window: 14 x 14 pixels by default."""
     size = img.size
     img = img.crop(centre)
     if resize is not None:
@@ -251,7 +251,7 @@ def get_image_from_state(
 def preview_state_image(
     data: str, size: tuple[int, ...] = (20, 20, 4), mode: str = "RGB", zoom: bool = True, retval: bool = True
 ) -> Image.Image | None:
-    """The same unless ``retval`` is off; it is shown in a notebook, and not here."""
+    """Return the image in a sensor's raw string, or None with ``retval`` off. Shown only in a notebook."""
     return get_image_from_state(data, size, mode) if retval else None
 
 

@@ -1,4 +1,4 @@
-"""Networks of one's own from files that are no pickles: plain weights (``.npz``) and ONNX.
+"""Your own networks from files that are no pickles: plain weights (``.npz``) and ONNX.
 
 Both answer to ``predict`` and ``predict_proba`` as scikit-learn's do. Nothing here trains a network.
 """

@@ -36,7 +36,7 @@ class AgentRole(ResponderRole):
         return self._find()(*json.loads(asked["arguments"]), **json.loads(asked["named"]))
 
     def _find(self) -> Callable[..., Any]:
-        """Return the agent's function: the one with its name, else the only ``*_parser``, else the only function."""
+        """Return the agent's function: the one with its name, else the only ``*_<name>``, else the only function."""
         name = self._own_name
         own = self._namespace.get(name)
         if callable(own):

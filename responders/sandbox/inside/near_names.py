@@ -57,7 +57,7 @@ def meant_by(error: BaseException) -> str:
         found = _CANNOT_IMPORT.search(str(error)) if isinstance(error, ImportError) else None
         return _near(found[1], dir(sys.modules.get(found[2])), 0.7) if found else ""
     except Exception:
-        # A suggestion would call code of the student's objects.
+        # ``dir`` may run code of the student's objects, which may raise anything.
         return ""
 
 

@@ -214,7 +214,7 @@ class NotebookRole(ResponderRole):
         return None
 
     def _fix_msg(self) -> None:
-        """Set ``msg`` to the last text received, unless the notebook has its own global ``msg``."""
+        """Note whether the notebook has its own global ``msg``. Otherwise ``msg`` is set to each text received."""
         mine = self._given_msg is not None and self._namespace.get("msg") == self._given_msg
         self._defines_msg = "msg" in self._namespace and not mine
 

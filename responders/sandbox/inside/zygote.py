@@ -29,8 +29,8 @@ _STATUS, _USED = ctypes.byref(_ENDED), ctypes.byref(_ENDED, 8)
 _ANY_CHILD = b"\xff" * 4  # -1 for wait4(2)
 _PRACTICE = 2
 _wait4 = ctypes.CDLL(None).wait4
-#: Environment variables for student code, besides a home. Libraries that are loaded late must not start threads or use
-#: other kernels either.
+#: Environment variables for student code, in addition to a home. Libraries that are loaded late must not start threads
+#: or use other kernels either.
 _KEPT = (
     "LANG",
     "NPY_DISABLE_CPU_FEATURES",

@@ -216,7 +216,7 @@ def bound_by(node: ast.AST) -> set[str]:
 def made_in(tree: ast.Module) -> set[str]:
     """Return the names that a module gives to its own functions, classes and values.
 
-    Excludes names imported under their own name, and instances of imported classes.
+    Excludes names imported under their own name, and instances of classes that it doesn't define.
     """
     nodes = list(ast.walk(tree))
     made = {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)}

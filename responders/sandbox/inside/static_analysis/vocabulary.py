@@ -37,7 +37,7 @@ CONSTRUCTS: dict[type[ast.AST], str] = {
 TAKES_NAME = {"getattr": 1, "__getattribute__": -1, "__getattr__": -1}
 #: Calls whose arguments are all names to look up.
 TAKES_NAMES = frozenset({"attrgetter", "methodcaller", "itemgetter"})
-#: Calls that look up texts in these positional arguments, and in their keyword arguments.
+#: Calls that look up a text in these positional arguments, then keywords that do so in every call.
 MAY_TAKE_NAME: dict[str, tuple[int, ...]] = {
     **dict.fromkeys(("agg", "aggregate", "apply"), (0,)),
     "NamedAgg": (1,),

@@ -281,7 +281,7 @@ class Walk:
         self._parts(node, here)
 
     def _ask_table(self, table: ast.expr, key: ast.expr, node: ast.AST, here: _Here) -> None:
-        """Add the name looked up in a table (``globals()["say"]``), or doubt if the text doesn't show it."""
+        """Add the name looked up in a table (``globals()["say"]``), if the text shows both."""
         named = table.func if isinstance(table, ast.Call) else table
         names = self._naming.names(named)
         text = text_of(key)
