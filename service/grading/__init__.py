@@ -1,1 +1,1 @@
-"""From a submission and an assignment to a grade: the plan, the runs, and what they are worth."""
+"""Grading of one submission against one assignment: run plan, trial runs, and marks."""

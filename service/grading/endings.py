@@ -1,4 +1,4 @@
-"""How a trial ended, in the few words that fit a table; what is said of it in sentences is ``reports.words``'."""
+"""Short labels for verdicts, as used in tables. Full sentences about verdicts are in ``reports.words``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from types import MappingProxyType
 from service.language import translatable
 from sim.recording import Verdict
 
-#: Every verdict has some.
+#: Every verdict has a label.
 ENDED: Mapping[Verdict, str] = MappingProxyType(
     {
         Verdict.FINISHED: translatable("finished"),

@@ -1,7 +1,7 @@
-"""Grades the example submissions of an assignment and compares what they get with what they must get.
+"""Grading of an assignment's example submissions, and comparison with the expected results.
 
-It is how an assignment is tested: the reference gets full marks, each wrong solution loses the right ones. It
-prints nothing.
+This is how an assignment is tested: the reference must get full marks, and each wrong solution must lose the expected
+ones. The module prints nothing.
 """
 
 from __future__ import annotations
@@ -27,38 +27,38 @@ from submissions.assignment.reader import find_assignment
 
 @dataclass(frozen=True, slots=True)
 class ExampleResult:
-    """What one example got. ``problems`` has a sentence for each thing that is not as expected.
+    """The result of one example. ``problems`` has one sentence for each difference from the expected result.
 
-    ``unwritten`` is what ``expected.toml`` could say of it, and does not yet.
+    ``unwritten`` is the entry that ``expected.toml`` does not have yet.
     """
 
     name: str
-    marks: Decimal | None  # None when it was refused
+    marks: Decimal | None  # None if it was rejected
     lost: tuple[str, ...]  # ids of the criteria without full marks
-    seconds: float  # of real time
+    seconds: float  # real time
     problems: tuple[str, ...]
     unwritten: Expectation | None = None
-    marked: MarkedSubmission | None = None  # for statistics; None when it was refused
+    marked: MarkedSubmission | None = None  # for statistics; None if it was rejected
 
 
 @dataclass(frozen=True, slots=True)
 class ComparedMeasure:
-    """A measure of the reference beside what programs reach in the original simulator."""
+    """A measure of the reference solution, compared with the value from the original simulator."""
 
     original: OriginalMeasure
-    value: float | None  # None when the reference measured nothing of that name
+    value: float | None  # None if the reference has no measure of that name
     unit: str = ""
 
     @property
     def agrees(self) -> bool:
-        """Whether the reference comes near enough to the original; not so where it measured nothing."""
+        """Return whether the reference is close enough to the original. False if it has no such measure."""
         near = self.original.within * max(abs(self.original.value), 1e-9)
         return self.value is not None and abs(self.value - self.original.value) <= near + 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class CheckedAssignment:
-    """All examples of an assignment, the reference first."""
+    """The results of all examples of an assignment, the reference first."""
 
     assignment: Assignment
     examples: tuple[ExampleResult, ...]
@@ -66,19 +66,19 @@ class CheckedAssignment:
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """A sentence for each thing that is wrong: with the examples first, then with the measures."""
+        """One sentence for each problem: first those of the examples, then those of the measures."""
         of_examples = (problem for example in self.examples for problem in example.problems)
         of_measures = (problem for measure in self.measures for problem in _measure_problems(measure))
         return (*of_examples, *of_measures)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence for each thing that is allowed, but makes marks easy to guess."""
+        """One sentence for each setting that is allowed but makes marks easy to guess."""
         return tuple(find_guessable_reports(self.assignment))
 
     @property
     def unwritten(self) -> Mapping[str, Expectation]:
-        """What ``expected.toml`` does not say yet, by example; nothing of an example with another problem."""
+        """Expectations missing from ``expected.toml``, by example. Examples with other problems are left out."""
         return {
             each.name: each.unwritten
             for each in self.examples
@@ -86,16 +86,17 @@ class CheckedAssignment:
         }
 
     def written(self) -> CheckedAssignment:
-        """As it is once ``expected.toml`` says what it did not."""
+        """Return the result as it will be once ``expected.toml`` contains the missing expectations."""
         told = self.unwritten
         examples = (replace(each, problems=()) if each.name in told else each for each in self.examples)
         return replace(self, examples=tuple(examples))
 
 
 def check_examples(name_or_path: str, *, runner: TrialRunner) -> CheckedAssignment:
-    """Grade every example of the assignment. An assignment without examples has none to be wrong.
+    """Grade every example of the assignment. An assignment without examples has no problems.
 
-    Raises AssignmentError for an assignment, or an ``expected.toml``, that cannot be used.
+    Raises:
+        AssignmentError: The assignment or its ``expected.toml`` is invalid.
     """
     assignment = find_assignment(name_or_path)
     wanted = expected(name_or_path)
@@ -113,7 +114,7 @@ def check_examples(name_or_path: str, *, runner: TrialRunner) -> CheckedAssignme
 
 
 def example_names(name_or_path: str) -> tuple[str, ...]:
-    """The examples' names, the reference first, then sorted; none where there are no examples."""
+    """Return the names of the examples, the reference first, then sorted. Empty if there are no examples."""
     try:
         folder = examples(name_or_path)
     except UsageError:
@@ -149,13 +150,13 @@ def _no_table(name: str) -> str:
 
 
 def _found(graded: Grade, lost: tuple[str, ...]) -> Expectation:
-    """What is to be expected if the example got what it must."""
+    """Return the expectation that matches this grade."""
     earns = {result.id: result.marks for result in graded.criteria if result.id in lost}
     return Expectation(marks=graded.marks, verdict=graded.verdict, loses=lost, earns=earns)
 
 
 def _usual(name: str, assignment: Assignment) -> Expectation | None:
-    """What an example must get that nothing is written down for: full marks for the reference."""
+    """Return the default expectation of an example without an entry: full marks for the reference, else None."""
     return Expectation(marks=assignment.max_marks) if name == REFERENCE else None
 
 
@@ -187,7 +188,7 @@ def _differences(graded: Grade, lost: tuple[str, ...], wanted: Expectation | Non
 
 
 def _fault(graded: Grade) -> str:
-    """What went wrong first, as far as somebody said."""
+    """Return the first reported fault as a sentence part; empty if there is none."""
     faults = [fault for trial in graded.trials for fault in faults_of(trial.recording)]
     return f"; {fault_words(faults[0])}" if faults else ""
 
@@ -198,7 +199,7 @@ def _lost_words(graded: Grade) -> str:
 
 
 def _compared(original: OriginalMeasure, graded: Grade) -> ComparedMeasure:
-    """The first measure of that name, over criteria and trials in their order."""
+    """Compare the original with the first measure of that name, in the order of criteria and trials."""
     for result in graded.criteria:
         for evidence in result.evidence:
             for measure in evidence.measures:

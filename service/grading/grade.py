@@ -1,6 +1,6 @@
 """The result of grading one submission: marks, verdicts, evidence. Every output is a pure function of it.
 
-Nothing here judges or simulates; ``judge.py`` and ``grader.py`` make grades, reports and the store keep them.
+This module contains data only. ``judge.py`` and ``grader.py`` create grades; reports and the store read them.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from submissions.seeds import PUBLIC
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """What became of the images that were sent: ``sent`` is the sum of the four that follow it.
+    """Counts of the images that were sent. ``sent`` is the sum of the next four fields.
 
-    ``duplicates`` are answers beyond the one that counts. Accuracy is over ``counted`` images (or patterns) and
-    ``missing`` ones, which are wrong.
+    ``duplicates`` are answers after the one that counts. Accuracy is calculated over ``counted`` images (or patterns)
+    and ``missing`` ones. Missing ones count as wrong.
     """
 
     sent: int
@@ -31,12 +31,12 @@ class Counts:
     duplicates: int = 0
     counted: int = 0
     missing: int = 0
-    of: str = "images"  # what is counted: images, or the patterns that several images show
+    of: str = "images"  # the unit: images, or patterns that several images show
 
 
 @dataclass(frozen=True, slots=True)
 class Confidence:
-    """The mean confidence, 0 to 1, of the answers that were right and of those that were wrong, and how many said."""
+    """Mean confidence (0 to 1) of the correct and of the wrong answers, and how many answers had one."""
 
     right: float | None
     n_right: int
@@ -46,9 +46,9 @@ class Confidence:
 
 @dataclass(frozen=True, slots=True)
 class Accuracy:
-    """How often a classifier was right, with the 95 % Wilson interval, and who was taken for whom.
+    """Accuracy of a classifier, with its 95 % Wilson interval and confusion matrix.
 
-    ``confusion`` maps (truth, answer) to a count; the answer is None where none was given or it could not be read.
+    ``confusion`` maps (truth, answer) to a count. The answer is None if there was none or it could not be read.
     """
 
     value: float
@@ -73,22 +73,22 @@ class Level:
 
     @property
     def value(self) -> float:
-        """The part of the images that was named rightly, 0 to 1; 0 without images."""
+        """Return the fraction of images identified correctly, 0 to 1; 0 without images."""
         return self.right / self.n if self.n else 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class AccuracyCurve:
-    """The accuracy along one swept condition (a key of ``submissions.sweep.CONDITIONS``), ascending."""
+    """The accuracy along one swept condition (a key of ``submissions.sweep.CONDITIONS``), in ascending order."""
 
     along: str
     levels: tuple[Level, ...]
-    asked: float | None = None  # the accuracy that marks are given for, where a criterion says one
+    asked: float | None = None  # the required accuracy, if the criterion has one
 
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """One image the robot sent, what it showed and what was answered."""
+    """One image that the robot sent, its true label and the answer."""
 
     image: Image
     truth: str
@@ -99,7 +99,7 @@ class Prediction:
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """What was measured on the way to a judgement: ``lap time``, 47.3, ``s``."""
+    """A measured value that a judgement is based on: ``lap time``, 47.3, ``s``."""
 
     name: str
     value: float
@@ -108,7 +108,7 @@ class Measure:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """When and where a criterion was decided, so that a report can point at it."""
+    """The time and place at which a criterion was decided, for reports to refer to."""
 
     trial: int  # index into the grade's trials
     passed: bool
@@ -120,9 +120,9 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What is told of a criterion while some of its trials are not shown: as if there were the visible ones alone.
+    """The feedback on a criterion that has hidden trials, made from its visible trials only.
 
-    A student can put into a hidden trial's numbers and words what the robot saw there.
+    Students could otherwise encode in numbers and texts what the robot saw in a hidden trial.
     """
 
     message: str
@@ -132,17 +132,17 @@ class Shown:
 
 @dataclass(frozen=True, slots=True)
 class SetByHand:
-    """That an instructor set a criterion's marks or excused it, and what the grader had given."""
+    """A staff adjustment of a criterion's marks, or its exclusion, with the marks that the grader gave."""
 
-    graded: Decimal | None  # None where it could not be judged
-    worth: Decimal  # the most there are for it, where nobody excuses it
+    graded: Decimal | None  # None if it could not be judged
+    worth: Decimal  # maximum marks before it was excused
     reason: str
     excused: bool
 
 
 @dataclass(frozen=True, slots=True)
 class WrittenComment:
-    """What an instructor wrote to the student; an empty ``criterion`` is for all of the submission."""
+    """A comment from an instructor to the student. If ``criterion`` is empty, it is about the whole submission."""
 
     criterion: str
     text: str
@@ -150,31 +150,31 @@ class WrittenComment:
 
 @dataclass(frozen=True, slots=True)
 class CriterionResult:
-    """One marked line; an excused one is out of no marks."""
+    """The result of one criterion. An excused criterion has a maximum of 0 marks."""
 
     id: str
     title: str
     marks: Decimal
     max_marks: Decimal
-    message: str  # what was expected, what happened; of all trials, so for staff where ``shown`` is something else
+    message: str  # expected and observed, over all trials; staff only if ``shown`` differs
     visibility: str = "visible"
     evidence: tuple[Evidence, ...] = ()
     accuracy: Accuracy | None = None
     predictions: tuple[Prediction, ...] = ()
     curves: tuple[AccuracyCurve, ...] = ()
-    shown: Shown | None = None  # None where every trial is visible
-    unjudged: str = ""  # why it could not be judged, for staff; empty if it was
-    for_staff: str = ""  # where somebody should look, which no student is told
-    set_by_hand: SetByHand | None = None  # None of a grade as graded
+    shown: Shown | None = None  # None if every trial is visible
+    unjudged: str = ""  # why it could not be judged, for staff; otherwise empty
+    for_staff: str = ""  # what staff should check; not shown to students
+    set_by_hand: SetByHand | None = None  # None if the marks are as graded
 
     @property
     def worth(self) -> Decimal:
-        """The most marks there are for it, whoever excused it."""
+        """The maximum marks of the criterion, even if it is excused."""
         return self.max_marks if self.set_by_hand is None else self.set_by_hand.worth
 
     @property
     def excused(self) -> bool:
-        """Whether neither its marks nor the most there are count."""
+        """Return whether the criterion is excused: neither its marks nor its maximum count."""
         return self.set_by_hand is not None and self.set_by_hand.excused
 
 
@@ -189,18 +189,18 @@ class TrialResult:
     motor_noise: float
     visibility: str
     recording: Recording
-    sweep: tuple[tuple[str, float], ...] = ()  # the condition that is swept and its level in this trial
-    place: int = 0  # which of the scenario's poses it started from, whatever noise or the program made of that
+    sweep: tuple[tuple[str, float], ...] = ()  # the swept condition and its level in this trial
+    place: int = 0  # index of the scenario's pose, before noise and before the program ran
 
     @property
     def verdict(self) -> Verdict:
-        """How the run ended, as recorded."""
+        """The verdict of the run, as recorded."""
         return verdict_of(self.recording)
 
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """What all trials may cost together and, for staff, what they did."""
+    """The shared limits of all trials and, for staff, the resources that they used."""
 
     limits: JobLimits
     spent: Spent | None = None
@@ -208,7 +208,7 @@ class Cost:
 
 @dataclass(frozen=True, slots=True)
 class Grade:
-    """The marks of one job. ``sandbox`` says which layers stood around the student's code."""
+    """The marks of one job. ``sandbox`` lists the sandbox layers that were active."""
 
     assignment: str
     assignment_title: str
@@ -220,30 +220,30 @@ class Grade:
     sandbox: str
     grader_version: str
     notes: tuple[str, ...] = ()
-    missing: str = ""  # the file that was asked for and not submitted; what needs it has no marks
-    hints: tuple[str, ...] = ()  # what probably cost marks, the most telling first; no mark depends on them
-    secret_sha256: str = PUBLIC.sha256  # of the secret that the seeds were hashed from
-    cost: Cost | None = field(default=None, compare=False)  # measured, so that no two runs need agree
+    missing: str = ""  # a required file that was not submitted; criteria that need it get no marks
+    hints: tuple[str, ...] = ()  # likely reasons for lost marks, best first; they don't affect marks
+    secret_sha256: str = PUBLIC.sha256  # hash of the secret that the seeds are derived from
+    cost: Cost | None = field(default=None, compare=False)  # measured, so it may differ between two runs
     comments: tuple[WrittenComment, ...] = ()
 
     @property
     def marks(self) -> Decimal:
-        """The marks of all criteria together."""
+        """The total marks of all criteria."""
         return sum((result.marks for result in self.criteria), Decimal(0))
 
     @property
     def max_marks(self) -> Decimal:
-        """The marks that all criteria together could have given, but for those that are excused."""
+        """The maximum total marks, without excused criteria."""
         return sum((result.max_marks for result in self.criteria), Decimal(0))
 
     @property
     def worth(self) -> Decimal:
-        """The marks that all criteria together could have given, those that are excused included."""
+        """The maximum total marks, with excused criteria."""
         return sum((result.worth for result in self.criteria), Decimal(0))
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict of the first faulty trial, ``finished`` if there is none."""
+        """The verdict of the first trial that did not finish; ``finished`` if all did."""
         return next((t.verdict for t in self.trials if t.verdict is not Verdict.FINISHED), Verdict.FINISHED)
 
     @property
@@ -253,12 +253,12 @@ class Grade:
 
     @property
     def recognition(self) -> CriterionResult | None:
-        """The first marked criterion with an accuracy and not excused; without one the first that is for practice."""
+        """The first marked criterion with an accuracy that is not excused; if there is none, the first unmarked one."""
         measured = [each for each in self.criteria if each.accuracy is not None and not each.excused]
         return next((result for result in measured if result.worth), measured[0] if measured else None)
 
 
 def unjudged_notes(criteria: Sequence[CriterionResult]) -> tuple[str, ...]:
-    """Return the note that some of these criteria could not be judged, if so."""
+    """Return a note on the number of criteria that could not be judged; empty if all were judged."""
     count = sum(bool(result.unjudged) for result in criteria)
     return (f"{count} of {len(criteria)} criteria could not be judged; staff will look at it",) if count else ()

@@ -1,6 +1,6 @@
-"""Grades one submission against one assignment: every trial run, every criterion judged.
+"""Grading of one submission against one assignment: runs every trial and judges every criterion.
 
-A plain function that knows no queue and no database; the command line, the workers and the tests all call it.
+``grade`` is a plain function without queue or database. The command line, the workers and the tests call it.
 """
 
 from __future__ import annotations
@@ -39,21 +39,21 @@ _OBSERVE_SECONDS = 1.0
 
 @dataclass(frozen=True, slots=True)
 class GradingProgress:
-    """How far a grading has come."""
+    """The progress of a grading, in trials."""
 
     trials_done: int
     trials: int
 
 
 class Observe(Protocol):
-    """Called after each trial and about once a second; raises Cancelled to stop the grading."""
+    """Callback for progress, called after each trial and about once a second. Raises Cancelled to stop the grading."""
 
     def __call__(self, progress: GradingProgress, /) -> None:
-        """Take in how far it is, soon, for the grading waits; raise Cancelled to stop it."""
+        """Process the progress quickly, because grading waits. Raise Cancelled to stop the grading."""
 
 
 def _nobody(progress: GradingProgress) -> None:
-    """The default observer."""
+    """Ignore the progress. The default observer."""
 
 
 def grade(
@@ -64,12 +64,14 @@ def grade(
     observe: Observe | None = None,
     runner: TrialRunner | None = None,
 ) -> Grade:
-    """The marks of ``submission`` in the worlds of the installation that has this secret.
+    """Grade ``submission`` with seeds derived from ``secret``, the secret of the installation.
 
-    Without a ``runner`` one is made for this grading and closed afterwards.
+    Without a ``runner``, one is created for this grading and closed afterwards.
 
-    Raises UsageError when no part is there that the assignment asks for, HostError when this machine fails,
-    and whatever ``observe`` raises.
+    Raises:
+        UsageError: The submission has none of the parts that the assignment needs.
+        HostError: This machine failed.
+        Exception: Whatever ``observe`` raises.
     """
     if runner is None:
         with TrialRunner() as own:
@@ -111,7 +113,7 @@ def grade(
 def _run_trials(
     plan: RunPlan, trials: Sequence[Trial], runner: TrialRunner, meter: JobMeter, watch: _Watch
 ) -> list[TrialResult]:
-    """The results in the order of ``trials``, whatever the order in which they are run."""
+    """Run the trials and return the results in the order of ``trials``, which may differ from the order of the runs."""
     if not all(map(_is_visible, trials)):
         runner.check_forgetting()
     run: dict[int, TrialResult] = {}
@@ -119,7 +121,7 @@ def _run_trials(
     for number in _run_order(trials, plan.child_seed):
         trial = trials[number]
         if not _is_visible(trial):
-            # Visible trials ran within a limit of their own, which does not tell how many hidden ones there are.
+            # Visible trials run within their own limit, so that it does not reveal the number of hidden trials.
             meter.extend(_limits_of_job(plan.assignment, len(trials)))
         run[number] = TrialResult(
             trial.scenario.id,
@@ -137,7 +139,7 @@ def _run_trials(
 
 
 def _recorded(trial: Trial, plan: RunPlan, runner: TrialRunner, meter: JobMeter, repeats: RepeatedFaults) -> Recording:
-    """One trial, without the children that would only do again what they did before."""
+    """Run one trial, without any child process that would only repeat an earlier fault."""
     spec, obstacles, before = _spec(trial, plan), plan.assignment.world.obstacles, meter.spent
     with runner.sparing(repeats):
         try:
@@ -149,10 +151,10 @@ def _recorded(trial: Trial, plan: RunPlan, runner: TrialRunner, meter: JobMeter,
 
 
 def _run_order(trials: Sequence[Trial], own_seed: int) -> Sequence[int]:
-    """The numbers of the trials as they are run: visible ones first, and else in an order of each submission's own.
+    """Return the order in which to run the trials: visible ones first, otherwise shuffled for each submission.
 
-    So what counts processes or looks at a clock does not tell a trial again, and what is shown was there before the
-    first hidden trial was; nor does the order of the visible ones depend on hidden ones.
+    This way, code that counts processes or reads a clock cannot recognise a trial. Visible results are complete before
+    the first hidden trial runs, and the order of visible trials does not depend on hidden ones.
     """
     chance = Stream(own_seed, "order of trials")
     visible = [number for number, trial in enumerate(trials) if _is_visible(trial)]
@@ -166,7 +168,7 @@ def _is_visible(trial: Trial) -> bool:
 
 
 def _spared_notes(results: Sequence[TrialResult]) -> tuple[str, ...]:
-    """By which rule trials have been spared a child; how many hidden ones were is not told."""
+    """Return notes on visible trials that ran without a child. Hidden trials are not counted."""
     shown = [result.recording.notes for result in results if result.visibility == "visible"]
     counts = [(note, sum(note in notes for notes in shown)) for note in SPARED.values()]
     return tuple(
@@ -183,7 +185,7 @@ def _limits_of_job(assignment: Assignment, trials: int) -> JobLimits:
 
 
 class _Watch:
-    """Turns the many heartbeats of a trial into one call of the observer a second."""
+    """Reduces the frequent heartbeats of a trial to one observer call a second."""
 
     def __init__(self, observe: Callable[[GradingProgress], None], trials: int) -> None:
         self._observe = observe
@@ -212,7 +214,7 @@ def _floor(world: WorldSpec, seed: int) -> Floor:
 
 @functools.lru_cache(maxsize=2)
 def _own_floor(name: str, image: bytes) -> Floor:
-    """Read once for all trials: cameras know an image again by its identity."""
+    """Load the floor image once for all trials. Cameras cache images by identity."""
     return floor_from_image(name, image)
 
 
@@ -243,7 +245,7 @@ def _spec(trial: Trial, plan: RunPlan) -> TrialSpec:
 
 
 def _partner(trial: Trial, plan: RunPlan) -> PartnerSpec | None:
-    """The second robot; a program of the assignment's own may run until the time is up."""
+    """Return the second robot, if there is one. A program from the assignment may run until the time limit."""
     if plan.second_program is None or trial.second_pose is None:
         return None
     given = plan.assignment.parts.second_program in plan.assignment.given_parts

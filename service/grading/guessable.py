@@ -1,4 +1,4 @@
-"""Finds criteria that a program passes at most poses without a look, because these poses share one answer."""
+"""Detection of criteria that a constant answer passes at most poses."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from submissions.criteria.reporting import Reports
 def find_guessable_reports(assignment: Assignment) -> Iterator[str]:
     """Yield a sentence for each ``reports`` criterion of which one row fits more than half of the poses.
 
-    A criterion with the same row for all poses, or with no rows of its own, does not count: it asks for no difference.
+    Criteria with the same row for all poses, or without rows, are skipped: they don't ask for a difference.
     """
     for criterion in assignment.criteria:
         if not isinstance(criterion, Reports):
@@ -33,7 +33,7 @@ def find_guessable_reports(assignment: Assignment) -> Iterator[str]:
 
 
 def _labels(assignment: Assignment, criterion: Reports) -> Sequence[Row]:
-    """Return the row of each pose; none where each trial has a floor of its own, or the floor has no labels."""
+    """Return the row of each pose. Empty if the floor differs between trials or has no labels."""
     world = assignment.world
     if world.image is not None or (world.sheet is None and world.background in seeded_names()):
         return ()

@@ -1,6 +1,6 @@
-"""Tables of what students get wrong: what to do about an error, how the brick is used, and where its parts are.
+"""Tables of common student mistakes: advice on errors, usage of the brick, and the ports of its parts.
 
-Only data; the rules that look things up here are in the other ``hint_`` modules.
+Data only. The rules that use these tables are in the other ``hint_`` modules.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
-#: What to do about an error. Each pattern is searched in the error, and after a line feed the line that it is in; in
-#: an advice ``\g<1>`` is what the pattern's first group has found.
+#: Advice on errors. Each pattern is searched in the error message plus a line feed and the line of code. In an advice,
+#: ``\g<1>`` is the first group of the pattern.
 ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
     (re.compile(error), advice)
     for error, advice in (
@@ -197,7 +197,7 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
     )
 )
 
-#: Modules that students know from elsewhere and that are not there.
+#: Modules that students know from elsewhere and that are not available.
 NOT_AVAILABLE = frozenset(
     {
         "cv2",
@@ -216,7 +216,7 @@ NOT_AVAILABLE = frozenset(
     }
 )
 
-#: How the calls of a pair of motors are written, by the object's name and the method's.
+#: The correct form of calls to a pair of motors, by object and method.
 USAGE: Mapping[str, str] = MappingProxyType(
     {
         "tank_drive.on": "tank_drive.on(left speed, right speed)",
@@ -230,7 +230,7 @@ USAGE: Mapping[str, str] = MappingProxyType(
     }
 )
 
-#: Properties of sensors and motors: the least and the most that they read, and the unit.
+#: Properties of sensors and motors: minimum, maximum and unit.
 READINGS: Mapping[str, tuple[float, float, str]] = MappingProxyType(
     {
         "reflected_light_intensity": (0, 255, "goes from 0 to 255"),
@@ -246,7 +246,7 @@ READINGS: Mapping[str, tuple[float, float, str]] = MappingProxyType(
         "position": (-1e9, 1e9, "is in degrees"),
     }
 )
-#: What else is read without brackets.
+#: Other names that are read without brackets.
 PROPERTIES = frozenset(READINGS) | {
     "rate",
     "angle_and_rate",
@@ -264,7 +264,7 @@ PROPERTIES = frozenset(READINGS) | {
     "distance_inches_continuous",
 }
 
-#: Calls that take a time or an amount as their last argument: the most that is plausible, its unit, and the fix.
+#: Calls with a time or an amount as their last argument: largest plausible value, its unit, and the fix.
 AMOUNTS: Mapping[str, tuple[float, str, str]] = MappingProxyType(
     {
         "sleep": (100, "seconds", "milliseconds"),
@@ -273,7 +273,7 @@ AMOUNTS: Mapping[str, tuple[float, str, str]] = MappingProxyType(
     }
 )
 
-#: Methods and functions that do something only when they are called.
+#: Methods and functions that have an effect only when called.
 ACTIONS = frozenset(
     {
         "on",
@@ -293,6 +293,6 @@ ACTIONS = frozenset(
         "sleep",
     }
 )
-#: Of those, the ones that move a robot, and the ones that move it until they are done.
+#: The actions that start a robot moving, and those that move it and wait.
 MOVES_ON = frozenset({"on", "run_forever", "run_direct"})
 MOVES_FOR = frozenset({"on_for_seconds", "on_for_rotations", "on_for_degrees"})

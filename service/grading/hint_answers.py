@@ -1,6 +1,6 @@
-"""Hints on objects that the responder answers: another key, another value's number, None, a text for a number.
+"""Hints on objects in the responder's answers: wrong key, swapped values, None, a text instead of a number.
 
-They compare what was answered with what a criterion that lost marks asks for.
+They compare the answers with the criteria that lost marks.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _NEAR = 0.6
 
 
 def of_other_keys(clues: Clues) -> Iterator[str]:
-    """A key that no answer has, where the answers have one like it or others in its place."""
+    """Yield a hint on a key missing from all answers, if they have a similar key or other keys in its place."""
     for criterion in clues.lost:
         path = (criterion.path or "") if isinstance(criterion, Replies) else ""
         wanted = path.rpartition(".")[2]
@@ -48,7 +48,7 @@ def of_other_keys(clues: Clues) -> Iterator[str]:
 
 
 def of_missing_key(clues: Clues) -> Iterator[str]:
-    """A key that the assignment asks for and the robot looks for, and that no answer has."""
+    """Yield a hint on a key that the assignment asks for and the robot reads, but no answer has."""
     missing = (_NO_KEY.match(fault.message) for fault in clues.faults if fault.who == "program")
     key = next((found[1] for found in missing if found), "")
     if not key or f'"{key}"' not in clues.task or clues.missing == "responder":
@@ -62,7 +62,7 @@ def of_missing_key(clues: Clues) -> Iterator[str]:
 
 
 def of_none_answers(clues: Clues) -> Iterator[str]:
-    """An answer with None in it, and the one line that returns None."""
+    """Yield a hint on an answer that contains None, with the line if only one line returns None."""
     answer = next((each for each in clues.answers if _NOTHING.search(each)), None)
     if answer is None or not any(isinstance(each, Replies) for each in clues.lost):
         return
@@ -84,7 +84,7 @@ def of_none_answers(clues: Clues) -> Iterator[str]:
 
 
 def of_swapped_values(clues: Clues) -> Iterator[str]:
-    """A number that another key of the answer has."""
+    """Yield a hint on a number that belongs to another key of the answer."""
     reports = {each.id for each in clues.lost if isinstance(each, Reports) and each.source == "reply"}
     for result in clues.results:
         asked = _AFTER.search(_messages(result)) if result.id in reports else None
@@ -104,7 +104,7 @@ def of_swapped_values(clues: Clues) -> Iterator[str]:
 
 
 def of_text_numbers(clues: Clues) -> Iterator[str]:
-    """A number that is sent as a text, where the program compares it with a number."""
+    """Yield a hint on a number sent as a text that the program compares with a number."""
     if not any(isinstance(each, Resends | FreshAnswers | Replies) for each in clues.lost):
         return
     for answer in clues.answers:
@@ -123,7 +123,7 @@ def of_text_numbers(clues: Clues) -> Iterator[str]:
 
 
 def of_image_command(clues: Clues) -> Iterator[str]:
-    """A text that is nearly ``image_data left``."""
+    """Yield a hint on a printed text that is close to ``image_data left``."""
     if not any(isinstance(each, ImageLog) for each in clues.lost):
         return
     for text in clues.printed:
@@ -136,7 +136,7 @@ def of_image_command(clues: Clues) -> Iterator[str]:
 
 
 def _near_keys(clues: Clues) -> Iterator[str]:
-    """A key that is asked for within a text, as in ``"'typ': 'PY'"``."""
+    """Yield a hint on a key required within a text, as in ``"'typ': 'PY'"``."""
     for criterion in clues.lost:
         texts = criterion.contains if isinstance(criterion, Replies) else ()
         wanted = {key for text in texts for key in _KEY.findall(text)}
@@ -150,7 +150,7 @@ def _near_keys(clues: Clues) -> Iterator[str]:
 
 
 def _keys_beside(answer: str, path: str) -> list[str]:
-    """The keys that an answer has where the last key of the path is to be."""
+    """Return the keys of an answer at the level of the path's last key."""
     value = _parsed(answer)
     for key in path.split(".")[:-1]:
         value = value.get(key) if isinstance(value, dict) else None
@@ -158,7 +158,7 @@ def _keys_beside(answer: str, path: str) -> list[str]:
 
 
 def _object_of(answer: str) -> dict[str, object]:
-    """The innermost object of an answer that has numbers."""
+    """Return the innermost object of an answer that is wrapped in objects of one key; {} if it is not an object."""
     value = _parsed(answer)
     while isinstance(value, dict) and len(value) == 1:
         value = next(iter(value.values()))
@@ -172,7 +172,7 @@ def _parsed(answer: str) -> object:
 
 
 def _line_of_key(keys: list[str], clues: Clues) -> str:
-    """The line of a responder that writes one of the keys."""
+    """Return the line of a responder that writes one of the keys; empty if none does."""
     for listing in clues.answering:
         for key in keys:
             line = listing.find(re.compile(rf"""["']{re.escape(key)}["']\s*:"""))

@@ -1,6 +1,6 @@
-"""Hints on texts that went out with their braces: the f before the quotes is missing.
+"""Hints on texts that were output with their braces, because the f before the quotes is missing.
 
-They need a text that was printed, said, sent or answered, and a name in its braces that the submission defines.
+Evidence: a printed, spoken, sent or answered text with a name in braces that the submission defines.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _LONGEST = 60
 
 
 def of_braces(clues: Clues) -> Iterator[str]:
-    """The line with the text that was meant as an f-string."""
+    """Yield a hint with the line of the text that was meant as an f-string."""
     if not clues.lost:
         return
     texts = (*clues.printed, *clues.spoken, *clues.sent, *clues.answers)

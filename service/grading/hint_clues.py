@@ -1,6 +1,6 @@
-"""What hints are looked for in: the texts of a submission line by line, and what its visible trials have shown.
+"""The data that hints search: the submission's texts by line, and the results of its visible trials.
 
-Student code is split into tokens and searched here, and never parsed, so that no text costs more than its length.
+Student code is split into tokens, not parsed, so the cost is bounded by the length of the text.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _QUEUE = re.compile("pyState")
 
 @dataclass(frozen=True)
 class Listing:
-    """One text of the student's: a file, or a cell of a notebook, which is nobody's part."""
+    """One text of the student: a file, or a notebook cell, which belongs to no part."""
 
     name: str
     part: Part | None
@@ -36,37 +36,44 @@ class Listing:
 
     @cached_property
     def code(self) -> CodeStatements:
-        """Its statements; split into tokens when a hint first looks at them."""
+        """The statements of the text. It is tokenized on first use."""
         return read_code(self.lines)
 
     @cached_property
     def magic_place(self) -> int | None:
-        """The index of its magic line."""
+        """The index of its magic line, if it has one."""
         return magic_place("\n".join(self.lines))
 
     @property
     def runs_robot(self) -> bool:
-        """Whether it is a cell with a robot program."""
+        """Return whether this is a cell with a robot program."""
         return self.magic_place is not None and is_program_magic(self.lines[self.magic_place])
 
     def find(self, pattern: re.Pattern[str], start: int = 0) -> int | None:
-        """The number, from 1, of the first line after ``start`` that has it."""
+        """Return the number, from 1, of the first line after ``start`` that matches; None if no line does."""
         return next((n for n, line in enumerate(self.lines[start:], start + 1) if pattern.search(line)), None)
 
     def at(self, line: int | None) -> str:
-        """``line 3 of robot.py``, or its name where no line is known."""
+        """Return ``line 3 of robot.py``, or only the name if the line is unknown."""
         return self.name if line is None else f"line {line} of {self.name}"
 
 
 @dataclass(frozen=True, slots=True)
 class Clues:
-    """``lost`` are the criteria that are shown and have not all their marks; ``missing`` is a part.
+    """The evidence for hints, limited to what the student may see.
 
-    ``messages`` are what the student is told of each lost criterion, by its id; ``results`` are the lost ones.
-    ``limit`` is the simulated time of the shortest visible scenario, in seconds. ``task`` is the description.
-    ``beside`` are the Python files beside the parts, agents among them. ``marked_cell`` is the one robot cell that is
-    run by itself, ``ignored_magic`` why its magic line is ignored, ``idle_responder`` the first line of a Raw cell with
-    a responder. ``assignment`` is the id.
+    Attributes:
+        lost: Visible criteria without full marks.
+        missing: The part that was not submitted.
+        messages: The student's feedback on each lost criterion, by id.
+        results: The results of the lost criteria.
+        limit: Simulated time of the shortest visible scenario, in seconds.
+        task: The description of the assignment.
+        beside: Python files submitted with the parts, including agents.
+        marked_cell: The robot cell that is graded, if there is only one.
+        ignored_magic: Why its magic line is ignored.
+        idle_responder: The first line of a Raw cell that contains a responder.
+        assignment: The id of the assignment.
     """
 
     listings: tuple[Listing, ...]
@@ -88,23 +95,23 @@ class Clues:
 
     @property
     def cell_errors(self) -> tuple[Fault, ...]:
-        """The cells of a notebook that failed, in the first trial that has some."""
+        """The notebook cells that failed, in the first trial with failed cells."""
         return next((each.cell_errors for each in self.recordings if each.cell_errors), ())
 
     @property
     def programs(self) -> Iterator[Listing]:
-        """The texts that are robot programs: files, and cells that begin with a magic of the simulator."""
+        """The robot programs: files, and cells that begin with a simulator magic."""
         return (each for each in self.listings if each.part == "program" or (each.part is None and each.runs_robot))
 
     @property
     def responders(self) -> Iterator[Listing]:
-        """The texts that are no robot programs."""
+        """The responder's texts that are not robot programs."""
         programs = {each.name for each in self.programs}
         return (each for each in self.of("responder") if each.name not in programs)
 
     @property
     def answering(self) -> Iterator[Listing]:
-        """The texts that run with the responder: its own, and the agents'."""
+        """The texts that run in the responder's process: the responder and its agents."""
         yield from self.responders
         yield from self.beside
 
@@ -115,7 +122,7 @@ class Clues:
 
     @property
     def wants_queue(self) -> bool:
-        """Whether anything is asked of objects, or the program looks for some."""
+        """Return whether a criterion asks for JSON objects or the program reads the queue."""
         asked = any(
             getattr(each, "is_json", False) or getattr(each, "path", None) or getattr(each, "json_queue", False)
             for each in self.lost
@@ -124,50 +131,50 @@ class Clues:
 
     @property
     def stood_still(self) -> bool:
-        """Whether no robot moved in any trial that is shown."""
+        """Return whether no robot moved in any visible trial."""
         return bool(self.recordings) and all(map(stood_still, self.recordings))
 
     @property
     def seconds(self) -> float:
-        """How long the longest trial that is shown lasted."""
+        """The duration of the longest visible trial, in seconds."""
         return max((each.end_t for each in self.recordings), default=0.0)
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """Of all trials that are looked at, the earliest of each first."""
+        """The first three faults of each visible trial, in order of time."""
         return (fault for recording in self.recordings for fault in faults_of(recording)[:3])
 
     @property
     def printed(self) -> tuple[str, ...]:
-        """The different texts that programs printed."""
+        """The distinct texts that programs printed."""
         return _different(line.text for recording in self.recordings for line in recording.printed)
 
     @property
     def spoken(self) -> tuple[str, ...]:
-        """The different texts that robots said."""
+        """The distinct texts that robots said."""
         return _different(line.text for recording in self.recordings for line in recording.spoken)
 
     @property
     def messages(self) -> Iterator[Message]:
-        """All texts that crossed the bridge."""
+        """All messages that crossed the bridge."""
         return (message for recording in self.recordings for message in recording.messages)
 
     @property
     def sent(self) -> tuple[str, ...]:
-        """The different texts that robots sent."""
+        """The distinct messages from robots."""
         return self._messages("robot")
 
     @property
     def answers(self) -> tuple[str, ...]:
-        """The different texts that the responder answered."""
+        """The distinct answers of the responder."""
         return self._messages("responder")
 
     def of(self, part: Part) -> Iterator[Listing]:
-        """The texts that the part may be in."""
+        """Return the texts that may contain the part."""
         return (each for each in self.listings if each.part in (part, None))
 
     def where(self, part: Part, pattern: re.Pattern[str]) -> str:
-        """``line 3 of robot.py``: the first line that has it; the part's file where none has."""
+        """Return the first matching line as ``line 3 of robot.py``; the part's file if no line matches."""
         for listing in self.of(part):
             line = listing.find(pattern)
             if line is not None:
@@ -183,7 +190,7 @@ class Clues:
 def clues_of(
     submission: Submission, plan: RunPlan, trials: Sequence[TrialResult], results: Sequence[CriterionResult]
 ) -> Clues:
-    """Only what the student may see before anything is published."""
+    """Collect the clues from what the student may see before publication."""
     lost = {each.id for each in results if each.visibility == "visible" and each.marks < each.max_marks}
     visible = (trial.recording for trial in trials if trial.visibility == "visible")
     recordings = [each for first in visible for each in (first, first.partner) if each is not None]
@@ -209,7 +216,7 @@ def clues_of(
 
 
 def _as_shown(result: CriterionResult, seen: Set[int]) -> CriterionResult:
-    """The result without all that hidden trials have told."""
+    """Return the result without anything that comes from hidden trials."""
     evidence = tuple(each for each in result.evidence if each.trial in seen)
     if len(evidence) == len(result.evidence):
         return result
@@ -251,20 +258,20 @@ def _different(texts: Iterator[str]) -> tuple[str, ...]:
 
 
 def listing_of(fault: Fault, clues: Clues) -> Listing | None:
-    """The text that a fault is in; None where that is no text of the student's."""
+    """Return the text that contains the fault; None if it is not one of the student's texts."""
     name = name_of(fault)
     return next((each for each in clues.texts if each.name == name), None)
 
 
 def place_of(fault: Fault, clues: Clues) -> str:
-    """``line 3 of robot.py``, where a fault is; empty where that is no text of the student's."""
+    """Return the position of a fault as ``line 3 of robot.py``; empty if it is not in the student's texts."""
     name = name_of(fault)
     listing = listing_of(fault, clues) or Listing(shown(name), None, ())
     return listing.at(fault.line) if listing.lines or name in clues.files else ""
 
 
 def name_of(fault: Fault) -> str:
-    """What the text that a fault is in is called."""
+    """Return the name of the text that contains the fault."""
     if fault.file:
         return fault.file
     if fault.cell is not None:

@@ -1,6 +1,6 @@
-"""The statements of a student's text, as hints need them: their lines, indents and tokens, and what contains what.
+"""The statements of a student's text, for hints: their lines, indentation, tokens and nesting.
 
-Texts are only split into tokens, by the standard library's tokenizer in Python, and never parsed or run.
+Texts are split by the standard library's Python tokenizer. They are not parsed or run.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _OPENING, _CLOSING = frozenset("([{"), frozenset(")]}")
 
 @dataclass(frozen=True, slots=True)
 class CallInCode:
-    """One call in a statement: ``name`` is dotted, ``arguments`` are the tokens of each argument."""
+    """One call in a statement: ``name`` is dotted, ``arguments`` has the tokens of each argument."""
 
     name: str
     arguments: tuple[tuple[str, ...], ...]
@@ -30,10 +30,10 @@ class CallInCode:
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """One logical line. ``line`` counts from 1; ``tokens`` are without comments; ``last_line`` is where it ends.
+    """One logical line. ``line`` counts from 1, ``last_line`` is its last line, ``tokens`` excludes comments.
 
-    ``number`` is its index in the code, ``parent`` that of the statement whose body it is in, -1 where there is none.
-    ``columns`` are where the tokens begin in their lines.
+    ``number`` is its index in the code. ``parent`` is the index of the enclosing statement, or -1. ``columns`` are the
+    columns where the tokens begin.
     """
 
     line: int
@@ -51,32 +51,32 @@ class Statement:
 
     @property
     def has_body(self) -> bool:
-        """Whether indented statements belong to it."""
+        """Return whether indented statements follow it."""
         return ":" in self.tokens and self.keyword in _WITH_BODY
 
     @property
     def condition(self) -> tuple[str, ...]:
-        """The tokens between the keyword and the colon of ``while`` or ``if``."""
+        """The tokens between the keyword and the last colon of a ``while`` or ``if``."""
         end = len(self.tokens) - 1 - self.tokens[::-1].index(":") if ":" in self.tokens else len(self.tokens)
         return self.tokens[1:end]
 
     @property
     def target(self) -> str:
-        """The single name that it assigns; empty where it assigns none."""
+        """The name in an assignment to a single name; otherwise empty."""
         return self.tokens[0] if len(self.tokens) > 2 and self.tokens[1] == "=" and is_name(self.tokens[0]) else ""
 
     @property
     def bound(self) -> frozenset[str]:
-        """The names that it binds, by any kind of assignment, definition, import or loop."""
+        """The names that it binds by assignment, definition, import or loop."""
         return frozenset(_bound(self.tokens))
 
     @property
     def calls(self) -> tuple[CallInCode, ...]:
-        """The calls in it, from the left."""
+        """The calls in the statement, from left to right. Empty for ``def`` and ``class``."""
         return tuple(_calls(self.tokens)) if self.keyword not in ("def", "class") else ()
 
     def has(self, *names: str) -> bool:
-        """Whether one of the names is among the tokens."""
+        """Return whether one of the names is among the tokens."""
         return any(name in self.tokens for name in names)
 
 
@@ -90,13 +90,13 @@ class CodeStatements:
     statements: tuple[Statement, ...] = ()
 
     def at(self, line: int | None) -> Statement | None:
-        """The statement that a line belongs to."""
+        """Return the statement that contains the line, or None."""
         if line is None:
             return None
         return next((each for each in self.statements if each.line <= line <= each.last_line), None)
 
     def body(self, head: Statement) -> tuple[Statement, ...]:
-        """The statements inside a loop, condition or function."""
+        """Return the statements inside a loop, condition or function."""
         found = []
         for each in self.after(head):
             if each.indent <= head.indent:
@@ -105,16 +105,16 @@ class CodeStatements:
         return tuple(found)
 
     def after(self, statement: Statement) -> tuple[Statement, ...]:
-        """The statements below one."""
+        """Return the statements after this one."""
         return self.statements[statement.number + 1 :]
 
     def next_outside(self, head: Statement) -> Statement | None:
-        """The first statement below the body of ``head``."""
+        """Return the first statement after the body of ``head``, or None."""
         below = self.after(head)[len(self.body(head)) :]
         return below[0] if below else None
 
     def around(self, statement: Statement) -> tuple[Statement, ...]:
-        """The statements whose bodies contain it, the innermost first."""
+        """Return the enclosing statements, the innermost first."""
         found: list[Statement] = []
         parent = statement.parent
         while parent >= 0:
@@ -123,7 +123,7 @@ class CodeStatements:
         return tuple(found)
 
     def loops_around(self, statement: Statement) -> tuple[Statement, ...]:
-        """The loops that it is in, itself among them, the innermost first; then those that call its function."""
+        """Return the enclosing loops, including itself, innermost first, then loops that call its function."""
         around = self.around(statement)
         loops = [each for each in (statement, *around) if each.keyword in LOOPS]
         function = next((each.tokens[1] for each in around if each.keyword == "def" and len(each.tokens) > 1), "")
@@ -133,11 +133,11 @@ class CodeStatements:
         return tuple(loops)
 
     def functions(self) -> Iterator[Statement]:
-        """The heads of its functions."""
+        """Return the heads of the functions."""
         return (each for each in self.statements if each.keyword == "def" and len(each.tokens) > 1)
 
     def number(self, tokens: Sequence[str]) -> float | None:
-        """The number that an argument is, also by way of a name that is assigned once."""
+        """Return the number that an argument denotes, directly or by a name that is assigned once; otherwise None."""
         sign = -1.0 if tokens and tokens[0] == "-" else 1.0
         tokens = tokens[1:] if sign < 0 else tokens
         if len(tokens) > 3 and tokens[0].startswith("Speed") and tokens[1] == "(":
@@ -153,7 +153,7 @@ class CodeStatements:
 
 
 def read_code(lines: Sequence[str]) -> CodeStatements:
-    """Split a text into statements; what the tokenizer cannot take ends them. Magic lines are left out."""
+    """Split a text into statements, without magic lines. Stops where the tokenizer fails."""
     text = "\n".join("#" if _MAGIC.match(line) else line for line in lines) + "\n"
     found: list[Statement] = []
     open_blocks: list[Statement] = []
@@ -166,19 +166,19 @@ def read_code(lines: Sequence[str]) -> CodeStatements:
 
 
 def result_of(body: Sequence[Statement]) -> str:
-    """The name that a function without return was probably to return: what is fitted, else what is assigned last."""
+    """Guess the name that a function without return should return: a fitted object, else the last assigned name."""
     fitted = [call.name.removesuffix(".fit") for each in body for call in each.calls if call.name.endswith(".fit")]
     assigned = [each.target for each in body if each.target]
     return next(iter((*fitted, *assigned[::-1])), "")
 
 
 def is_name(token: str) -> bool:
-    """Whether a token is a name or a keyword."""
+    """Return whether a token is a name or a keyword."""
     return _NAME.match(token) is not None
 
 
 def joined(tokens: Sequence[str]) -> str:
-    """The tokens as code that can be shown."""
+    """Join the tokens into readable code."""
     text = ""
     for before, token in zip(("", *tokens), tokens, strict=False):
         tight = token in ".,:)]}" or before in "([{." or (token in "([" and (is_name(before) or before in (")", "]")))
@@ -187,7 +187,7 @@ def joined(tokens: Sequence[str]) -> str:
 
 
 def depths(tokens: Sequence[str]) -> list[int]:
-    """How many brackets each token is in; a bracket itself is outside of its own."""
+    """Return the bracket depth of each token. A bracket has the depth outside it."""
     found, depth = [], 0
     for token in tokens:
         depth -= token in _CLOSING
@@ -211,7 +211,7 @@ def _statements(text: str) -> Iterator[Statement]:
 
 
 def _statement(tokens: list[tokenize.TokenInfo]) -> Iterator[Statement]:
-    """The statements of one logical line; semicolons and a body on the same line split it."""
+    """Yield the statements of one logical line, split at semicolons and before a body on the same line."""
     tokens = tokens[:_MOST_TOKENS]
     first, words = tokens[0], [token.string for token in tokens]
     indent, depth, begin = first.start[1], 0, 0

@@ -1,6 +1,6 @@
-"""Hints on errors: the first error of each trial and of a notebook's cells, with what to do about it.
+"""Hints on errors: the first error of each trial and of a notebook's cells, with advice.
 
-The advice comes from ``hint_advice.py``'s table, or from what the submission has where only that tells the fix.
+The advice comes from the table in ``hint_advice.py``, or from the submission if the table is not enough.
 """
 
 from __future__ import annotations
@@ -45,37 +45,37 @@ _NO_MODULE = re.compile(r"ModuleNotFoundError: No module named '([\w.]+)'")
 _UNPACKED = re.compile(r"ValueError: (?:too many|not enough) values to unpack")
 _LIBRARIES = ("joblib", "numpy", "pandas", "sklearn")
 _LABELS = re.compile(r"label|target|\by\b|y_train", re.IGNORECASE)
-#: Why a message was lost for good: no wait helps.
+#: Reasons why a message was lost for good. Waiting does not help.
 _OUT_OF_REACH = {
     "out of range": "was out of range. Drive nearer before you send",
     "facing away": "faced away. Turn to the receiver before you send",
     "blocked": "was behind an obstacle. Drive around it before you send",
 }
 _TEXT = re.compile(r"""(["'])((?:(?!\1).){1,200})\1""")
-#: Values that an error prints at length; nobody reads them.
+#: Long values in error messages, which are removed.
 _VALUES = re.compile(r"(?:, got 1D array instead)?:?\s*\n.*|array=.*|: line \d+ column \d+ \(char \d+\)", re.DOTALL)
 _KEY = re.compile(r"""["'](\w{2,40})["']\s*:""")
-#: A guess of Python's that a surer advice replaces.
+#: A guess by Python that better advice replaces.
 _GUESS = re.compile(r"\. Perhaps you forgot a comma\?$")
-#: What a module that is not there leaves to choose from.
+#: The list of available modules in a message about a missing module.
 _MODULES = re.compile(r"(?<='): numpy, .* are there$")
 _NEAR_KEY, _NEAR_MODULE = 0.6, 0.8
 
 
 def of_cell_errors(clues: Clues) -> Iterator[str]:
-    """The first cell of a notebook that failed, where something failed later: that came of it."""
+    """Yield a hint on the first notebook cell that failed, if a later error followed from it."""
     if any(fault.verdict not in _NO_ERRORS for fault in clues.faults):
         yield from _of_cells(clues)
 
 
 def of_other_cell_errors(clues: Clues) -> Iterator[str]:
-    """The first cell that failed, where nothing else did."""
+    """Yield a hint on the first notebook cell that failed, if marks were lost."""
     if clues.lost:
         yield from _of_cells(clues)
 
 
 def of_errors(clues: Clues) -> Iterator[str]:
-    """The first error of a trial in its own words, with what was probably meant."""
+    """Yield the first error of each trial, with advice."""
     firsts = (faults[0] for recording in clues.recordings if (faults := faults_of(recording)))
     for fault in list(dict.fromkeys(replace(each, t=0.0) for each in firsts))[:_MOST_ERRORS]:
         if fault.verdict not in _NO_ERRORS:
@@ -102,7 +102,7 @@ def _of_error(fault: Fault, clues: Clues) -> Iterator[str]:
 
 
 def advised(fault: Fault, clues: Clues) -> str:
-    """An error in its own words, and what to do about it."""
+    """Return the error message followed by advice."""
     sentence = _VALUES.sub("", fault.message)[:_LONGEST_ERROR].rstrip(".")
     advice = advice_on(fault, clues)
     if not advice:
@@ -112,7 +112,7 @@ def advised(fault: Fault, clues: Clues) -> str:
 
 
 def advice_on(fault: Fault, clues: Clues) -> str:
-    """What to do about an error; empty where nothing is known of it."""
+    """Return advice on an error; empty if there is none."""
     listing = listing_of(fault, clues)
     statement = None if listing is None else listing.code.at(fault.line)
     for adviser in _ADVISERS:
@@ -123,7 +123,7 @@ def advice_on(fault: Fault, clues: Clues) -> str:
 
 
 def _of_null(fault: Fault, clues: Clues, *_: object) -> str:
-    """A value that the responder has sent as null."""
+    """Return advice on an error caused by a null value from the responder."""
     answer = next((text for text in clues.answers if _NULL.search(text)), None)
     if fault.who != "program" or "'NoneType' object" not in fault.message or answer is None:
         return ""
@@ -132,7 +132,7 @@ def _of_null(fault: Fault, clues: Clues, *_: object) -> str:
 
 
 def _of_lost_message(fault: Fault, clues: Clues, _: Listing | None, statement: Statement | None) -> str:
-    """An answer that never came, because the channel lost what was sent."""
+    """Return advice on an answer that never came because the channel lost the message."""
     empty = "IndexError" in fault.message and statement is not None and statement.has("pyState", "messages")
     lost = next((each for each in clues.messages if each.lost in _OUT_OF_REACH), None)
     if fault.who != "program" or not empty or lost is None or clues.answers:
@@ -143,7 +143,7 @@ def _of_lost_message(fault: Fault, clues: Clues, _: Listing | None, statement: S
 
 
 def _of_module(fault: Fault, clues: Clues, *_: object) -> str:
-    """A module that is an agent, that only robot programs have, or that nobody has here."""
+    """Return advice on an import of an agent, of a robot-only module, or of an unavailable module."""
     found = _NO_MODULE.match(fault.message)
     if found is None:
         return ""
@@ -159,7 +159,7 @@ def _of_module(fault: Fault, clues: Clues, *_: object) -> str:
 
 
 def _of_message_text(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
-    """A message that the responder uses as an object and has not decoded."""
+    """Return advice on a message that the responder uses as an object without decoding it."""
     if fault.who != "responder" or listing is None or statement is None:
         return ""
     if not fault.message.startswith("TypeError: string indices") or any(
@@ -170,7 +170,7 @@ def _of_message_text(fault: Fault, _: Clues, listing: Listing | None, statement:
 
 
 def _of_unpacking(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
-    """A property with three values that is given to two names."""
+    """Return advice on a property with three values that is unpacked into fewer names."""
     if statement is None or not _UNPACKED.match(fault.message) or "=" not in statement.tokens:
         return ""
     place = statement.tokens.index("=")
@@ -182,7 +182,7 @@ def _of_unpacking(fault: Fault, _: Clues, __: Listing | None, statement: Stateme
 
 
 def _of_fit(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
-    """The labels where a network is to be given the images."""
+    """Return advice on ``fit`` called with labels and images in the wrong order."""
     if statement is None or "could not convert string to float" not in fault.message:
         return ""
     for call in statement.calls:
@@ -193,14 +193,14 @@ def _of_fit(fault: Fault, _: Clues, __: Listing | None, statement: Statement | N
 
 
 def _of_steering(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
-    """The speed where the steering is to be."""
+    """Return advice on a speed given in the position of the steering."""
     calls = () if statement is None or "SpeedPercent" not in fault.message else statement.calls
     usage = next((USAGE[call.name] for call in calls if call.name.startswith("tank_turn.") and call.name in USAGE), "")
     return f"The arguments are in the wrong order: write {usage}." if usage else ""
 
 
 def _of_missing_file(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
-    """A file that was not submitted, or that is named with a folder."""
+    """Return advice on a file that was not submitted, or is named with a folder."""
     found = _NO_FILE.search(fault.message)
     if found:
         file = PurePosixPath(found[1].replace("\\", "/")).name
@@ -219,7 +219,7 @@ def _of_missing_file(fault: Fault, clues: Clues, listing: Listing | None, _: Sta
 
 
 def _of_key(fault: Fault, clues: Clues, *_: object) -> str:
-    """A key that is nearly one of those that were sent, or that the submission writes."""
+    """Return advice on a key that is similar to one in the messages or the submission."""
     found = _NO_KEY.match(fault.message)
     if not found:
         return ""
@@ -235,7 +235,7 @@ def _of_key(fault: Fault, clues: Clues, *_: object) -> str:
 
 
 def _of_call(fault: Fault, clues: Clues, listing: Listing | None, statement: Statement | None) -> str:
-    """What is called and cannot be: a property, or a name that was given another value."""
+    """Return advice on a call of something that is not callable: a property, or an overwritten name."""
     found = _NOT_CALLABLE.match(fault.message)
     if found is None or statement is None or listing is None:
         return ""
@@ -252,7 +252,7 @@ def _of_call(fault: Fault, clues: Clues, listing: Listing | None, statement: Sta
 
 
 def _of_usage(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
-    """A call with too few or too many values, and how it is written."""
+    """Return the usage of a call that has too few values."""
     found = _TOO_FEW.match(fault.message)
     if found is None or statement is None:
         return ""
@@ -262,7 +262,7 @@ def _of_usage(fault: Fault, _: Clues, __: Listing | None, statement: Statement |
 
 
 def _of_hint(fault: Fault, *_: object) -> str:
-    """What the process itself has found: a name that is like this one."""
+    """Return the hint that the child process found: a similar name."""
     return fault.hint
 
 
@@ -274,7 +274,7 @@ def _of_table(fault: Fault, _: Clues, listing: Listing | None, statement: Statem
 
 
 _Adviser = Callable[[Fault, Clues, Listing | None, Statement | None], str]
-#: The first that knows something is heard.
+#: The first adviser with a result is used.
 _ADVISERS: Sequence[_Adviser] = (
     of_syntax,
     of_constant,

@@ -1,6 +1,6 @@
-"""Hints on what is in the wrong place: parts with each other's content, a second definition, a second robot program.
+"""Hints on misplaced content: swapped parts, a second definition, a second robot program.
 
-They look at the texts as a whole; what is wrong within one statement is in ``hint_slips.py``.
+They search whole texts. ``hint_slips.py`` has the mistakes within one statement.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ _RESPONDER = re.compile(r"^def (?:\w+_)?responder\(")
 _ROBOT = re.compile(
     r"^\s*(?:from|import) ev3dev2|^[^#]*(?:print\(f?[\"'](?:PY::|IMG_DATA)|tank_(?:drive|turn)\.|\bsay\()"
 )
-#: A word that is no flag, and in the line below the flag and the word before it.
+#: A word that is not a flag, and on the next line the flag with the word before it.
 _CUT_VALUE = re.compile(r"'(\w+)' is not a flag\n.*?(-[br]|--background|--robotSetup) (\w+) \1\b")
 
 
 def of_starter(clues: Clues) -> Iterator[str]:
-    """Parts that are still what students are given to begin with."""
+    """Yield a hint if the parts are unchanged starter files."""
     own = {each.name: each for each in clues.listings if each.part is not None}
     given = {name: text for name, text in _starter(clues.assignment).items() if name in own}
     if not clues.lost or not given or any(_plain(own[name].lines) != _plain(given[name]) for name in given):
@@ -53,7 +53,7 @@ def _plain(lines: Sequence[str]) -> list[str]:
 
 @cache
 def _starter(assignment: str) -> Mapping[str, tuple[str, ...]]:
-    """The lines of each file that students are given to begin with; the catalogue's alone are known."""
+    """Return the lines of each starter file. Only assignments in the catalogue are known."""
     if assignment not in catalogue():
         return {}
     files = sorted((assignment_folder(assignment) / "starter").glob("*.py"))
@@ -61,7 +61,7 @@ def _starter(assignment: str) -> Mapping[str, tuple[str, ...]]:
 
 
 def of_swapped_parts(clues: Clues) -> Iterator[str]:
-    """robot.py with the responder in it, and responder.py with the robot program."""
+    """Yield a hint if robot.py contains the responder and responder.py the robot program."""
     parts = {each.part: each for each in clues.listings if each.part is not None}
     program, responder = parts.get("program"), parts.get("responder")
     if not clues.lost or program is None or responder is None:
@@ -75,7 +75,7 @@ def of_swapped_parts(clues: Clues) -> Iterator[str]:
 
 
 def of_ignored_magic(clues: Clues) -> Iterator[str]:
-    """A magic line that is ignored as a whole, where its flags are asked for, or something was to be drawn with -p."""
+    """Yield a hint on an ignored magic line, if its flags are required or -p was needed to draw."""
     draws = any(isinstance(each, Drawing | Circuits) for each in clues.lost)
     asks = any(isinstance(each, SourceRules) and each.flags for each in clues.lost)
     if not clues.ignored_magic or not (draws or asks):
@@ -97,7 +97,7 @@ def of_ignored_magic(clues: Clues) -> Iterator[str]:
 
 
 def of_redefined(clues: Clues) -> Iterator[str]:
-    """A function that a later definition replaces before anything calls it."""
+    """Yield a hint on a function that a later definition replaces before it is called."""
     if not clues.lost:
         return
     programs = {each.name for each in clues.programs}
@@ -109,14 +109,14 @@ def of_redefined(clues: Clues) -> Iterator[str]:
             continue
         yield from _redefined([listing])
         if is_cell:
-            # The robot program here has used all that is above it.
+            # This robot program uses the cells above it.
             yield from _redefined(cells)
             cells = []
     yield from _redefined(cells)
 
 
 def of_several_programs(clues: Clues) -> Iterator[str]:
-    """A notebook with another robot cell that drives, of which nothing is marked."""
+    """Yield a hint if a notebook has other robot cells that drive but are not graded."""
     if clues.marked_cell is None or not any(isinstance(each, DRIVEN) for each in clues.lost):
         return
     marked = f"cell {clues.marked_cell}"

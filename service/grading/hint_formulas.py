@@ -1,6 +1,6 @@
-"""Hints on formulas: missing brackets, a radius for a diameter, a difference the wrong way round.
+"""Hints on formulas: missing brackets, radius instead of diameter, a difference in the wrong order.
 
-A formula is only named where a criterion that depends on it lost marks, or where the recordings show its sign.
+A formula is named only if a dependent criterion lost marks, or the recordings show the sign error.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _NEAR = 0.05
 
 
 def of_gain(clues: Clues) -> Iterator[str]:
-    """``GAIN * light - EDGE``, where the edge is to be taken from the light first."""
+    """Yield a hint on ``GAIN * light - EDGE``, where brackets around the difference are missing."""
     if not any(isinstance(each, Follows | Laps) for each in clues.lost):
         return
     for listing, each in statements_of(clues):
@@ -53,7 +53,7 @@ def of_gain(clues: Clues) -> Iterator[str]:
 
 
 def of_division(clues: Clues) -> Iterator[str]:
-    """``distance / diameter * math.pi``, where the product is to be below the line."""
+    """Yield a hint on ``distance / diameter * math.pi``, where the product should be the divisor."""
     if not any(isinstance(each, Functions | Reports) for each in clues.lost):
         return
     for listing in (*clues.programs, *clues.responders):
@@ -72,7 +72,7 @@ def of_division(clues: Clues) -> Iterator[str]:
 
 
 def of_radius(clues: Clues) -> Iterator[str]:
-    """A length that is half of what is asked for, and comes of a wheel's size."""
+    """Yield a hint on a reported length that is half of the expected one, because a radius was used."""
     results = [
         each for each in clues.results if any(each.id == one.id for one in clues.lost if isinstance(one, Reports))
     ]
@@ -93,7 +93,7 @@ def of_radius(clues: Clues) -> Iterator[str]:
 
 
 def of_reversed_distance(clues: Clues) -> Iterator[str]:
-    """``18 - distance``, where the robot is to drive faster the farther away something is, and drives backwards."""
+    """Yield a hint on ``18 - distance`` in a wrong order, if the robot drove backwards."""
     if not any(isinstance(each, Apart) for each in clues.lost) or not any(map(_drove_backwards, clues.recordings)):
         return
     for listing, each in statements_of(clues):
@@ -111,7 +111,7 @@ def of_reversed_distance(clues: Clues) -> Iterator[str]:
 
 
 def of_gyro_direction(clues: Clues) -> Iterator[str]:
-    """A loop that waits for the gyro to grow while it falls, or the other way round."""
+    """Yield a hint on a loop that waits for the gyro to change in the wrong direction."""
     for recording in clues.recordings:
         for fault in faults_of(recording)[:1]:
             listing = listing_of(fault, clues)
@@ -134,7 +134,7 @@ def of_gyro_direction(clues: Clues) -> Iterator[str]:
 
 
 def _exchanged(left: Sequence[str]) -> str:
-    """The difference the other way round; the negative value where there is none."""
+    """Return the difference with its operands swapped; the negated value if there is no difference."""
     if "-" in left:
         place = list(left).index("-")
         return joined((*left[place + 1 :], "-", *left[:place]))
@@ -142,14 +142,14 @@ def _exchanged(left: Sequence[str]) -> str:
 
 
 def _reading_after(listing: Listing, tokens: Sequence[str]) -> str:
-    """The distance that an operand is, as it is written; empty where it is none."""
+    """Return the operand as code if it is a distance reading; otherwise empty."""
     if tokens[1:2] == (".",) and tokens[2:3] and tokens[2] in _DISTANCES:
         return joined(tokens[:3])
     return tokens[0] if reading_in(tokens[:1], listing.code) in _DISTANCES else ""
 
 
 def _turned_at_last(recording: Recording) -> float:
-    """By how much the gyro changed in the last second that it turned, in degrees."""
+    """Return the change of the gyro over the last 30 ticks, in degrees."""
     angles = np.asarray(recording.ticks.gyro, dtype=float)
     return float(angles[-1] - angles[max(len(angles) - 30, 0)]) if len(angles) else 0.0
 

@@ -1,6 +1,6 @@
-"""Hints on functions that are called by themselves: their name, what they return, and where.
+"""Hints on functions that the grader calls directly: their name, return value and position.
 
-What was called and what came back is in the criteria's results; no robot is run.
+Calls and return values come from the criteria's results. No robot runs.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ _GAVE_NOTHING = re.compile(r"TypeError: (\w+) returned NoneType, which has no \w
 _NO_FUNCTION = "there is no function called"
 _HIDDEN = "hidden calls"
 _CALLED = re.compile(r"Expected (\w+)\(")
-#: The list that was expected, and the one that came back.
+#: The expected list and the returned list.
 _LISTS = re.compile(r"to return (\[[^\]]+\]), but it returned (\[[^\]]*\])")
 _FAILED = re.compile(r"(?:but it did not|to be loaded, but): (\w+: .{1,300}?) \(line (\d+)\)")
 _NEAR = 0.75
 
 
 def of_functions(clues: Clues) -> Iterator[str]:
-    """One for each function that lost marks."""
+    """Yield one hint for each function that lost marks."""
     messages = {each.id: each.message for each in clues.results}
     for criterion in clues.lost:
         if not isinstance(criterion, Functions):
@@ -43,7 +43,7 @@ def of_functions(clues: Clues) -> Iterator[str]:
 
 
 def of_wrong_values(name: str, told: str) -> str:
-    """The function, its call, and the value that it gave; no line, as the line that returns a value may be right."""
+    """Return a hint with the function, its call and the value. It names no line, since the return may be correct."""
     expected = f"{told[0].lower()}{told[1:].rstrip('.')}"
     if _HIDDEN not in told:
         called = _CALLED.search(told)
@@ -55,14 +55,14 @@ def of_wrong_values(name: str, told: str) -> str:
 
 
 def no_return(listing: Listing, head: Statement) -> str:
-    """That a function has no return, and the line to add."""
+    """Return a hint that the function has no return, with the line to add."""
     result = result_of(listing.code.body(head))
     fix = f"Add return {result} as its last line" if result else "Add return with the result"
     return f"{listing.at(head.line)}: {head.tokens[1]} has no return, so it gives nothing back. {fix}"
 
 
 def of_no_return(clues: Clues) -> Iterator[str]:
-    """A function such as ``train`` that ends without a return."""
+    """Yield a hint on a function such as ``train`` that ends without a return."""
     name = next((found[1] for fault in clues.faults if (found := _GAVE_NOTHING.search(fault.message))), "")
     for listing in clues.responders:
         for head in listing.code.functions():
@@ -73,7 +73,10 @@ def of_no_return(clues: Clues) -> Iterator[str]:
 
 
 def early_return(listing: Listing, head: Statement) -> Statement | None:
-    """A return that ends a loop in its first turn: directly in it, or in the else of an if that returns as well."""
+    """Return a return that ends a loop in its first iteration, or None.
+
+    It is directly in the loop, or in the else of an if whose branches all return.
+    """
     for each in listing.code.body(head):
         parent = listing.code.statements[each.parent] if each.parent >= 0 else None
         if each.keyword != "return" or parent is None:
@@ -84,7 +87,7 @@ def early_return(listing: Listing, head: Statement) -> Statement | None:
 
 
 def _returns_in_any_case(listing: Listing, last: Statement) -> bool:
-    """Whether an ``else`` is directly in a loop, and all the branches before it end with a return too."""
+    """Return whether an ``else`` is directly in a loop and all branches before it also end with a return."""
     loop = listing.code.statements[last.parent] if last.parent >= 0 else None
     if loop is None or loop.keyword not in LOOPS:
         return False
@@ -99,7 +102,7 @@ def _returns_in_any_case(listing: Listing, last: Statement) -> bool:
 
 
 def _of_error(told: str, clues: Clues) -> str:
-    """The line in which a called function failed, and the advice on its error."""
+    """Return the line where a called function failed, with advice on its error; empty if unknown."""
     found = _FAILED.search(told)
     listing = next((each for each in clues.responders if each.part == "responder"), None)
     if found is None or listing is None:

@@ -1,7 +1,6 @@
-"""Hints on programs that were stopped at the limit of simulated time or of computing: in which line, and why.
+"""Hints on programs stopped at the limit of simulated or CPU time, with the line and the reason.
 
-A loop's reason to go on for ever is looked for in its condition and its body; where there is none that is plain, the
-line alone is named.
+The loop's condition and body are searched for the reason. If there is no clear reason, only the line is named.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ _MOST_TURNS = 100_000
 
 
 def of_limits(clues: Clues) -> Iterator[str]:
-    """The line that a program was in when it was stopped, and why the loop around it does not end."""
+    """Yield hints with the line where a program was stopped and why the loop around it does not end."""
     for fault in dict.fromkeys(_stopped(clues)):
         where, listing = place_of(fault, clues), listing_of(fault, clues)
         if not where or listing is None:
@@ -38,7 +37,7 @@ def of_limits(clues: Clues) -> Iterator[str]:
 
 
 def _stopped(clues: Clues) -> Iterator[Fault]:
-    """What ended the trials at a limit; time that was up only where a criterion names it."""
+    """Yield the faults that ended trials at a limit. Time limits count only if a criterion reports them."""
     for recording in clues.recordings:
         for fault in faults_of(recording)[:1]:
             told = any(fault.message in each.message for each in clues.results)
@@ -79,7 +78,7 @@ def _wait_for(loop: Statement, code: CodeStatements, fault: Fault) -> str:
 
 
 def too_large_amount(code: CodeStatements, statement: Statement, least: float) -> str:
-    """That a call asks for a time or an amount in the wrong unit; empty where it does not."""
+    """Return a hint that a call has a time or an amount in the wrong unit; otherwise empty."""
     for call in statement.calls:
         known = AMOUNTS.get(call.name.rpartition(".")[2])
         plain = [each for each in call.arguments if "=" not in each]
@@ -98,7 +97,7 @@ def too_large_amount(code: CodeStatements, statement: Statement, least: float) -
 
 
 def _endless(loop: Statement, code: CodeStatements, listing: Listing, fault: Fault) -> str:
-    """Why a loop does not end; empty where that is not plain."""
+    """Return why a loop does not end; empty if that is not clear."""
     body = code.body(loop)
     where = listing.at(loop.line)
     if loop.keyword == "for":
@@ -143,7 +142,7 @@ def _endless(loop: Statement, code: CodeStatements, listing: Listing, fault: Fau
 
 
 def _wrong_step(loop: Statement, body: Sequence[Statement]) -> tuple[Statement, str, str] | None:
-    """The statement that keeps a counted loop from its end, what it does, and the fix."""
+    """Return the statement that moves a counter away from its limit, its effect, and the fix; otherwise None."""
     condition = loop.condition
     if len(condition) < 3 or condition[1] not in _AWAY or not is_name(condition[0]):
         return None
@@ -162,7 +161,7 @@ def _wrong_step(loop: Statement, body: Sequence[Statement]) -> tuple[Statement, 
 
 
 def _direction(statement: Statement, name: str) -> str:
-    """Whether a statement adds to a name or takes from it; empty where it does neither."""
+    """Return ``+`` or ``-`` if the statement adds to the name or subtracts from it; otherwise empty."""
     tokens = statement.tokens
     if tokens[0] == name and len(tokens) == 3 and tokens[1] in ("+=", "-="):
         return tokens[1][0]
@@ -171,12 +170,12 @@ def _direction(statement: Statement, name: str) -> str:
     return ""
 
 
-#: The sign that leads away from the end of a loop on this comparison.
+#: The sign that leads away from the end of a loop with this comparison.
 _AWAY = {">": "+", ">=": "+", "<": "-", "<=": "-"}
 
 
 def _read_before(loop: Statement, body: Sequence[Statement], code: CodeStatements) -> str:
-    """A reading that the loop uses and that was taken only once, before it."""
+    """Return a hint on a reading that the loop uses but that is read only once, before it."""
     if any(_reads(each) for each in body):
         return ""
     changed = {name for each in body for name in each.bound}
@@ -205,7 +204,7 @@ def _end_it(body: Sequence[Statement], fault: Fault) -> str:
 
 
 def without_effect(statement: Statement, code: CodeStatements) -> str:
-    """That a statement computes something and keeps nothing; empty where it has an effect."""
+    """Return a hint that a statement computes a value and discards it; empty if it has an effect."""
     tokens = statement.tokens
     if _has_turned_operator(statement, code):
         return f"{tokens[0]} ={tokens[2]} {tokens[3]} sets {tokens[0]} to {tokens[2]}{tokens[3]}"
@@ -217,7 +216,7 @@ def without_effect(statement: Statement, code: CodeStatements) -> str:
 
 
 def _has_turned_operator(statement: Statement, code: CodeStatements) -> bool:
-    """Whether ``count =- 1`` is written so, with these blanks, in a loop, for a variable that has a number before."""
+    """Return whether this is ``count =- 1``, spaced so, in a loop, for a variable assigned earlier."""
     tokens, columns, name = statement.tokens, statement.columns, statement.target
     if len(tokens) != 4 or not name or name.isupper() or tokens[2] not in ("+", "-"):
         return False
@@ -230,7 +229,7 @@ _STATEMENTS = frozenset(keyword.kwlist)
 
 
 def fix_effect(statement: Statement) -> str:
-    """How a statement without effect is written so that it has one."""
+    """Return the correct form of a statement without effect."""
     tokens = statement.tokens
     if tokens[1] == "=":
         return f"Write {tokens[0]} {tokens[2]}= {tokens[3]}"
@@ -240,7 +239,7 @@ def fix_effect(statement: Statement) -> str:
 
 
 def always_true(condition: Sequence[str], code: CodeStatements) -> str:
-    """Why a comparison of a reading with a number always holds; empty where it may not."""
+    """Return why a comparison of a reading with a number is always true; empty if it is not."""
     place = next((at for at, token in enumerate(condition) if token in ("<", ">", "<=", ">=")), None)
     if place is None or any(token in ("and", "or", "not") for token in condition):
         return ""
@@ -260,13 +259,13 @@ def always_true(condition: Sequence[str], code: CodeStatements) -> str:
 
 
 def reading_in(tokens: Sequence[str], code: CodeStatements) -> str:
-    """The reading that the one token is, or that the name was assigned; empty where it is neither."""
+    """Return the reading that the token is or that was assigned to the name; otherwise empty."""
     name = tokens[-1] if tokens and tokens[-1] in READINGS else _source(tokens, code)
     return name if name in READINGS else ""
 
 
 def _source(tokens: Sequence[str], code: CodeStatements) -> str:
-    """The last token of what a name was assigned."""
+    """Return the last token of the value assigned to a name; otherwise empty."""
     if len(tokens) != 1:
         return ""
     given = next((each for each in code.statements if each.target == tokens[0]), None)
@@ -290,5 +289,5 @@ def _reads(statement: Statement) -> bool:
 
 
 def _waits(loop: Statement, code: CodeStatements) -> bool:
-    """Whether a loop does what takes simulated time: the state of a motor is read for nothing."""
+    """Return whether the loop takes simulated time. Reading the state of a motor takes none."""
     return any(token in _WAITS for each in (loop, *code.body(loop)) for token in each.tokens)

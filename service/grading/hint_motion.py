@@ -1,6 +1,6 @@
-"""Hints on robots that stand still, or drive and turn otherwise than is asked: which line does it, and by how much.
+"""Hints on robots that don't move, or drive or turn differently than required: the line and the difference.
 
-They are heard only where criteria that are shown have lost marks.
+They apply only if visible criteria lost marks.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from submissions.criteria.ending import EndPose
 from submissions.criteria.motion import AskedMotion, Displacement, Moves
 from submissions.criteria.stopping import StopOn
 
-#: What a robot that is not stopped in time has no marks for.
+#: Criteria that fail if the robot does not stop in time.
 STOPPED = (EndPose, StopOn)
 _AT_ONCE = 0.5
 _TURNED = re.compile(r"robot turned (\d+(?:\.\d+)?)°")
 
 
 def of_stillness(clues: Clues) -> Iterator[str]:
-    """A robot that should drive and never did."""
+    """Yield a hint on a robot that should have driven and never did."""
     if not clues.stood_still or not any(isinstance(each, DRIVEN + STOPPED) for each in clues.lost):
         return
     moving = [(listing, each) for listing, each in statements_of(clues) if moves(each, MOVES_ON | MOVES_FOR)]
@@ -76,13 +76,13 @@ def _has_no_block(statement: Statement) -> bool:
 
 
 def _conditions_of(listing: Listing, statement: Statement) -> list[Statement]:
-    """The ``if`` and ``while`` around a statement that may be false, the innermost first."""
+    """Return the enclosing ``if`` and ``while`` statements that may be false, the innermost first."""
     around = listing.code.around(statement)
     return [each for each in around if each.keyword in ("if", "elif", "while") and each.condition != ("True",)]
 
 
 def of_units(clues: Clues) -> Iterator[str]:
-    """An amount in the wrong unit, or a reading that is compared with a number that it never has."""
+    """Yield a hint on an amount in the wrong unit, or a reading compared with a value outside its range."""
     for listing, each in statements_of(clues):
         amount = too_large_amount(listing.code, each, 0)
         if amount and any(isinstance(lost, DRIVEN + STOPPED) for lost in clues.lost):
@@ -95,7 +95,7 @@ def of_units(clues: Clues) -> Iterator[str]:
 
 
 def of_distances(clues: Clues) -> Iterator[str]:
-    """A robot that was stopped by a reading in centimetres, in the wrong place."""
+    """Yield a hint on a robot that a distance threshold in centimetres stopped in the wrong place."""
     if not any(isinstance(each, STOPPED) for each in clues.lost):
         return
     found = [
@@ -115,7 +115,7 @@ def of_distances(clues: Clues) -> Iterator[str]:
 
 
 def of_turns(clues: Clues) -> Iterator[str]:
-    """The one line that turns the robot, where it has turned too much or too little."""
+    """Yield a hint on the only line that turns the robot, if the robot turned too much or too little."""
     turns = list(_turning(clues))
     if len(turns) != 1:
         return
@@ -140,7 +140,7 @@ def _rounded(number: float) -> str:
 
 
 def of_curves(clues: Clues) -> Iterator[str]:
-    """A turn that is none on the spot, where corners are asked for."""
+    """Yield a hint on a turn that is a curve instead of on the spot, if corners are required."""
     corners = any(isinstance(each, Drawing) for each in clues.lost) and not clues.stood_still
     for listing, each, call in _turning(clues):
         steering = listing.code.number(call.arguments[0]) if call.arguments else None
@@ -154,7 +154,7 @@ def of_curves(clues: Clues) -> Iterator[str]:
 
 
 def of_speeds(clues: Clues) -> Iterator[str]:
-    """Wheels of different speeds, or that turn backwards, where the robot is to drive straight forwards."""
+    """Yield a hint on unequal or negative wheel speeds, if the robot should drive straight forwards."""
     if clues.stood_still or not any(_asks_straight(criterion) for criterion in clues.lost):
         return
     for listing, each in statements_of(clues):
@@ -176,7 +176,7 @@ def of_speeds(clues: Clues) -> Iterator[str]:
 
 
 def of_loops_that_end_at_once(clues: Clues) -> Iterator[str]:
-    """A loop on a sensor whose condition is false at the start, so that the robot stops at once."""
+    """Yield a hint on a sensor loop whose condition is false at the start, so the robot stops immediately."""
     if clues.seconds <= _AT_ONCE and not any(True for _ in clues.faults):
         for ended, condition in loops_that_end_at_once(clues):
             other = condition.replace("<", ">") if "<" in condition else condition.replace(">", "<")
@@ -184,7 +184,7 @@ def of_loops_that_end_at_once(clues: Clues) -> Iterator[str]:
 
 
 def loops_that_end_at_once(clues: Clues) -> Iterator[tuple[str, str]]:
-    """The first loop on a sensor below a line that switches the motors on: why it ends at once, and its condition."""
+    """Yield the first sensor loop after the motors are switched on: why it ends immediately, and its condition."""
     for listing, each in statements_of(clues):
         reading = next((token for token in each.condition if token in PROPERTIES), "")
         drives = any(moves(other, MOVES_ON) for other in listing.code.statements[: each.number])
@@ -206,7 +206,7 @@ def _asks_straight(criterion: object) -> bool:
 
 
 def _turning(clues: Clues) -> Iterator[tuple[Listing, Statement, CallInCode]]:
-    """The calls that turn the robot by an amount."""
+    """Yield the calls that turn the robot by an amount."""
     for listing, each in statements_of(clues):
         for call in each.calls:
             if call.name.startswith("tank_turn.") and call.name.rpartition(".")[2] in MOVES_FOR:
@@ -214,7 +214,7 @@ def _turning(clues: Clues) -> Iterator[tuple[Listing, Statement, CallInCode]]:
 
 
 def _told(clues: Clues) -> Iterator[tuple[Criterion, str]]:
-    """Each criterion that lost marks, with what is told of its first failure."""
+    """Return each criterion that lost marks, with the message of its first failure."""
     told = {each.id: next((one.message for one in each.evidence if not one.passed), "") for each in clues.results}
     return ((each, told.get(each.id, "")) for each in clues.lost)
 
@@ -232,7 +232,7 @@ def _asked_turn(criterion: Criterion) -> tuple[float, float] | None:
 
 
 def _is_zero(listing: Listing, statement: Statement) -> bool:
-    """Whether it drives with no speed, or by nothing."""
+    """Return whether the statement drives at speed zero or by zero."""
     for call in statement.calls:
         if call.name.rpartition(".")[2] in MOVES_ON | MOVES_FOR:
             speeds = call.arguments[1:2] if "turn" in call.name else call.arguments[:2]

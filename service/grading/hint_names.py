@@ -1,6 +1,6 @@
-"""Advice on names that are not defined or were overwritten: those of another process, of a later line, of a module.
+"""Advice on undefined or overwritten names: those of another process, of a later line, of a module.
 
-A robot program does not see what the responder or another cell defines, and the responder does not see the robot's.
+The robot program does not see names defined in the responder or another cell, and the reverse.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ NO_NAME = re.compile(r"NameError: name '(\w+)' is not defined")
 _NO_ATTRIBUTE = re.compile(r"AttributeError: '(\w+)' object has no attribute '(\w+)'")
 _NOT_CALLABLE = re.compile(r"TypeError: '(\w+)' object is not callable")
 _CALLED = re.compile(r"(?<![.\w])(\w+)\(")
-#: How Python writes what JSON and other languages write so.
+#: Python's form of constants from JSON and other languages.
 _CONSTANTS = {"null": "None", "none": "None", "NULL": "None", "true": "True", "false": "False"}
 
-#: What %%sim_magic_preloaded binds and the other magics do not.
+#: Names that %%sim_magic_preloaded binds and the other magics don't.
 PRELOADED = frozenset(("say", "speaker", "tank_turn", "tank_drive", "ultrasonic", "colorLeft", "colorRight", "gyro"))
 _GIVEN = PRELOADED | {"print", "str", "int", "float", "list", "len", "range", "max", "min", "sum", "round", "input"}
-#: Whose attributes are often written alone.
+#: Objects whose attributes are often written without the object.
 _OWNERS = {
     **dict.fromkeys(("left_motor", "right_motor"), ("tank_drive",)),
     **dict.fromkeys(("on_for_seconds", "on_for_rotations", "on_for_degrees"), ("tank_drive", "tank_turn")),
@@ -34,7 +34,7 @@ _OWNERS = {
 
 
 def of_owner(fault: Fault, clues: Clues, *_: object) -> str:
-    """An attribute of the robot's parts that is written without its owner."""
+    """Return advice on an attribute of a robot part that is written without its object."""
     name = NO_NAME.match(fault.message)
     owners = _OWNERS.get(name[1], ()) if name and fault.who == "program" and clues.preamble == "preloaded" else ()
     if name is None or not owners:
@@ -43,13 +43,13 @@ def of_owner(fault: Fault, clues: Clues, *_: object) -> str:
 
 
 def of_constant(fault: Fault, *_: object) -> str:
-    """``null`` or ``true``, as JSON has them."""
+    """Return advice on ``null`` or ``true``, as written in JSON."""
     name = NO_NAME.match(fault.message)
     return f"Write {_CONSTANTS[name[1]]} in place of {name[1]}." if name and name[1] in _CONSTANTS else ""
 
 
 def of_other_process(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
-    """A name that only the other process defines: the robot's or the responder's."""
+    """Return advice on a name that only the other process (robot or responder) defines."""
     name = NO_NAME.match(fault.message)
     if name is None or listing is None:
         return ""
@@ -69,7 +69,7 @@ def of_other_process(fault: Fault, clues: Clues, listing: Listing | None, _: Sta
 
 
 def of_later_cell(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
-    """A name that a cell below defines, which is no robot program."""
+    """Return advice on a name that a later cell, not a robot program, defines."""
     name = NO_NAME.match(fault.message)
     if name is None or listing is None or fault.cell is None:
         return ""
@@ -81,7 +81,7 @@ def of_later_cell(fault: Fault, clues: Clues, listing: Listing | None, _: Statem
 
 
 def of_later_line(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
-    """A function that is defined below the line that calls it."""
+    """Return advice on a function that is defined after the line that calls it."""
     name = NO_NAME.match(fault.message)
     if name is None or listing is None or statement is None or listing.code.around(statement):
         return ""
@@ -92,14 +92,14 @@ def of_later_line(fault: Fault, _: Clues, listing: Listing | None, statement: St
 
 
 def of_overwritten(fault: Fault, clues: Clues, listing: Listing | None, statement: Statement | None) -> str:
-    """A module or a function whose name was given to another value."""
+    """Return advice on a module or function whose name was assigned another value."""
     if listing is None or statement is None:
         return ""
     lost = _NO_ATTRIBUTE.match(fault.message)
     if lost:
         owners = _owners_of(lost[2], statement)
     elif _NOT_CALLABLE.match(fault.message):
-        # A call in an f-string is no token of its own.
+        # The tokenizer returns an f-string as one token, so calls in it are searched by pattern.
         owners = _CALLED.findall("".join(listing.lines[statement.line - 1 : statement.last_line]))
     else:
         return ""
@@ -113,7 +113,7 @@ def of_overwritten(fault: Fault, clues: Clues, listing: Listing | None, statemen
 
 
 def _is_shared(name: str, listing: Listing, clues: Clues) -> bool:
-    """Whether a name is that of a module, a function or an object of the robot's, and not only this variable."""
+    """Return whether a name is that of a module, a function or a robot object, not only of this variable."""
     binds = (
         each
         for other in _same_process(listing, clues)
@@ -133,7 +133,7 @@ def _owners_of(attribute: str, statement: Statement) -> list[str]:
 
 
 def _defining(name: str, listings: Iterator[Listing] | list[Listing]) -> Iterator[tuple[Listing, Statement]]:
-    """The statements that bind a name outside of functions."""
+    """Yield the statements that bind a name outside functions."""
     for listing in listings:
         for each in listing.code.statements:
             if not each.indent and name in each.bound:
@@ -141,7 +141,7 @@ def _defining(name: str, listings: Iterator[Listing] | list[Listing]) -> Iterato
 
 
 def _same_process(listing: Listing, clues: Clues) -> list[Listing]:
-    """The texts that run with this one, from the top; a robot's cell and a file are alone."""
+    """Return the texts in the same process, in order. Robot cells and files run alone."""
     if listing.part is not None or listing.name in {each.name for each in clues.programs}:
         return [listing]
     if listing not in clues.listings:

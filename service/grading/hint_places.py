@@ -1,6 +1,6 @@
-"""The line that a criterion's finding comes from, where no other rule knows the cause: what prints it, what drives.
+"""Hints with the line that caused a criterion's result, used if no other rule knows the cause.
 
-A line is named only where just one can be meant.
+A line is named only if it is the only candidate.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _EXPECTED = re.compile(r"Expected ")
 
 
 def of_places(clues: Clues) -> Iterator[str]:
-    """The finding of the criterion that lost most, after its line."""
+    """Yield the result of the criterion that lost most, prefixed with its line."""
     results = {each.id: each for each in clues.results}
     dearest = sorted(clues.lost, key=lambda each: results[each.id].marks - results[each.id].max_marks)
     for criterion in dearest[:1]:
@@ -48,7 +48,7 @@ def _finding(result: CriterionResult) -> str:
 
 
 def _place(criterion: Criterion, told: str, clues: Clues) -> str:
-    """Where it comes from; empty where nobody knows, or several lines may be meant."""
+    """Return the position of the cause; empty if it is unknown or ambiguous."""
     if isinstance(criterion, Reports) and criterion.source == "reply":
         key = _LABEL.search(told)
         found = [clues.where("responder", re.compile(rf"""["']{re.escape(key[1])}["']""")) if key else ""]

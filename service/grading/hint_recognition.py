@@ -1,6 +1,6 @@
-"""Hints on images that are named wrongly: names in another order, one answer for all, the other sensor's image.
+"""Hints on misclassified images: names in another order, one answer for all, the wrong sensor's image.
 
-They look at who was taken for whom in the trials that the student may see.
+They use the confusion matrix of the trials that the student may see.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _MOST = 0.5
 
 
 def of_recognition(clues: Clues) -> Iterator[str]:
-    """One for the first criterion that lost marks on images."""
+    """Yield a hint for the first criterion that lost marks on images."""
     for result in clues.results:
         accuracy = result.accuracy
         if accuracy is None or accuracy.value > _MOST + 0.2 or not accuracy.n:
@@ -37,7 +37,7 @@ def of_recognition(clues: Clues) -> Iterator[str]:
 
 
 def _of_other_sensor(clues: Clues) -> str:
-    """The line that has the right sensor's image, where none has the left one's."""
+    """Return a hint on the line that uses the right sensor's image, if no line uses the left one's."""
     for listing in clues.responders:
         line = listing.find(_RIGHT)
         if line is not None and not any(each.find(_LEFT) for each in clues.responders):
@@ -49,7 +49,7 @@ def _of_other_sensor(clues: Clues) -> str:
 
 
 def _of_order(taken: Mapping[str, str], clues: Clues) -> str:
-    """Names that stand in another order than the network's: two swapped, or all shifted."""
+    """Return a hint on class names in a different order than the network's: two swapped, or all shifted."""
     swapped = [(truth, answer) for truth, answer in taken.items() if truth != answer and taken.get(answer) == truth]
     wrong = [truth for truth, answer in taken.items() if truth != answer]
     if not wrong or len(set(taken.values())) < len(taken):
@@ -73,7 +73,7 @@ def _of_order(taken: Mapping[str, str], clues: Clues) -> str:
 
 
 def _list_of(taken: Mapping[str, str], clues: Clues) -> str:
-    """The line with the first of the names in quotes."""
+    """Return the first line with one of the names in quotes."""
     for listing in clues.responders:
         for number, line in enumerate(listing.lines, 1):
             if any(f'"{name}"' in line or f"'{name}'" in line for name in taken):
@@ -86,7 +86,7 @@ def _predicting(clues: Clues) -> str:
 
 
 def _of_constant(taken: Mapping[str, str], accuracy: Accuracy, clues: Clues) -> str:
-    """One name for all images."""
+    """Return a hint if all images get the same name."""
     if len(set(taken.values())) > 1 or len(taken) < 3:
         return ""
     answer = next(iter(taken.values()))
@@ -100,7 +100,7 @@ def _of_constant(taken: Mapping[str, str], accuracy: Accuracy, clues: Clues) -> 
 
 
 def _of_unknown(result: CriterionResult, accuracy: Accuracy, clues: Clues) -> str:
-    """An answer that is no name that is asked for."""
+    """Return a hint on an answer that is not a valid name."""
     found = next((_NO_LABEL.search(each.message) for each in result.evidence if not each.passed), None)
     if found is None or not accuracy.labels:
         return ""

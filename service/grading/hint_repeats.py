@@ -1,6 +1,6 @@
-"""Hints on words and programs that come too often or not often enough, by the loops that they are in or are not in.
+"""Hints on texts and programs that repeat too often or too rarely, because of the loops they are in.
 
-Each compares the loops of a program with what the robot said or how soon the program ended.
+Each rule compares the loops with what the robot said, or with how early the program ended.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from submissions.criteria.sequence import WordSequence
 
 _OUTPUT = frozenset({"say", "print"})
 _AGAIN = re.compile(r"these words (\d+) more times")
-#: The last number that came, and the one that did not.
+#: The last correct number and the missing one.
 _ENDED_EARLY = re.compile(r'after "(-?\d+)" came (?:nothing|"[^\W\d]+") instead of "(-?\d+)"')
 _INCLUSIVE = {"<": "<=", ">": ">="}
 
 
 def of_words_in_loop(clues: Clues) -> Iterator[str]:
-    """A text that is said in each turn of a loop, where it is asked for once."""
+    """Yield a hint on a text that is said in each iteration, but required once."""
     for criterion in clues.lost:
         if not isinstance(criterion, WordSequence):
             continue
@@ -49,7 +49,7 @@ def of_words_in_loop(clues: Clues) -> Iterator[str]:
 
 
 def of_inner_loop(clues: Clues) -> Iterator[str]:
-    """A loop that repeats what it says, as it is inside another loop that it has nothing to do with."""
+    """Yield a hint on a loop that repeats its output because it is nested in an unrelated loop."""
     again = next((found for each in clues.results if (found := _AGAIN.search(each.message))), None)
     if again is None:
         return
@@ -69,7 +69,7 @@ def of_inner_loop(clues: Clues) -> Iterator[str]:
 
 
 def of_last_number(clues: Clues) -> Iterator[str]:
-    """A count that ends one number too early: ``< 10`` for ``<= 10``, ``range(5)`` for ``range(1, 6)``."""
+    """Yield a hint on a count that ends one too early: ``< 10`` for ``<= 10``, ``range(5)`` for ``range(1, 6)``."""
     for criterion in clues.lost:
         result = next((each for each in clues.results if each.id == criterion.id), None)
         found = _ENDED_EARLY.search(result.message) if isinstance(criterion, WordSequence) and result else None
@@ -99,7 +99,7 @@ def of_last_number(clues: Clues) -> Iterator[str]:
 
 
 def of_exact_reading(clues: Clues) -> Iterator[str]:
-    """A loop that logs only as long as a reading is exactly one number."""
+    """Yield a hint on a loop that logs only while a reading equals one exact number."""
     if not any(isinstance(each, Datalog) for each in clues.lost) or not _ended(clues):
         return
     for listing, each in statements_of(clues):
@@ -117,7 +117,7 @@ def of_exact_reading(clues: Clues) -> Iterator[str]:
 
 
 def of_single_round(clues: Clues) -> Iterator[str]:
-    """A program that waits for a sensor and reacts once, where the robot has to do so again and again."""
+    """Yield a hint on a program that reacts to a sensor once, if the robot has to do so repeatedly."""
     several = any(isinstance(each, Encounters) and each.at_least > 1 for each in clues.lost)
     if not several or not _ended(clues) or clues.seconds > clues.limit / 2:
         return
@@ -136,11 +136,11 @@ def of_single_round(clues: Clues) -> Iterator[str]:
 
 
 def _first_move(statements: tuple[Statement, ...], loop: Statement) -> Statement:
-    """The first statement above a loop that calls a motor, without one between; the loop itself where none does."""
+    """Return the first statement above a loop that switches a motor on; the loop if there is none."""
     above = [each for each in statements[: loop.number] if moves(each, frozenset({"on"}))]
     return above[0] if above else loop
 
 
 def _ended(clues: Clues) -> bool:
-    """Whether the program came to its end by itself in every trial that is shown."""
+    """Return whether the program ended by itself in every visible trial."""
     return bool(clues.recordings) and all(each.verdict is Verdict.FINISHED for each in clues.recordings)

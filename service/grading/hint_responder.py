@@ -1,6 +1,6 @@
-"""Hints on responders: that there is none, that it cannot be called, that its answers are not what is asked for.
+"""Hints on responders: missing, not callable, or with wrong answers.
 
-They need evidence from a trial; the text of the responder only tells the line.
+They need evidence from a trial. The responder's text only supplies the line.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _PY = re.compile(r"""["']PY::""")
 
 
 def of_misnamed_function(clues: Clues) -> Iterator[str]:
-    """A function that is asked for and is there under nearly its name."""
+    """Yield a hint on a required function that exists under a similar name."""
     names = (_NO_FUNCTION.search(fault.message) for fault in clues.faults)
     asked = next((name[1] for name in names if name), None)
     if asked is None:
@@ -46,7 +46,7 @@ def of_misnamed_function(clues: Clues) -> Iterator[str]:
 
 
 def of_missing_responder(clues: Clues) -> Iterator[str]:
-    """A function that was meant as the responder, or that none is defined."""
+    """Yield a hint on a function that was probably meant as the responder, or that there is none."""
     if clues.missing == "responder" or not any(_MISSING in fault.message for fault in clues.faults):
         return
     if clues.idle_responder:
@@ -88,7 +88,7 @@ def of_missing_responder(clues: Clues) -> Iterator[str]:
 
 
 def of_uncallable_responder(clues: Clues) -> Iterator[str]:
-    """A responder that takes another number of values than one, or that is no function."""
+    """Yield a hint on a responder that does not take exactly one argument, or is not a function."""
     for fault in clues.faults:
         bad = _BAD_CALL.match(fault.message)
         if fault.who != "responder" or not (bad or _NOT_CALLABLE in fault.message):
@@ -113,7 +113,7 @@ def of_uncallable_responder(clues: Clues) -> Iterator[str]:
 
 
 def of_printed_answers(clues: Clues) -> Iterator[str]:
-    """A responder that comes to its end without a return, in some branch or in all."""
+    """Yield a hint on a responder that ends without a return, in some or all branches."""
     if not any(fault.message.startswith(_NOTHING_RETURNED) for fault in clues.faults):
         return
     for listing in clues.responders:
@@ -141,7 +141,7 @@ def of_printed_answers(clues: Clues) -> Iterator[str]:
 
 
 def of_unreadable_answers(clues: Clues) -> Iterator[str]:
-    """The return of an answer that is no text, or of a text that is no JSON after ``JSON::``."""
+    """Yield a hint on a return value that is not a text, or has invalid JSON after ``JSON::``."""
     fault = next((each for each in clues.faults if _UNREADABLE.search(each.message) and not each.agent), None)
     if fault is None or _NOTHING_RETURNED in fault.message:
         return
@@ -159,7 +159,7 @@ def of_unreadable_answers(clues: Clues) -> Iterator[str]:
 
 
 def of_double_json(clues: Clues) -> Iterator[str]:
-    """An answer that is a text in JSON, and in that text the object."""
+    """Yield a hint on an answer that is encoded as JSON twice."""
     if not any(_TWICE.match(text) for text in clues.answers):
         return
     for listing in clues.responders:
@@ -174,7 +174,7 @@ def of_double_json(clues: Clues) -> Iterator[str]:
 
 
 def of_single_colon(clues: Clues) -> Iterator[str]:
-    """A message that is cut at its first colon, so that the rest begins with the second one."""
+    """Yield a hint on a message that is split at its first colon, so the rest begins with the second."""
     contents = {text.partition("::")[2][:_MOST_OF_CONTENT] for text in clues.sent if "::" in text} - {""}
     if not clues.lost or not any(
         f":{each}" in text and f"::{each}" not in text for each in contents for text in clues.answers
@@ -194,7 +194,7 @@ def of_single_colon(clues: Clues) -> Iterator[str]:
 
 
 def of_unqueued_answers(clues: Clues) -> Iterator[str]:
-    """A queue that is empty because no answer begins with JSON::, and what answers so."""
+    """Yield a hint on an empty queue if no answer begins with JSON::, with the line that answers."""
     empty = any(_EMPTY.match(fault.message) and fault.who == "program" for fault in clues.faults)
     if not empty or not clues.wants_queue or not clues.answers or any(JSON in text for text in clues.answers):
         return
@@ -213,7 +213,7 @@ def of_unqueued_answers(clues: Clues) -> Iterator[str]:
 
 
 def of_replaced_prefix(clues: Clues) -> Iterator[str]:
-    """An answer with PY:: before it, which is for the robot's messages."""
+    """Yield a hint on an answer with the prefix PY::, which is for messages from the robot."""
     for text in clues.answers:
         if text.startswith("PY::") and clues.wants_queue:
             where = clues.where("responder", re.compile(r"""["']PY::"""))

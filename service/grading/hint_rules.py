@@ -1,6 +1,6 @@
-"""The near misses that are known: what each looks like, and a sentence on what was found and what is expected.
+"""Rules for known near misses: how to detect each one, and a sentence on what was found and what is expected.
 
-A rule needs evidence from a trial wherever its mistake leaves some; the text of a submission then only tells the line.
+A rule needs evidence from a trial if its mistake leaves any. The submission's text then only supplies the line.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ _NOTEBOOK_LINE = re.compile(r"^\s*[%!]")
 #: A return of an object, in any form.
 RETURNS = re.compile(r"\breturn\b.*(?:dumps|JSON::|\{)")
 _NEARLY_PY = re.compile(r"""\s*["']?(?:p\s*y\s*[:;.]{1,3}|\w{1,6}::)""", re.IGNORECASE)
-#: A message with something before it.
+#: A message with a text before it.
 _LATE_PY = re.compile(r"[^\n]{1,60}?[ \"'>:]((?:PY::|IMG_DATA).*)")
 _NAME_IN_TEXT = re.compile(r"PY::(\{?[A-Za-z_]\w*\}?)$")
 _KEY = re.compile(r"""["'](\w+)["']\s*:""")
 _NEARLY_JSON = re.compile(r"""\s*["']?json\s*[:;]{0,3}\s*(?=[\[{"'])""", re.IGNORECASE)
 _RETURNS_OBJECT = re.compile(r"\breturn\b(?!.*JSON::).*(?:dumps|str\s*\(|\{)")
-#: What ``image_data`` without a side comes to.
+#: The log entry of ``image_data`` without a side.
 _NO_SIDE = "undefined image data logged..."
 _NEAR = 0.75
 
 
 def of_missing_files(clues: Clues) -> Iterator[str]:
-    """A part that is there under nearly its name."""
+    """Yield a hint on a part that was submitted under a similar file name."""
     near = meant_as(clues.missing, clues.files) if clues.missing is not None else ""
     if clues.missing is not None and near:
         yield f"there is {shown(near)}, but no {PART_FILES[clues.missing]}; expected that name, so rename it"
 
 
 def of_empty_parts(clues: Clues) -> Iterator[str]:
-    """A part that is there, with nothing in it but blank lines and comments."""
+    """Yield a hint on a part that contains only blank lines and comments."""
     for listing in clues.listings:
         if (
             listing.part is not None
@@ -52,7 +52,7 @@ def of_empty_parts(clues: Clues) -> Iterator[str]:
 
 
 def of_magics(clues: Clues) -> Iterator[str]:
-    """A magic line below other code, without its %, or of a kind that only a notebook can have."""
+    """Yield a hint on a magic line that is below other code, lacks its %, or is valid only in a notebook."""
     faulty = [fault for fault in clues.faults if fault.message.startswith(("SyntaxError", "NameError"))]
     for listing in clues.listings:
         if listing.part is None:
@@ -84,7 +84,7 @@ def _of_magic(listing: Listing, number: int, line: str) -> str:
 
 
 def of_messages(clues: Clues) -> Iterator[str]:
-    """A print that is nearly a message."""
+    """Yield a hint on a printed text that is almost a message."""
     if not clues.collaborative or not any(clues.of("program")):
         return
     for text in clues.printed:
@@ -106,7 +106,7 @@ def of_messages(clues: Clues) -> Iterator[str]:
 
 
 def of_images(clues: Clues) -> Iterator[str]:
-    """A print that nearly sends the images."""
+    """Yield a hint on a printed text that almost sends the images."""
     if not clues.collaborative or not any(clues.of("program")):
         return
     for text in (*clues.printed, *clues.sent):
@@ -124,14 +124,14 @@ def of_images(clues: Clues) -> Iterator[str]:
 
 
 def of_image_log(clues: Clues) -> Iterator[str]:
-    """A print that logs no image, as it names no side."""
+    """Yield a hint on a print that logs no image because it names no side."""
     if not clues.collaborative and clues.lost and _NO_SIDE in clues.printed:
         where = clues.where("program", _literal("image_data"))
         yield f'{where} prints "image_data", which logs no image; expected "image_data both", or left or right for both'
 
 
 def of_quoted_names(clues: Clues) -> Iterator[str]:
-    """A message with a name where its value was meant."""
+    """Yield a hint on a message that contains a variable's name instead of its value."""
     for text in (*clues.sent, *clues.printed) if clues.lost else ():
         name = _NAME_IN_TEXT.match(text)
         if name is None:
@@ -145,7 +145,7 @@ def of_quoted_names(clues: Clues) -> Iterator[str]:
 
 
 def of_answers(clues: Clues) -> Iterator[str]:
-    """An answer that is nearly an object for the robot's queue."""
+    """Yield a hint on an answer that is almost an object for the robot's queue."""
     if not any(clues.of("responder")):
         return
     for text in clues.answers:
@@ -164,7 +164,7 @@ def of_answers(clues: Clues) -> Iterator[str]:
 
 
 def where_returned(text: str, clues: Clues, pattern: re.Pattern[str] = _RETURNS_OBJECT) -> str:
-    """The line of the last return whose own keys are all in an answer; the first return where none has them."""
+    """Return the line of the last return whose keys are all in the answer; otherwise the first matching line."""
     for listing in clues.responders:
         for number, line in reversed(list(enumerate(listing.lines, 1))):
             if pattern.search(line) and all(key in text for key in _KEY.findall(line)):
@@ -177,7 +177,7 @@ def _is_empty(line: str) -> bool:
 
 
 def _literal(begin: str) -> re.Pattern[str]:
-    """A text in quotes that begins so."""
+    """Return a pattern for a quoted text with this beginning."""
     return re.compile(rf"""["']\s*{re.escape(begin.strip())}(?!:)""")
 
 

@@ -1,6 +1,6 @@
-"""Hints on functions of the student's that are called with more or fewer values than they have parameters.
+"""Hints on the student's functions that are called with the wrong number of values.
 
-For an agent or a method the definition is wrong, for it is called by others; for any other function it may be either.
+For agents and methods the definition is wrong, because others call them. Otherwise either may be wrong.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _CALLED = re.compile(r"TypeError: (?:(\w+)\.)?(\w+)\(\) (?:takes|missing) (\w+)(
 
 
 def of_signatures(clues: Clues) -> Iterator[str]:
-    """The definition that a call does not fit."""
+    """Yield a hint on the definition that does not match a call."""
     for fault in clues.faults:
         found = _CALLED.match(fault.message)
         listing, head = _definition(found[2], clues) if found else (None, None)
@@ -58,7 +58,7 @@ def _parameters(head: Statement) -> list[str]:
 
 
 def _arguments(name: str, clues: Clues) -> list[str]:
-    """The names of the values in a call of a function; a name for each that has none."""
+    """Return the argument names in a call of the function, with a placeholder for each that is not a name."""
     for listing in clues.answering:
         for each in listing.code.statements:
             for call in each.calls:

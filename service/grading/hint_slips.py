@@ -1,6 +1,6 @@
-"""Slips that the tokens of one statement prove: ``^`` for a power, ``or "text"``, a missing comma, an empty range.
+"""Hints on slips that one statement proves: ``^`` as power, ``or "text"``, a missing comma, an empty range.
 
-Each is a mistake whatever the program does, so they are named before anything that a criterion found.
+They are always mistakes, so they come before hints based on criteria.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _Slip = Callable[[Listing, Statement], str]
 
 
 def of_slips(clues: Clues) -> Iterator[str]:
-    """The first slip in any text, where marks were lost."""
+    """Yield the first slip in any text, if marks were lost."""
     if not clues.lost:
         return
     for listing in clues.texts:
@@ -37,7 +37,7 @@ def of_slips(clues: Clues) -> Iterator[str]:
 
 
 def of_short_list(clues: Clues) -> Iterator[str]:
-    """A list with a missing comma, where an index was outside of a list."""
+    """Yield a hint on a list with a missing comma, if a list index was out of range."""
     if not any("IndexError: list index out of range" in fault.message for fault in clues.faults):
         return
     for listing in clues.texts:
@@ -49,7 +49,7 @@ def of_short_list(clues: Clues) -> Iterator[str]:
 
 
 def slips_in(listing: Listing) -> Iterator[str]:
-    """All slips in a text."""
+    """Yield all slips in a text."""
     for statement in listing.code.statements:
         for slip in _SLIPS:
             found = slip(listing, statement)
@@ -82,7 +82,7 @@ def _bitwise(listing: Listing, statement: Statement) -> str:
 
 
 def _constant_operand(listing: Listing, statement: Statement) -> str:
-    """``day == "Saturday" or "Sunday"``: the second is no comparison."""
+    """Return a hint on ``day == "Saturday" or "Sunday"``, where the second operand is not a comparison."""
     tokens = statement.tokens
     for place, token in enumerate(tokens[:-1]):
         value, after = tokens[place + 1], tokens[place + 2 : place + 3]
@@ -102,7 +102,7 @@ def _constant_operand(listing: Listing, statement: Statement) -> str:
 
 
 def _bare_operand(listing: Listing, statement: Statement) -> str:
-    """``left and right < 25``: the first is no comparison."""
+    """Return a hint on ``left and right < 25``, where the first operand is not a comparison."""
     tokens = statement.tokens
     for place in range(1, len(tokens) - 4):
         before, name, word, other, sign = tokens[place - 1 : place + 4]
@@ -118,7 +118,7 @@ def _bare_operand(listing: Listing, statement: Statement) -> str:
 
 
 def _is_number(code: CodeStatements, name: str) -> bool:
-    """Whether a name is a reading, or is compared by size elsewhere."""
+    """Return whether a name is a reading, or is compared with ``<`` or ``>`` elsewhere."""
     if reading_in((name,), code):
         return True
     return any(
@@ -146,7 +146,7 @@ def _missing_comma(listing: Listing, statement: Statement) -> str:
 
 
 def _line_of(listing: Listing, statement: Statement, one: str, other: str) -> int:
-    """The line that the first of two neighbouring texts is in."""
+    """Return the line of the first of two adjacent texts."""
     for number in range(statement.line, min(statement.last_line, len(listing.lines)) + 1):
         text = listing.lines[number - 1]
         if one in text and (other in text or text.partition("#")[0].rstrip().endswith(one)):
@@ -170,7 +170,7 @@ def _uncalled(listing: Listing, statement: Statement) -> str:
 
 
 def _reading_as_text(listing: Listing, statement: Statement) -> str:
-    """A number of a sensor that is compared with a text."""
+    """Return a hint on a sensor's number that is compared with a text."""
     tokens = statement.tokens
     for place in range(1, len(tokens) - 1):
         sign, text = tokens[place : place + 2]
@@ -201,12 +201,12 @@ def _empty_range(listing: Listing, statement: Statement) -> str:
 
 
 def show_arguments(arguments: Sequence[Sequence[str]]) -> str:
-    """The arguments of a call as code."""
+    """Return the arguments of a call as code."""
     return ", ".join(f"{each[0]}={joined(each[2:])}" if each[1:2] == ("=",) else joined(each) for each in arguments)
 
 
 def _idle_value(listing: Listing, statement: Statement) -> str:
-    """A name or a text alone in a line of a function: a forgotten ``return``."""
+    """Return a hint on a name or text alone on a line of a function: a forgotten ``return``."""
     head = next((each for each in listing.code.around(statement) if each.keyword == "def"), None)
     if head is None or len(statement.tokens) != 1:
         return ""
@@ -219,7 +219,7 @@ def _idle_value(listing: Listing, statement: Statement) -> str:
 
 
 def _chained_ifs(listing: Listing, statement: Statement) -> str:
-    """``if``, ``if``, ``else`` on the same reading, where the second was to be ``elif``."""
+    """Return a hint on ``if``, ``if``, ``else`` on the same reading, where the second should be ``elif``."""
     code = listing.code
     if statement.keyword != "if" or len(statement.condition) != 3 or statement.condition[1] not in _ORDERS:
         return ""
@@ -244,7 +244,7 @@ def _chained_ifs(listing: Listing, statement: Statement) -> str:
 
 
 def _within(tokens: Sequence[str], levels: Sequence[int], place: int) -> tuple[list[str], list[str]]:
-    """The tokens to the left and to the right of one, as far as they are in the same bracket and operand."""
+    """Return the tokens to the left and right of one, within the same bracket and operand."""
     stops = ("and", "or", ",", ":", "=", "return", "if", "while")
 
     def side(step: int) -> list[str]:

@@ -1,6 +1,6 @@
-"""Hints on steps that are valid Python and do something else than was meant, as the lost marks show.
+"""Hints on valid steps that do something else than intended, as the lost marks show.
 
-A loop that counts from 1, the first message for the last, a name in quotes, a turn to the other side.
+Examples: a loop that counts from 1, the first message instead of the last, a name in quotes, a wrong turn.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from submissions.criteria.texts import Says
 
 _FIRST = re.compile(r"(?:\w+_)?(?:begin|beginning|start|first)(?:_\w+)?\Z", re.IGNORECASE)
 _AWAY = 60.0
-#: What a sequence of numbers should have gone on with.
+#: The number after which a sequence went wrong, the wrong one, and the expected one.
 _OTHER_NUMBER = re.compile(r'but after "(-?\d+)" came "(-?\d+)" instead of "(-?\d+)"')
 
 
 def of_count_from_one(clues: Clues) -> Iterator[str]:
-    """``range(1, SIDES)``, whose numbers nothing uses, where one turn is missing."""
+    """Yield a hint on ``range(1, SIDES)`` with an unused loop variable, if one iteration is missing."""
     if not any(isinstance(each, (*DRIVEN, WordSequence)) for each in clues.lost):
         return
     for listing, each in statements_of(clues):
@@ -49,7 +49,7 @@ def of_count_from_one(clues: Clues) -> Iterator[str]:
 
 
 def of_other_step(clues: Clues) -> Iterator[str]:
-    """``range(10, 101)``, where the numbers that are asked for are farther apart."""
+    """Yield a hint on ``range(10, 101)``, if the required numbers have a larger step."""
     for criterion in clues.lost:
         found = _OTHER_NUMBER.search(_message(clues, criterion.id)) if isinstance(criterion, WordSequence) else None
         if found is None:
@@ -71,7 +71,7 @@ def of_other_step(clues: Clues) -> Iterator[str]:
 
 
 def of_first_value(clues: Clues) -> Iterator[str]:
-    """A variable for the first value that each later value replaces."""
+    """Yield a hint on a variable for the first value that each later value overwrites."""
     for listing, each in statements_of(clues):
         name = each.target
         inner = next((one for one in listing.code.around(each)), None)
@@ -87,7 +87,7 @@ def of_first_value(clues: Clues) -> Iterator[str]:
 
 
 def of_first_message(clues: Clues) -> Iterator[str]:
-    """The first message of the queue, where the last is asked for."""
+    """Yield a hint on code that reads the first message of the queue, if the last is required."""
     if not any(isinstance(each, Says) and "last thing" in _message(clues, each.id) for each in clues.lost):
         return
     for listing, each in statements_of(clues):
@@ -98,7 +98,7 @@ def of_first_message(clues: Clues) -> Iterator[str]:
 
 
 def of_spoken_name(clues: Clues) -> Iterator[str]:
-    """``say("count")``: the name of a variable, and not its value."""
+    """Yield a hint on ``say("count")``: a variable's name instead of its value."""
     for listing, each in statements_of(clues):
         for call in each.calls:
             text = call.arguments[0][0] if call.arguments and len(call.arguments[0]) == 1 else ""
@@ -119,7 +119,7 @@ def _is_variable(name: str, listing: Listing) -> bool:
 
 
 def of_unused_parameter(clues: Clues) -> Iterator[str]:
-    """A function that drives and does not use one of the values that it is called with."""
+    """Yield a hint on a function that drives without using one of its parameters."""
     for listing in clues.programs if any(isinstance(each, DRIVEN) for each in clues.lost) else ():
         for head in listing.code.functions():
             body = listing.code.body(head)
@@ -139,7 +139,7 @@ def of_unused_parameter(clues: Clues) -> Iterator[str]:
 
 
 def of_no_way_back(clues: Clues) -> Iterator[str]:
-    """A program that only drives forwards, where the robot is to come back."""
+    """Yield a hint on a program that only drives forwards, if the robot should come back."""
     if not any(isinstance(each, Excursions) for each in clues.lost):
         return
     moving = [(listing, each) for listing, each in statements_of(clues) if moves(each, MOVES_FOR)]
@@ -154,7 +154,7 @@ def of_no_way_back(clues: Clues) -> Iterator[str]:
 
 
 def of_mirrored_end(clues: Clues) -> Iterator[str]:
-    """An end on the other side of the last straight way than the target: the last turn was to the wrong side."""
+    """Yield a hint on an end position mirrored at the last straight line: the last turn went the wrong way."""
     for criterion in clues.lost:
         if not isinstance(criterion, EndPose) or criterion.x is None or criterion.y is None:
             continue
@@ -177,7 +177,7 @@ def of_mirrored_end(clues: Clues) -> Iterator[str]:
 
 
 def _last_turn(clues: Clues) -> tuple[Listing, Statement] | None:
-    """The last statement outside of functions that turns the robot, also by a function of the program."""
+    """Return the last statement outside functions that turns the robot, directly or by a function; or None."""
     found = None
     for listing, each in statements_of(clues):
         turning = {
@@ -192,7 +192,7 @@ def _last_turn(clues: Clues) -> tuple[Listing, Statement] | None:
 
 
 def _last_corner(recording: Recording) -> Pose | None:
-    """Where the robot began its last turn, in the heading that it had before; None if it did not turn."""
+    """Return the pose where the robot began its last turn, with the heading before it; None if it did not turn."""
     headings = [recording.start.heading, *recording.ticks.heading]
     still = len(headings) - 1
     while still > 0 and abs(headings[still] - headings[still - 1]) < 0.02:
@@ -205,7 +205,7 @@ def _last_corner(recording: Recording) -> Pose | None:
 
 
 def _parameters(head: Statement) -> list[str]:
-    """The parameters without a default value."""
+    """Return the parameters without a default value."""
     tokens = head.tokens
     return [
         token

@@ -1,6 +1,6 @@
-"""Hints on programs that run to their end and do too little: what is never called, never waited for or never repeated.
+"""Hints on programs that finish but do too little: code that is never called, waited for or repeated.
 
-They are heard only where criteria that are shown have lost marks, and the text says what did not happen.
+They apply only if visible criteria lost marks, and the message says what did not happen.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from submissions.criteria.motion import Displacement, Encounters, Excursions, Mo
 from submissions.criteria.path import Visits
 from submissions.criteria.point import Circuits
 
-#: What a robot that stands still has no marks for.
+#: Criteria that fail if the robot does not move.
 DRIVEN = (Circuits, Displacement, Drawing, Encounters, Excursions, Follows, Laps, Moves, Visits)
 _STOPS = frozenset({"off", "stop"})
 _SPOKEN = frozenset({"say", "print"})
@@ -27,7 +27,7 @@ _SOON = 1.0
 
 
 def of_unbracketed(clues: Clues) -> Iterator[str]:
-    """A function that is named as a statement, and so not called."""
+    """Yield a hint on a function that is named as a statement, and so not called."""
     for listing, each in statements_of(clues):
         name = joined(each.tokens)
         last = each.tokens[-1]
@@ -39,7 +39,7 @@ def of_unbracketed(clues: Clues) -> Iterator[str]:
 
 
 def of_replaced(clues: Clues) -> Iterator[str]:
-    """``say = ...``: a function that is given a value, and so not called."""
+    """Yield a hint on ``say = ...``, which overwrites a function instead of calling it."""
     for listing, each in statements_of(clues):
         if each.target in _SPOKEN and _TEXT.match(each.tokens[2]):
             value = joined(each.tokens[2:])
@@ -51,7 +51,7 @@ def of_replaced(clues: Clues) -> Iterator[str]:
 
 
 def of_uncalled(clues: Clues) -> Iterator[str]:
-    """A function that nothing calls, and that would have done something."""
+    """Yield a hint on a function with an effect that is never called."""
     if not clues.lost:
         return
     for listing in clues.programs:
@@ -76,7 +76,7 @@ def _numbers(listing: Listing, head: Statement) -> Iterator[int]:
 
 
 def _effect(name: str) -> str:
-    """What a call does to the world, roughly: it moves the robot, or it says or prints something; empty for neither."""
+    """Return the kind of effect of a call: it moves the robot, or says or prints; otherwise empty."""
     action = name.rpartition(".")[2]
     if action in MOVES_ON | MOVES_FOR:
         return "moves"
@@ -84,7 +84,7 @@ def _effect(name: str) -> str:
 
 
 def of_no_effect(clues: Clues) -> Iterator[str]:
-    """A statement that computes something and keeps nothing."""
+    """Yield a hint on a statement that computes a value and discards it."""
     for listing, each in statements_of(clues):
         effect = without_effect(each, listing.code)
         if effect:
@@ -93,7 +93,7 @@ def of_no_effect(clues: Clues) -> Iterator[str]:
 
 
 def of_single_look(clues: Clues) -> Iterator[str]:
-    """``if`` on a sensor where the robot was to go on until it reads something."""
+    """Yield a hint on ``if`` on a sensor where the robot should continue until a reading."""
     if clues.seconds > _SOON and not clues.stood_still:
         return
     for listing, each in statements_of(clues):
@@ -109,7 +109,7 @@ def of_single_look(clues: Clues) -> Iterator[str]:
 
 
 def of_stop_in_loop(clues: Clues) -> Iterator[str]:
-    """Motors that are switched off in the loop that they should run in."""
+    """Yield a hint on motors that are switched off in the loop where they should run."""
     for listing, each in statements_of(clues):
         body = listing.code.body(each) if each.keyword == "while" else ()
         direct = [one for one in body if one.parent == each.number]
@@ -125,7 +125,7 @@ def of_stop_in_loop(clues: Clues) -> Iterator[str]:
 
 
 def of_unindented(clues: Clues) -> Iterator[str]:
-    """A statement below a loop that was meant to be in it."""
+    """Yield a hint on a statement after a loop that should be inside it."""
     drives = any(isinstance(each, DRIVEN) for each in clues.lost)
     for listing, each in statements_of(clues):
         below = listing.code.next_outside(each) if each.keyword == "for" else None
@@ -143,13 +143,13 @@ def of_unindented(clues: Clues) -> Iterator[str]:
 
 
 def statements_of(clues: Clues) -> Iterator[tuple[Listing, Statement]]:
-    """Those of all robot programs, where marks were lost."""
+    """Yield the statements of all robot programs, if marks were lost."""
     if clues.lost:
         yield from ((listing, each) for listing in clues.programs for each in listing.code.statements)
 
 
 def moves(statement: Statement, how: frozenset[str]) -> bool:
-    """Whether it calls one of these methods of a motor or a pair."""
+    """Return whether the statement calls one of these methods of a motor or motor pair."""
     return any("." in call.name and call.name.rpartition(".")[2] in how for call in statement.calls)
 
 

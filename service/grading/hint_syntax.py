@@ -1,6 +1,6 @@
-"""Advice on lines that Python cannot read: ``else if``, texts without quotes or without their end, missing indentation.
+"""Advice on lines that Python cannot parse: ``else if``, missing or unclosed quotes, missing indentation.
 
-Such a text is not split into statements to its end, so the lines themselves are searched.
+Such texts are not fully split into statements, so the lines are searched.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _STEP = 4
 
 
 def of_syntax(fault: Fault, _: Clues, listing: Listing | None, __: Statement | None) -> str:
-    """The fix of a line that Python cannot read; empty where it is not plain."""
+    """Return the fix of a line that Python cannot parse; empty if it is unclear."""
     if listing is None or fault.line is None or not fault.message.startswith(("SyntaxError", "IndentationError")):
         return ""
     line = "".join(listing.lines[fault.line - 1 : fault.line])
@@ -42,7 +42,7 @@ def _of_else_if(line: str) -> str:
 
 
 def _of_block(fault: Fault, listing: Listing, line: str) -> str:
-    """The indentation of a line that begins no deeper than the head above it."""
+    """Return the fix of a line that is not indented deeper than the block's head above it."""
     found = _NO_BLOCK.match(fault.message)
     if found is None:
         return ""
@@ -54,7 +54,7 @@ def _of_block(fault: Fault, listing: Listing, line: str) -> str:
 
 
 def _of_unclosed_text(fault: Fault, line: str) -> str:
-    """The line with the quote that ends its text."""
+    """Return the line with its missing closing quote."""
     found = _UNCLOSED_TEXT.match(fault.message)
     if found is None:
         return ""
@@ -73,7 +73,7 @@ def _of_unclosed_text(fault: Fault, line: str) -> str:
 
 
 def _split_end(text: str, brackets: int) -> tuple[str, str]:
-    """The words of a text, and the code after it: as many brackets as are open, and an argument with its name."""
+    """Split a text into its words and the code after them: closing brackets, or a named argument."""
     named = _KEYWORD_ARGUMENT.search(text) if brackets > 0 else None
     if named is not None:
         return text[: named.start()], text[named.start() :]
@@ -84,7 +84,7 @@ def _split_end(text: str, brackets: int) -> tuple[str, str]:
 
 
 def _open_quote(line: str) -> int | None:
-    """Where the text begins that no quote ends; None if there is none."""
+    """Return the position of an opening quote that is never closed; None if there is none."""
     opening: int | None = None
     skip = False
     for place, letter in enumerate(line):
@@ -102,7 +102,7 @@ def _open_quote(line: str) -> int | None:
 
 
 def _of_words(line: str, listing: Listing) -> str:
-    """Words in the brackets of a call, without quotes."""
+    """Return advice on unquoted words in the brackets of a call."""
     found = _WORDS.search(line)
     if found is None or _NO_TEXT.search(found[2]):
         return ""

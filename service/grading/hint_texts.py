@@ -1,6 +1,6 @@
-"""Texts that are nearly what a criterion asks for: what was printed, said, sent or answered, beside what was expected.
+"""Near misses: printed, spoken, sent or answered texts that almost match what a criterion expects.
 
-Another number is another answer, and no near miss; nor is a text that stands for another of those that are asked for.
+A different number is a different answer, not a near miss. So is a text that matches another expected text.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from submissions.submission import PART_FILES, Part
 _NEAR = 0.72
 _MOST_TEXTS, _LONGEST = 20, 80
 _DIGITS = re.compile(r"[\d.,]+")
-#: The end of what the simulator itself prints when an image is logged.
+#: The end of the text that the simulator prints when an image is logged.
 _LOGGED = "image data logged..."
 _QUOTE = re.compile("[\"']")
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """A text that is asked for, and whether it is all, the beginning or some of what counts."""
+    """An expected text, and whether it must be all, the beginning or a part of the actual text."""
 
     text: str
     how: str
 
     def compared_parts(self, text: str) -> Iterator[str]:
-        """What of a text is to be compared with it: all, as many words from its start, or from anywhere."""
+        """Yield the parts of a text to compare: all of it, its first words, or every run of as many words."""
         words, count = text.split(), len(self.text.split())
         if self.how == "equals":
             yield " ".join(words)
@@ -47,7 +47,7 @@ class Wanted:
         yield from (" ".join(words[place : place + count]) for place in places)
 
     def is_met_by(self, text: str, *, ignore_case: bool) -> bool:
-        """As the criterion compares them."""
+        """Return whether the text matches, by the criterion's rules."""
         given, plain = (" ".join(each.split()) for each in (text, self.text))
         if ignore_case:
             given, plain = given.casefold(), plain.casefold()
@@ -61,12 +61,12 @@ class Wanted:
 
 
 def of_sent_texts(clues: Clues) -> Iterator[str]:
-    """A message that is nearly right: whatever its answer led to came of it."""
+    """Yield hints on messages that are almost right. Later errors follow from them."""
     yield from _of_criteria((each for each in clues.lost if isinstance(each, Messages)), clues)
 
 
 def of_texts(clues: Clues) -> Iterator[str]:
-    """One for each criterion that has lost marks by a text that is nearly right."""
+    """Yield one hint for each criterion that lost marks because a text is almost right."""
     yield from _of_criteria(clues.lost, clues)
 
 
@@ -87,9 +87,9 @@ def _of_criteria(criteria: Iterable[Criterion], clues: Clues) -> Iterator[str]:
 
 
 def of_unspoken(clues: Clues) -> Iterator[str]:
-    """A text that is printed where it should be said, and nothing is."""
+    """Yield a hint on a text that is printed instead of said, if nothing is said."""
     wanted = [list(_wanted(each)) for each in clues.lost if isinstance(each, Says) or _is_spoken(each)]
-    # After an error, nothing may be said for that alone.
+    # After an error, the missing speech may have no other cause.
     if clues.spoken or not wanted or any(fault.verdict is Verdict.PROGRAM_ERROR for fault in clues.faults):
         return
     asked = [one for each in wanted for one in each]
@@ -101,7 +101,7 @@ def of_unspoken(clues: Clues) -> Iterator[str]:
 
 
 def of_unlogged(clues: Clues) -> Iterator[str]:
-    """A series of the datalog of which nothing is printed."""
+    """Yield a hint on a datalog series of which nothing is printed."""
     for criterion in clues.lost:
         if not isinstance(criterion, Datalog) or clues.missing is not None:
             continue
@@ -123,7 +123,7 @@ def _is_spoken(criterion: Criterion) -> bool:
 
 
 def _looked_at(criterion: Criterion, clues: Clues) -> tuple[Part, Sequence[str], str]:
-    """Whose texts a criterion looks at, and how they came about; none where it looks at anything else."""
+    """Return the part and the texts that a criterion checks, and a verb for them; no texts for other criteria."""
     match criterion:
         case Datalog():
             return "program", clues.printed, "prints"
@@ -151,14 +151,14 @@ def _wanted(criterion: Criterion) -> Iterator[Wanted]:
 
 
 def is_near(wanted: Wanted, text: str) -> bool:
-    """Whether some part of a text differs from what is asked for by little."""
+    """Return whether a part of the text is close to the expected text."""
     if len(wanted.text) > _LONGEST or len(text) > _LONGEST:
         return False
     return any(_alike(part, wanted.text) for part in wanted.compared_parts(text))
 
 
 def _alike(one: str, other: str) -> bool:
-    """Whether they differ by a few letters, blanks or signs, and not by numbers alone."""
+    """Return whether the texts differ by a few characters, and not only by numbers."""
     plain, expected = (_DIGITS.sub("0", each) for each in (one, other))
     if plain == expected or not any(letter.isalpha() for letter in expected):
         return False
@@ -166,7 +166,7 @@ def _alike(one: str, other: str) -> bool:
 
 
 def where_written(clues: Clues, part: Part, text: str) -> str:
-    """The line that has most of the text's beginning in quotes."""
+    """Return the line that quotes the longest beginning of the text."""
     words = text.split()
     for count in range(min(len(words), 12), 0, -1):
         begin = " ".join(words[:count])

@@ -1,6 +1,6 @@
-"""Hints on loops that a light sensor ends at the wrong place: a threshold that does not fit, ``or`` for ``and``.
+"""Hints on loops that a light sensor ends in the wrong place: a wrong threshold, ``or`` instead of ``and``.
 
-The readings are in the recordings, so what the condition was there can be calculated.
+The recordings contain the readings, so the value of the condition can be calculated.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
 _PERCENT = "reflected_light_intensity_pc"
 _SENSORS: Mapping[Side, str] = {"left": "colorLeft", "right": "colorRight"}
 _CHANNELS = ("red", "green", "blue")
-#: So much of a percent two readings differ in that a threshold can tell apart.
+#: The smallest difference of two readings, in percent, that a threshold can separate.
 _APART = 0.5
 _Colour = Sequence[float]
 
 
 def of_thresholds(clues: Clues) -> Iterator[str]:
-    """A loop that goes on although the sensor is where the robot should stop."""
+    """Yield a hint on a loop that continues although the sensor is where the robot should stop."""
     for criterion in clues.lost:
         if not isinstance(criterion, StopOn) or criterion.zone is None or criterion.sensor == "either":
             continue
@@ -50,7 +50,7 @@ def of_thresholds(clues: Clues) -> Iterator[str]:
 
 
 def of_joined_colours(clues: Clues) -> Iterator[str]:
-    """``or`` between comparisons of a colour where ``and`` was meant, or the other way round."""
+    """Yield a hint on ``or`` between colour comparisons where ``and`` is right, or the reverse."""
     for criterion in clues.lost:
         if not isinstance(criterion, StopOn) or criterion.rgb is None:
             continue
@@ -66,14 +66,14 @@ def of_joined_colours(clues: Clues) -> Iterator[str]:
 
 
 def _loops(clues: Clues) -> Iterator[tuple[Listing, Statement]]:
-    """The last loop on a condition of each program: it is what stops the robot."""
+    """Yield the last ``while`` loop of each program, which stops the robot."""
     for listing in clues.programs:
         loops = [each for each in listing.code.statements if each.keyword == "while"]
         yield from ((listing, each) for each in loops[-1:])
 
 
 def _threshold(listing: Listing, loop: Statement, sensor: str) -> tuple[str, float] | None:
-    """The sign and the number that the sensor's reading is compared with; None where the loop asks anything else."""
+    """Return the sign and number that the sensor's reading is compared with; None for other conditions."""
     place = next((at for at, token in enumerate(loop.condition) if token in _COMPARE), None)
     if place is None or any(token in ("and", "or", "not") for token in loop.condition):
         return None
@@ -89,7 +89,7 @@ def _threshold(listing: Listing, loop: Statement, sensor: str) -> tuple[str, flo
 def _passed_over(
     recording: Recording, side: Side, zone: tuple[float, float, float, float]
 ) -> tuple[Floats, Floats] | None:
-    """The readings before the zone and in it, in percent; None where the robot did not drive through it."""
+    """Return the readings before and in the zone, in percent; None if the robot did not drive through the zone."""
     places = positions(recording, "left_light" if side == "left" else "right_light")[1:]
     left, bottom, right, top = zone
     x, y = places[:, 0], places[:, 1]
@@ -103,7 +103,7 @@ def _passed_over(
 
 
 def _of_passed(sign: str, number: float, before: Floats, within: Floats) -> str:
-    """Why a loop did not end in the zone, where another number would have ended it there and not before."""
+    """Return why a loop did not end in the zone, if another threshold would have ended it there; otherwise empty."""
     holds = _COMPARE[sign]
     if not all(holds(float(each), number) for each in within):
         return ""
@@ -124,14 +124,14 @@ def _colour_at_end(recording: Recording, side: Side) -> _Colour:
 
 
 def _wrong_word(code: CodeStatements, statement: Statement, end: _Colour, wanted: _Colour) -> str:
-    """That ``and`` or ``or`` is the wrong word; empty where the colours do not prove it."""
+    """Return a hint that ``and`` or ``or`` is wrong; empty if the colours don't prove it."""
     pair = _compared_pair(code, statement)
     if pair is None:
         return ""
     word, comparisons, stops = pair
     ended = [_holds(each, end) for each in comparisons]
     meant = [_holds(each, wanted) for each in comparisons]
-    # With the other word the loop would have gone on here, and would have ended over the colour that is asked for.
+    # With the other word, the loop would have continued here and ended over the required colour.
     if ended[0] == ended[1] or meant != [stops, stops] or (word == "or") != stops:
         return ""
     other = "and" if word == "or" else "or"
@@ -146,7 +146,7 @@ _Comparison = tuple[str, str, float, int]
 
 
 def _compared_pair(code: CodeStatements, statement: Statement) -> tuple[str, list[_Comparison], bool] | None:
-    """The word between two comparisons of a colour, these, and whether the loop ends where they are true."""
+    """Return the word between two colour comparisons, the comparisons, and whether the loop ends if they are true."""
     tokens = statement.condition
     if statement.keyword == "while" and tokens[:2] == ("not", "(") and tokens[-1:] == (")",):
         tokens, stops = tokens[2:-1], True
@@ -165,7 +165,7 @@ def _compared_pair(code: CodeStatements, statement: Statement) -> tuple[str, lis
 
 
 def _comparison(code: CodeStatements, tokens: Sequence[str]) -> _Comparison | None:
-    """What is compared, the sign, the number, and which part of the colour it is."""
+    """Return the operand, the sign, the number and the colour channel of a comparison; otherwise None."""
     place = next((at for at, token in enumerate(tokens) if token in _COMPARE), None)
     if place is None:
         return None
@@ -175,7 +175,7 @@ def _comparison(code: CodeStatements, tokens: Sequence[str]) -> _Comparison | No
 
 
 def _channel(code: CodeStatements, tokens: Sequence[str]) -> int | None:
-    """0 to 2 for red, green and blue, read from the sensor or unpacked from ``rgb``."""
+    """Return 0 to 2 for red, green and blue, read from the sensor or unpacked from ``rgb``; otherwise None."""
     if not tokens:
         return None
     name = tokens[-1]

@@ -1,6 +1,6 @@
-"""Hints on programs that wait too little, look too seldom, or begin to speak before they have finished.
+"""Hints on programs that wait too little, read a sensor too rarely, or speak before the last text has ended.
 
-Each compares a number in the program with what the recordings show.
+Each rule compares a number in the program with the recordings.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _SELDOM = 0.5
 
 
 def of_overlapping_speech(clues: Clues) -> Iterator[str]:
-    """``say`` without ``wait=True``, where words were to be finished."""
+    """Yield a hint on ``say`` without ``wait=True``, if the text must be spoken to its end."""
     if not any(_SPEAKING in each.message for each in clues.results) or not _lost(clues, WordSequence):
         return
     for listing, each in statements_of(clues):
@@ -38,7 +38,7 @@ def of_overlapping_speech(clues: Clues) -> Iterator[str]:
 
 
 def of_short_waits(clues: Clues) -> Iterator[str]:
-    """A wait for an answer that is shorter than the answer takes."""
+    """Yield a hint on a wait for an answer that is shorter than the answer takes."""
     if not _lost(clues, Resends) or not any(_TOO_EARLY in each.message for each in clues.results):
         return
     takes = _fastest_answer(clues)
@@ -53,7 +53,7 @@ def of_short_waits(clues: Clues) -> Iterator[str]:
 
 
 def of_seldom_looks(clues: Clues) -> Iterator[str]:
-    """A loop that reads a sensor so seldom that the robot drives past what it looks for."""
+    """Yield a hint on a loop that reads a sensor so rarely that the robot drives past its target."""
     if not _lost(clues, *STOPPED) or clues.stood_still:
         return
     for listing, each in statements_of(clues):
@@ -77,13 +77,13 @@ def _lost(clues: Clues, *kinds: type) -> bool:
 
 
 def _sleep(listing: Listing, statement: Statement) -> float | None:
-    """For how many seconds a statement sleeps; None if it does not, or if that is not plain."""
+    """Return how many seconds a statement sleeps; None if it does not sleep or the number is unclear."""
     call = next((each for each in statement.calls if each.name in ("time.sleep", "sleep")), None)
     return listing.code.number(call.arguments[0]) if call is not None and call.arguments else None
 
 
 def _fastest_answer(clues: Clues) -> float:
-    """How long the fastest answer took from the question, in seconds."""
+    """Return the shortest time from a message to its answer, in seconds; 0 if there are no answers."""
     took = (
         message.delivered - recording.messages[message.reply_to].t
         for recording in clues.recordings
@@ -94,7 +94,7 @@ def _fastest_answer(clues: Clues) -> float:
 
 
 def _speed(clues: Clues) -> float:
-    """The fastest mean speed of a trial, in mm/s."""
+    """Return the highest mean speed of a trial, in mm/s."""
     found = [0.0]
     for recording in clues.recordings:
         xs, ys = recording.ticks.x, recording.ticks.y

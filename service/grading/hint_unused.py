@@ -1,6 +1,6 @@
-"""Hints on values that go nowhere or to the wrong place: unread variables, swapped ports and flags.
+"""Hints on unused or misplaced values: unread variables, swapped ports and flags.
 
-The text of the program shows each of them; they are heard only where criteria that are shown have lost marks.
+The program text shows each of them. They apply only if visible criteria lost marks.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _OPERATORS = frozenset("+-*/")
 _PAIRS = frozenset({"MoveTank", "MoveSteering"})
 _SWAPPED_PORTS = ("OUTPUT_C", ",", "OUTPUT_B")
 _MISSING_FLAG = re.compile(r"to have -(\w), but")
-#: A flag that takes a value, and the value behind it.
+#: A flag that takes a value, and the value after it.
 _VALUED_FLAG = re.compile(r"(?<=\s)-(\w*?)([broxyaPNMs])([A-Za-z]{2,})(?=\s|$)")
 _FEW = re.compile(r"[Ee]xpected at least (\d+) samples of \w+, but there (?:is|are) (\d+)")
 _PAIRS_TAKEN = re.compile(r"\d+ of (\d+) pairs are usable")
@@ -32,7 +32,7 @@ _Y_NAME = re.compile(r"(?:\w*_)?d?y\d?\Z", re.IGNORECASE)
 
 
 def of_unread(clues: Clues) -> Iterator[str]:
-    """A value that is computed and that no line uses."""
+    """Yield a hint on a value that is computed but never used."""
     for listing, each in statements_of(clues):
         name, value = each.target, each.tokens[2:]
         computes = name and (_OPERATORS & set(value) or value[-1] in PROPERTIES) and name not in value
@@ -44,13 +44,13 @@ def of_unread(clues: Clues) -> Iterator[str]:
 
 
 def _reads(statement: Statement, name: str) -> bool:
-    """Whether a statement has a name for anything but its one assignment, in a formatted string too."""
+    """Return whether a statement uses a name apart from its assignment, including in f-strings."""
     tokens = statement.tokens[2:] if statement.target == name else statement.tokens
     return any(token == name or (not is_name(token) and name in token) for token in tokens)
 
 
 def of_swapped_ports(clues: Clues) -> Iterator[str]:
-    """``MoveTank(OUTPUT_C, OUTPUT_B)``: the left motor comes first, and it is on B."""
+    """Yield a hint on ``MoveTank(OUTPUT_C, OUTPUT_B)``: the left motor, on B, must come first."""
     if not any(isinstance(each, DRIVEN + STOPPED) for each in clues.lost):
         return
     found = [(listing, each, call.name) for listing, each in statements_of(clues) for call in each.calls]
@@ -70,7 +70,7 @@ def of_swapped_ports(clues: Clues) -> Iterator[str]:
 
 
 def of_swallowed_flags(clues: Clues) -> Iterator[str]:
-    """``-oAHWR``: a flag that takes a value, so that the flags behind it are its value."""
+    """Yield a hint on ``-oAHWR``: the flag takes a value, so the flags after it become its value."""
     told = [each.message for each in clues.results for one in clues.lost if one.id == each.id and _is_source(one)]
     missing = {flag for message in told for flag in _MISSING_FLAG.findall(message)}
     for listing in clues.programs if missing else ():
@@ -94,7 +94,7 @@ def _is_source(criterion: object) -> bool:
 
 
 def of_few_samples(clues: Clues) -> Iterator[str]:
-    """A log that has too few samples: whatever else it lacks may come of that."""
+    """Yield a hint on a log with too few samples, which may explain its other errors."""
     for criterion in clues.lost:
         told = next((each.message for each in clues.results if each.id == criterion.id), "")
         found = _FEW.search(told) if isinstance(criterion, Datalog) else None
@@ -112,7 +112,7 @@ def of_few_samples(clues: Clues) -> Iterator[str]:
 
 
 def _sleeping_loops(clues: Clues) -> list[tuple[Listing, Statement, float]]:
-    """The statements that sleep in a loop that prints, and for how long."""
+    """Return the statements that sleep in a printing loop, with their seconds."""
     found = []
     for listing, each in statements_of(clues):
         call = next((one for one in each.calls if one.name in ("time.sleep", "sleep")), None)
@@ -128,7 +128,7 @@ def _sleeping_loops(clues: Clues) -> list[tuple[Listing, Statement, float]]:
 
 
 def of_few_images(clues: Clues) -> Iterator[str]:
-    """A robot that drives past its patterns so fast that it takes too few images."""
+    """Yield a hint on a robot that is too fast to take enough images of its patterns."""
     for criterion in clues.lost:
         told = next((each.message for each in clues.results if each.id == criterion.id), "")
         found = _PAIRS_TAKEN.search(told) if isinstance(criterion, Collects) else None
@@ -148,7 +148,7 @@ def of_few_images(clues: Clues) -> Iterator[str]:
 
 
 def of_partial_reading(clues: Clues) -> Iterator[str]:
-    """A robot that stops as soon as the edge of its sensor is on what it looks for."""
+    """Yield a hint on a robot that stops when only the edge of its sensor is on the target."""
     for criterion in clues.lost:
         told = next((each.message for each in clues.results if each.id == criterion.id), "")
         found = _READING.search(told) if isinstance(criterion, StopOn) else None
@@ -170,7 +170,7 @@ def of_partial_reading(clues: Clues) -> Iterator[str]:
 
 
 def of_swapped_atan2(clues: Clues) -> Iterator[str]:
-    """``math.atan2(dx, dy)``, where the robot does not get where it should."""
+    """Yield a hint on ``math.atan2(dx, dy)``, if the robot misses its target."""
     if not any(isinstance(each, DRIVEN + STOPPED) for each in clues.lost):
         return
     for listing, each in statements_of(clues):

@@ -1,6 +1,6 @@
-"""Slips with variables that the text of one program proves: another case, the other side's sensor, a step too early.
+"""Slips with variables that one program's text proves: wrong case, wrong side's sensor, a step too early.
 
-``hint_slips.py`` looks for them beside its own.
+``hint_slips.py`` runs these rules with its own.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _OTHER_SIDE = {"left": "right", "right": "left", "Left": "Right", "Right": "Left
 
 
 def other_case(listing: Listing, statement: Statement) -> str:
-    """``Count = count + 1``: a name that is never read, beside one that differs only in upper and lower case."""
+    """Return a hint on ``Count = count + 1``: an unread name that differs from another only in case."""
     name, tokens = statement.target, statement.tokens
     meant = next((each for each in tokens[2:] if each != name and each.casefold() == name.casefold()), "")
     statements = listing.code.statements
@@ -30,7 +30,7 @@ def other_case(listing: Listing, statement: Statement) -> str:
 
 
 def same_side(listing: Listing, statement: Statement) -> str:
-    """A name with right in it that is given what its left twin is given, from the left; and the other way round."""
+    """Return a hint on a name with right in it that is assigned a value from the left, or the reverse."""
     name, value = statement.target, statement.tokens[2:]
     twin = _mirrored(name)
     fixed = tuple(_mirrored(token) if is_name(token) else token for token in value)
@@ -50,7 +50,7 @@ def same_side(listing: Listing, statement: Statement) -> str:
 
 
 def early_step(listing: Listing, statement: Statement) -> str:
-    """``tosses[count]`` below ``count = count + 1`` in ``while count < len(tosses)``."""
+    """Return a hint on ``tosses[count]`` after ``count = count + 1`` in ``while count < len(tosses)``."""
     code = listing.code
     loop = next((each for each in code.around(statement) if each.keyword == "while"), None)
     if loop is None or len(loop.condition) != 6 or loop.condition[1:4] != ("<", "len", "("):
@@ -74,7 +74,7 @@ def early_step(listing: Listing, statement: Statement) -> str:
 
 
 def removal_from_list(listing: Listing, statement: Statement) -> str:
-    """``days.remove(day)`` in ``for day in days``: the loop skips the item after each that is removed."""
+    """Return a hint on ``days.remove(day)`` in ``for day in days``, which skips the item after each removal."""
     tokens, code = statement.tokens, listing.code
     loop = next((each for each in code.around(statement) if each.keyword == "for"), None)
     if loop is None or len(loop.tokens) != 5 or tokens[1:4] != (".", "remove", "(") or tokens[0] != loop.tokens[3]:
@@ -90,7 +90,7 @@ def removal_from_list(listing: Listing, statement: Statement) -> str:
 
 
 def unreachable_if(listing: Listing, statement: Statement) -> str:
-    """``if a < 5 and b < 5`` below ``if a < 9`` that has returned: the second is never true."""
+    """Return a hint on ``if a < 5 and b < 5`` after an ``if a < 9`` that returns: the second is never true."""
     code, asked = listing.code, _conjuncts(statement)
     in_chain = statement.keyword == "elif"
     for each in reversed(code.statements[: statement.number]) if asked else ():
@@ -116,7 +116,7 @@ _Comparison = tuple[str, str, str]
 
 
 def _conjuncts(statement: Statement) -> list[_Comparison]:
-    """The comparisons of names that ``and`` joins in a condition; none where it has anything else."""
+    """Return the name comparisons that ``and`` joins in a condition. Empty if it contains anything else."""
     if statement.keyword not in ("if", "elif"):
         return []
     parts: list[tuple[str, ...]] = [()]
@@ -130,7 +130,7 @@ _SIGNS = frozenset({"<", ">", "<=", ">=", "==", "!="})
 
 
 def _implies(one: _Comparison, other: _Comparison) -> bool:
-    """Whether one comparison is only true where the other is: the same, or with a number that is farther out."""
+    """Return whether the first comparison implies the second: the same, or with a stricter number."""
     if one == other:
         return True
     if one[:2] != other[:2] or not all(each[2].replace(".", "", 1).isdecimal() for each in (one, other)):
@@ -145,5 +145,5 @@ def _item(items: str, name: str) -> tuple[str, ...]:
 
 
 def _mirrored(name: str) -> str:
-    """The name with left for right and right for left."""
+    """Swap left and right in a name."""
     return _SIDE.sub(lambda found: _OTHER_SIDE.get(found[0], found[0]), name)

@@ -1,8 +1,8 @@
-"""What probably went wrong, in sentences that quote it, with its line, and say what was expected.
+"""Likely mistakes, as sentences that quote the code with its line and state what was expected.
 
-A pure function of the submission, what happened in the trials that its student may see, and what is asked. No mark
-depends on it. Where nothing that is shown is missing it says only what was accepted although the description asks for
-something else: other words, or missing keys.
+The hints are a pure function of the submission, the visible trials and the assignment. Marks don't depend on them. If
+all visible criteria have full marks, they only report what was accepted although it differs from the description: other
+words, or missing keys.
 """
 
 from __future__ import annotations
@@ -108,9 +108,9 @@ from submissions.submission import Part, Submission
 
 _MOST = 5
 Rule = Callable[[Clues], Iterator[str]]
-#: What keeps everything else from happening.
+#: Problems that prevent everything else.
 _OF_FILES: Sequence[Rule] = (of_missing_files, of_empty_parts, of_starter, of_swapped_parts)
-#: What explains an error better than its own words do; those are told where none of these does.
+#: Rules that explain an error better than its message. The message is used if none of them applies.
 _OF_ERRORS: Sequence[Rule] = (
     of_magics,
     of_cell_errors,
@@ -125,7 +125,7 @@ _OF_ERRORS: Sequence[Rule] = (
     of_signatures,
     of_short_list,
 )
-#: What errors come of.
+#: Rules for the causes of errors.
 _OF_MESSAGES: Sequence[Rule] = (
     of_messages,
     of_quoted_names,
@@ -140,7 +140,7 @@ _OF_MESSAGES: Sequence[Rule] = (
     of_other_keys,
     of_text_numbers,
 )
-#: Why a program that came to its end did too little; the surest first.
+#: Rules for programs that finished but did too little, the most certain first.
 _OF_STRUCTURE: Sequence[Rule] = (
     of_ignored_magic,
     of_unbracketed,
@@ -208,11 +208,12 @@ def hints_for(
     results: Sequence[CriterionResult],
     heartbeat: Callable[[], None] = lambda: None,
 ) -> tuple[str, ...]:
-    """The most telling first; where every criterion that is shown has full marks, what was accepted all the same.
+    """Return hints, the most useful first. With full visible marks, return accepted differences instead.
 
-    None if it takes too long.
+    Returns None if it takes too long.
 
-    Raises what ``sentences_within`` raises.
+    Raises:
+        Exception: Whatever ``sentences_within`` raises.
     """
     shown = [result for result in results if result.visibility == "visible"]
     rules = accepted_differences if all(result.marks >= result.max_marks for result in shown) else _near_and_accepted
@@ -224,7 +225,7 @@ def _near_and_accepted(clues: Clues) -> tuple[str, ...]:
 
 
 def near_misses(clues: Clues) -> tuple[str, ...]:
-    """All that the rules find, whatever the marks; what keeps everything else from happening first."""
+    """Return everything that the rules find, regardless of marks. Problems that prevent everything else come first."""
     explained = _found(_OF_ERRORS, clues)
     errors = explained or tuple(of_errors(clues))
     sent = _found(_OF_MESSAGES, clues)
@@ -243,7 +244,7 @@ def _found(rules: Sequence[Rule], clues: Clues) -> tuple[str, ...]:
 
 
 def accepted_differences(clues: Clues) -> tuple[str, ...]:
-    """One sentence on words and one on keys that are not those of the description; none where they are."""
+    """Return one sentence each on words and on keys that differ from the description. Empty if none do."""
     task = " ".join(clues.task.split())
     return (*_other_words(task, clues), *_missing_keys(task, clues))
 
@@ -281,7 +282,7 @@ def _missing_keys(task: str, clues: Clues) -> Iterator[str]:
 
 
 def _forms(task: str) -> Iterator[str]:
-    """Each object that stands after ``JSON::``, to its last bracket."""
+    """Yield each object after ``JSON::``, up to its closing bracket."""
     for piece in task.split(JSON)[1:]:
         depth = 0
         for place, letter in enumerate(piece):

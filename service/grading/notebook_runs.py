@@ -1,6 +1,6 @@
-"""What the magics of a notebook come to: runs with their own flags, and the one run that is marked.
+"""Planning of the runs that a notebook's magics start: runs with their own flags, and the marked run.
 
-It decides only; the cells are executed and the robots run by ``responders``.
+This module only decides. ``responders`` executes the cells and runs the robots.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from submissions.magics import Flags, Setup, Simulator, parse_flags
 from submissions.marked_run import Site
 from submissions.source_text import modules_of
 
-#: What ``%sim_magic --refresh`` puts in the place of the program.
+#: The program that ``%sim_magic --refresh`` loads.
 _REFRESHED = "print('Refreshing simulator...')"
 
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """The robot program that is loaded: the cell it is in, its text with that cell's line numbers, its flags."""
+    """The loaded robot program: its cell, its text with that cell's line numbers, and its flags."""
 
     cell: int
     text: str
@@ -37,28 +37,28 @@ class Program:
 
 
 _NO_PROGRAM = Program(0, "", Flags())
-#: From the program, the flags of the magic that starts it and the simulator's set-up to the marked run.
+#: Creates the marked run from the program, the flags of the magic that starts it, and the simulator settings.
 MarkedRun = Callable[[Program, Flags, Setup], PlannedRun]
 
 
 @dataclass(frozen=True, slots=True)
 class UnmarkedRuns:
-    """What runs have that keep their own flags; each draws its own chance from ``seed``."""
+    """Settings of unmarked runs, which keep their own flags. Each run draws its own chance from ``seed``."""
 
     limits: ChildLimits
     output_bytes: int
     seconds: float
     seed: int
-    files: Mapping[str, bytes]  # of which programs import modules
+    files: Mapping[str, bytes]  # source of importable modules
     tick: int = TICK
     sheet: int = 0
 
 
 class NotebookRuns:
-    """Follows the magics of one execution, in the order in which they are called."""
+    """Follows the magics of one notebook execution, in call order."""
 
     def __init__(self, marked: Site | None, marked_run: MarkedRun, unmarked: UnmarkedRuns, last: PlannedRun) -> None:
-        """``marked`` is where the marked run starts; ``last`` what is run after all cells, if anything."""
+        """Create the planner. ``marked`` is where the marked run starts, ``last`` the run after all cells, if any."""
         self._marked = marked
         self._marked_run = marked_run
         self._unmarked = unmarked
@@ -67,16 +67,16 @@ class NotebookRuns:
         self._program: Program | None = None
         self._count = 0
         self.marked_ran = False
-        #: Where robots were started, in order.
+        #: Sites of the runs, in order.
         self.started: list[Site] = []
 
     def standing(self) -> PlannedRun:
-        """How the robot stands that does not run."""
+        """The run of a robot that does not move, at its current pose."""
         setup = self.simulator.apply(Flags())
         return PlannedRun(self._own(_NO_PROGRAM, setup), setup.obstacles)
 
     def call(self, call: MagicCall) -> PlannedRun:
-        """What one magic comes to."""
+        """Return the run that one magic starts."""
         here = Site(call.cell, call.line or 0)
         marked = here == self._marked and not self.marked_ran
         try:
@@ -103,11 +103,11 @@ class NotebookRuns:
         return self._start(here, marked, flags, setup, ())
 
     def ran(self, recording: Recording) -> None:
-        """The robot stays where it has come to."""
+        """Keep the robot at the end pose of the run."""
         self.simulator.leave_at(recording.end)
 
     def last(self) -> PlannedRun:
-        """What is run after all cells, if anything."""
+        """Return the run after all cells, if any."""
         return self._last
 
     def _load(self, call: MagicCall, flags: Flags) -> tuple[Flags, Setup]:
@@ -136,7 +136,7 @@ class NotebookRuns:
         )
 
     def _own(self, program: Program, setup: Setup) -> TrialSpec:
-        """A run as its own flags have it."""
+        """Return the spec of an unmarked run, by its own flags."""
         own = self._unmarked
         seed = Stream(own.seed, "notebook run").integer(self._count) >> 1
         return TrialSpec(
@@ -157,6 +157,6 @@ class NotebookRuns:
 
 
 def program_spec(program: Program, limits: ChildLimits, output_bytes: int, files: Mapping[str, bytes]) -> ProgramSpec:
-    """The program of a cell as the bridge takes it, with the modules among ``files`` that it can import."""
+    """Return the bridge's spec of a cell's program, with the modules among ``files`` that it can import."""
     code = Code(f"cell {program.cell}", program.text)
     return ProgramSpec(code, program.flags.preamble, limits, output_bytes, modules_of(code.text, files.get))

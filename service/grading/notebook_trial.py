@@ -1,6 +1,6 @@
-"""One trial of a notebook: it is executed from top to bottom, and the marked run becomes the trial's recording.
+"""Trials of a notebook: it is executed from top to bottom, and the marked run becomes the recording.
 
-What is marked is the assignment's to say; what the magics come to is ``notebook_runs.py``'s.
+The assignment decides which run is marked. ``notebook_runs.py`` plans the runs of the magics.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from submissions.marked_run import RunChoice, Site
 
 @dataclass(frozen=True, slots=True)
 class NotebookTrial:
-    """How each trial executes the notebook, and which run in it is marked.
+    """The execution of the notebook in each trial, and the choice of the marked run.
 
-    ``choice`` is None when the program is the assignment's.
-    With ``as_read`` the text of the trial's spec is what is run: its rules were held against that, and a notebook can
-    hand over another. The seed and the agents in ``notebook`` are set for each trial.
+    ``choice`` is None if the program comes from the assignment. With ``as_read``, the program text of the trial spec is
+    run: the source rules were checked against it, and a notebook could supply another text. The seed and the agents in
+    ``notebook`` are set for each trial.
     """
 
     notebook: NotebookSpec
@@ -35,10 +35,13 @@ class NotebookTrial:
     as_read: bool = False
 
     def run(self, spec: TrialSpec, obstacles: tuple[Rectangle, ...], runner: TrialRunner, meter: JobMeter) -> Recording:
-        """The recording of the marked run, with what the whole notebook told.
+        """Run the notebook and return the recording of the marked run, with the output of the whole notebook.
 
-        Where it was never come to, another that did run is marked instead, if the choice has others.
-        Raises HostError when the machine fails, and whatever the meter's heartbeat raises.
+        If the marked run never started, another run is marked instead, if the choice allows it.
+
+        Raises:
+            HostError: The machine failed.
+            Exception: Whatever the meter's heartbeat raises.
         """
         site = self.choice.site if self.choice is not None else None
         executed, started = self._execute(spec, obstacles, site, runner, meter)
@@ -54,21 +57,21 @@ class NotebookTrial:
         recording = executed.marked.recording
         faults = recording.faults
         if executed.stopped is not None and not any(fault.who == "responder" for fault in faults):
-            # It was stopped in a cell, before or after this run.
+            # The notebook was stopped in a cell, before or after this run.
             faults = (*faults, replace(executed.stopped, t=recording.end_t))
         verdict = faults[0].verdict if faults else Verdict.FINISHED
         return executed.told(replace(recording, faults=faults, verdict=verdict))
 
     def _instead(self, started: Sequence[Site]) -> Site | None:
-        """What is marked for a run that no cell came to; None where just that one is asked for."""
+        """Return the run to mark if the marked run never started; None if there is no replacement."""
         if self.choice is None or self.choice.only or not started:
             return None
         return next((site for site in self.choice.others if site in started), started[-1])
 
     def notes_on_all(self, results: Sequence[TrialResult]) -> tuple[str, ...]:
-        """What the cells could not do is much the same in every trial, and told once.
+        """Return the notes on the cells once for all trials, since they are almost equal.
 
-        Never that of a hidden trial: a cell can put into the words of an error where its robot stood.
+        Notes come from a visible trial: cells can put the robot's position into error messages.
         """
         return next((result.recording.notes for result in results if result.visibility == "visible"), ())
 
@@ -80,7 +83,7 @@ class NotebookTrial:
         runner: TrialRunner,
         meter: JobMeter,
     ) -> tuple[ExecutedNotebook, list[Site]]:
-        """What came of the notebook with the run at ``site`` marked, and where robots were started."""
+        """Execute the notebook with the run at ``site`` marked. Return the result and the sites of the runs."""
         planned = PlannedRun(spec, obstacles, None, True, True)
 
         def marked_run(program: Program, flags: Flags, setup: Setup) -> PlannedRun:
@@ -93,9 +96,9 @@ class NotebookTrial:
             )
             return replace(planned, spec=run)
 
-        # On the usual sheet, unless that is the marked one without its patches: they would tell the answers.
+        # Use the usual sheet, unless it is the marked one without its patches, which would reveal the answers.
         sheet = int(spec.floor.sheet == 0 and not spec.floor.label_patches)
-        # Their noise would tell the trial again, were it of the world's seed.
+        # Noise with the world's seed would identify the trial.
         limits, files = spec.program.limits, self.notebook.files
         output = spec.program.output_bytes
         unmarked = UnmarkedRuns(limits, output, spec.seconds, spec.child_seed, files, spec.tick, sheet)
@@ -109,9 +112,9 @@ class NotebookTrial:
 
 
 def _why_not(executed: ExecutedNotebook, site: Site | None) -> Fault:
-    """Why the marked run did not come about: the notebook was stopped, its cell failed, or never came to it.
+    """Return why the marked run never started: the notebook was stopped, its cell failed, or was never reached.
 
-    It counts as the program's fault, which then has not run.
+    It counts as a fault of the program, which did not run.
     """
     never = f"The robot program of cell {site.cell} is marked, and was never run." if site is not None else ""
     failed = next((fault for fault in executed.raised if site is not None and fault.cell == site.cell), None)

@@ -1,6 +1,6 @@
-"""Submissions of a class that somebody should look at: far below the others, far slower, or close to the pass mark.
+"""Submissions in a class that need review: far below the others, far slower, or close to the pass mark.
 
-A pure function of marks and times that are there already; it judges nothing.
+A pure function of existing marks and times. It does not judge anything.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from decimal import Decimal
 from statistics import fmean, median, pstdev
 from typing import Literal
 
-#: Of fewer nobody is unlike the others.
+#: The smallest class with outliers.
 _FEWEST = 8
 _SPREADS_BELOW = 2.0
 _TIMES_SLOWER, _SECONDS_SLOWER = 3.0, 5.0
-#: How far from the pass mark is close, of all marks.
+#: The distance from the pass mark that counts as close, as a fraction of all marks.
 _CLOSE = Decimal("0.05")
 
 
 @dataclass(frozen=True, slots=True)
 class MarksAndTime:
-    """What one submission got, 0 to 1, and how many seconds its grading took, where it was run."""
+    """The marks of one submission (0 to 1) and the seconds its grading took, if it ran."""
 
     id: str
     share: Decimal
@@ -30,14 +30,14 @@ class MarksAndTime:
 
 @dataclass(frozen=True, slots=True)
 class Outlier:
-    """One to be looked at, and why."""
+    """A submission that needs review, with the reason."""
 
     id: str
     why: Literal["low", "slow", "close"]
 
 
 def outliers(found: Sequence[MarksAndTime], pass_share: Decimal) -> tuple[Outlier, ...]:
-    """The lowest, then the slowest, then those on either side of the pass mark."""
+    """Return the lowest, then the slowest, then those on either side of the pass mark."""
     return (*_low(found), *_slow(found), *_close(found, pass_share))
 
 

@@ -1,6 +1,6 @@
-"""Who is first in what an assignment ranks, across a batch: ties, and how sure each value is.
+"""Ranking of a batch by a measured value: ties, and the confidence interval of each value.
 
-What a value is worth to each student was decided by its judge; nothing here gives marks.
+The judges decide what a value is worth. This module gives no marks.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import fmean, stdev
 
-#: Student's t of a 95 % interval, by degrees of freedom from 1; from the last on it is at most 4 % too wide.
+#: Student's t of a 95 % interval, by degrees of freedom from 1. Beyond the last entry, the interval is at most 4 % too
+#: wide.
 _T95 = (
     *(12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228),
     *(2.201, 2.179, 2.160, 2.145, 2.131, 2.120, 2.110, 2.101, 2.093, 2.086),
@@ -20,7 +21,7 @@ _T95 = (
 
 @dataclass(frozen=True, slots=True)
 class StudentMeasures:
-    """What one student's trials measured: those of ``trials`` that count."""
+    """The measures of one student: the values of the trials that count, out of ``trials``."""
 
     student: str
     values: tuple[float, ...]
@@ -29,9 +30,9 @@ class StudentMeasures:
 
 @dataclass(frozen=True, slots=True)
 class RankRow:
-    """A student's place, shared where the measures are equal as shown; none without a trial that counts.
+    """A student's place, shared if the displayed values are equal; None without a trial that counts.
 
-    ``value`` is the mean of the trials that count, ``low`` to ``high`` its 95 % interval, where there are two or more.
+    ``value`` is the mean of the trials that count. ``low`` to ``high`` is its 95 % interval, for two trials or more.
     """
 
     place: int | None
@@ -44,7 +45,7 @@ class RankRow:
 
 @dataclass(frozen=True, slots=True)
 class RankTable:
-    """The students of a batch by one value, the best first."""
+    """The students of a batch, ranked by one value, the best first."""
 
     assignment: str
     title: str
@@ -54,12 +55,12 @@ class RankTable:
 
     @property
     def texts(self) -> list[tuple[str, ...]]:
-        """Place, student, value, interval and trials of each row, as every table shows them."""
+        """Place, student, value, interval and trials of each row, as tables show them."""
         return [_texts(row) for row in self.rows]
 
 
 def ranked(measures: Sequence[StudentMeasures], *, highest: bool) -> tuple[RankRow, ...]:
-    """The rows in order of their places; 1, 2, 2, 4 where the second and the third are equal."""
+    """Return the rows in order of place. Equal values share a place: 1, 2, 2, 4."""
     means = {each: round(fmean(each.values), 2) for each in measures if each.values}
     placed = [
         _row(each, 1 + sum((other > mean) if highest else (other < mean) for other in means.values()), mean, means)

@@ -1,6 +1,6 @@
-"""What of a submission is run, called, trained and read, resolved once for all trials of an assignment.
+"""The run plan: the code of a submission to run, call, train and read, resolved once for all trials.
 
-Nothing is run here, and after it nobody asks again in what form the submission came.
+Nothing runs here. Later steps don't depend on the form of the submission.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ _MEGABYTE = 1 << 20
 
 @dataclass(frozen=True, slots=True)
 class ProgramTrial:
-    """A trial of a robot program by itself; ``cell`` is the cell of a notebook that it was taken from."""
+    """A trial of a robot program. ``cell`` is the notebook cell that the program was taken from, if any."""
 
     cell: int | None = None
 
     def run(self, spec: TrialSpec, obstacles: tuple[Rectangle, ...], runner: TrialRunner, meter: JobMeter) -> Recording:
-        """Raises as ``TrialRunner.run`` does."""
+        """Run the trial. Raises the same errors as ``TrialRunner.run``."""
         recording = runner.run(spec, obstacles, meter)
         if self.cell is None:
             return recording
@@ -54,17 +54,17 @@ class ProgramTrial:
         return replace(recording, faults=tuple(faults))
 
     def notes_on_all(self, results: Sequence[TrialResult]) -> tuple[str, ...]:
-        """What is told once of all trials; nothing, for each recording tells its own."""
+        """Return notes on all trials together: none, because each recording has its own."""
         return ()
 
 
 @dataclass(frozen=True, slots=True)
 class RunPlan:
-    """Who takes part in every trial, and what of the submission is looked at beside them.
+    """The participants of every trial, and the code to analyse.
 
-    ``program`` is None where no robot is run; then there are no trials. ``answers`` is what answers it, unless
-    ``trial`` sees to that; ``functions`` is what a responder's functions are called of, ``read_as`` the parts as the
-    source reader takes them.
+    ``program`` is None if no robot runs; then there are no trials. ``answers`` is the responder, unless ``trial``
+    supplies it. ``functions`` is the module whose functions are called. ``read_as`` has the parts in the form for the
+    source reader.
     """
 
     assignment: Assignment
@@ -75,26 +75,26 @@ class RunPlan:
     collaborative: bool = False
     flags: Flags = field(default_factory=Flags)
     read_as: Mapping[Part, Mapping[str, Any]] = field(default_factory=lambda: MappingProxyType({}))
-    own_files: Mapping[str, bytes] = field(default_factory=lambda: MappingProxyType({}))  # those submitted
+    own_files: Mapping[str, bytes] = field(default_factory=lambda: MappingProxyType({}))  # submitted files
     notes: tuple[str, ...] = ()
     submission: str = ""  # content hash
-    missing: Part | None = None  # asked for, and not submitted
-    child_seed: int = 0  # of the chance that is the submission's own, and no trial's
-    agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # whom ``answers`` may ask
-    second_program: ProgramSpec | None = None  # where there are two robots
+    missing: Part | None = None  # required, but not submitted
+    child_seed: int = 0  # seed of the submission's own chance, shared by all trials
+    agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # agents of ``answers``
+    second_program: ProgramSpec | None = None  # if there are two robots
     second_flags: Flags = field(default_factory=Flags)
-    ran: Mapping[Part, RanStatements] = field(default_factory=lambda: MappingProxyType({}))  # of parts that are watched
+    ran: Mapping[Part, RanStatements] = field(default_factory=lambda: MappingProxyType({}))  # of the watched parts
     ignored_magic: str = ""  # why a program's magic line is ignored
 
     @property
     def processes(self) -> tuple[ProgramSpec | ResponderSpec, ...]:
-        """Those that take part in every trial; the one that takes longest to start first."""
+        """The processes that take part in every trial, the slowest to start first."""
         answers = self.trial.notebook.as_responder if isinstance(self.trial, NotebookTrial) else self.answers
         found = (answers, *self.agents.values(), self.program, self.second_program)
         return tuple(each for each in found if each is not None)
 
     def unwatched(self) -> RunPlan:
-        """The plan for a trial that is not shown: which statements are run there could tell what the robot sees."""
+        """Return the plan for hidden trials. Recorded statements could reveal sensor values, so none are recorded."""
         program, second, answers = self.program, self.second_program, self.answers
         return replace(
             self,
@@ -105,9 +105,10 @@ class RunPlan:
 
 
 def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PUBLIC) -> RunPlan:
-    """The plan for grading ``submission`` in the installation that has this secret.
+    """Return the plan for grading ``submission``, with seeds derived from ``secret``.
 
-    Raises UsageError when no part is there that the assignment asks for.
+    Raises:
+        UsageError: The submission has none of the parts that the assignment needs.
     """
     notebook = submission.notebook
     if notebook is not None and assignment.training is not None:
@@ -131,9 +132,9 @@ def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PU
 
 
 def _watched(plan: RunPlan) -> RunPlan:
-    """The plan with a look at which statements are run of the parts of which rules ask what they use.
+    """Return the plan with recording of executed statements for the parts that rules on used code check.
 
-    A notebook is not watched, and nor is what is trained: of these, what can be run counts.
+    Notebooks and trained models are not watched. For these, reachable code counts.
     """
     asked = {
         criterion.part
@@ -172,13 +173,13 @@ def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
     if missing == "program" and (asking := _stand_in(assignment)) is not None:
         asked_by = "your responder was asked by a program of Robomark's own, which only sends the texts"
         plan = replace(plan, program=asking, notes=(*plan.notes, asked_by))
-    # What is sent to a responder that is not there is a message all the same.
+    # Text sent to a missing responder is still a message.
     collaborative = plan.collaborative or missing == "responder"
     return replace(plan, missing=missing, collaborative=collaborative, ignored_magic=head.ignored)
 
 
 def _stand_in(assignment: Assignment) -> ProgramSpec | None:
-    """A program that asks a responder all that it is judged by alone; None where that is nothing."""
+    """Return a program that sends all questions of the criteria to the responder; None if there are none."""
     texts = list(dict.fromkeys(text for criterion in assignment.criteria for text in criterion.questions))
     if not texts:
         return None
@@ -187,7 +188,7 @@ def _stand_in(assignment: Assignment) -> ProgramSpec | None:
 
 
 def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignment) -> RunPlan:
-    """A notebook that has to answer the robot is executed; of any other only the marked robot program is taken."""
+    """Plan a notebook: executed if it must answer the robot, otherwise only its marked robot program is used."""
     asked = assignment.parts
     if asked.program == "none":
         return _executed(submission, notebook, assignment, None, Flags(), ())
@@ -199,7 +200,7 @@ def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignm
     site, cell = choice.site, choice.run.program
     head = _read_head(cell.source if cell is not None else "", assignment)
     if asked.responder == "student":
-        # A line that cannot be read is told by its execution, which may come to another cell.
+        # Executing the notebook reports an unreadable magic line, and may reach another cell.
         notes = () if head.ignored else head.notes
         if cell is not None:
             again = "" if site.cell == cell.number else f", as it is run again by cell {site.cell}"
@@ -225,7 +226,7 @@ def _beside_each_other(
     assignment: Assignment,
     notes: tuple[str, ...],
 ) -> RunPlan:
-    """A robot program, and a responder that is a module of its own; one that is trained answers no robot."""
+    """Plan a robot program with a responder in its own module. A responder that is trained does not answer robots."""
     answers = responder if assignment.training is None else None
     codes: Mapping[Part, ProgramSpec | ResponderSpec | None] = {"program": program, "responder": responder}
     return RunPlan(
@@ -250,7 +251,7 @@ def _executed(
     notes: tuple[str, ...],
     choice: RunChoice | None = None,
 ) -> RunPlan:
-    """A notebook from top to bottom; what in it is no robot program stands for the responder."""
+    """Plan a notebook that runs from top to bottom. Its cells without robot programs are the responder."""
     files = _files(submission, assignment, "student")
     functions = _responder(Code(notebook.name, python_of(notebook)), files, assignment)
     assert functions is not None
@@ -280,7 +281,7 @@ def _executed(
 
 
 def _with_second_program(plan: RunPlan, submission: Submission) -> RunPlan:
-    """The plan with what runs on the second robot. Robots that nobody answers talk to each other."""
+    """Return the plan with a second robot. Robots without a responder talk to each other."""
     assignment = plan.assignment
     who = assignment.parts.second_program
     if plan.program is None or isinstance(plan.trial, NotebookTrial):
@@ -313,7 +314,7 @@ def _part(what: str, usual: str, who: str, submitted: Code | None, assignment: A
 
 @dataclass(frozen=True, slots=True)
 class _Head:
-    """A program's flags, its text after its magic line, notes on both, and why that line is ignored, if it is."""
+    """A program's flags, its text after the magic line, notes on both, and why that line is ignored, if it is."""
 
     flags: Flags
     text: str
@@ -322,7 +323,7 @@ class _Head:
 
 
 def _read_head(text: str, assignment: Assignment) -> _Head:
-    """Take a program's magic line apart; a note tells where the assignment decides otherwise."""
+    """Parse a program's magic line. Notes say where the assignment overrides it."""
     try:
         flags, text = split_program(text)
         wanted = setup(flags)
@@ -342,9 +343,9 @@ def _read_head(text: str, assignment: Assignment) -> _Head:
 
 
 def _files(submission: Submission, assignment: Assignment, who: str) -> Mapping[str, bytes]:
-    """What lies beside a part of ``who``; a submission's own file wins over a given one.
+    """Return the files in the folder of a part of ``who``. Submitted files override given ones.
 
-    What the assignment brings imports none of the submission's code.
+    Parts from the assignment cannot import the submission's code.
     """
     submitted = submission.files_without(assignment.parts.agents)
     own = (each for each in submitted.items() if who == "student" or not each[0].endswith(".py"))
@@ -352,7 +353,7 @@ def _files(submission: Submission, assignment: Assignment, who: str) -> Mapping[
 
 
 def _agents(submission: Submission, assignment: Assignment) -> dict[str, AgentSpec]:
-    """Each has a folder like the responder's and may use as much; in a given one's lie given files alone."""
+    """Plan the agents. Each has a folder and limits like the responder's; given agents see only given files."""
     agents = {}
     for name, who in assignment.parts.agents.items():
         given = who != "student"
@@ -380,7 +381,7 @@ def _responder(code: Code | None, files: Mapping[str, bytes], assignment: Assign
 
 
 def _avoided(assignment: Assignment, part: Part) -> tuple[str, ...]:
-    """The modules that a student's part may not import: what carries marks is refused when it is run, too."""
+    """Return the modules that a student's part may not import. Marked import rules are also enforced at run time."""
     if getattr(assignment.parts, part) != "student":
         return ()
     rules = (each for each in assignment.criteria if isinstance(each, SourceRules) and each.part == part and each.marks)

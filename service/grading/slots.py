@@ -1,6 +1,6 @@
-"""Who of the graders on one machine runs student code now: usually all beside each other, and sometimes one alone.
+"""Locks between the graders on one machine: they usually run student code in parallel, sometimes exclusively.
 
-Locks on two files, so that the kernel gives back what a grader held that was killed. It runs nothing itself.
+There are two file locks, so the kernel releases those of a killed grader. This module runs nothing itself.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ _POLL_SECONDS = 0.02
 
 
 class Slots:
-    """The locks in ``folder``, which all graders of one home share."""
+    """The locks in ``folder``, shared by all graders with the same home folder."""
 
     def __init__(self, folder: Path) -> None:
         self._gate, self._running = folder / "gate.lock", folder / "slots.lock"
 
     @contextmanager
     def beside_others(self, heartbeat: Callable[[], None]) -> Iterator[None]:
-        """Run unless somebody runs alone, or waits to; ``heartbeat`` is called while waiting."""
+        """Hold a shared lock. Waits while another grader has or wants the exclusive one, and calls ``heartbeat``."""
         with ExitStack() as running:
             with _locked(self._gate, fcntl.LOCK_SH, heartbeat):
                 running.enter_context(_locked(self._running, fcntl.LOCK_SH, heartbeat))
@@ -32,7 +32,7 @@ class Slots:
 
     @contextmanager
     def alone(self, heartbeat: Callable[[], None]) -> Iterator[None]:
-        """Run when nobody else does, and let nobody else begin."""
+        """Hold an exclusive lock: wait for the other graders, and block new ones."""
         with _locked(self._gate, fcntl.LOCK_EX, heartbeat), _locked(self._running, fcntl.LOCK_EX, heartbeat):
             yield
 

@@ -1,6 +1,6 @@
-"""Runs a robot program or a notebook by itself, set up by the flags of the magic: what happened, and no marks.
+"""Runs of a robot program or notebook without marks, set up by the flags of the magic.
 
-The command ``run`` and the public Python API call it; each shows or keeps the recordings that it returns.
+The command ``run`` and the public Python API use it. Both show or store the recordings that it returns.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _NETWORKS = {"mlp_shapes_14x14.joblib": "shapes"}
 
 @dataclass(frozen=True, slots=True)
 class RunLimits:
-    """What the processes of a run may use: the responder or the notebook, each robot program, and all together."""
+    """Limits for the processes of a run: the responder or notebook, each robot program, and all together."""
 
     responder: ChildLimits = _RESPONDER
     program: ChildLimits = _PROGRAM
@@ -48,16 +48,16 @@ class RunLimits:
     programs_cpu_seconds: float = 150.0
 
     def meter(self) -> JobMeter:
-        """A meter of all processes of one run together."""
+        """Return a meter for all processes of one run."""
         return JobMeter(JobLimits(cpu_seconds=self.programs_cpu_seconds + self.responder.cpu_seconds))
 
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
-    """How a program is run: by the flags of the magic, and by what they do not say.
+    """Run options: the flags of the magic, and settings that have no flag.
 
-    ``seconds`` is simulated time, ``tick`` is in units of simulated time; ``floor`` is an image in the place of one of
-    the simulator's. The digit sheet is that of the seed unless ``sheet`` is given.
+    ``seconds`` is simulated time, ``tick`` is in units of simulated time. ``floor`` is an image that replaces the
+    simulator's floor. Without ``sheet``, the seed selects the digit sheet.
     """
 
     flags: Flags = field(default_factory=Flags)
@@ -71,13 +71,13 @@ class RunOptions:
 
     @property
     def sheet_number(self) -> int:
-        """Which digit sheet lies on the floor."""
+        """The number of the digit sheet on the floor."""
         return self.seed if self.sheet is None else self.sheet
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramFile:
-    """A robot program: the file that it is in, the flags of its magic line, and its text."""
+    """A robot program: its file, the flags of its magic line, and its text."""
 
     path: Path
     flags: Flags
@@ -85,27 +85,35 @@ class ProgramFile:
 
     @property
     def code(self) -> Code:
-        """Its text under the file's name."""
+        """The program text under the file's name."""
         return Code(self.path.name, self.text)
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramRun:
-    """What happened in the run of a program, what it consisted of, and notes on its flags."""
+    """The recording of a program run, its spec, and notes on its flags."""
 
     recording: Recording
     spec: TrialSpec
     notes: tuple[str, ...]
-    over: Recording | None = None  # of another program in the same world
+    over: Recording | None = None  # the recording of another program in the same world
 
 
 def read_program(path: Path) -> ProgramFile:
-    """The robot program in a file. Raises UsageError where it cannot be read, or its magic line is wrong."""
+    """Read the robot program in a file.
+
+    Raises:
+        UsageError: The file cannot be read, or its magic line is invalid.
+    """
     return _program_file(path, _source(path))
 
 
 def read_runnable(path: Path) -> ReadNotebook | ProgramFile:
-    """The notebook in a file, or that nbconvert has made a file of, else the robot program. Raises UsageError."""
+    """Read a notebook, a notebook exported by nbconvert, or a robot program.
+
+    Raises:
+        UsageError: The file cannot be read or is invalid.
+    """
     if path.suffix.lower() == ".ipynb":
         return read_notebook(read_file(path), path.name)
     text = _source(path)
@@ -113,7 +121,7 @@ def read_runnable(path: Path) -> ReadNotebook | ProgramFile:
 
 
 def find_responder(given: str, limits: RunLimits) -> ResponderSpec:
-    """The responder FILE or FILE:NAME, with the files beside it, and the course's networks unless it brings its own."""
+    """Load the responder FILE or FILE:NAME with its neighbouring files. The course's networks are the default."""
     path, name = Path(given), None
     if not path.exists() and ":" in given:
         file, _, name = given.rpartition(":")
@@ -125,7 +133,7 @@ def find_responder(given: str, limits: RunLimits) -> ResponderSpec:
 
 
 def own_floor(background: str | None) -> Floor | None:
-    """The floor that an image file is; None where a floor of the simulator is named."""
+    """Return the floor of an image file; None if ``background`` names a floor of the simulator."""
     path = Path(background or "")
     if background in names() or path.suffix.lower() not in _IMAGES:
         return None
@@ -141,13 +149,13 @@ def run_program(
     second: ProgramFile | None = None,
     over: ProgramFile | None = None,
 ) -> ProgramRun:
-    """Run a robot program, with a second robot where there is one, and ``over`` once more in the same world.
+    """Run a robot program, optionally with a second robot, and then ``over`` in the same world.
 
-    The options' flags count for more than those of the program's own magic line.
+    The flags of the options override those of the program's magic line.
 
     Raises:
-        UsageError: a flag has a wrong value, or the second program does not say where its robot starts.
-        HostError: this machine fails.
+        UsageError: A flag has an invalid value, or the second program has no start position.
+        HostError: The machine failed.
     """
     wanted = options.flags
     flags = Flags(
@@ -173,11 +181,11 @@ def run_program(
 def run_notebook(
     notebook: Notebook, files: Mapping[str, bytes], options: RunOptions, runner: TrialRunner
 ) -> ExecutedNotebook:
-    """Execute a notebook; its last robot program is run even without ``-R``, and with the options' flags.
+    """Execute a notebook. Its last robot program runs even without ``-R``, with the flags of the options.
 
     Raises:
-        UsageError: a flag of the options has a wrong value.
-        HostError: this machine fails.
+        UsageError: A flag of the options has an invalid value.
+        HostError: The machine failed.
     """
     limits = options.limits
 
@@ -201,7 +209,7 @@ def run_notebook(
 
 
 def read_files_beside(path: Path, text: str) -> dict[str, bytes]:
-    """What a responder or a notebook with this text finds in its folder: data, modules, and the course's networks."""
+    """Return the files for a responder or notebook with this text: data, modules, and the course's networks."""
     files = {file: weights_bytes(model) for file, model in _NETWORKS.items()}
     files |= {f"{name}.py": module.encode() for name, module in _modules_beside(path, text).items()}
     left = _FILES_BYTES
@@ -215,7 +223,11 @@ def read_files_beside(path: Path, text: str) -> dict[str, bytes]:
 
 
 def read_file(path: Path) -> bytes:
-    """What is in a regular file. Raises UsageError where it cannot be read."""
+    """Return the content of a regular file.
+
+    Raises:
+        UsageError: It cannot be read.
+    """
     try:
         if not stat.S_ISREG(path.stat().st_mode):
             raise UsageError(f"{path} is not a file; expected one that can be read")
@@ -225,7 +237,7 @@ def read_file(path: Path) -> bytes:
 
 
 def _trial(program: ProgramSpec, chosen: Setup, options: RunOptions) -> TrialSpec:
-    """A trial of one robot without a responder, in the world that the flags choose."""
+    """Return the spec of a trial with one robot and no responder, in the world that the flags choose."""
     return TrialSpec(
         program=program,
         responder=None,
@@ -249,7 +261,7 @@ def _program_spec(program: ProgramFile, flags: Flags, limits: RunLimits) -> Prog
 
 
 def _partner(second: ProgramFile, limits: RunLimits) -> PartnerSpec:
-    """The second robot, as the first line of its program says."""
+    """Return the second robot, as set up by its magic line."""
     if not {"x", "y"} <= second.flags.values.keys():
         name = second.path.name
         raise UsageError(f"{name}: does not say where the second robot starts; expected -x and -y in line 1")
@@ -259,7 +271,7 @@ def _partner(second: ProgramFile, limits: RunLimits) -> PartnerSpec:
 
 
 def _modules_beside(path: Path, text: str) -> Mapping[str, str]:
-    """What a file with this text imports from its folder."""
+    """Return the modules that the text imports from the file's folder."""
 
     def read(name: str) -> bytes | None:
         beside = path.parent / name

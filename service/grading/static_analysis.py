@@ -1,6 +1,6 @@
-"""What is found out about a submission without driving: what its text has, values of its functions, a check's answers.
+"""Analysis without a robot run: reading the source, calling functions, and running an assignment's checks.
 
-All of it is found inside the sandbox; what it is worth is decided in the modules of the families.
+All of it runs inside the sandbox. The modules of the criterion families decide the marks.
 """
 
 from __future__ import annotations
@@ -29,32 +29,37 @@ from submissions.criteria.code import Functions, PythonCheck, SourceRules
 from submissions.submission import Part
 
 _MEGABYTE = 1 << 20
-#: Its limits are much more than the longest text takes: how fast a machine is must make no difference.
+#: The limits are far above the needs of the longest text, so the speed of the machine makes no difference.
 _READER = ResponderSpec(
     Code("reader.py", "from inside.static_analysis.reader import read"), {}, ChildLimits(30.0, 512 * _MEGABYTE), 100_000
 )
-#: What is handed to it of all files together, and of one; a little more than it reads, so that it says so.
+#: Size limits for all files together and for one file. They exceed the reader's limits slightly, so that it reports
+#: them.
 _MOST_READ, _MOST_OF_ONE = 1_000_001, 300_001
-#: The names by which a responder's functions are found.
+#: The names of a responder's functions.
 _RESPONDERS = ("responder", "*_responder")
 
 
 class FunctionCaller(Protocol):
-    """Calls functions inside the sandbox; a runner does."""
+    """Calls functions inside the sandbox. Implemented by the trial runner."""
 
     def call(self, module: ResponderSpec, calls: Sequence[FunctionCall], seed: int, meter: JobMeter) -> Called:
-        """Call a module's functions one after the other in a fresh child, and return what they gave."""
+        """Call a module's functions in sequence in a fresh child, and return their results."""
 
 
 def analyse(plan: RunPlan, trials: Sequence[TrialResult], caller: FunctionCaller, meter: JobMeter) -> StaticAnalysis:
-    """Everything that the criteria ask for beside the recordings. Raises HostError when the machine fails."""
+    """Return everything that the criteria need besides the recordings.
+
+    Raises:
+        HostError: The machine failed.
+    """
     assignment = plan.assignment
     answers: dict[str, SourceAnswers] = {}
     called: dict[str, Called] = {}
     checks: dict[tuple[str, int], Returned] = {}
-    # What the instructor's checks cost is not the submission's, and what that has left is not theirs.
+    # The instructor's checks have their own budget, separate from the submission's.
     own = JobMeter(meter.limits, meter.heartbeat)
-    # Texts are read last, as what counts in them is what has been run.
+    # Source rules come last, because they consider which code was executed.
     for criterion in sorted(assignment.criteria, key=lambda each: isinstance(each, SourceRules)):
         if isinstance(criterion, SourceRules) and criterion.part in plan.read_as:
             answers[criterion.id] = _answers(criterion, plan, caller, meter)
@@ -70,7 +75,7 @@ def analyse(plan: RunPlan, trials: Sequence[TrialResult], caller: FunctionCaller
 
 
 def plain_trial(trial: TrialResult) -> dict[str, Any]:
-    """What an instructor's check is given: the recording as JSON has it."""
+    """Return a trial's recording as JSON values, the input of an instructor's check."""
     recording = trial.recording
     return {
         "scenario": trial.scenario,
@@ -124,9 +129,9 @@ def _answers(criterion: SourceRules, plan: RunPlan, caller: FunctionCaller, mete
 
 
 def _read_files(part: Part, plan: RunPlan) -> Iterator[Mapping[str, Any]]:
-    """The part, and the files submitted beside it that it can import.
+    """Yield the part, and the submitted files that it can import.
 
-    A responder may import any, and what is in it as bytes: they say themselves how they are written.
+    A responder may import any of them. They are passed as bytes, because they declare their own encoding.
     """
     yield {"name": "", **{kind: content[:_MOST_OF_ONE] for kind, content in plan.read_as[part].items()}}
     spec = plan.program if part == "program" else plan.functions
@@ -149,7 +154,7 @@ def _beside(part: Part, plan: RunPlan) -> Iterator[tuple[str, str, str]]:
 
 
 def _entries(assignment: Assignment) -> Iterator[str]:
-    """The functions of a responder that are called from outside."""
+    """Yield the names of a responder's functions that are called from outside."""
     yield from _RESPONDERS
     if assignment.training is not None:
         yield assignment.training.function

@@ -1,6 +1,6 @@
-"""What a class got for an assignment: mean, spread, each criterion's share of its marks, and what cost marks most.
+"""Statistics of a class for an assignment: mean, spread, share of marks by criterion, common causes of lost marks.
 
-A pure function of marks that are there already; it reads no database and judges nothing.
+A pure function of existing marks. It reads no database and does not judge anything.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 _BINS, _MOST_BINS = 10, 15
 _HUNDREDTH = Decimal("0.01")
-#: Share of all marks that passes, where nobody names another.
+#: The default pass mark, as a fraction of all marks.
 PASS_SHARE = Decimal("0.4")
 
 
 @dataclass(frozen=True, slots=True)
 class MarkedCriterion:
-    """One criterion of one submission, as far as it could be judged."""
+    """One criterion of one submission that could be judged."""
 
     id: str
     title: str
@@ -35,7 +35,7 @@ class MarkedCriterion:
 
 @dataclass(frozen=True, slots=True)
 class MarkedSubmission:
-    """One submission that has marks, out of all that its assignment gives: others count for an excused criterion."""
+    """One marked submission, scaled to the assignment's full marks: other criteria make up for an excused one."""
 
     who: str
     assignment: str
@@ -47,19 +47,22 @@ class MarkedSubmission:
 
 @dataclass(frozen=True, slots=True)
 class CriterionStatistics:
-    """``mean_share`` is the mean of what ``n`` submissions got of its marks, 0 to 1; ``full`` of them got all."""
+    """Statistics of one criterion.
+
+    ``mean_share`` is the mean fraction of its marks over ``n`` submissions, 0 to 1. ``full`` of them got all marks.
+    """
 
     id: str
     title: str
     n: int
     mean_share: float
     full: int
-    lost: Decimal  # marks, by all of them together
+    lost: Decimal  # total marks lost by all submissions
 
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """What cost these students marks; ``criterion`` is the title of the one that they lost them for, if it is one."""
+    """A reason why these students lost marks. ``criterion`` is the title of the affected criterion, if there is one."""
 
     sentence: str
     students: tuple[str, ...]
@@ -68,7 +71,7 @@ class Cause:
 
 @dataclass(frozen=True, slots=True)
 class AssignmentStatistics:
-    """Of ``n`` submissions for one assignment; ``spread`` is the standard deviation, None of a single one."""
+    """Statistics of ``n`` submissions for one assignment. ``spread`` is the standard deviation, None for n = 1."""
 
     assignment: str
     n: int
@@ -79,12 +82,12 @@ class AssignmentStatistics:
     median: Decimal
     highest: Decimal
     criteria: tuple[CriterionStatistics, ...]
-    causes: tuple[Cause, ...]  # the commonest first
+    causes: tuple[Cause, ...]  # most common first
 
 
 @dataclass(frozen=True, slots=True)
 class MarksBin:
-    """How many got from ``low`` to below ``high``; the last bin has those with all marks."""
+    """The number of students from ``low`` to below ``high``. The last bin has those with full marks."""
 
     low: Decimal
     high: Decimal
@@ -92,7 +95,7 @@ class MarksBin:
 
 
 def distribution(marks: Iterable[Decimal], max_marks: Decimal) -> tuple[MarksBin, ...]:
-    """A bin a mark where there are few, else ten, and one more for all marks; none where nothing is to be got."""
+    """Return one bin per mark if there are few, otherwise ten, plus one for full marks. Empty if the maximum is 0."""
     if max_marks <= 0:
         return ()
     is_few = max_marks == int(max_marks) and max_marks <= _MOST_BINS
@@ -105,9 +108,9 @@ def distribution(marks: Iterable[Decimal], max_marks: Decimal) -> tuple[MarksBin
 
 
 def marks_out_of_all(marks: Decimal, max_marks: Decimal, worth: Decimal) -> Decimal | None:
-    """Marks out of ``max_marks`` as marks out of ``worth``: where a criterion is excused, the others count for it.
+    """Scale marks out of ``max_marks`` to marks out of ``worth``: the others make up for an excused criterion.
 
-    None where all criteria are excused, so that there are no marks.
+    Returns None if all criteria are excused.
     """
     if worth == max_marks:
         return marks
@@ -117,7 +120,7 @@ def marks_out_of_all(marks: Decimal, max_marks: Decimal, worth: Decimal) -> Deci
 
 
 def marked_of(grade: Grade) -> MarkedSubmission:
-    """A grade as statistics see it; what could not be judged is left out."""
+    """Convert a grade for statistics, without criteria that could not be judged."""
     criteria = tuple(
         MarkedCriterion(each.id, each.title, each.marks, each.max_marks) for each in grade.criteria if not each.unjudged
     )
@@ -127,7 +130,7 @@ def marked_of(grade: Grade) -> MarkedSubmission:
 
 
 def statistics_of(submissions: Iterable[MarkedSubmission]) -> tuple[AssignmentStatistics, ...]:
-    """The statistics of each assignment there is a submission for, in the order of their names."""
+    """Return the statistics of each assignment that has a submission, in order of name."""
     of_assignment: dict[str, list[MarkedSubmission]] = {}
     for submission in submissions:
         of_assignment.setdefault(submission.assignment, []).append(submission)
@@ -154,7 +157,7 @@ def _of_one(assignment: str, found: Sequence[MarkedSubmission]) -> AssignmentSta
 
 
 def _criteria(found: Sequence[MarkedSubmission]) -> tuple[CriterionStatistics, ...]:
-    """In the order in which submissions have them; one that is worth nothing has no share."""
+    """Return the criteria in the order of the submissions. Criteria worth no marks are left out."""
     of_each: dict[str, list[MarkedCriterion]] = {}
     for submission in found:
         for criterion in submission.criteria:
@@ -176,9 +179,9 @@ def _criterion(own: Sequence[MarkedCriterion]) -> CriterionStatistics:
 
 
 def _causes(found: Sequence[MarkedSubmission]) -> tuple[Cause, ...]:
-    """A submission that ended by a fault lost its marks by that; of any other each criterion counts.
+    """Return the causes of lost marks: the fault that ended a submission, otherwise each criterion.
 
-    One that was still running at the end is both: that is no fault by itself.
+    For a submission that was still running at the end, both count, because that alone is not a fault.
     """
     students: dict[tuple[str, str], list[str]] = {}
     for submission in found:

@@ -1,7 +1,7 @@
-"""Marking a submission that trains: its model is trained on some trials' images and names those of the others.
+"""Grading of submissions that train a model: it learns from some trials' images and classifies the others'.
 
-The robot's runs come first and are recorded like any; here the submission's answers are added to the recordings, so
-that they are judged like a responder's.
+The robot runs first, recorded as usual. The model's answers are then added to the recordings, so they are judged like a
+responder's.
 """
 
 from __future__ import annotations
@@ -32,10 +32,13 @@ _SIDE = {"focus": 14, "whole": 20}
 def with_models_answers(
     results: list[TrialResult], plan: RunPlan, training: Training, runner: TrialRunner, meter: JobMeter
 ) -> list[TrialResult]:
-    """The trials; those that are tested on with the model's answers to their images.
+    """Train the model and return the trials, with its answers to the images of the test trials.
 
-    What goes wrong in training or naming is a fault of every trial that is tested on. Raises HostError when the
-    machine fails, and whatever the meter's heartbeat raises.
+    Errors in training or classification are faults of every test trial.
+
+    Raises:
+        HostError: The machine failed.
+        Exception: Whatever the meter's heartbeat raises.
     """
     trainer = plan.functions
     if trainer is None or not results:
@@ -43,11 +46,11 @@ def with_models_answers(
     learnt = [pair for result in results if result.scenario in training.scenarios for pair in _collected(result)]
     known = [(pair, pair.truth) for pair in learnt if pair.truth is not None]
     asked = [index for index, result in enumerate(results) if result.scenario not in training.scenarios]
-    # Hidden images come last: what a student is told of the visible ones is said before the model has seen those.
+    # Hidden images come last, so that feedback on visible ones is fixed before the model sees hidden ones.
     visible = [index for index in asked if results[index].visibility == "visible"]
     groups = [group for group in (visible, [index for index in asked if index not in visible]) if group]
     unseen = [[pair for index in group for pair in _collected(results[index])] for group in groups]
-    # Not in the order of the track: neighbours on it mostly show the same.
+    # Not in track order, where neighbours mostly show the same label.
     chance = Stream(plan.child_seed, "order of images")
     orders = [sorted(range(len(images)), key=chance.integer) for images in unseen]
     if known:
@@ -80,7 +83,7 @@ def with_models_answers(
 
 
 def _nothing_learnt(images: int, plan: RunPlan) -> Fault:
-    """The fault of a robot program that leaves nothing to train on; the assignment's own program is no student's."""
+    """Return the fault of a run without training images. It is the student's only if the program is theirs."""
     collected = "collected no images" if not images else f"collected {images} images, but none over a known label"
     sentence = f"the robot {collected}, so there is nothing to train on"
     if plan.assignment.parts.program != "student":
@@ -89,7 +92,7 @@ def _nothing_learnt(images: int, plan: RunPlan) -> Fault:
 
 
 def _collected(result: TrialResult) -> list[ImagePair]:
-    """A trial's images, logged and sent, in the order in which they were taken."""
+    """Return a trial's images, logged and sent, in the order in which they were taken."""
     found = [*pairs(result.recording, "log"), *pairs(result.recording, "sent")]
     return sorted(found, key=lambda pair: pair.image.tick)
 
@@ -101,7 +104,7 @@ def _arrays(found: Sequence[ImagePair], training: Training) -> Images:
 
 
 def _answered(recording: Recording, asked: Sequence[ImagePair], names: Iterator[str | None], gave: Named) -> Recording:
-    """The recording with each image as a message of the robot's and each name as its answer."""
+    """Return the recording with each image as a message from the robot and each name as its answer."""
     messages: list[Message] = []
     images: list[Image] = []
     given: list[str | None] = []

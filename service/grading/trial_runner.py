@@ -1,6 +1,6 @@
-"""What a worker keeps warm between trials: cameras over floors, arenas, and the zygotes of student code.
+"""Resources that a worker keeps between trials: cameras over floors, arenas, and zygotes for student code.
 
-A runner holds no result and no state that one trial could leave for the next.
+A runner keeps no result, and no state that passes from one trial to the next.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ AnArena = TypeVar("AnArena", bound=Arena)
 
 
 class TrialRunner:
-    """Runs trials. Use it as a context manager, or ``close`` it; everything is started when first needed.
+    """Runs trials. Use it as a context manager, or call ``close``. Everything starts on first use.
 
-    All student code runs in ``sandboxes``, which are closed with the runner. ``slots`` are those of the machine's
-    graders; without them there is no other. A ``meter`` counts what one job costs. Unless it ``spares`` children that
-    would only do again what they did before, every child is run.
+    All student code runs in ``sandboxes``, which are closed with the runner. ``slots`` are the locks shared by the
+    machine's graders; None if there is only one grader. A ``meter`` counts the cost of one job. With ``spares``, child
+    processes that would repeat a known fault are not run.
     """
 
     def __init__(
@@ -70,7 +70,12 @@ class TrialRunner:
         obstacles: tuple[Rectangle, ...] = (),
         meter: JobMeter | None = None,
     ) -> Recording:
-        """One trial. Raises HostError when the machine fails, and whatever the meter's heartbeat raises."""
+        """Run one trial.
+
+        Raises:
+            HostError: The machine failed.
+            Exception: Whatever the meter's heartbeat raises.
+        """
         meter = meter or JobMeter()
         partner = spec.partner
         if partner is not None:
@@ -83,28 +88,28 @@ class TrialRunner:
     def execute_notebook(
         self, spec: NotebookSpec, planner: RunPlanner, meter: JobMeter | None = None
     ) -> ExecutedNotebook:
-        """A notebook from top to bottom, with all its runs; ``planner`` serves one, so ``undisturbed`` is apart.
+        """Execute a notebook from top to bottom, with all its runs.
 
-        Raises as ``run`` does.
+        ``planner`` serves one execution, so callers use ``undisturbed`` themselves. Raises the same errors as ``run``.
         """
         return execute_notebook(spec, planner, self._ground, self._sandboxes, meter or JobMeter())
 
     def never_ran(self, spec: TrialSpec, obstacles: tuple[Rectangle, ...], fault: Fault, sandbox: str) -> Recording:
-        """The recording of a run that did not come about because of ``fault``."""
+        """Return the recording of a run that did not start because of ``fault``."""
         return never_ran(spec, *self._ground(spec, obstacles), fault, sandbox)
 
     def _ground(self, spec: TrialSpec, obstacles: tuple[Rectangle, ...]) -> tuple[Arena, CachedCamera]:
         return self._arena(obstacles), self._cameras.camera(spec.floor.pixels)
 
     def train(self, spec: TrainingSpec, meter: JobMeter | None = None) -> tuple[Named, ...]:
-        """A submission's model, trained and asked. Raises as ``run`` does."""
+        """Train a submission's model and let it classify images. Raises the same errors as ``run``."""
         meter = meter or JobMeter()
         return self.undisturbed(lambda: train_and_name(spec, self._sandboxes, meter), meter)
 
     def call(
         self, module: ResponderSpec, calls: Sequence[FunctionCall], seed: int, meter: JobMeter | None = None
     ) -> Called:
-        """Functions of a module, called in a fresh child without a robot. Raises as ``run`` does."""
+        """Call functions of a module in a fresh child, without a robot. Raises the same errors as ``run``."""
         meter = meter or JobMeter()
         return self.undisturbed(
             lambda: call_functions(
@@ -122,31 +127,39 @@ class TrialRunner:
         )
 
     def sparing(self, repeats: RepeatedFaults) -> AbstractContextManager[None]:
-        """Meanwhile children are not run of whom ``repeats`` knows what they would do."""
+        """Return a context in which children whose outcome ``repeats`` knows are not run."""
         return self._sandboxes.standing_in(repeats.child) if self._spares else nullcontext()
 
     def begin(self, processes: Iterable[ProgramSpec | ResponderSpec]) -> None:
-        """Start all that these will need, beside each other, and wait for nothing."""
+        """Start the zygotes for these processes in parallel, without waiting."""
         for role, without in dict.fromkeys((each.role, each.limits.without) for each in processes):
             self._sandboxes.begin(role, without)
 
     def check_sandbox(self) -> str:
-        """Which layers stand round student code here. Raises SandboxMissing when one cannot be put up."""
+        """Return the active sandbox layers.
+
+        Raises:
+            SandboxMissing: A required layer cannot be set up.
+        """
         return self._sandboxes.check()
 
     def check_forgetting(self) -> None:
-        """Hidden trials must leave nothing for later ones. Raises HostError where they could; done once in a while."""
+        """Check that trials leave nothing behind for later ones, as hidden trials require. Repeated occasionally.
+
+        Raises:
+            HostError: A trial could leave something behind.
+        """
         reason = self._sandboxes.remembers() if self._sandboxes.isolation.seccomp else None
         if reason is not None:
             raise HostError(f"a trial could leave something for the next, so nothing hidden is graded here: {reason}")
 
     @property
     def children_cpu_seconds(self) -> float:
-        """CPU seconds that students' processes have used so far."""
+        """CPU seconds used by students' processes so far."""
         return self._sandboxes.children_cpu_seconds
 
     def close(self) -> None:
-        """End all children, and give back the sandboxes, cameras and arenas."""
+        """End all children, and release the sandboxes, cameras and arenas."""
         self._sandboxes.close()
         self._cameras.close()
         for arena in (*self._arenas.values(), *self._shared_arenas.values()):
@@ -163,9 +176,9 @@ class TrialRunner:
         self.close()
 
     def undisturbed(self, work: Callable[[], Result], meter: JobMeter) -> Result:
-        """Do ``work``, and anew where it ends for a reason that is not the submission's fault.
+        """Do ``work``, and repeat it if it ends for a reason that is not the submission's fault.
 
-        Where a child has imported a library that it was not expected to, all is as if it had been expected.
+        If a child imported an unexpected library, the repeated run provides the library from the start.
         """
         before = meter.spent
         try:
@@ -176,9 +189,10 @@ class TrialRunner:
         return self._unless_killed(work, meter)
 
     def _unless_killed(self, work: Callable[[], Result], meter: JobMeter) -> Result:
-        """Do ``work``; where a child in it is killed by neither us nor itself, again, and with nothing else running.
+        """Do ``work``. If a child is killed from outside, repeat it exclusively, with no other grader running.
 
-        Other people's children may have taken the memory; one that is killed alone twice is itself to blame.
+        Children of other graders may have used the memory. A child killed twice, the second time alone, is at fault
+        itself.
         """
         before = meter.spent
         try:
@@ -203,7 +217,7 @@ class TrialRunner:
         return _kept(self._arenas, obstacles, lambda: Arena(obstacles))
 
     def _shared_arena(self, obstacles: tuple[Rectangle, ...], robot: Robot, number: int) -> SharedArena:
-        """That of robot ``number`` of two of a kind."""
+        """Return the arena of robot ``number`` of a pair."""
         key, partner = (obstacles, robot.name, number), f"robot {3 - number}"
         return _kept(self._shared_arenas, key, lambda: SharedArena(obstacles, robot, partner))
 
@@ -214,7 +228,7 @@ def _on_one_processor(work: Callable[[], Result]) -> Result:
 
 
 def _kept(arenas: OrderedDict[Key, AnArena], key: Key, make: Callable[[], AnArena]) -> AnArena:
-    """The arena of this key, made if need be; the one that has not been used for longest is closed."""
+    """Return the arena of this key, created if needed. Closes the least recently used arena beyond the limit."""
     arena = arenas.pop(key, None) or make()
     arenas[key] = arena
     while len(arenas) > _MOST_ARENAS:
