@@ -1,1 +1,1 @@
-"""What each criterion makes of the trials; a module a family, named as in ``submissions/criteria``."""
+"""The judges: one module per criterion family, with the same names as in ``submissions/criteria``."""

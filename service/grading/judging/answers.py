@@ -1,6 +1,6 @@
-"""What is in a responder's answer: its JSON, and the part of it that a path picks.
+"""Access to a responder's answer: its JSON, and the value at a path.
 
-Answers are students' texts: whatever they hold, nothing here raises.
+Answers are student text, so nothing here raises, whatever they contain.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from sim.recording import Fault, Message, Recording
 
 
 class Nothing:
-    """Stands for what is not there, which is not the same as JSON's null."""
+    """Type of NOTHING, which marks a missing value. It differs from JSON's null."""
 
 
 NOTHING = Nothing()
 
 
 def is_json_answer(text: str) -> bool:
-    """Whether it is ``JSON::`` and well-formed JSON."""
+    """Return whether the text is ``JSON::`` followed by well-formed JSON."""
     return not isinstance(parsed(text), Nothing)
 
 
 def parsed(text: str) -> Any:
-    """The object after ``JSON::``; NOTHING if the text has no such prefix or is malformed."""
+    """Return the value after ``JSON::``; NOTHING if the text has no such prefix or is malformed."""
     if not text.startswith(JSON):
         return NOTHING
     try:
@@ -38,7 +38,7 @@ def parsed(text: str) -> Any:
 
 
 def at_path(value: Any, path: str) -> Any:
-    """What ``value`` has at ``message.shape``; whole numbers pick from lists. NOTHING if there is no such place."""
+    """Return the value at a path such as ``message.shape``; NOTHING if there is none. Integers index lists."""
     for part in path.split("."):
         if isinstance(value, dict) and part in value:
             value = value[part]
@@ -53,7 +53,7 @@ def at_path(value: Any, path: str) -> Any:
 
 
 def as_text(value: Any) -> str:
-    """A text as it is, anything else as compact JSON."""
+    """Return a text unchanged, and other values as compact JSON."""
     if isinstance(value, str):
         return value
     try:
@@ -63,13 +63,13 @@ def as_text(value: Any) -> str:
 
 
 def same_value(found: Any, expected: Any) -> bool:
-    """JSON equality: numbers by value, truth values only with truth values."""
+    """Return whether two JSON values are equal. Numbers compare by value, booleans only with booleans."""
     if isinstance(found, bool) or isinstance(expected, bool):
         return found is expected
     if isinstance(found, int | float) and isinstance(expected, int | float):
         try:
             return abs(found - expected) <= 1e-9 * max(1.0, abs(expected))
-        except OverflowError:  # a whole number beyond all fractions
+        except OverflowError:  # an integer larger than any float
             return found == expected
     if isinstance(found, str) and isinstance(expected, str):
         return found.split() == expected.split()
@@ -81,7 +81,7 @@ def same_value(found: Any, expected: Any) -> bool:
 
 
 class Answers:
-    """What answered each message of one recording, looked up without a search: a run may hold 100 000 messages."""
+    """The answers to each message of a recording, indexed because a run may contain 100 000 messages."""
 
     def __init__(self, recording: Recording) -> None:
         self._messages = recording.messages
@@ -95,19 +95,19 @@ class Answers:
         self._faults = sorted((fault for fault in recording.faults if fault.who == "responder"), key=lambda f: f.t)
 
     def to(self, index: int) -> Message | None:
-        """The first answer to the message at ``index``, arrived or not; copies that the channel made do not count."""
+        """Return the first answer to the message at ``index``, delivered or not, without copies made by the channel."""
         return self._first.get(index)
 
     def all_to(self, index: int) -> Sequence[Message]:
-        """Every answer to the message at ``index``, copies and lost ones too, in the order in which they were given."""
+        """Return every answer to the message at ``index``, including copies and lost ones, in the order given."""
         return self._all.get(index, ())
 
     def fault_after(self, index: int) -> Fault | None:
-        """The first fault of the responder's from the moment on at which the message at ``index`` was sent."""
+        """Return the responder's first fault since the message at ``index`` was sent, or None."""
         place = bisect_left(self._faults, self._messages[index].t - 1e-9, key=lambda fault: fault.t)
         return self._faults[place] if place < len(self._faults) else None
 
     def silence(self, index: int) -> str:
-        """That the message at ``index`` had no answer, and why, where the recording tells."""
+        """Return a sentence part that the message at ``index`` had no answer, with the reason if it is recorded."""
         fault = self.fault_after(index) or (self._faults[-1] if self._faults else None)
         return "there was no answer" + (f": {fault_words(fault)}" if fault else "")

@@ -1,4 +1,4 @@
-"""Shows what two agents said to each other as if the robot had asked a responder, so that it is judged alike.
+"""Presents messages between two agents as a robot's questions and a responder's answers, for the same judges.
 
 Nothing is judged here.
 """
@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 from sim.recording import Message, Recording
 from submissions.criteria.asking import BetweenAgents
 
-#: The note of an answer that is no text but, as JSON, a value.
+#: The note on an answer that is a JSON value instead of a text.
 VALUE = "value"
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Who tells whom, in words, and their messages as those of a robot and its responder."""
+    """The sender and receiver in words, and their messages presented as those of a robot and its responder."""
 
     teller: str
     told: str
@@ -24,7 +24,7 @@ class Pair:
 
 
 def pair_of(criterion: BetweenAgents, recording: Recording) -> Pair:
-    """The two whom a criterion looks at: the robot and the responder, unless it names others."""
+    """Return the pair that a criterion checks: the robot and the responder, unless it names agents."""
     if not criterion.agents:
         return Pair("the robot", "the responder", recording)
     teller, told = criterion.agents

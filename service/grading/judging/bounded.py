@@ -1,7 +1,7 @@
-"""Judging within bounds: little is judged at once, all else in a process that is killed at its limits.
+"""Judging within limits: small inputs are judged directly, others in a process that is killed at its limits.
 
-What is judged, and how, is ``judge.py``'s. A criterion that cannot be judged within its bounds spoils no other, and
-what else is looked for in students' texts (``hints.py``) spoils no mark.
+``judge.py`` has the judging itself. A criterion that exceeds its limits does not affect others, and the search for
+hints (``hints.py``) does not affect marks.
 """
 
 from __future__ import annotations
@@ -30,33 +30,33 @@ from sim.recording import Image
 from submissions.assignment.definition import Assignment
 from submissions.criteria import Criterion
 
-#: Characters that programs and responders wrote in all trials; to fork a worker costs as much as judging so many.
+#: Largest number of characters written in all trials for direct judging. Forking costs about as much as judging them.
 _LITTLE = 100_000
-_A_TEXT = 20  # characters that a text counts for, beside its own
+_A_TEXT = 20  # characters added per text
 _HEARTBEAT_MILLISECONDS = 200
 _LONGEST_CAUSE = 300
 _FRAME = struct.Struct("<Q")
 _IMAGE = "IMG_DATA::"
-#: The child ends by its bounds, or with its parent: what stops a service must not make it look unable to judge.
+#: Only its limits or its parent end the child. A signal that stops the service must not count as a judging failure.
 _NOT_FOR_IT = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 _ITS_BOUNDS = (signal.SIGPROF, signal.SIGALRM)
 
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """What judging may take: seconds of computing, seconds in all, bytes beyond what is mapped."""
+    """Limits of judging: CPU seconds, wall-clock seconds, and bytes beyond those already mapped."""
 
     cpu_seconds: float
     seconds: float
     memory_bytes: int
 
 
-#: Of all criteria where there is little to judge, and of what no mark depends on.
+#: For all criteria together if there is little to judge, and for hints.
 _GUARD = Bounds(2.0, 10.0, 256 << 20)
 
 
 def bounds_for(trials: Sequence[TrialResult]) -> Bounds:
-    """For each criterion; ten times and more what the slowest takes for the longest texts and runs."""
+    """Return the limits for each criterion: at least ten times the needs of the longest texts and runs."""
     ticks = sum(len(trial.recording.ticks) for trial in trials)
     cpu_seconds = 10 + len(trials) + ticks / 5000
     return Bounds(cpu_seconds, 6 * cpu_seconds, 512 << 20)
@@ -69,16 +69,18 @@ def judge_within(
     analysis: StaticAnalysis,
     heartbeat: Callable[[], None] = lambda: None,
 ) -> tuple[CriterionResult, ...]:
-    """As ``judge``; of a criterion that could not be judged its result tells so, and why.
+    """Judge like ``judge``. The result of a criterion that could not be judged says so, with the reason.
 
-    Raises HostError as ``judge`` does, or when no process can be started, and whatever ``heartbeat`` raises.
+    Raises:
+        HostError: As for ``judge``, or if no process can be started.
+        Exception: Whatever ``heartbeat`` raises.
     """
     refuse_spoilt(trials)
     left = in_turn(assignment)
     results: dict[str, CriterionResult] = {}
     case = Case(assignment, trials, analysis, results)
     if _is_little(trials):
-        # Whatever is wrong here is found out in a process.
+        # The process below finds any problem again.
         with suppress(Exception, _Late), _guarded():
             while left:
                 results[left[0].id] = judge_one(left[0], case)
@@ -93,7 +95,8 @@ def judge_within(
         del left[: len(frames)]
         if not left:
             break
-        # Killed by somebody else, as when the machine's memory runs out: once that may be no fault of the criterion's.
+        # Killed from outside, for example when the machine is out of memory. Once, this may not be the criterion's
+        # fault.
         if _ended_by(status) == signal.SIGKILL and killed_at != left[0].id:
             killed_at = left[0].id
             continue
@@ -107,9 +110,11 @@ def sentences_within(
     find: Callable[[], tuple[str, ...]],
     heartbeat: Callable[[], None] = lambda: None,
 ) -> tuple[str, ...]:
-    """What ``find`` finds in the trials' texts, on which no mark depends: nothing, where it cannot within bounds.
+    """Return the results of ``find``, which don't affect marks. Empty if it exceeds its limits.
 
-    Raises HostError when no process can be started, and whatever ``heartbeat`` raises.
+    Raises:
+        HostError: No process can be started.
+        Exception: Whatever ``heartbeat`` raises.
     """
     if _is_little(trials):
         with suppress(Exception, _Late), _guarded():
@@ -126,17 +131,17 @@ def sentences_within(
 
 
 def _is_little(trials: Sequence[TrialResult]) -> bool:
-    """Whether it is read at once, which only the main thread can break off."""
+    """Return whether to judge directly, which can be interrupted only in the main thread."""
     return _written(trials) <= _LITTLE and threading.current_thread() is threading.main_thread()
 
 
 class _Late(BaseException):
-    """What is little takes too long; no judge must catch this."""
+    """A time limit expired during direct judging. A BaseException, so that judges don't catch it."""
 
 
 @contextmanager
 def _guarded() -> Iterator[None]:
-    """For a moment only, with little more memory; raises _Late, or MemoryError, in what takes more."""
+    """Apply small time and memory limits. Raises _Late or MemoryError in code that exceeds them."""
 
     def late(*_: object) -> NoReturn:
         raise _Late
@@ -150,7 +155,7 @@ def _guarded() -> Iterator[None]:
         finally:
             _set_timers(0, 0)
     finally:
-        # Again, should a timer have run out on the way here.
+        # Stop the timers again, in case one expired on the way here.
         _set_timers(0, 0)
         resource.setrlimit(resource.RLIMIT_AS, memory)
         for number, handler in before.items():
@@ -158,7 +163,7 @@ def _guarded() -> Iterator[None]:
 
 
 def _written(trials: Sequence[TrialResult]) -> int:
-    """How much there is to read that student code wrote; what an image is sent as is not its own."""
+    """Return the amount of student-written text. Image data does not count."""
     recordings = [trial.recording for trial in trials]
     lines = (line.text for recording in recordings for line in (*recording.printed, *recording.spoken))
     messages = (message.text for recording in recordings for message in recording.messages)
@@ -169,14 +174,14 @@ def _written(trials: Sequence[TrialResult]) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _Judging:
-    """What the process knows, from before it was forked."""
+    """The state of the judging process, from before the fork."""
 
     bounds: Bounds
     case: Case
-    results: dict[str, CriterionResult]  # those of the case, to add to
+    results: dict[str, CriterionResult]  # also in the case; extended while judging
 
     def frames(self, criteria: Sequence[Criterion]) -> Iterator[bytes]:
-        """The result of each of the criteria."""
+        """Yield the result of each criterion, pickled."""
         _confine(self.bounds)
         for criterion in criteria:
             _set_timers(self.bounds.cpu_seconds, self.bounds.seconds)
@@ -198,7 +203,7 @@ class _Judging:
 
 
 def _confine(bounds: Bounds) -> None:
-    # Nothing of the parent's may be finalised here: a database would be told that its connection has ended.
+    # Objects of the parent must not be finalised here: that would close its database connections.
     gc.disable()
     for number in _NOT_FOR_IT:
         signal.signal(number, signal.SIG_IGN)
@@ -215,7 +220,7 @@ def _set_timers(cpu_seconds: float, seconds: float) -> None:
 
 
 def _limit_memory(more: int) -> tuple[int, int]:
-    """Let this process map so many bytes more than it has; the limits before."""
+    """Limit this process to ``more`` bytes beyond its mapped memory, and return the previous limits."""
     mapped = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     before = resource.getrlimit(resource.RLIMIT_AS)
     most = before[1]
@@ -225,7 +230,7 @@ def _limit_memory(more: int) -> tuple[int, int]:
 
 
 def _in_a_process(work: Callable[[], Iterator[bytes]], heartbeat: Callable[[], None]) -> tuple[list[bytes], int]:
-    """What ``work`` yielded in a forked process until that ended, and its wait status."""
+    """Run ``work`` in a forked process. Return what it yielded and its wait status."""
     reader, writer = os.pipe()
     try:
         pid = os.fork()
@@ -256,7 +261,7 @@ def _work_and_leave(work: Callable[[], Iterator[bytes]], writer: int) -> NoRetur
                 out.write(frame)
                 out.flush()
     finally:
-        # Whatever the parent has to do at its end is not this process's.
+        # Skip the parent's exit handlers.
         os._exit(0)
 
 
@@ -273,7 +278,7 @@ def _read(reader: int, heartbeat: Callable[[], None]) -> Iterator[bytes]:
 
 
 def _frames(told: bytes) -> Iterator[bytes]:
-    """The whole frames; one that was being written when the process ended is none."""
+    """Yield the complete frames. A frame cut off at the end is ignored."""
     place = 0
     while place + _FRAME.size <= len(told):
         begin = place + _FRAME.size
@@ -283,7 +288,7 @@ def _frames(told: bytes) -> Iterator[bytes]:
 
 
 class _Pickler(pickle.Pickler):
-    """Names the images of the recordings by where they are: they are many, and both sides have them."""
+    """Refers to images of the recordings by position, because they are large and both sides have them."""
 
     def __init__(self, file: io.BytesIO, places: Mapping[int, tuple[int, int]]) -> None:
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
@@ -328,7 +333,7 @@ def _unjudged(criterion: Criterion, cause: str) -> CriterionResult:
 
 
 def _ended_by(status: int) -> int:
-    """The number of the signal, 0 if it was none."""
+    """Return the number of the signal that ended the process; 0 if none did."""
     return os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
 
 

@@ -1,6 +1,6 @@
-"""Judging how often images are named rightly: what the accuracy is worth.
+"""Judging of classification accuracy: the marks for it.
 
-What each image was taken for is found in ``recognition.py``.
+``recognition.py`` finds the class that each image was assigned to.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from submissions.criteria.classification import Classification
 
 @judges_case(Classification)
 def judge_classification(criterion: Classification, case: Case) -> CriterionResult:
-    """The share of images that are named rightly, all trials pooled, and the marks for it."""
+    """Return the fraction of images identified correctly over all trials, and the marks for it."""
 
     def judged(trials: Indexed) -> CriterionResult:
         found = classify(criterion, case.assignment, trials)

@@ -1,6 +1,6 @@
-"""Judging the code that was submitted: what its text has, what its functions return, what a check in Python says.
+"""Judging of submitted code: its source, the results of its functions, and an instructor's Python checks.
 
-Texts are read and functions called inside the sandbox; what came back is data, compared here and nothing more.
+Sources are read and functions called inside the sandbox. The results are data, which this module only compares.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from sim.errors import AssignmentError
 from submissions.criteria.code import CONSTRUCTS, ExpectedCall, Functions, PythonCheck, SourceRules, flags_in
 from submissions.magics import Flags
 
-#: More that is wrong would give_up the first.
+#: The largest number of problems to report, so that the first is easy to see.
 _MOST_TOLD = 4
 
 
 @judges_case(SourceRules)
 def judge_source_rules(criterion: SourceRules, case: Case) -> CriterionResult:
-    """What the source has and does without, once for all trials."""
+    """Judge what the source must and must not contain, once for all trials."""
     driven = case.trials if criterion.part == "program" else ()
     answers = case.analysis.answers.get(criterion.id)
     return once(criterion, judge_source(criterion, answers, case.analysis.flags, driven))
@@ -36,20 +36,20 @@ def judge_source_rules(criterion: SourceRules, case: Case) -> CriterionResult:
 
 @judges_case(Functions)
 def judge_functions(criterion: Functions, case: Case) -> CriterionResult:
-    """What the responder's functions returned when they were called, once for all trials."""
+    """Judge the results of the responder's functions, once for all trials."""
     return once(criterion, _returned(criterion, case.analysis.called.get(criterion.id)))
 
 
 @judges_case(PythonCheck)
 def judge_python_check(criterion: PythonCheck, case: Case) -> CriterionResult:
-    """What the instructor's own check made of each trial."""
+    """Judge each trial by the result of the instructor's own check."""
     return by_trial(criterion, case, lambda index, _: _checked(criterion, case.analysis.checks[criterion.id, index]))
 
 
 def judge_source(
     criterion: SourceRules, answers: SourceAnswers | None, flags: Flags, trials: Sequence[TrialResult] = ()
 ) -> Outcome:
-    """``trials`` are those that the program was driven in."""
+    """Judge the source. ``trials`` are the runs of the program."""
     whose = "your program" if criterion.part == "program" else "your responder"
     if answers is None:
         return failed(f"Expected {whose} to be submitted, but it was not.")
@@ -80,7 +80,10 @@ def judge_source(
 
 
 def _spoke(rule: str, answers: SourceAnswers, trials: Sequence[TrialResult]) -> str:
-    """That the robot spoke although the text shows no call that does it; a rule may mean one and not the other."""
+    """Return a note that the robot spoke although the source shows no call for it; empty if it did not.
+
+    A rule may name only one of the speech functions.
+    """
     meant = [fnmatchcase(call, rule) for call in SPEECH]
     shown = any(place is not None for place in answers.speech)
     if not rule.endswith("()") or not any(meant) or shown:
@@ -90,14 +93,14 @@ def _spoke(rule: str, answers: SourceAnswers, trials: Sequence[TrialResult]) -> 
 
 
 def _for_staff(criterion: SourceRules, answers: SourceAnswers) -> str:
-    """Where to look for what is avoided, as its text does not show all that it can do."""
+    """Return what staff should check for avoided constructs, because the source does not show all it can do."""
     if not criterion.avoids or not answers.doubts:
         return ""
     return f"Can do more than its text shows: {'; '.join(answers.doubts)}."
 
 
 def _missing_flags(criterion: SourceRules, flags: Flags) -> list[str]:
-    """For each flag that is asked for the flag if it is missing, else nothing."""
+    """Return one entry per required flag: the flag if it is missing, otherwise empty."""
     if not criterion.flags:
         return []
     wanted = flags_in(criterion.flags)
@@ -119,7 +122,7 @@ _MOST_MEASURES = 20
 
 
 def calls_of(criterion: Functions) -> tuple[FunctionCall, ...]:
-    """What has to be called for the criterion."""
+    """Return the calls that the criterion needs."""
     return tuple(
         FunctionCall(call.function or criterion.function, call.arguments, call.named) for call in criterion.calls
     )
@@ -146,7 +149,7 @@ def _returned(criterion: Functions, called: Called | None) -> Outcome:
 
 
 def _of_calls(criterion: Functions, scores: Sequence[Fraction], wrong: str, for_staff: str) -> Outcome:
-    """What the calls are worth; ``wrong`` says what went wrong, if something did."""
+    """Return the outcome of the calls. ``wrong`` describes the first problem, if any."""
     share = sum(scores, Fraction(0)) / len(scores)
     measures = (Measure("right", float(share)),)
     if not wrong or (criterion.table and share >= Fraction(str(criterion.at_least))):
@@ -160,7 +163,7 @@ def _of_calls(criterion: Functions, scores: Sequence[Fraction], wrong: str, for_
 
 
 def _hidden_words(criterion: Functions, called: Called, scores: Sequence[Fraction], least: Fraction) -> str:
-    """What students read where only hidden calls went wrong; no value and no error, as a program chooses these."""
+    """Return the message if only hidden calls failed, without values or errors, which a program can choose."""
     calls = criterion.calls
     if not any(score < least for score in scores):
         return ""
@@ -179,7 +182,11 @@ def _hidden_words(criterion: Functions, called: Called, scores: Sequence[Fractio
 
 
 def _checked(criterion: PythonCheck, gave: Returned) -> Outcome:
-    """The outcome that an instructor's check returned. Raises AssignmentError when it failed or returned nonsense."""
+    """Return the outcome from an instructor's check.
+
+    Raises:
+        AssignmentError: The check failed or returned an invalid value.
+    """
     if gave.fault is not None:
         raise AssignmentError(f"The assignment's own check fails: {criterion.file}: {fault_words(gave.fault)}.")
     told = {"passed": gave.value} if isinstance(gave.value, bool) else gave.value
@@ -200,7 +207,7 @@ def _checked(criterion: PythonCheck, gave: Returned) -> Outcome:
 
 
 def _compare(criterion: Functions, call: ExpectedCall, gave: Returned) -> tuple[Fraction, str]:
-    """The part of a call that is right, and what happened."""
+    """Return the correct fraction of a call, and a description of what happened."""
     if gave.fault is not None:
         return Fraction(0), f"it did not: {fault_words(gave.fault)}"
     value = gave.value
@@ -223,7 +230,7 @@ def _entries_right(criterion: Functions, wanted: Sequence[Any], value: Any) -> F
 
 
 def _same(criterion: Functions, found: Any, wanted: Any) -> bool:
-    """Equal in JSON's sense, numbers within the tolerance, texts but for runs of spaces."""
+    """Return whether values are equal as JSON, numbers within the tolerance, texts apart from repeated spaces."""
     if isinstance(found, bool) or isinstance(wanted, bool):
         return found is wanted
     if _is_number(found) and _is_number(wanted):
@@ -261,6 +268,6 @@ def _wanted(call: ExpectedCall) -> str:
 
 
 def _shown(value: Any) -> str:
-    """Texts in quotes, all else as it is, shortened."""
+    """Return the value for a message: texts in quotes, others as they are, shortened."""
     told = quoted(as_text(value))
     return told if isinstance(value, str) else told[1:-1]

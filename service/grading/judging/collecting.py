@@ -1,6 +1,6 @@
-"""Judging training data that a robot collected: pairs of images, their labels, balance and duplicates.
+"""Judging of training data that a robot collected: image pairs, their labels, balance and duplicates.
 
-The images are the simulator's own records; whether a network learns from them is ``training.py``'s.
+The images come from the simulator's recording. ``training.py`` tests whether a network learns from them.
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ _PART_FOR_THE_REST = Fraction(1, 2)
 
 @dataclass(frozen=True, slots=True)
 class ImagePair:
-    """A left and a right image of the same moment, what the left one shows, and what the right one's grey says."""
+    """A left and right image of the same moment, with the label on the floor and the one coded in grey.
+
+    ``truth`` is the floor's label under the left sensor, ``decoded`` the label of the right image's grey.
+    """
 
     image: Image
     truth: str | None
@@ -35,13 +38,13 @@ class ImagePair:
 
     @property
     def label(self) -> str | None:
-        """What the pair can be trained with as; None where the two disagree or either says nothing."""
+        """The training label of the pair; None if its two labels differ or one is missing."""
         return self.truth if self.truth is not None and self.truth == self.decoded else None
 
 
 @judges(Collects)
 def judge_collects(criterion: Collects, trial: TrialResult) -> Outcome:
-    """The labelled pairs of images, counted by class without repetitions, beside how many are asked for."""
+    """Judge the labelled image pairs: count them by class, without repetitions, and compare with the requirement."""
     recording = trial.recording
     found = pairs(recording, criterion.source, trial.light_noise)
     classes = criterion.classes or label_names(recording.background)
@@ -73,7 +76,7 @@ def judge_collects(criterion: Collects, trial: TrialResult) -> Outcome:
 
 
 def _different(found: Sequence[ImagePair], recording: Recording) -> list[ImagePair]:
-    """The pairs whose left image is of another window of the floor, and not the same, as that of any before."""
+    """Return the pairs whose left image shows a new window of the floor and differs from all earlier ones."""
     known: set[object] = set()
     fresh = []
     for pair in found:
@@ -86,14 +89,14 @@ def _different(found: Sequence[ImagePair], recording: Recording) -> list[ImagePa
 
 
 def pairs(recording: Recording, source: str, light_noise: float = 0.0) -> list[ImagePair]:
-    """The pairs of images that a recording has: those logged (``log``) or those sent as ``IMG_DATA`` (``sent``)."""
+    """Return the image pairs of a recording: the logged ones (``log``) or those sent as ``IMG_DATA`` (``sent``)."""
     images = recording.images if source == "sent" else tuple(_logged(recording))
     greys = GREYS.get(recording.background, {})
     return [ImagePair(image, _truth(recording, image), decoded(image, greys, light_noise)) for image in images]
 
 
 def _logged(recording: Recording) -> Iterator[Image]:
-    """Every left image of the log, with the right one if that follows it, as ``get_sensor_image_pair`` takes them."""
+    """Yield each logged left image, with the right one if it follows, like ``get_sensor_image_pair``."""
     log = recording.image_log
     for (side, left, tick), (other, right, _) in pairwise((*log, ("", "", 0))):
         if side == "left":
@@ -108,7 +111,7 @@ def _bytes(csv: str) -> bytes:
 
 
 def _truth(recording: Recording, image: Image) -> str | None:
-    """What the floor has under the left sensor where the image was taken."""
+    """Return the floor's label under the left sensor at the position of the image."""
     if image.truth is not None or image.message >= 0:
         return image.truth
     floor = floor_of(recording)
@@ -123,7 +126,7 @@ def _checks(
     usable: int,
     repeated: int,
 ) -> Iterator[tuple[bool, str]]:
-    """What must hold, each with what to say if it does not."""
+    """Yield each condition with the message for the case that it fails."""
     how = "image_data both" if criterion.source == "log" else "IMG_DATA"
     yield bool(found), f"Expected pairs of images to be collected, but there are none ({how})"
     rarest = min(classes, key=lambda label: counts[label], default="")

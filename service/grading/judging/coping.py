@@ -1,6 +1,6 @@
-"""Judging how a program copes with a channel that loses: what it sends again and from where, which answers it believes.
+"""Judging of a program on a lossy channel: its resends, where it sends from, and which answers it uses.
 
-What chance lost is never held against it; what it sent from out of reach is.
+Random losses are never held against it. Messages sent from out of reach are.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from sim.recording import Line, Message, Recording, Verdict
 from submissions.criteria.coping import FreshAnswers, InReach, Resends
 from submissions.criteria.texts import TextConditions
 
-#: A program that looks, waits or prints does so to 10 ms.
+#: Programs check, wait and print with a resolution of 10 ms.
 _ROUNDING = 0.011
-_MOST_WORDS = 50  # of an answer, to know it again
+_MOST_WORDS = 50  # of an answer, for comparisons
 
 
 @dataclass(frozen=True, slots=True)
 class _Question:
-    """A text of the robot's: when it was sent, all that was answered, and what of that arrived whole."""
+    """A text that the robot sent: its tries, all answers to it, and the answers that arrived unchanged."""
 
     text: str
     tries: tuple[Message, ...]
@@ -40,12 +40,12 @@ class _Question:
 
     @property
     def answered(self) -> float | None:
-        """When its first answer arrived, seconds."""
+        """The time at which its first answer arrived, in seconds."""
         return min((message.delivered or 0.0 for message in self.answers), default=None)
 
     @property
     def excused(self) -> bool:
-        """Whether chance alone kept it from being answered."""
+        """Return whether only random losses prevented an answer."""
         heard = sum(message.delivered is not None and message.arrived_as is None for message in self.tries)
         lost = all(map(by_chance, self.replies)) and len(self.replies) >= heard
         return not self.answers and lost and not any(map(out_of_reach, self.tries))
@@ -53,7 +53,7 @@ class _Question:
 
 @judges(Resends)
 def judge_resends(criterion: Resends, trial: TrialResult) -> Outcome:
-    """Each different text, and what was wrong with how it was sent again."""
+    """Judge how each different text was sent again."""
     recording = trial.recording
     questions = [each for each in _questions(recording) if meets(criterion, each.text)]
     what = _what(criterion)
@@ -86,7 +86,7 @@ def judge_resends(criterion: Resends, trial: TrialResult) -> Outcome:
 
 @judges(InReach)
 def judge_in_reach(criterion: InReach, trial: TrialResult) -> Outcome:
-    """Each message, and where the robot stood when it sent it."""
+    """Judge the robot's position at each message."""
     recording = trial.recording
     sent = [each for each in recording.messages if each.sender == "robot" and meets(criterion, each.text)]
     astray = [message for message in sent if out_of_reach(message)]
@@ -117,7 +117,7 @@ def judge_in_reach(criterion: InReach, trial: TrialResult) -> Outcome:
 
 @judges(FreshAnswers)
 def judge_fresh_answers(criterion: FreshAnswers, trial: TrialResult) -> Outcome:
-    """Each report, held against the answers that had come to the text sent last before it, and to all others."""
+    """Judge each report against the answers to the text sent last before it, and against all other answers."""
     recording = trial.recording
     questions = _questions(recording)
     expected = "Expected the robot to report each answer as that to what it sent last"
@@ -164,19 +164,19 @@ def judge_fresh_answers(criterion: FreshAnswers, trial: TrialResult) -> Outcome:
 
 
 def _unanswered(question: _Question) -> str:
-    """That no answer came, and why, where it was not chance."""
+    """Return a sentence that no answer came, with the reason if it was not a random loss."""
     astray = next(filter(out_of_reach, (*question.tries, *question.replies)), None)
     why = f": the channel lost {quoted(astray.text)} ({loss_words(astray)})" if astray else ""
     return f"no answer to {quoted(question.text)} came{why}"
 
 
 class _Answered:
-    """Which answers had come when, looked up by their words: a run may have thousands of each."""
+    """The arrival times of answers, indexed by their words, because a run may contain thousands of them."""
 
     def __init__(self, criterion: FreshAnswers, questions: Sequence[_Question]) -> None:
         sent = sorted((message.t, each.text) for each in questions for message in each.tries)
         self._times, self._texts = [t for t, _ in sent], [text for _, text in sent]
-        #: For the words of an answer: the texts that were answered so, and when first, the earliest first.
+        #: For the words of an answer: the texts that had this answer, with the first time of each, the earliest first.
         self._by_words: dict[tuple[str, ...], dict[str, float]] = {}
         came = ((message.delivered or 0.0, each.text, message) for each in questions for message in each.answers)
         for t, text, message in sorted(came, key=lambda each: each[0]):
@@ -186,12 +186,15 @@ class _Answered:
         self._lengths = sorted({len(words) for words in self._by_words})
 
     def sent_last(self, t: float) -> str:
-        """The text that was sent last before that moment; empty if none was."""
+        """Return the last text sent before the time; empty if there is none."""
         place = bisect_left(self._times, t - 1e-9)
         return self._texts[place - 1] if place else ""
 
     def named_in(self, line: Line, asked: str) -> Iterator[str]:
-        """Of each answer in the line that had come by then, what it answers: ``asked`` if it is one to that."""
+        """Yield the text that each answer in the line replies to; ``asked`` if the answer fits it.
+
+        Only answers that had arrived by the time of the line count.
+        """
         words = words_of(line.text)
         for length in self._lengths:
             for place in range(len(words) - length + 1):
@@ -203,7 +206,7 @@ class _Answered:
 
 
 def _questions(recording: Recording) -> list[_Question]:
-    """The different texts that the robot sent, in the order in which each was sent first."""
+    """Return the different texts that the robot sent, in order of first sending."""
     tries: dict[str, list[Message]] = {}
     replies: dict[str, list[Message]] = {}
     for message in recording.messages:
@@ -211,7 +214,7 @@ def _questions(recording: Recording) -> list[_Question]:
             tries.setdefault(message.text, []).append(message)
         elif message.reply_to is not None:
             asked = recording.messages[message.reply_to]
-            # What answers another text than was sent answers nothing.
+            # An answer to a corrupted text is not an answer to the text that was sent.
             if asked.arrived_as is None:
                 replies.setdefault(asked.text, []).append(message)
     return [
@@ -230,7 +233,7 @@ def _arrived_whole(reply: Message) -> bool:
 
 
 def _mistake(criterion: Resends, question: _Question, recording: Recording) -> tuple[float, str] | None:
-    """When the robot first did not send a text as it should have, and what was wrong; None where nothing is."""
+    """Return the time and description of the first wrong resend of a text; None if all are right."""
     least, most = criterion.every
     answered = question.answered
     until = recording.end_t if answered is None else answered
@@ -253,14 +256,14 @@ def _mistake(criterion: Resends, question: _Question, recording: Recording) -> t
 
 
 def _stopped_trying(last: float, most: float, recording: Recording) -> bool:
-    """Whether the program ended, or went on for longer than it may wait, after its last try."""
+    """Return whether the program ended, or continued past its longest wait, after its last try."""
     fault = cut(recording)
     timed_out = fault is not None and fault.verdict is Verdict.TIME_LIMIT
     return not timed_out or recording.end_t - last > most + _ROUNDING
 
 
 def _reports(criterion: FreshAnswers, recording: Recording) -> Iterator[Line]:
-    """What follows ``after`` in the lines that begin with it, by time."""
+    """Yield the text after ``after`` in the lines that begin with it, in order of time."""
     printed = recording.printed if criterion.source != "speech" else ()
     spoken = recording.spoken if criterion.source != "print" else ()
     begin = criterion.after.strip()
@@ -270,7 +273,7 @@ def _reports(criterion: FreshAnswers, recording: Recording) -> Iterator[Line]:
 
 
 def _value(criterion: FreshAnswers, answer: Message) -> str:
-    """What of an answer is looked for in a report; empty where it is not there."""
+    """Return the part of an answer that a report must contain; empty if the answer does not have it."""
     if criterion.path is None:
         return answer.text
     found = at_path(parsed(answer.text), criterion.path)

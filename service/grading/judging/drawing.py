@@ -1,6 +1,6 @@
-"""Judging what the robot drew: its straight legs, the angles between them, and whether figures close.
+"""Judging of drawings: straight legs, the angles between them, and whether figures close.
 
-A leg is driven straight; what lies between two legs, a turn on the spot or a bend, is a corner.
+A leg is a straight part of the path. A corner is the turn or bend between two legs.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from service.grading.judging.outcome import Outcome, failed, passed
 from sim.recording import Floats, Recording
 from submissions.criteria.drawing import Drawing
 
-#: Two straight parts that differ by less than this, degrees, may be one leg.
+#: Two straight parts whose directions differ by less than this may be one leg, degrees.
 _SAME_DIRECTION = 3.0
-#: A shorter straight part belongs to a corner, mm.
+#: Shorter straight parts belong to a corner, mm.
 _STUB = 20.0
 
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """A straight part of the path: its rows, its ends, mm."""
+    """A straight part of the path: its rows and its ends, mm."""
 
     first: int
     last: int
@@ -39,17 +39,17 @@ class Leg:
 
     @property
     def length(self) -> float:
-        """From end to end, mm."""
+        """The distance from end to end, mm."""
         return math.dist(self.start, self.end)
 
     @property
     def direction(self) -> float:
-        """Degrees, in which the robot moved."""
+        """The direction of motion, degrees."""
         return math.degrees(math.atan2(self.end[1] - self.start[1], self.end[0] - self.start[0]))
 
 
 def legs_of(recording: Recording, pen: bool) -> tuple[Leg, ...]:
-    """The legs of a path in order; with ``pen`` only of what was drawn."""
+    """Return the legs of a path in order. With ``pen``, only drawn ones."""
     points = positions(recording)
     ahead, _ = travel(recording)
     going = straight(recording)
@@ -68,7 +68,7 @@ def legs_of(recording: Recording, pen: bool) -> tuple[Leg, ...]:
 
 
 def _goes_on(leg: Leg, part: Leg) -> bool:
-    """Whether a part has the leg's direction and begins in the leg's line, not beside it or back along it."""
+    """Return whether a part continues the leg: same direction, and on its line ahead of its end."""
     along = math.radians(leg.direction)
     x, y = part.start[0] - leg.end[0], part.start[1] - leg.end[1]
     ahead, aside = x * math.cos(along) + y * math.sin(along), y * math.cos(along) - x * math.sin(along)
@@ -77,13 +77,13 @@ def _goes_on(leg: Leg, part: Leg) -> bool:
 
 
 def between(before: float, after: float) -> float:
-    """From one direction to another, degrees to the left, -180 to 180."""
+    """Return the angle from one direction to another, degrees to the left, -180 to 180."""
     return (after - before + 180) % 360 - 180
 
 
 @judges(Drawing)
 def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
-    """Every figure in turn; the score is the share of the figures that are right."""
+    """Judge each figure in order. The score is the fraction of correct figures."""
     recording = trial.recording
     if criterion.pen and not pen_down(recording).any():
         return failed(
@@ -128,7 +128,7 @@ def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
 
 
 def _figures(criterion: Drawing, legs: Sequence[Leg]) -> tuple[list[Sequence[Leg]], int]:
-    """The whole figures that the legs make up, in order, and the number of legs that are left."""
+    """Return the complete figures in order, and the number of remaining legs."""
     counts: Iterable[int] = criterion.legs if isinstance(criterion.legs, tuple) else itertools.repeat(criterion.legs)
     figures: list[Sequence[Leg]] = []
     first = 0
@@ -142,7 +142,7 @@ def _figures(criterion: Drawing, legs: Sequence[Leg]) -> tuple[list[Sequence[Leg
 
 @dataclass(frozen=True, slots=True)
 class _Problem:
-    """What is wrong with a figure, and the row where that is seen."""
+    """A problem with a figure, and the row where it appears."""
 
     words: str
     row: int
@@ -159,7 +159,7 @@ def _figures_words(criterion: Drawing) -> str:
 
 
 def _problem(criterion: Drawing, number: int, figure: Sequence[Leg]) -> _Problem | None:
-    """The first thing that is wrong with the figure, if something is."""
+    """Return the first problem with the figure, or None."""
     mean = _mean(figure)
     which = f" of figure {number + 1}" if criterion.figure_count > 1 else ""
     for place, leg in enumerate(figure, 1):
@@ -220,6 +220,6 @@ def _measures(legs: Sequence[Leg]) -> tuple[Measure, ...]:
 
 
 def _leg(points: Floats, first: int, last: int) -> Leg:
-    """The ticks from ``first`` to ``last`` are the way from row ``first`` to row ``last``."""
+    """Return the leg from row ``first`` to row ``last``."""
     (x1, y1), (x2, y2) = points[first], points[last]
     return Leg(first, last, (float(x1), float(y1)), (float(x2), float(y2)))

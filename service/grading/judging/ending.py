@@ -1,6 +1,6 @@
-"""Judging how a run ended: by itself and in time, and where the robot was.
+"""Judging of the end of a run: whether the program ended by itself and in time, and where the robot was.
 
-Faults of the responder do not end a program, so they are no business of this module.
+Faults of the responder don't end a program, so this module ignores them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from submissions.criteria.ending import EndPose, Finishes, SinceEvent
 
 @judges(Finishes)
 def judge_finishes(criterion: Finishes, trial: TrialResult) -> Outcome:
-    """How the program ended and when; a fault of the responder's does not count."""
+    """Judge how and when the program ended. Faults of the responder are ignored."""
     recording = trial.recording
     fault = cut(recording)
     measures = (Measure("time", recording.end_t, "s"),)
@@ -49,7 +49,7 @@ def _ended(fault: Fault) -> str:
 
 @judges(EndPose)
 def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
-    """Distances in mm, angles in degrees without regard to full turns; the edges of a zone belong to it."""
+    """Judge the end pose. Distances are in mm, angles in degrees modulo 360; the edges belong to a zone."""
     end, t = trial.recording.end, trial.recording.end_t
     where = f"({end.x:.1f}, {end.y:.1f}) facing {end.heading % 360:.1f}°"
     measures = (
@@ -106,7 +106,7 @@ def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
 
 
 def _since_problem(since: SinceEvent, recording: Recording) -> str:
-    """What is wrong at the end with the way and the time since the event; empty if nothing is."""
+    """Return the problem with the distance or time since the event; empty if there is none."""
     came = next((t for t, text in _texts(since, recording) if since.contains in text), None)
     what = f"{quoted(since.contains)} was {since.of}"
     if came is None:
@@ -128,7 +128,7 @@ def _since_problem(since: SinceEvent, recording: Recording) -> str:
 
 
 def _texts(since: SinceEvent, recording: Recording) -> list[tuple[float, str]]:
-    """When each text of this kind came, in order of time."""
+    """Return the times and texts of this kind, in order of time."""
     match since.of:
         case "sent":
             found = [(each.t, each.text) for each in recording.messages if each.sender == "robot"]
@@ -143,7 +143,7 @@ def _texts(since: SinceEvent, recording: Recording) -> list[tuple[float, str]]:
 
 
 def _way(recording: Recording) -> tuple[Measure, ...]:
-    """How far and in which direction the end is from the start, as the crow flies."""
+    """Return the straight-line distance and direction from start to end."""
     dx, dy = recording.end.x - recording.start.x, recording.end.y - recording.start.y
     bearing = math.degrees(math.atan2(dy, dx))
     return Measure("displacement", math.hypot(dx, dy), "mm"), Measure("bearing", bearing, "°")

@@ -1,6 +1,6 @@
-"""Finding a row of figures and words in a report: one matcher for the row that is wanted and for those that are not.
+"""Search for a row of numbers and words in a report, used for expected and unexpected rows.
 
-What follows from a row that is found is decided in ``reporting.py``.
+``reporting.py`` decides the consequences of a match.
 """
 
 from __future__ import annotations
@@ -15,23 +15,23 @@ from service.grading.judging.text_tokens import Token, tokens_of, words_of
 Entry = float | str
 Row = tuple[Entry, ...]
 Values = tuple[float, ...]
-#: Half of the last binary digit is no difference between two decimal numbers.
+#: Half of the last binary digit does not make two decimal numbers different.
 _SLACK = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """How many entries of a row were found in order, and the numbers among them."""
+    """The number of entries of a row found in order, and the numbers among them."""
 
     count: int
     values: Values
 
 
 class Report:
-    """The tokens of a report, in which rows are looked for.
+    """The tokens of a report, searchable for rows.
 
-    Entries of a row come in order, with anything between them. After a text, however, the next entry is one of the
-    first of its kind: "rows 7 columns 9" has 7 rows, and not 9. The kinds are numbers, and the texts in ``rows``.
+    Entries of a row must come in order, with anything between them. After a text, however, the next entry must be among
+    the first of its kind: "rows 7 columns 9" has 7 rows, and not 9. The kinds are numbers, and the texts in ``rows``.
     """
 
     def __init__(self, tokens: Sequence[Token], rows: Collection[Row], tolerance: float) -> None:
@@ -50,7 +50,7 @@ class Report:
         self._before_number = _ends_before_runs([number is not None for number in self._numbers])
 
     def find(self, row: Row) -> Found:
-        """The longest beginning of ``row`` that is there."""
+        """Return the longest beginning of ``row`` in the report."""
         reached: Mapping[int, Values] = {0: ()}
         for count, entry in enumerate(row):
             after_text = count > 0 and isinstance(row[count - 1], str)
@@ -60,29 +60,30 @@ class Report:
         return Found(len(row), reached[min(reached)])
 
     def has(self, row: Row) -> bool:
-        """Whether all entries of ``row`` are there."""
+        """Return whether all entries of ``row`` are in the report."""
         return self.find(row).count == len(row)
 
     def _next(self, entry: Entry, reached: Mapping[int, Values], after_text: bool) -> Mapping[int, Values]:
-        """Where ``entry`` ends that comes after one of the places ``reached``, each with the numbers up to there."""
+        """Return where ``entry`` can end after one of the places ``reached``, each with the numbers up to there."""
         places = self._places(entry)
         length = len(words_of(entry)) if isinstance(entry, str) else 1
         starts = sorted(reached)
         before_run = self._before_text if isinstance(entry, str) else self._before_number
         ends: dict[int, Values] = {}
         for place in places[bisect_left(places, starts[0]) :]:
-            # After a text, only the nearest place counts: between it and the entry's run is nothing of its kind.
+            # After a text, only the nearest place counts: nothing of the entry's kind is between it and the entry's
+            # run.
             start = starts[bisect_right(starts, place) - 1] if after_text else starts[0]
             if after_text and start <= before_run[place]:
                 continue
             number = self._numbers[place]
             ends[place + length] = reached[start] if number is None else (*reached[start], number)
             if not isinstance(entry, str):
-                break  # After a number anything goes: no later one leads further.
+                break  # After a number, any later place is allowed, so the first is enough.
         return ends
 
     def _places(self, entry: Entry) -> list[int]:
-        """Where ``entry`` begins, in order."""
+        """Return the places where ``entry`` begins, in order."""
         if isinstance(entry, str):
             parts = words_of(entry)
             return [
@@ -93,7 +94,7 @@ class Report:
         return sorted(place for number in near for place in self._by_number[number])
 
     def _covered(self, texts: Iterable[str]) -> list[bool]:
-        """Whether each token is part of one of the texts."""
+        """Return for each token whether it is part of one of the texts."""
         covered = [False] * len(self._words)
         for text in texts:
             length = len(words_of(text))
@@ -103,7 +104,7 @@ class Report:
 
 
 def _ends_before_runs(fits: Sequence[bool]) -> list[int]:
-    """Return for each place the last one that fits before the run of the place; -1 where there is none."""
+    """Return for each place the last fit before the run of the place; -1 if there is none."""
     ends: list[int] = []
     last, before = -1, -1
     for place, is_fit in enumerate(fits):
@@ -116,18 +117,18 @@ def _ends_before_runs(fits: Sequence[bool]) -> list[int]:
 
 
 def suits(row: Row, wanted: Row, tolerance: float) -> bool:
-    """Whether a right report of ``wanted`` may be one of ``row`` as well."""
+    """Return whether a correct report of ``wanted`` may also be one of ``row``."""
     tokens = [token for entry in wanted for token in _tokens_of_entry(entry)]
     return Report(tokens, (row, wanted), 2 * tolerance).has(row)
 
 
 def are_alike(row: Row, other: Row, tolerance: float) -> bool:
-    """Whether no report can be right for one of the rows and wrong for the other."""
+    """Return whether every report is right for both rows or wrong for both."""
     return suits(row, other, tolerance) and suits(other, row, tolerance)
 
 
 def is_near(value: float | None, wanted: float, tolerance: float) -> bool:
-    """Whether a token's value is the wanted number."""
+    """Return whether a token's value equals the expected number, within the tolerance."""
     return value is not None and abs(value - wanted) <= tolerance + _SLACK
 
 

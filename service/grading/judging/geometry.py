@@ -1,6 +1,6 @@
-"""Where the robot and its parts were, when, and how that lies to areas and lines of the floor.
+"""The positions of the robot and its parts over time, relative to areas and lines of the floor.
 
-Geometry only; what it is worth is decided in the modules of the families.
+Geometry only. The modules of the families decide the marks.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from sim.trigonometry import sincos
 from submissions.criteria.places import Area, LineToFollow, Part, Zone
 
 Side = Literal["left", "right"]
-#: A light sensor's middle, or the axle's.
+#: The centre of a light sensor or of the axle.
 Spot = Side | Literal["middle"]
-#: Less than this between two ticks is standing still, mm and degrees.
+#: Smaller changes between two ticks count as standing still, mm and degrees.
 STILL = 0.01
 
 
 def times(recording: Recording) -> Floats:
-    """Seconds, shape (n + 1,)."""
+    """Return the times of all rows in seconds, shape (n + 1,)."""
     return np.concatenate([[0.0], recording.ticks.t])
 
 
 def headings(recording: Recording) -> Floats:
-    """Degrees, unwrapped, shape (n + 1,)."""
+    """Return the headings in degrees, unwrapped, shape (n + 1,)."""
     return np.concatenate([[recording.start.heading], recording.ticks.heading])
 
 
 def positions(recording: Recording, part: Part = "robot") -> Floats:
-    """Where a part is: x and y, mm, shape (n + 1, 2). Where the pen is up, its rows are NaN.
+    """Return the positions x and y of a part, mm, shape (n + 1, 2). For the pen, rows are NaN while it is up.
 
-    Positions that are no numbers are NaN too, so that no comparison with them holds.
+    Invalid positions are NaN too, so every comparison with them is false.
     """
     ticks = recording.ticks
     middle = np.column_stack(
@@ -51,14 +51,14 @@ def positions(recording: Recording, part: Part = "robot") -> Floats:
     if part == "pen":
         return np.where(pen_down(recording)[:, None], middle, np.nan)
     light = light_of(recording, "left" if part == "left_light" else "right")
-    # Local x is to the robot's right, y forward: turned by the heading less a right angle.
+    # Local x is to the robot's right and y forward, so the rotation is the heading minus a right angle.
     turned = np.radians(headings(recording) - 90)
     cosine, sine = np.cos(turned), np.sin(turned)
     return middle + np.column_stack([cosine * light.x - sine * light.y, sine * light.x + cosine * light.y])
 
 
 def pen_down(recording: Recording) -> NDArray[np.bool_]:
-    """Whether the pen drew on the way to each row, shape (n + 1,); a row before a stroke begins belongs to it."""
+    """Return whether the pen drew on the way to each row, shape (n + 1,), including the first row of each stroke."""
     down = np.zeros(len(recording.ticks) + 1, dtype=bool)
     ends = [tick + 1 for tick, _ in recording.pen[1:]] + [len(down)]
     for (tick, is_down), end in zip(recording.pen, ends, strict=False):
@@ -67,14 +67,14 @@ def pen_down(recording: Recording) -> NDArray[np.bool_]:
 
 
 def place_at(recording: Recording, row: int) -> tuple[float, Pose]:
-    """Time and pose of a row."""
+    """Return the time and pose of a row."""
     if row <= 0 or not len(recording.ticks):
         return 0.0, recording.start
     return seconds_at(recording, row), pose_after(recording, row)
 
 
 def travel(recording: Recording) -> tuple[Floats, Floats]:
-    """What each tick added: mm along the heading before it (backwards less than 0), and degrees. Shapes (n,)."""
+    """Return the motion in each tick: mm along the heading (negative backwards), and degrees. Shapes (n,)."""
     points, degrees = positions(recording), headings(recording)
     along = np.radians(degrees[:-1])
     steps = np.diff(points, axis=0)
@@ -82,56 +82,56 @@ def travel(recording: Recording) -> tuple[Floats, Floats]:
 
 
 def standing(recording: Recording) -> NDArray[np.bool_]:
-    """Whether the robot stood still in each tick, shape (n,)."""
+    """Return whether the robot stood still in each tick, shape (n,)."""
     ahead, turned = travel(recording)
     return (np.abs(ahead) < STILL) & (np.abs(turned) < STILL)
 
 
 def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """The runs of true entries, as (first, one past the last)."""
+    """Return the runs of true entries, as (first, one past the last)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def relative_to(start: Pose, x: float, y: float) -> tuple[float, float]:
-    """How far ahead, and how far to the left, a point is of a pose, mm."""
+    """Return a point's distance ahead and to the left of a pose, mm."""
     along = math.radians(start.heading)
     dx, dy = x - start.x, y - start.y
     return dx * math.cos(along) + dy * math.sin(along), -dx * math.sin(along) + dy * math.cos(along)
 
 
 def light_of(recording: Recording, side: Side) -> LightSensor:
-    """The light sensor of that side, where it is bolted on."""
+    """Return the light sensor of that side, with its mounting position."""
     robot = robot_of(recording)
     return robot.left_light if side == "left" else robot.right_light
 
 
 def part_at(recording: Recording, part: Spot, pose: Pose) -> tuple[float, float]:
-    """World mm of the middle of a light sensor, or of the axle, with the robot at ``pose``."""
+    """Return the world position of a light sensor's centre or of the axle, with the robot at ``pose``, mm."""
     if part == "middle":
         return pose.x, pose.y
     return sensor_at(light_of(recording, part), pose)
 
 
 def sensor_at(sensor: LightSensor, pose: Pose) -> tuple[float, float]:
-    """World mm of the middle of a light sensor, with the robot at ``pose``."""
+    """Return the world position of a light sensor's centre, with the robot at ``pose``, mm."""
     turn = math.radians(pose.heading - 90)
     sine, cosine = math.sin(turn), math.cos(turn)
     return pose.x + cosine * sensor.x - sine * sensor.y, pose.y + sine * sensor.x + cosine * sensor.y
 
 
 def part_at_time(recording: Recording, part: Spot, t: float) -> tuple[float, float]:
-    """As ``part_at``, after the last tick until ``t`` seconds."""
+    """Return the position as ``part_at`` does, after the last tick before ``t`` seconds."""
     return part_at(recording, part, pose_at(recording, t))
 
 
 def footprint_at(recording: Recording, side: Side, pose: Pose) -> Footprint:
-    """The window that a light sensor sees; it does not turn with the robot, so it alone decides what is in it."""
+    """Return the window that a light sensor sees. It does not rotate with the robot, so it alone decides the image."""
     return footprint(light_of(recording, side), pose.x, pose.y, *sincos(math.radians(pose.heading) - math.pi / 2))
 
 
 def floor_share(recording: Recording, side: Side, pose: Pose) -> float:
-    """How much of what a light sensor sees is floor, 0 to 1; beside it all is black."""
+    """Return the fraction of a light sensor's view that is floor, 0 to 1. Everything else is black."""
     where, diameter = footprint_at(recording, side, pose), light_of(recording, side).diameter
     rows, columns = where.row + np.arange(diameter), where.column + np.arange(diameter)
     floor = ((rows >= 0) & (rows < HEIGHT))[:, None] & ((columns >= 0) & (columns < WIDTH))
@@ -140,19 +140,19 @@ def floor_share(recording: Recording, side: Side, pose: Pose) -> float:
 
 
 def in_zone(place: tuple[float, float], zone: Zone, margin: float = 0.0) -> bool:
-    """Whether a place is in [left, bottom, right, top], or at most ``margin`` mm outside each edge."""
+    """Return whether a place is in [left, bottom, right, top], extended by ``margin`` mm."""
     (x, y), (left, bottom, right, top) = place, zone
     return left - margin <= x <= right + margin and bottom - margin <= y <= top + margin
 
 
 def zone_words(zone: Zone) -> str:
-    """``x from 0 to 100 and y from 20 to 80``, for a sentence."""
+    """Return the zone as ``x from 0 to 100 and y from 20 to 80``."""
     left, bottom, right, top = zone
     return f"x from {left:g} to {right:g} and y from {bottom:g} to {top:g}"
 
 
 def distance_to(area: Area, points: Floats) -> Floats:
-    """Signed distance of each point (n, 2) to the edge of the area, mm, below 0 in it; a point on the edge has 0."""
+    """Return the signed distance of each point (n, 2) to the edge of the area, mm, negative inside."""
     distances = _to_shape(area, points)
     return -distances if area.outside else distances
 
@@ -171,7 +171,7 @@ def _to_shape(area: Area, points: Floats) -> Floats:
     edges = list(zip(corners, (*corners[1:], corners[0]), strict=True))
     nearest = np.min([to_segment(points, first, last) for first, last in edges], axis=0)
     within = np.zeros(len(points), dtype=bool)
-    for (x1, y1), (x2, y2) in edges:  # a ray to the right crosses the outline an odd number of times from inside
+    for (x1, y1), (x2, y2) in edges:  # from inside, a ray to the right crosses the outline an odd number of times
         crosses = (y1 > y) != (y2 > y)
         if y1 != y2:
             within ^= crosses & (x < x1 + (y - y1) / (y2 - y1) * (x2 - x1))
@@ -180,7 +180,7 @@ def _to_shape(area: Area, points: Floats) -> Floats:
 
 
 def to_segment(points: Floats, first: tuple[float, float], last: tuple[float, float]) -> Floats:
-    """Distance of each point (n, 2) to the stretch between two points, mm."""
+    """Return the distance of each point (n, 2) to a line segment, mm."""
     start, along = np.array(first), np.array(last) - np.array(first)
     length = float(along @ along)
     share = np.clip((points - start) @ along / length, 0, 1) if length > 0 else np.zeros(len(points))
@@ -189,16 +189,16 @@ def to_segment(points: Floats, first: tuple[float, float], last: tuple[float, fl
     return distances
 
 
-#: How far along the line, at least, the nearest point is looked for from one tick to the next, mm.
+#: The smallest search range along the line from one tick to the next, mm.
 _WINDOW = 100.0
 
 
 @dataclass(frozen=True, slots=True)
 class Along:
-    """Where each row from ``first`` on is with regard to a line.
+    """The position of each row from ``first`` on, relative to a line.
 
-    ``progress`` is along the line (mm, growing beyond its length where it is closed), ``offset`` from it (mm, to the
-    left of its direction above 0).
+    ``progress`` is along the line (mm; it grows beyond the length if the line is closed). ``offset`` is the distance
+    from it (mm, positive to the left).
     """
 
     first: int
@@ -208,11 +208,11 @@ class Along:
 
 
 def along(course: LineToFollow, points: Floats, within: float) -> Along | None:
-    """How the path goes along the line from where it first comes ``within`` mm of it; None if it never does.
+    """Return the path's progress from where it first comes ``within`` mm of the line; None if it never does.
 
-    From then on the nearest point is looked for only near the one before, so that a path that leaves the line and
-    comes upon it again elsewhere, or crosses it, has not come any farther. A corner that is cut at d mm from the line
-    on both sides makes the nearest point jump by twice that, so twice ``within`` is near enough.
+    After that, the nearest point is searched only near the previous one. So a path that leaves the line and meets it
+    elsewhere, or crosses it, makes no progress. Cutting a corner at d mm from the line on both sides moves the nearest
+    point by 2 d, so a range of twice ``within`` is enough.
     """
     line = _Line(course)
     distances = line.distances(points)
@@ -229,7 +229,7 @@ def along(course: LineToFollow, points: Floats, within: float) -> Along | None:
 
 
 def covered(found: Along, within: float, begin: float, end: float) -> float:
-    """The share of the line from ``begin`` to ``end`` that was driven forwards, ``within`` mm of it."""
+    """Return the fraction of the line from ``begin`` to ``end`` that was driven forwards, ``within`` mm of it."""
     near = np.abs(found.offset) <= within
     pieces = []
     for before, after, is_near in zip(found.progress, found.progress[1:], near[:-1] & near[1:], strict=False):
@@ -243,7 +243,7 @@ def covered(found: Along, within: float, begin: float, end: float) -> float:
 
 
 class _Line:
-    """The stretches of a line, repeated endlessly if it is closed."""
+    """The segments of a line, repeated endlessly if it is closed."""
 
     def __init__(self, course: LineToFollow) -> None:
         corners = np.array(course.corners())
@@ -264,7 +264,7 @@ class _Line:
         return float(progress[int(np.argmin(distance))])
 
     def step(self, x: float, y: float, at: float, window: float) -> tuple[float, float]:
-        """The nearest place within the window around ``at``, and the signed distance to it."""
+        """Return the nearest place in the window around ``at``, and the signed distance to it."""
         progress, distance, side = self._from(x, y)
         if self._closed:
             progress = at + (progress - at + self.length / 2) % self.length - self.length / 2
@@ -275,7 +275,7 @@ class _Line:
         return float(progress[best]), float(np.copysign(distance[best], side[best]))
 
     def _from(self, x: float, y: float) -> tuple[Floats, Floats, Floats]:
-        """For each stretch: the nearest place on it along the line, the distance to it, and the side (left above 0)."""
+        """Return for each segment the nearest place, the distance to it, and the side (positive to the left)."""
         away_x, away_y = x - self._starts[:, 0], y - self._starts[:, 1]
         forward_x, forward_y = self._directions[:, 0], self._directions[:, 1]
         ahead = np.clip(away_x * forward_x + away_y * forward_y, 0, self._lengths)

@@ -1,6 +1,6 @@
-"""Judging: from an assignment and what happened in its trials to one result a criterion.
+"""Judging: one result per criterion, from the assignment and its trials.
 
-Each criterion is judged in the module that is named like its schema's; none of them is named here.
+The module named like a criterion's schema judges it. This module names none of them.
 """
 
 from __future__ import annotations
@@ -27,18 +27,23 @@ def _judges() -> Mapping[type[Criterion], Judge]:
     return MappingProxyType({each.schema: each for values in declared for each in values if isinstance(each, Judge)})
 
 
-#: Who judges the criteria of each schema.
+#: The judge of each schema.
 JUDGES = _judges()
 
 
 def judge(
     assignment: Assignment, trials: tuple[TrialResult, ...], analysis: StaticAnalysis = _NOTHING_FOUND
 ) -> tuple[CriterionResult, ...]:
-    """One result for each criterion of the assignment, in its order.
+    """Return one result for each criterion of the assignment, in its order.
 
-    ``analysis`` is what is known of the submission beside the recordings. A trial that was cut short is judged by
-    what was reached. Raises HostError for a trial that this machine spoilt, because such a trial must be run
-    again, not marked, and AssignmentError where a check of the instructor's failed.
+    Args:
+        assignment: The assignment.
+        trials: The trials. A trial that was cut short is judged by what it reached.
+        analysis: Data about the submission besides the recordings.
+
+    Raises:
+        HostError: A trial failed on this machine. It must be run again, not marked.
+        AssignmentError: A check of the instructor failed.
     """
     refuse_spoilt(trials)
     results: dict[str, CriterionResult] = {}
@@ -49,18 +54,18 @@ def judge(
 
 
 def refuse_spoilt(trials: Sequence[TrialResult]) -> None:
-    """Raises HostError for a trial that this machine spoilt."""
+    """Raise HostError if a trial failed on this machine."""
     if any(trial.verdict is Verdict.HOST_ERROR for trial in trials):
         raise HostError("A trial that failed on this machine cannot be marked; it has to be run again.")
 
 
 def in_turn(assignment: Assignment) -> list[Criterion]:
-    """The criteria as they are judged: those that look at the result of another come last."""
+    """Return the criteria in judging order: those that use the result of another come last."""
     return sorted(assignment.criteria, key=lambda each: each.result_needed is not None)
 
 
 def judge_one(criterion: Criterion, case: Case) -> CriterionResult:
-    """The result of one criterion; one that needs a part that was not submitted has no marks for that alone."""
+    """Judge one criterion. If a part that it needs was not submitted, it gets no marks."""
     missing = case.analysis.missing
     if missing in criterion.parts_needed:
         return once(criterion, failed(f"There is no {PART_FILES[missing]}."))

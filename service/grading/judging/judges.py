@@ -1,6 +1,6 @@
-"""What a judge is given, how the judge of a criterion is declared, and how outcomes of trials become one result.
+"""Input of judges, declaration of judges, and combination of trial outcomes into one result.
 
-Whether a trial passes is decided in the module of the family, which is named like the schema's.
+The module of a criterion's family decides whether a trial passes.
 """
 
 from __future__ import annotations
@@ -23,25 +23,25 @@ from submissions.submission import Part
 C = TypeVar("C", bound=Criterion)
 #: Trials with their indices in the grade.
 Indexed = Sequence[tuple[int, TrialResult]]
-#: What is said of all trials, or of those that are shown.
+#: Makes the message for all trials, or for the visible ones.
 Summary = Callable[[Indexed, Sequence[Outcome]], str]
 
 
 @dataclass(frozen=True, slots=True)
 class StaticAnalysis:
-    """``answers`` and ``called`` are by the id of a criterion, ``checks`` by that and the place of the trial."""
+    """Analysis results. ``answers`` and ``called`` are by criterion id, ``checks`` by criterion id and trial index."""
 
     answers: Mapping[str, SourceAnswers] = field(default_factory=dict)
     flags: Flags = field(default_factory=Flags)
     called: Mapping[str, Called] = field(default_factory=dict)
     checks: Mapping[tuple[str, int], Returned] = field(default_factory=dict)
     sandbox: str = ""
-    missing: Part | None = None  # asked for, and not submitted
+    missing: Part | None = None  # required, but not submitted
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One submission before its judges; ``results`` are those of the criteria before this one in turn, by id."""
+    """The input of a judge: one submission. ``results`` are those of the criteria judged before, by id."""
 
     assignment: Assignment
     trials: Sequence[TrialResult]
@@ -49,7 +49,7 @@ class Case:
     results: Mapping[str, CriterionResult]
 
     def looked_at_by(self, criterion: Criterion) -> Indexed:
-        """The trials of the criterion's scenarios, as the robot had them that it looks at."""
+        """Return the trials of the criterion's scenarios, as recorded by the robot that it checks."""
         return [
             (index, as_had_by(criterion.robot, trial))
             for index, trial in enumerate(self.trials)
@@ -58,26 +58,26 @@ class Case:
 
 
 def has_hidden(trials: Indexed) -> bool:
-    """Whether any of the trials is not shown to students at once."""
+    """Return whether any of the trials is hidden from students."""
     return any(trial.visibility != "visible" for _, trial in trials)
 
 
 def as_had_by(robot: int, trial: TrialResult) -> TrialResult:
-    """The trial with the recording of that robot; of the first, where there is one."""
+    """Return the trial with the recording of that robot; of the first, if there is only one."""
     partner = trial.recording.partner
     return trial if robot == 1 or partner is None else replace(trial, recording=partner)
 
 
 @dataclass(frozen=True, slots=True)
 class Judge:
-    """Who judges the criteria of one schema."""
+    """The judge of one schema."""
 
     schema: type[Criterion]
     judge: Callable[[Any, Case], CriterionResult]
 
 
 def judges(schema: type[C]) -> Callable[[Callable[[C, TrialResult], Outcome]], Judge]:
-    """Declares the judge of a schema that looks at one trial at a time and needs nothing else."""
+    """Declare the judge of a schema that needs only one trial at a time."""
 
     def declared(judge: Callable[[C, TrialResult], Outcome]) -> Judge:
         return Judge(
@@ -88,7 +88,7 @@ def judges(schema: type[C]) -> Callable[[Callable[[C, TrialResult], Outcome]], J
 
 
 def judges_case(schema: type[C]) -> Callable[[Callable[[C, Case], CriterionResult]], Judge]:
-    """Declares the judge of a schema that needs more than one trial to see, or none."""
+    """Declare the judge of a schema that needs several trials, or none."""
 
     def declared(judge: Callable[[C, Case], CriterionResult]) -> Judge:
         return Judge(schema, judge)
@@ -97,7 +97,7 @@ def judges_case(schema: type[C]) -> Callable[[Callable[[C, Case], CriterionResul
 
 
 def summary(trials: Indexed, outcomes: Sequence[Outcome]) -> str:
-    """How many trials went well, and what happened in the first that did not."""
+    """Return the number of trials that passed, and the message of the first that failed."""
     count = len(outcomes)
     passes = sum(outcome.passed for outcome in outcomes)
     if count and passes == count:
@@ -112,7 +112,7 @@ def summary(trials: Indexed, outcomes: Sequence[Outcome]) -> str:
 def by_trial(
     criterion: Criterion, case: Case, outcome_of: Callable[[int, TrialResult], Outcome], told: Summary = summary
 ) -> CriterionResult:
-    """The result from the outcome of each trial, which is asked for by its index in the grade."""
+    """Combine the outcomes of the trials into a result. ``outcome_of`` gets the trial's index in the grade."""
     trials = case.looked_at_by(criterion)
     outcomes = [outcome_of(index, trial) for index, trial in trials]
     share = share_of(outcomes, criterion.over)
@@ -132,7 +132,7 @@ def by_trial(
 
 
 def once(criterion: Criterion, outcome: Outcome) -> CriterionResult:
-    """The result of what is looked at once a submission: no trial is its evidence."""
+    """Return the result of a criterion that is judged once per submission, without trials as evidence."""
     share = Fraction(outcome.passed) if criterion.over == "all" else outcome.score
     return CriterionResult(
         id=criterion.id,
@@ -146,7 +146,7 @@ def once(criterion: Criterion, outcome: Outcome) -> CriterionResult:
 
 
 def _shown(trials: Indexed, outcomes: Sequence[Outcome], told: Summary) -> Shown | None:
-    """What a student may read where some trials are hidden."""
+    """Return the feedback for students if some trials are hidden; otherwise None."""
     places = [place for place, (_, trial) in enumerate(trials) if trial.visibility == "visible"]
     if len(places) == len(trials):
         return None

@@ -1,6 +1,6 @@
-"""Reading the grey patch that stands beside a pattern in the right sensor's image, as the course's notebooks do.
+"""Reading of the grey patch beside a pattern in the right sensor's image, as in the course's notebooks.
 
-An image in, a label out; where the robot was does not matter here.
+The input is an image, the output a label. The robot's position does not matter.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from PIL import Image as Pixels
 from sim.floors import SHAPES
 from sim.recording import Image
 
-#: A median further off a label's grey, or nearer to the grey of another, is no label's.
+#: A median that differs more from a label's grey, or is nearer to another's, matches no label.
 _TOLERANCE = 12.0
-#: So much of the focus must be of the patch's grey: an edge of a patch in the image makes it no use.
+#: The fraction of the focus that must have the patch's grey. An image with an edge of a patch is not usable.
 _UNIFORM_SHARE = 0.98
 _SLACK = 3.0
 
 _SHAPES: Mapping[int, str] = MappingProxyType({int(code * 255 / 6): name for code, name in enumerate(SHAPES)})
 _DIGITS: Mapping[int, str] = MappingProxyType({25 * digit: str(digit) for digit in range(10)})
-#: What the greys of patches stand for, as an assignment names it for an image of its own.
+#: The labels of the greys, by the name that an assignment uses for its own floor image.
 CODES: Mapping[str, Mapping[int, str]] = MappingProxyType({"shapes": _SHAPES, "digits": _DIGITS})
-#: The grey of each label's patch, by floor: decode_shape_label in 08.4, get_training_label_from_sensor in 08.2.
+#: The label of each grey, by floor: decode_shape_label in 08.4, get_training_label_from_sensor in 08.2.
 GREYS: Mapping[str, Mapping[int, str]] = MappingProxyType(
     {
         "Simple_Shapes": _SHAPES,
@@ -38,9 +38,9 @@ GREYS: Mapping[str, Mapping[int, str]] = MappingProxyType(
 
 
 def decoded(image: Image, greys: Mapping[int, str], light_noise: float = 0.0) -> str | None:
-    """The label whose patch fills the right image's focus, by the label of each grey; None if none does.
+    """Return the label whose patch fills the right image's focus; None if there is none.
 
-    ``light_noise`` is the amplitude, in grey levels, that pixels may be off.
+    ``light_noise`` is the amplitude of pixel noise, in grey levels.
     """
     if not greys or len(image.right) != 4 * image.side**2:
         return None
@@ -55,16 +55,16 @@ def decoded(image: Image, greys: Mapping[int, str], light_noise: float = 0.0) ->
 
 
 def focus(rgba: bytes, side: int) -> NDArray[np.uint8]:
-    """The red values of the square that lies wholly inside the round sensor: 14 x 14 of 20 x 20.
+    """Return the red values of the square inside the round sensor: 14 x 14 of 20 x 20.
 
-    The crop (3, 3, 17, 17) is the course's ``sensor_image_focus``; other sizes are cropped in proportion.
+    The crop (3, 3, 17, 17) is the course's ``sensor_image_focus``. Other sizes are cropped in proportion.
     """
     edge = round(side * 3 / 20)
     return _pixels(rgba, side)[edge : side - edge, edge : side - edge, 0]
 
 
 def grey_image(image: Image, *, focus: bool) -> NDArray[np.uint8]:
-    """The left image as greys (Pillow's ``convert("L")``): its 14 x 14 focus, or all 20 x 20 pixels."""
+    """Return the left image in greys (Pillow's ``convert("L")``): its 14 x 14 focus, or all 20 x 20 pixels."""
     edge = round(image.side * 3 / 20) if focus else 0
     rgb = np.ascontiguousarray(_pixels(image.left, image.side)[:, :, :3])
     grey = np.asarray(Pixels.fromarray(rgb).convert("L"))

@@ -1,6 +1,6 @@
-"""Judging how well a line was followed, and how fast a circuit was driven.
+"""Judging of line following and of lap times.
 
-Where the path was along the line is worked out in ``geometry.py``.
+``geometry.py`` calculates the progress of the path along the line.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from submissions.criteria.line import Follows, Laps
 
 @judges(Follows)
 def judge_follows(criterion: Follows, trial: TrialResult) -> Outcome:
-    """The share of the line that was driven along, of all that counts."""
+    """Judge the fraction of the line that was driven along, of the part that counts."""
     recording = trial.recording
     who, line = PART_NAMES[criterion.of], criterion.line.name
     found = along(criterion.line, positions(recording, criterion.of), criterion.within)
@@ -80,7 +80,7 @@ def judge_follows(criterion: Follows, trial: TrialResult) -> Outcome:
 
 
 def _part_that_counts(criterion: Follows, found: Along) -> tuple[float, float]:
-    """From where to where the line counts, mm along it: without a bound, its last mm alone would be all of it."""
+    """Return the range of the line that counts, mm. Without a bound, its last mm alone could count as all of it."""
     met = float(found.progress[0])
     if criterion.line.is_closed:
         return met, met + found.length
@@ -89,7 +89,7 @@ def _part_that_counts(criterion: Follows, found: Along) -> tuple[float, float]:
 
 @dataclass(frozen=True, slots=True)
 class Crossing:
-    """When the robot crossed the start line, and how far it had come along the circuit."""
+    """A crossing of the start line, with the progress along the circuit."""
 
     t: float
     row: int
@@ -98,7 +98,7 @@ class Crossing:
 
 @judges(Laps)
 def judge_laps(criterion: Laps, trial: TrialResult) -> Outcome:
-    """A lap is from one crossing of the start line to a later one; the path between two ticks is straight."""
+    """Judge laps, each from one crossing of the start line to a later one. The path is straight between ticks."""
     recording = trial.recording
     points = positions(recording)
     found = along(criterion.line, points, criterion.within)
@@ -157,11 +157,11 @@ def _laps_words(count: int) -> str:
 
 
 def _crossings(criterion: Laps, points: Floats, found: Along, per_second: float) -> list[Crossing]:
-    """Each time the path, of so many points a second, crosses the start line in the circuit's direction."""
+    """Return each crossing of the start line in the circuit's direction. ``per_second`` is the rate of points."""
     x1, y1, x2, y2 = criterion.start_line
     first, line = np.array([x1, y1]), np.array([x2 - x1, y2 - y1])
     away = points - first
-    # Which side of the start line each point is on, and where along it.
+    # The side of the start line that each point is on, and the position along it.
     side = line[0] * away[:, 1] - line[1] * away[:, 0]
     place = away @ line / float(line @ line)
     crossings = []
@@ -178,10 +178,10 @@ def _crossings(criterion: Laps, points: Floats, found: Along, per_second: float)
 
 
 def whole_laps(criterion: Laps, found: Along, crossings: list[Crossing]) -> tuple[list[tuple[float, int]], int | None]:
-    """Time and last row of each whole lap, and where a lap was spoilt by leaving the line, if one was.
+    """Return the time and last row of each complete lap, and the row where leaving the line spoilt a lap, if any.
 
-    A lap begins at the last crossing from which it is whole, so it has the least time and the fewest ways to be
-    spoilt; no two laps overlap.
+    A lap begins at the last crossing from which it is complete, so it has the shortest time and the fewest ways to be
+    spoilt. Laps don't overlap.
     """
     laps, spoilt = [], None
     free = 0
@@ -209,17 +209,17 @@ def _last_row(found: Along, crossings: list[Crossing]) -> int:
 
 
 def _until_the_end(found: Along, end: float) -> int:
-    """How many rows there are until the line's end was reached; all, if it was not."""
+    """Return the number of rows until the line's end was reached; all if it was not."""
     reached = np.flatnonzero(found.progress >= end - 1e-6)
     return int(reached[0]) + 1 if len(reached) else len(found.progress)
 
 
 def _where_it_ended(found: Along, within: float) -> int:
-    """The row at which the robot was on the line for the last time."""
+    """Return the last row in which the robot was on the line."""
     return int(np.flatnonzero(np.abs(found.offset) <= within)[-1])
 
 
 def _one_side(offset: Floats) -> float:
-    """The larger share of the rows on either side of the line; 1 if none is off it."""
+    """Return the larger fraction of the rows on one side of the line; 1 if all are on the line."""
     left, right = int((offset > 0).sum()), int((offset < 0).sum())
     return max(left, right) / (left + right) if left + right else 1.0

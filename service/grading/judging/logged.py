@@ -1,6 +1,6 @@
-"""Judging what a program logs: series of the datalog, and images.
+"""Judging of logged data: datalog series, and images.
 
-Images and readings are the simulator's own records; values are what the program printed, which may be any number.
+Images and readings come from the simulator's recording. Values are those the program printed, so they may be invented.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from sim.recording import Datum, Image, Recording
 from sim.sensors import Footprint
 from submissions.criteria.logged import Datalog, ImageLog
 
-Check = tuple[Fraction, str]  # the part of it that was reached, and what to say if not all
+Check = tuple[Fraction, str]  # the fraction reached, and the message if it is below 1
 
 
 @judges(Datalog)
 def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
-    """The samples of one series of the datalog; if so asked only those that a sensor read."""
+    """Judge the samples of one datalog series; if required, only those that a sensor read."""
     recording = trial.recording
     name = criterion.series
     logged = [datum for datum in recording.datalog if datum.name == name]
@@ -70,7 +70,7 @@ def _instrument(criterion: Datalog) -> str:
 
 
 def _true_ones(criterion: Datalog, logged: Sequence[Datum], recording: Recording) -> list[Datum]:
-    """The samples that the instrument read; all where the criterion names none."""
+    """Return the samples that the instrument read; all if the criterion names none."""
     if criterion.measured is None:
         return list(logged)
     values, at = [datum.value for datum in logged], [datum.t for datum in logged]
@@ -88,7 +88,7 @@ def _there(count: int) -> str:
 
 @judges(ImageLog)
 def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
-    """How many images of each light sensor were logged, in what order, and what those at the start show."""
+    """Judge the number and order of logged images of each light sensor, and the content of those at the start."""
     recording = trial.recording
     log = recording.image_log
     checks: list[Check] = []
@@ -145,7 +145,7 @@ def _extremes(values: Sequence[float]) -> tuple[Measure, ...]:
 
 
 def _datalog_checks(criterion: Datalog, samples: Sequence[Datum], recording: Recording) -> list[Check]:
-    """What is asked but for the plateaus; the number of samples counts only where more than one is asked for."""
+    """Return all checks except plateaus. The number of samples counts only if more than one is required."""
     name, count = criterion.series, len(samples)
     values = [datum.value for datum in samples]
     checks: list[Check] = []
@@ -188,7 +188,7 @@ def _plateau_check(criterion: Datalog, values: Sequence[float]) -> Check:
 
 
 def _plateaus_in_order(criterion: Datalog, values: Sequence[float]) -> int:
-    """How many of the plateaus come in order."""
+    """Return how many of the plateaus come in order."""
     place = 0
     for found, wanted in enumerate(criterion.plateaus):
         run = 0
@@ -201,7 +201,7 @@ def _plateaus_in_order(criterion: Datalog, values: Sequence[float]) -> int:
 
 
 def _shows_start(entry: tuple[str, str, int], recording: Recording, noise: float) -> bool:
-    """Whether a logged image is the floor's own crop at the start pose, up to the noise on the light sensors."""
+    """Return whether a logged image is the floor's crop at the start pose, within the noise of the light sensors."""
     floor = floor_of(recording)
     if floor is None:
         pose = pose_after(recording, entry[2])
@@ -218,7 +218,7 @@ def _shows_start(entry: tuple[str, str, int], recording: Recording, noise: float
 
 
 def _crop(floor: Floor, where: Footprint, side: int) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
-    """RGB under a sensor of that many pixels, shape (side, side, 3), black off the floor."""
+    """Return the RGB under a sensor of that many pixels, shape (side, side, 3), black off the floor."""
     crop = np.zeros((side, side, 3), np.int64)
     top, left = max(where.row, 0), max(where.column, 0)
     bottom, right = min(where.row + side, HEIGHT), min(where.column + side, WIDTH)
@@ -240,7 +240,7 @@ def _is_uniform(csv: str) -> bool:
 
 
 def _shows_something(entry: tuple[str, str, int], recording: Recording) -> bool:
-    """Whether there was floor under the sensor and, where the floor has label patches, one that fills its image."""
+    """Return whether there was floor under the sensor and, on floors with label patches, a patch fills the image."""
     side, csv, tick = entry
     pose = pose_after(recording, tick)
     if floor_share(recording, "left" if side == "left" else "right", pose) < 1:
@@ -257,12 +257,12 @@ def _where(recording: Recording, tick: int) -> str:
     return f"one was taken at ({pose.x:.1f}, {pose.y:.1f})"
 
 
-#: What a reading of a sensor takes, seconds; what is printed sooner after another sample repeats it.
+#: The duration of a sensor reading, in seconds. A sample printed sooner after another repeats it.
 _READING = 0.01
 
 
 def _without_repeats(samples: Sequence[Datum]) -> list[Datum]:
-    """Of those that were printed in less time than a reading takes only the first."""
+    """Return the samples without those printed sooner than a reading takes."""
     found: list[Datum] = []
     for datum in samples:
         if not (found and datum.t < found[-1].t + _READING - 1e-9):

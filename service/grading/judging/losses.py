@@ -1,6 +1,6 @@
-"""What the channel lost of a conversation: by chance, which is nobody's doing, or because the robot was out of reach.
+"""Messages lost by the channel: by chance, or because the robot was out of reach.
 
-What is worth marks is decided in the modules of the families.
+The modules of the families decide the marks.
 """
 
 from __future__ import annotations
@@ -9,17 +9,17 @@ from sim.recording import Message
 
 
 def by_chance(message: Message) -> bool:
-    """Whether chance kept the text from arriving as it was sent."""
+    """Return whether a random loss or corruption kept the text from arriving as sent."""
     return message.lost == "chance" or message.arrived_as is not None
 
 
 def out_of_reach(message: Message) -> bool:
-    """Whether it was lost because of where the robot was, or how it stood."""
+    """Return whether it was lost because of the robot's position or heading."""
     return message.lost not in ("", "chance")
 
 
 def loss_words(message: Message) -> str:
-    """What befell a text that did not arrive as it was sent, in brackets behind ``the channel lost it``."""
+    """Return why a text did not arrive as sent, for use in brackets after ``the channel lost it``."""
     match message.lost:
         case "out of range":
             distance = round(message.distance or 0, 1)

@@ -1,6 +1,6 @@
-"""Pair what a criterion asks for with what a run has, so that as many wishes as possible are met.
+"""Matching of a criterion's requirements with the content of a run, for as many matches as possible.
 
-The first candidate that suits one wish may be the only one that suits a later wish, so no pair is final until the end.
+The first candidate for one requirement may be the only one for a later one, so pairs stay open until the end.
 """
 
 from __future__ import annotations
@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 
-#: For each wish, whether each candidate suits it.
+#: For each requirement, whether each candidate matches.
 Suits = Sequence[Sequence[bool]]
 
 
 def most_pairs(suits: Suits) -> list[int | None]:
-    """Return the candidate of each wish, None for a wish without one, with as many pairs as possible.
+    """Return the candidate of each requirement, None without one, with as many pairs as possible.
 
-    A maximum bipartite matching by augmenting paths. Of several, one in which earlier wishes have candidates.
+    Uses maximum bipartite matching by augmenting paths. Among equal solutions, earlier requirements get candidates.
     """
     pairs: list[int | None] = [None] * len(suits)
     owners: dict[int, int] = {}
@@ -29,7 +29,7 @@ def most_pairs(suits: Suits) -> list[int | None]:
 
 
 def _free_candidate(wish: int, suits: Suits, owners: dict[int, int], reached_from: dict[int, int]) -> int | None:
-    """Return the nearest candidate without an owner, and note for each candidate on the way who asked for it."""
+    """Return the nearest candidate without an owner, and record which requirement reached each candidate."""
     waiting = deque([wish])
     while waiting:
         owner = waiting.popleft()
@@ -43,10 +43,11 @@ def _free_candidate(wish: int, suits: Suits, owners: dict[int, int], reached_fro
 
 
 def most_in_order(wishes: int, first_from: Callable[[int, int], int | None], step: int = 1) -> list[int | None]:
-    """Return the place of each wish, None for a wish that is left out, with as many wishes in order as possible.
+    """Return the place of each requirement, None if it is left out, with as many in order as possible.
 
-    ``first_from(wish, start)`` is the first place from ``start`` on that suits a wish. The next wish is looked for
-    ``step`` places further on (0: from the same place). Of several, one in which earlier wishes have places.
+    ``first_from(wish, start)`` returns the first place from ``start`` on that matches. The search for the next
+    requirement begins ``step`` places further on (0: at the same place). Among equal solutions, earlier requirements
+    get places.
     """
     known: dict[tuple[int, int], tuple[int, int | None]] = {}
 

@@ -1,6 +1,6 @@
-"""Parts of the sentences that students are told: quotes, places, faults, why a run ended early.
+"""Parts of messages for students: quotes, places, faults, and why a run ended early.
 
-What went wrong is said by the modules of the families.
+The modules of the families write the messages themselves.
 """
 
 from __future__ import annotations
@@ -14,25 +14,25 @@ _LONGEST_QUOTE = 80
 
 
 def quoted(text: str) -> str:
-    """A text of the student's in a sentence: one line, shortened."""
+    """Return a student's text for use in a sentence: in quotes, on one line, shortened."""
     line = " ".join(text.split())
     return f'"{line}"' if len(line) <= _LONGEST_QUOTE else f'"{line[: _LONGEST_QUOTE - 3]}..."'
 
 
 def listed(texts: tuple[str, ...], word: str = "and") -> str:
-    """``"a", "b" and "c"``."""
+    """Return a list such as ``"a", "b" and "c"``."""
     quotes = [quoted(text) for text in texts]
     return quotes[0] if len(quotes) == 1 else f"{', '.join(quotes[:-1])} {word} {quotes[-1]}"
 
 
 def fault_words(fault: Fault) -> str:
-    """``NameError: name 'x' is not defined (line 3)``."""
+    """Return a fault as ``NameError: name 'x' is not defined (line 3)``."""
     where = f" ({fault.place})" if fault.place else ""
     return f"{fault.message.rstrip('.')}{where}"
 
 
 def place_words(trial: TrialResult, t: float | None) -> str:
-    """``In scenario line, from (100, 800) facing 0°, with light noise 32, at 3.00 s``."""
+    """Return a place as ``In scenario line, from (100, 800) facing 0°, with light noise 32, at 3.00 s``."""
     start = trial.recording.start
     x, y, heading = (f"{round(value, 1):g}" for value in (start.x, start.y, start.heading))
     words = [f"In scenario {trial.scenario}, from ({x}, {y}) facing {heading}°"]
@@ -50,7 +50,7 @@ def place_words(trial: TrialResult, t: float | None) -> str:
 
 
 def shown_words(message: str) -> str:
-    """What is told of visible trials, for a criterion that has others as well; the same whatever happened in those."""
+    """Return the feedback on visible trials with a fixed note that hidden trials are marked as well."""
     return (
         f"{message} Trials that are not shown are marked as well."
         if message
@@ -59,7 +59,7 @@ def shown_words(message: str) -> str:
 
 
 def early_end(trial: TrialResult, outcome: Outcome | None = None) -> str:
-    """Why the run ended before its time, unless the outcome tells already."""
+    """Return why the run ended early; empty if it did not, or the outcome already says so."""
     fault = cut(trial.recording)
     if fault is None or (outcome is not None and outcome.tells_end):
         return ""

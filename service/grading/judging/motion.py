@@ -1,6 +1,6 @@
-"""Judging how the robot moved: as a whole, move by move, there and back, and after what a sensor saw.
+"""Judging of motion: overall, move by move, there and back, and after a sensor reading.
 
-Moves are found in ``moves.py``; where on the floor the robot went is judged in ``path.py``.
+``moves.py`` finds the moves. ``path.py`` judges where on the floor the robot went.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from sim.recorded import robot_of
 from sim.recording import Floats, Recording
 from submissions.criteria.motion import Displacement, Encounters, Excursions, Moves, NamedMotion
 
-#: A turning point must stand out by so much from what lies around it, mm.
+#: The smallest height of a turning point above the path around it, mm.
 _NOTICEABLE = 5.0
-#: What counts as having reversed (mm) and turned (degrees) after an encounter, and as having stopped (ticks).
+#: The smallest reversal (mm), turn (degrees) and stop (ticks) that count after an encounter.
 _REVERSED, _TURNED, _STOPPED = 5.0, 15.0, 3
 
 
 @judges(Displacement)
 def judge_displacement(criterion: Displacement, trial: TrialResult) -> Outcome:
-    """From the start to the end; the wheels' positions are those that the program would read at the end."""
+    """Judge the motion from start to end. Wheel positions are those that the program would read at the end."""
     recording = trial.recording
     whole = move_between(recording, 0, len(recording.ticks))
     left, right = _wheels(recording)
@@ -71,7 +71,7 @@ def judge_displacement(criterion: Displacement, trial: TrialResult) -> Outcome:
 
 @judges(Moves)
 def judge_moves(criterion: Moves, trial: TrialResult) -> Outcome:
-    """Each move that is asked for is looked for among those that were made."""
+    """Judge the moves by searching for each required one among those that were made."""
     recording = trial.recording
     made = moves_of(recording)
     found = _paired(criterion, made)
@@ -100,7 +100,7 @@ def judge_moves(criterion: Moves, trial: TrialResult) -> Outcome:
 
 @judges(Excursions)
 def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
-    """Peaks of the way along the start's heading, and how near the start the robot was after each."""
+    """Judge the peaks of the motion along the start's heading, and the distance from the start after each."""
     recording = trial.recording
     ahead = _ahead(recording)
     turns = _turning_points(ahead)
@@ -143,7 +143,7 @@ def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
                 measures=measures,
             )
     away = np.hypot(*(positions(recording) - (recording.start.x, recording.start.y)).T)
-    # It is back from the last time out where the run ends, not where it came nearest before.
+    # The last return counts at the end of the run, not at the nearest earlier point.
     back = [*[turn.row for turn in turns if not turn.out][: wanted - 1], len(ahead) - 1]
     for number, row in enumerate(back, 1):
         if away[row] > criterion.returns_within:
@@ -166,7 +166,7 @@ def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
 
 @judges(Encounters)
 def judge_encounters(criterion: Encounters, trial: TrialResult) -> Outcome:
-    """Each fall of the reading below the threshold, and what the robot did in the seconds after it."""
+    """Judge the robot's reaction in the seconds after each fall of the reading below the threshold."""
     recording = trial.recording
     falls = _falls(criterion, recording)
     answered = _answered(criterion, recording, falls)
@@ -205,19 +205,19 @@ def judge_encounters(criterion: Encounters, trial: TrialResult) -> Outcome:
 
 @dataclass(frozen=True, slots=True)
 class _Turn:
-    """Where going out became coming back (``out``), or the other way round."""
+    """A change from going out to coming back (``out``), or the reverse."""
 
     row: int
     out: bool
 
 
 def _turning_points(ahead: Floats) -> list[_Turn]:
-    """Peaks and returns in turn, beginning with the first way out, ending with the last row.
+    """Return peaks and returns alternately, beginning with the first way out, ending with the last row.
 
-    A change of direction counts from 5 mm on. A last way out without a return is a peak with no return after it.
+    A change of direction counts from 5 mm on. A last way out without a return ends in a peak.
     """
     turns: list[_Turn] = []
-    sign = 0.0  # the side on which the current excursion is, 0 before the first
+    sign = 0.0  # the side of the current excursion, 0 before the first
     extreme, going_out = 0, True
     for row, value in enumerate(ahead):
         if not sign:
@@ -236,7 +236,7 @@ def _turning_points(ahead: Floats) -> list[_Turn]:
 
 
 def _paired(criterion: Moves, made: tuple[Move, ...]) -> list[Move | None]:
-    """The move that was made for each that is asked for, with as many as possible."""
+    """Return the move matched to each required one, with as many matches as possible."""
     suits = [[misses(wanted, move) is None for move in made] for wanted in criterion.moves]
 
     def first_from(wish: int, start: int) -> int | None:
@@ -255,7 +255,7 @@ def _missing_move(
     score: Fraction,
     measures: tuple[Measure, ...],
 ) -> Outcome:
-    """Tells of the move that was made in the place of the missing one."""
+    """Return the outcome for a missing move, with the move that was made instead."""
     wanted = criterion.moves[number]
     called = f"{wanted.name}: " if wanted.name else ""
     after = max((made.index(move) for move in found[:number] if move is not None), default=-1) + 1
@@ -302,14 +302,14 @@ def _proportion(heights: tuple[float, ...]) -> str:
 
 
 def _how_far(wanted: NamedMotion, move: Move) -> int:
-    """How many of the conditions a move misses."""
+    """Return how many of the conditions a move misses."""
     parts = ("forward", "sideways", "distance", "turn", "turn_size", "seconds")
     given = (part for part in parts if getattr(wanted, part) is not None)
     return sum(misses(NamedMotion(**{part: getattr(wanted, part)}), move) is not None for part in given)
 
 
 def _ahead(recording: Recording) -> Floats:
-    """How far the robot was ahead of its start, along the heading of the start, mm, shape (n + 1,)."""
+    """Return the distance ahead of the start, along its heading, mm, shape (n + 1,)."""
     along = math.radians(recording.start.heading)
     away = positions(recording) - np.array([recording.start.x, recording.start.y])
     return np.asarray(away @ np.array([math.cos(along), math.sin(along)]))
@@ -321,7 +321,7 @@ def _wheels(recording: Recording) -> tuple[float, float]:
 
 
 def _falls(criterion: Encounters, recording: Recording) -> list[int]:
-    """The rows at which a sensor began to read less than the threshold; beside the floor there is nothing to see."""
+    """Return the rows at which a sensor's reading fell below the threshold. Readings off the floor don't count."""
     ticks = recording.ticks
     readings = {"left": ticks.left_rgb, "right": ticks.right_rgb}
     dark: NDArray[np.bool_] = np.zeros(len(ticks), dtype=bool)
@@ -335,7 +335,7 @@ def _falls(criterion: Encounters, recording: Recording) -> list[int]:
 
 
 def _answered(criterion: Encounters, recording: Recording, falls: list[int]) -> list[int]:
-    """Those of the falls after which all that was asked came in order, and in time."""
+    """Return the falls after which everything required happened in order and in time."""
     ahead, turned = travel(recording)
     motion = _Motion(-np.minimum(ahead, 0), turned, standing(recording))
     t = times(recording)
@@ -345,7 +345,7 @@ def _answered(criterion: Encounters, recording: Recording, falls: list[int]) -> 
 
 @dataclass(frozen=True, slots=True)
 class _Motion:
-    """What each tick added, shape (n,): mm backwards, degrees; and whether the robot stood."""
+    """The motion in each tick, shape (n,): mm backwards, degrees, and whether the robot stood still."""
 
     backwards: Floats
     turned: Floats

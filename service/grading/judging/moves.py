@@ -1,6 +1,6 @@
-"""A run move by move: where one ends and the next begins, and what each came to.
+"""Division of a run into moves, with the measures of each.
 
-It finds and measures; what was asked of the moves is judged in ``motion.py``.
+This module only finds and measures moves. ``motion.py`` judges them.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from sim.recorded import robot_of, seconds_at
 from sim.recording import Recording
 from submissions.criteria.motion import AskedMotion
 
-#: What differs by less than this share between the wheels is straight.
+#: A smaller relative difference between the wheels counts as straight.
 _STRAIGHT = 0.1
-#: Two ways of moving are two moves where each goes on for so many ticks (0.3 s).
+#: Two kinds of motion are separate moves if each lasts at least this many ticks (0.3 s).
 _LASTING = 9
-#: A bound so far off (mm, degrees, s) is none: no run comes near it.
+#: A bound this large (mm, degrees, s) means no bound, because no run reaches it.
 _NO_BOUND = 10_000
-#: A shorter rest within a move does not part it in two.
+#: A rest of at most this many ticks does not split a move.
 _REST = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """One move: rows from ``first`` to ``last`` of the recording, and what it came to (mm, degrees, seconds)."""
+    """One move: rows ``first`` to ``last`` of the recording, and its measures (mm, degrees, seconds)."""
 
     first: int
     last: int
@@ -41,7 +41,7 @@ class Move:
 
     @property
     def distance(self) -> float:
-        """From where the move began straight to where it ended, mm."""
+        """The straight distance from the move's start to its end, mm."""
         return math.hypot(self.forward, self.sideways)
 
     def __str__(self) -> str:
@@ -57,10 +57,10 @@ class Move:
 
 
 def moves_of(recording: Recording) -> tuple[Move, ...]:
-    """The moves of a run, in order.
+    """Return the moves of a run, in order.
 
-    Standing still for more than two ticks parts moves, and so does the change between driving straight on, straight
-    back, turning left and turning right where both go on for 0.3 s.
+    Moves are separated by standing still for more than two ticks. They are also separated by a change between driving
+    forwards, backwards, turning left and turning right, if both last 0.3 s.
     """
     ways = _ways(recording)
     return tuple(
@@ -71,7 +71,7 @@ def moves_of(recording: Recording) -> tuple[Move, ...]:
 
 
 def move_between(recording: Recording, first: int, last: int) -> Move:
-    """What came of the ticks after row ``first`` up to row ``last``."""
+    """Return the move made by the ticks after row ``first`` up to row ``last``."""
     _, before = place_at(recording, first)
     _, after = place_at(recording, last)
     ahead, left = relative_to(before, after.x, after.y)
@@ -79,21 +79,21 @@ def move_between(recording: Recording, first: int, last: int) -> Move:
 
 
 def straight(recording: Recording) -> NDArray[np.bool_]:
-    """Whether both wheels went almost alike in each tick, shape (n,); false where the robot stood."""
+    """Return whether both wheels moved almost equally in each tick, shape (n,); false while the robot stands still."""
     ahead, turned = travel(recording)
     between_wheels = np.radians(turned) * robot_of(recording).wheel_spacing
     return (np.abs(between_wheels) <= _STRAIGHT * np.abs(ahead)) & ~standing(recording)
 
 
 def _ways(recording: Recording) -> NDArray[np.int8]:
-    """How the robot moved in each tick, shape (n,): straight on 1 or back -1, turning left 2 or right -2; 0 is rest."""
+    """Return the kind of motion in each tick, shape (n,): forwards 1, backwards -1, left 2, right -2, rest 0."""
     ahead, turned = travel(recording)
     ways = np.where(straight(recording), np.sign(ahead), 2 * np.sign(turned))
     return np.where(standing(recording), 0, ways).astype(np.int8)
 
 
 def misses(wanted: AskedMotion, move: Move) -> str | None:
-    """In what a move is not as wanted, ``a turn of 85 to 95°, but it was 80°``; None if it is."""
+    """Return how a move differs from the required one, ``a turn of 85 to 95°, but it was 80°``; None if it matches."""
     asked = (
         ("a distance from where it began", "", "", wanted.distance, move.distance, " mm"),
         ("a way", " forwards", " backwards", wanted.forward, move.forward, " mm"),
@@ -113,25 +113,25 @@ def misses(wanted: AskedMotion, move: Move) -> str | None:
 
 
 def facing(wished: tuple[float, float], positive: str, negative: str) -> tuple[str, float, float]:
-    """A range below 0 as one above it, with the words for its side."""
+    """Return a negative range as a positive one, with the word for its side."""
     least, most = wished
     return (negative, -most, -least) if most <= 0 and least < 0 else (positive, least, most)
 
 
 def range_words(least: float, most: float, unit: str) -> str:
-    """``85 to 95°``, ``at least 100 mm``, ``1 s``."""
+    """Return a range as ``85 to 95°``, ``at least 100 mm`` or ``1 s``."""
     if most >= _NO_BOUND:
         return f"at least {least:g}{unit}"
     return f"{least:g}{unit}" if least == most else f"{least:g} to {most:g}{unit}"
 
 
 def shown(value: float) -> str:
-    """At most two places after the point, without trailing zeros."""
+    """Return a number with at most two decimal places, without trailing zeros."""
     return f"{value:.2f}".rstrip("0").rstrip(".") if "." in f"{value:.2f}" else f"{value:.2f}"
 
 
 def measures_of(move: Move, name: str) -> tuple[Measure, ...]:
-    """``move 2 forward`` and so on."""
+    """Return the measures of a move, named ``move 2 forward`` and so on."""
     return (
         Measure(f"{name} forward", move.forward, "mm"),
         Measure(f"{name} sideways", move.sideways, "mm"),
@@ -150,7 +150,7 @@ def _parted_by_rests(still: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _parted_by_way(ways: NDArray[np.int8], first: int, last: int) -> list[tuple[int, int]]:
-    """A stretch of ticks, cut where two lasting ways of moving meet."""
+    """Split a range of ticks where two lasting kinds of motion meet."""
     lasting = sorted(
         (begin, end, way)
         for way in (-2, -1, 1, 2)

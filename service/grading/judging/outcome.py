@@ -1,6 +1,6 @@
-"""How one criterion fared in one trial, what kept a program from ending by itself, and what outcomes are worth.
+"""The outcome of one criterion in one trial, the fault that ended a program, and the value of outcomes.
 
-Who passes is decided in the modules of the families. Marks are exact fractions until the one rounding at the end.
+The modules of the families decide who passes. Marks are exact fractions until they are rounded once at the end.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _STEPS = 20
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """``score`` is the part of what was asked that was reached, 0 to 1, and 1 exactly when it passed."""
+    """The outcome of one criterion in one trial. ``score`` is the fraction reached, and 1 exactly if it passed."""
 
     passed: bool
     score: Fraction
@@ -31,8 +31,8 @@ class Outcome:
     t: float | None = None
     pose: Pose | None = None
     measures: tuple[Measure, ...] = ()
-    for_staff: str = ""  # where somebody should look, which no student is told
-    tells_end: bool = False  # the message says already why the run ended early
+    for_staff: str = ""  # what staff should check; not shown to students
+    tells_end: bool = False  # the message already says why the run ended early
 
 
 def passed(
@@ -42,7 +42,7 @@ def passed(
     measures: tuple[Measure, ...] = (),
     for_staff: str = "",
 ) -> Outcome:
-    """An outcome with the whole score."""
+    """Return an outcome with full score."""
     return Outcome(True, Fraction(1), message, t, pose, measures, for_staff)
 
 
@@ -54,14 +54,14 @@ def failed(
     measures: tuple[Measure, ...] = (),
     for_staff: str = "",
 ) -> Outcome:
-    """``score`` is kept below 1: everything may have been there, and yet in the wrong order."""
+    """Return a failed outcome. ``score`` is kept below 1, because all may be present but in the wrong order."""
     return Outcome(False, min(max(score, Fraction(0)), _SHORT_OF_ALL), message, t, pose, measures, for_staff)
 
 
 def cut(recording: Recording) -> Fault | None:
-    """What kept the program from ending by itself, if something did.
+    """Return the fault that kept the program from ending by itself, or None.
 
-    A responder that raises or breaks the protocol leaves the program running, so that is no cut.
+    Errors of a responder don't count, because the program continues after them.
     """
     for fault in recording.faults:
         if fault.who != "responder" and fault.verdict is not Verdict.PROTOCOL_ERROR:
@@ -72,16 +72,16 @@ def cut(recording: Recording) -> Fault | None:
 
 
 def earned(marks: Decimal, share: Fraction) -> Decimal:
-    """``share`` (0 to 1) of ``marks``, rounded half up to two places, never above ``marks``."""
+    """Return ``share`` (0 to 1) of ``marks``, rounded half up to two places, at most ``marks``."""
     exact = Fraction(marks) * min(max(share, Fraction(0)), Fraction(1))
-    # Scaled to whole cents first, so that no decimal expansion is cut off before the rounding.
+    # Scaled to whole cents first, so that no decimal expansion is truncated before rounding.
     cents = exact * 100
     whole = (2 * cents.numerator + cents.denominator) // (2 * cents.denominator)
     return min(Decimal(whole).scaleb(-2), marks).quantize(_CENT, rounding=ROUND_HALF_UP)
 
 
 def share_of(outcomes: Sequence[Outcome], over: Over) -> Fraction:
-    """What part of a criterion's marks these trials are worth, as ``over`` says; 0 without trials."""
+    """Return the fraction of a criterion's marks for these trials, by the rule ``over``; 0 without trials."""
     if not outcomes:
         return Fraction(0)
     passes = sum(outcome.passed for outcome in outcomes)
@@ -101,9 +101,9 @@ def share_of(outcomes: Sequence[Outcome], over: Over) -> Fraction:
 
 
 def in_steps(share: Fraction) -> Fraction:
-    """``share`` rounded to steps of 5 %; one below 1 stays below 1.
+    """Round ``share`` to steps of 5 %; a value below 1 stays below 1.
 
-    Of trials that are not shown no more is told, so that marks don't give away what a program counted there.
+    Used for hidden trials, so that marks don't reveal what a program counted there.
     """
     if share >= 1:
         return share
@@ -111,14 +111,14 @@ def in_steps(share: Fraction) -> Fraction:
 
 
 def share_of_accuracy(right: int, count: int, at_least: float | None, over: Over) -> Fraction:
-    """What part of a classification's marks ``right`` of ``count`` answers are worth.
+    """Return the fraction of a classification's marks for ``right`` of ``count`` answers.
 
-    All from ``at_least`` on (all right if None); below it nothing with ``all``, else in proportion.
+    Full marks from ``at_least`` on (all correct if None). Below it, nothing with ``all``, otherwise in proportion.
     """
     if not count:
         return Fraction(0)
     accuracy = Fraction(right, count)
-    # The decimal that the instructor wrote, not its nearest binary fraction: 9 of 10 is at least 0.9.
+    # Convert the decimal that the instructor wrote, not its nearest binary fraction: 9 of 10 is at least 0.9.
     enough = Fraction(1) if at_least is None else Fraction(str(at_least))
     if accuracy >= enough:
         return Fraction(1)
@@ -126,7 +126,10 @@ def share_of_accuracy(right: int, count: int, at_least: float | None, over: Over
 
 
 def share_of_steps(right: int, count: int, steps: Sequence[tuple[float, float]], marks: Decimal) -> Fraction:
-    """What part of ``marks`` the last of the ``steps`` (accuracy, marks) is worth that ``right`` of ``count`` reach."""
+    """Return the fraction of ``marks`` for the last step that the accuracy reaches.
+
+    ``steps`` are pairs (accuracy, marks). The accuracy is ``right`` of ``count``.
+    """
     if not count or not marks:
         return Fraction(0)
     reached = [worth for accuracy, worth in steps if Fraction(right, count) >= Fraction(str(accuracy))]

@@ -1,6 +1,6 @@
-"""Judging where the robot went: through places, within areas, clear of them, and how near a point.
+"""Judging of the path: through places, within areas, outside areas, and without touching obstacles.
 
-Going round a point is judged in ``point.py``, following a line in ``line.py``.
+``point.py`` judges paths round a point, and ``line.py`` line following.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from sim.recording import Floats, Recording
 from submissions.criteria.path import KeepsOut, StaysInside, TouchesNothing, Visits
 from submissions.criteria.places import Area, Part
 
-#: Standing still for more than so many ticks (half a second), or at the end, is stopping.
+#: Standing still for more than this many ticks (half a second), or at the end, counts as a stop.
 _STOP = 15
-#: The least change of heading that is a turn, degrees.
+#: The smallest change of heading that counts as a turn, degrees.
 _TURN = 2.0
-#: As far as the robot could go straight on, mm.
+#: Longer than any straight path on the floor, mm.
 _FAR = 10_000.0
 
 PART_NAMES = {
@@ -35,7 +35,7 @@ PART_NAMES = {
 
 @judges(Visits)
 def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
-    """Each place after the one before it (or at any time); a place is visited when its edge is reached."""
+    """Judge the places in order (or at any time). A place is visited when its edge is reached."""
     recording = trial.recording
     points = positions(recording, criterion.of)
     visited = _visited(criterion, points)
@@ -73,7 +73,7 @@ def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
 
 
 def _visited(criterion: Visits, points: Floats) -> list[int | None]:
-    """The row in which each place is visited, None for one that is not; with ``in_order`` as many as possible."""
+    """Return the row at which each place is visited, None if it is not; with ``in_order`` as many as possible."""
     inside = [np.flatnonzero(distance_to(place, points) <= 0) for place in criterion.places]
 
     def first_from(place: int, row: int) -> int | None:
@@ -81,14 +81,14 @@ def _visited(criterion: Visits, points: Floats) -> list[int | None]:
         return int(inside[place][number]) if number < len(inside[place]) else None
 
     if criterion.in_order:
-        # One row may be in several places, which overlap.
+        # Places may overlap, so one row may be in several.
         return most_in_order(len(inside), first_from, step=0)
     return [first_from(place, 0) for place in range(len(inside))]
 
 
 @judges(StaysInside)
 def judge_stays_inside(criterion: StaysInside, trial: TrialResult) -> Outcome:
-    """The first place outside all areas fails it; the score is the share of the path before that."""
+    """Judge by the first position outside all areas. The score is the fraction of the path before it."""
     recording = trial.recording
     points = _driven(recording, criterion.of)
     if points is None:
@@ -117,7 +117,7 @@ def judge_stays_inside(criterion: StaysInside, trial: TrialResult) -> Outcome:
 
 @judges(KeepsOut)
 def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
-    """The measure is the least distance to any of the areas."""
+    """Judge by the least distance to any of the areas."""
     recording = trial.recording
     points = _driven(recording, criterion.of)
     if points is None:
@@ -153,7 +153,7 @@ def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
 
 @judges(TouchesNothing)
 def judge_touches_nothing(criterion: TouchesNothing, trial: TrialResult) -> Outcome:
-    """What the body touched; the first touch that is not forgiven fails it."""
+    """Judge what the body touched. It fails at the first touch beyond the allowed number."""
     recording = trial.recording
     touches = recording.touches
     measures = (Measure("touches", len(touches)),)
@@ -171,7 +171,7 @@ def judge_touches_nothing(criterion: TouchesNothing, trial: TrialResult) -> Outc
 
 
 def _stop_in(recording: Recording, place: Area, points: Floats) -> int | None:
-    """The row at which the robot had stopped in a place, if it did."""
+    """Return the row at which the robot had stopped in a place, or None."""
     inside = distance_to(place, points)[1:] <= 0
     resting = standing(recording) & inside
     for first, last in stretches(resting):
@@ -181,13 +181,13 @@ def _stop_in(recording: Recording, place: Area, points: Floats) -> int | None:
 
 
 def _driven(recording: Recording, part: Part) -> Floats | None:
-    """The part's positions; None if the pen never drew."""
+    """Return the part's positions; None if the pen never drew."""
     points = positions(recording, part)
     return None if np.isnan(points).all() else points
 
 
 def _way(recording: Recording) -> float:
-    """How far the robot drove in all, mm."""
+    """Return the total distance driven, mm."""
     return float(np.hypot(*np.diff(positions(recording), axis=0).T).sum())
 
 
@@ -217,7 +217,7 @@ def _nearest(distances: Floats) -> tuple[int, float] | None:
 
 
 def _bounds(points: Floats) -> tuple[Measure, ...]:
-    """The rectangle that the path fills."""
+    """Return the bounding rectangle of the path."""
     (left, bottom), (right, top) = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     figures = (("least x", left), ("greatest x", right), ("least y", bottom), ("greatest y", top))
     return tuple(Measure(name, float(value), "mm") for name, value in figures)

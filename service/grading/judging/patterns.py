@@ -1,6 +1,6 @@
-"""What one image was taken for, and several images of one pattern made into one answer.
+"""The class assigned to each image, and the combination of several images of one pattern.
 
-Images belong together if they show the same thing at the same place under the sensor, wherever the robot stood.
+Images belong together if they show the same thing at the same place under the sensor.
 """
 
 from __future__ import annotations
@@ -22,28 +22,28 @@ _Place = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One image that counts, or the lack of one: what it shows, what it was taken for, and why that is."""
+    """One image that counts, or a missing one: its true label, the assigned label, and a description."""
 
     trial: int  # index into the grade's trials
     image: Image | None
     truth: str
     answer: str | None
-    words: str  # what happened, for a sentence
+    words: str  # a description, for a sentence
     confidence: float | None = None
 
     @property
     def right(self) -> bool:
-        """Whether it was taken for what it shows."""
+        """Return whether the image was identified correctly."""
         return self.answer == self.truth
 
 
 def by_pattern(
     images: Sequence[Sample], recording: Recording, how: How, apart: float, side: Side = "left"
 ) -> list[Sample]:
-    """One sample for each pattern among a trial's ``images``, in the order in which the robot came to them.
+    """Return one sample per pattern of a trial's ``images``, in the order in which the robot reached them.
 
-    Images of the same truth are of one pattern if the sensor of that ``side`` was at most ``apart`` mm from where it
-    took the first of them.
+    Images with the same truth belong to one pattern if the sensor of that ``side`` was within ``apart`` mm of its
+    position at the first of them.
     """
     groups = _Groups(apart)
     for image in images:
@@ -54,7 +54,7 @@ def by_pattern(
 
 @dataclass(slots=True)
 class _Groups:
-    """Images by pattern. The floor is cut into squares, so that only neighbours have to be compared."""
+    """Images by pattern. The floor is divided into squares, so that only neighbours are compared."""
 
     apart: float
     found: list[list[Sample]] = field(default_factory=list)
@@ -91,7 +91,7 @@ def _one(group: Sequence[Sample], how: How) -> Sample:
 
 
 def _majority(group: Sequence[Sample]) -> Sample:
-    """The image whose answer was given most often; silence counts only if nothing was answered."""
+    """Return the image with the most frequent answer. A tie, or no answer at all, gives a sample without answer."""
     counts = Counter(sample.answer for sample in group if sample.answer is not None).most_common()
     if not counts:
         return group[0]

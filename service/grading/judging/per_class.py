@@ -1,6 +1,6 @@
-"""How well each class is recognised: precision and recall, from the counts of who was taken for whom.
+"""Precision and recall of each class, from the confusion matrix.
 
-Derived from an ``Accuracy`` and never stored beside it, so the two cannot disagree.
+They are derived from an ``Accuracy`` and never stored, so the two cannot disagree.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from service.grading.grade import Accuracy
 class ClassScore:
     """One class: how many images showed it, how often it was answered, and how often both.
 
-    ``precision`` is right / answered and ``recall`` right / shown; None where there is nothing to divide by.
+    ``precision`` is right / answered and ``recall`` right / shown; None if the divisor is 0.
     """
 
     label: str
@@ -24,17 +24,17 @@ class ClassScore:
 
     @property
     def precision(self) -> float | None:
-        """The part of the images taken for this class that show it, 0 to 1."""
+        """The fraction of the images identified as this class that show it, 0 to 1."""
         return self.right / self.answered if self.answered else None
 
     @property
     def recall(self) -> float | None:
-        """The part of the images showing this class that were taken for it, 0 to 1."""
+        """The fraction of the images of this class that were identified correctly, 0 to 1."""
         return self.right / self.shown if self.shown else None
 
 
 def class_scores(accuracy: Accuracy) -> tuple[ClassScore, ...]:
-    """A score for every label, in their order; empty where the counts are withheld."""
+    """Return a score for every label, in order; empty if the counts are withheld."""
     if not accuracy.confusion:
         return ()
     return tuple(

@@ -1,6 +1,6 @@
-"""Judging by a point of the floor: how near the path comes to it, how often it goes round, how far from it it ends.
+"""Judging relative to a point of the floor: closest approach, rounds, and the distance of the end.
 
-Places to come through or to keep out of are judged in ``path.py``.
+``path.py`` judges places to visit or to avoid.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _TURN = 2.0
 
 @judges(Closest)
 def judge_closest(criterion: Closest, trial: TrialResult) -> Outcome:
-    """The least distance of the robot's middle to a point, and how it began to turn with regard to it."""
+    """Judge the least distance of the robot's centre to a point, and its first turn relative to the point."""
     recording = trial.recording
     points = positions(recording)
     near = _nearest(np.hypot(points[:, 0] - criterion.x, points[:, 1] - criterion.y))
@@ -65,7 +65,7 @@ def _to(direction: str) -> str:
 
 
 def _first_turn(recording: Recording, x: float, y: float) -> tuple[int, str] | None:
-    """When the robot had turned by 2 degrees, and whether that was towards the point."""
+    """Return the row of the first turn by 2 degrees, and its direction relative to the point; None without a turn."""
     degrees = headings(recording)
     rows = np.flatnonzero(np.abs(degrees - degrees[0]) > _TURN)
     if not len(rows):
@@ -78,7 +78,7 @@ def _first_turn(recording: Recording, x: float, y: float) -> tuple[int, str] | N
 
 
 def _straight_on(recording: Recording, x: float, y: float) -> float:
-    """Least distance from a point to the ray ahead of the start, mm."""
+    """Return the least distance from a point to the ray ahead of the start, mm."""
     start = recording.start
     along = math.radians(start.heading)
     end = (start.x + _FAR * math.cos(along), start.y + _FAR * math.sin(along))
@@ -92,19 +92,19 @@ def _nearest(distances: Floats) -> tuple[int, float] | None:
     return row, float(distances[row])
 
 
-#: The gyro is smoothed over so many rows (1 s) before corners are looked for.
+#: The gyro is smoothed over this many rows (1 s) before the search for corners.
 _SMOOTH = 31
-#: Going straight on for so many rows (0.5 s) parts two corners.
+#: Driving straight for this many rows (0.5 s) separates two corners.
 _LASTING = 15
-#: An upper bound of so many rounds is none.
+#: An upper bound of this many rounds means no bound.
 _NO_BOUND = 100
-#: A lesser change of heading is no corner, degrees.
+#: A smaller change of heading is not a corner, degrees.
 _CORNER = 30.0
 
 
 @judges(Circuits)
 def judge_circuits(criterion: Circuits, trial: TrialResult) -> Outcome:
-    """How many times the path goes round a point, and which way; parts of a round count."""
+    """Judge how many times, including fractions, and in which direction the path goes round a point."""
     recording = trial.recording
     round_it = rounds(positions(recording, criterion.of), criterion.x, criterion.y)
     times = float(abs(round_it[-1])) if len(round_it) else 0.0
@@ -164,9 +164,9 @@ def judge_circuits(criterion: Circuits, trial: TrialResult) -> Outcome:
 
 
 def rounds(points: Floats, x: float, y: float) -> Floats:
-    """How often the path has gone round (x, y) at each row since its first, anticlockwise above 0.
+    """Return the rounds about (x, y) up to each row, anticlockwise positive.
 
-    Rows that are NaN (where the pen was up) are left out.
+    Rows with NaN (pen up) are left out.
     """
     drawn = points[~np.isnan(points[:, 0])]
     if not len(drawn):
@@ -176,14 +176,14 @@ def rounds(points: Floats, x: float, y: float) -> Floats:
 
 
 def _whole_rounds(round_it: Floats) -> list[tuple[int, int]]:
-    """First and last row of each whole round."""
+    """Return the first and last row of each complete round."""
     farthest = np.maximum.accumulate(np.abs(round_it))
     ends = np.searchsorted(farthest, np.arange(1, int(farthest.max(initial=0.0)) + 1)).tolist()
     return list(zip([0, *ends], ends, strict=False))
 
 
 def _corners(turned: Floats) -> int:
-    """In how many steps the heading changes: parts in which it turns faster than on average, 0.5 s or more apart."""
+    """Return the number of corners: parts with above-average turning, at least 0.5 s apart and 30 degrees each."""
     if len(turned) <= _SMOOTH:
         return 0
     smooth = np.convolve(turned, np.ones(_SMOOTH) / _SMOOTH, mode="valid")
@@ -197,7 +197,7 @@ def _corners(turned: Floats) -> int:
 
 @judges_case(Spread)
 def judge_spread(criterion: Spread, case: Case) -> CriterionResult:
-    """An observation: where nothing was lost, all that was observed is told."""
+    """Judge the spread of the end positions. If no marks were lost, the message has all measurements."""
 
     def told(trials: Indexed, outcomes: Sequence[Outcome]) -> str:
         if trials and all(outcome.passed for outcome in outcomes):
@@ -208,7 +208,7 @@ def judge_spread(criterion: Spread, case: Case) -> CriterionResult:
 
 
 def _ended(criterion: Spread, trial: TrialResult) -> Outcome:
-    """Distance of the end from the point, mm."""
+    """Judge the distance of the end from the point, mm."""
     recording = trial.recording
     distance = _distance(criterion, trial)
     measures = (Measure("distance from the target", distance, "mm"),)
@@ -225,7 +225,7 @@ def _ended(criterion: Spread, trial: TrialResult) -> Outcome:
 
 
 def _spread_words(criterion: Spread, trials: Sequence[TrialResult]) -> str:
-    """Least, mean and greatest distance for each level of motor noise."""
+    """Return the least, mean and greatest distance for each level of motor noise."""
     levels = sorted({trial.motor_noise for trial in trials})
     told = []
     for level in levels:

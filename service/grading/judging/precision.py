@@ -1,6 +1,6 @@
-"""What naming everything is worth: the one rule for criteria that look for something among much that was put out.
+"""The penalty for output that names everything, for criteria that search for items in a lot of output.
 
-What is a stray is found in the modules of the families; where nothing may come beside, ``only`` asks that there.
+The modules of the families find the stray items. Criteria with ``only`` allow none at all and are not handled here.
 """
 
 from __future__ import annotations
@@ -11,26 +11,26 @@ from fractions import Fraction
 from service.grading.judging.outcome import Outcome, failed
 from submissions.criteria.common import AmongMany
 
-#: So many things beside the point weigh like one that was looked for and came where it does not belong.
+#: This many irrelevant items weigh as much as one required item in a wrong place.
 _OTHERS = 20
 
 
 @dataclass(frozen=True, slots=True)
 class Strays:
-    """What came beside what was looked for; ``words`` tell of it in a sentence, after "besides"."""
+    """Output besides the required items. ``words`` describes it in a sentence, after "besides"."""
 
     words: str
-    misplaced: int = 0  # of what is looked for, where it does not belong
-    others: int = 0  # of the same sort, and not looked for
+    misplaced: int = 0  # required items in a wrong place
+    others: int = 0  # items of the same kind that are not required
 
     @property
     def weight(self) -> Fraction:
-        """How many things that were looked for they weigh."""
+        """The weight, as a number of required items."""
         return self.misplaced + Fraction(self.others, _OTHERS)
 
 
 def tempered(outcome: Outcome, criterion: AmongMany, wanted: int, strays: Strays) -> Outcome:
-    """The outcome of looking for ``wanted`` things; strays that are not forgiven count like more that did not come."""
+    """Reduce the outcome for ``wanted`` items: strays beyond the allowed number count like additional missing items."""
     excess = strays.weight - (wanted if criterion.strays is None else criterion.strays)
     if excess <= 0:
         return outcome

@@ -1,6 +1,6 @@
-"""Which numbers that a program put out a sensor had read shortly before, whatever the unit.
+"""Comparison of a program's printed numbers with recent sensor readings, in any unit.
 
-A number that was read says nothing of what it was read for; that is judged in the modules of the families.
+A match does not show what the reading was for. The modules of the families judge that.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from sim.recorded import ticks_until
 from sim.recording import Floats, Recording
 from submissions.criteria.logged import Instrument
 
-#: How old a reading may be when it is printed, seconds.
+#: The largest age of a reading when it is printed, seconds.
 _AGE = 0.5
-#: How far a printed number may be from the reading, in the unit in which it was printed: it may have been rounded.
+#: The largest difference of a printed number from the reading, in the printed unit, to allow for rounding.
 _ROUNDED = 1.0
 INSTRUMENTS: tuple[Instrument, ...] = get_args(Instrument)
 
@@ -25,10 +25,10 @@ INSTRUMENTS: tuple[Instrument, ...] = get_args(Instrument)
 def were_read(
     values: Sequence[float], at: Sequence[float], instruments: Sequence[Instrument], recording: Recording
 ) -> NDArray[np.bool_]:
-    """Whether one of the instruments read each value in the half second before its time, shape (len(values),).
+    """Return whether an instrument read each value in the half second before its time, shape (len(values),).
 
-    Units: of light 0..255 and 0..100, for each colour and for all three together; of distance mm, cm and inches;
-    of turning degrees. Nothing has been read before the first tick.
+    Units: light 0..255 and 0..100, for each colour and for all three together; distance in mm, cm and inches; turning
+    in degrees. There are no readings before the first tick.
     """
     found = np.zeros(len(values), dtype=bool)
     if not len(recording.ticks) or not len(values):
@@ -45,7 +45,7 @@ def were_read(
 
 
 def _columns(instrument: Instrument, recording: Recording) -> list[Floats]:
-    """What it read after each tick, in each unit in which it may be printed."""
+    """Return the readings after each tick, in each unit in which they may be printed."""
     ticks = recording.ticks
     match instrument:
         case "left light" | "right light":

@@ -1,6 +1,6 @@
-"""Judging how the images that the robot sent were named: what became of each, which answer counts, how many are right.
+"""Judging of image recognition: the answer to each image, which answers count, and how many are correct.
 
-What an image shows is found in ``truths.py``; what it is all worth in ``classification.py`` and ``robustness.py``.
+``truths.py`` finds the true labels. ``classification.py`` and ``robustness.py`` decide the marks.
 """
 
 from __future__ import annotations
@@ -45,19 +45,19 @@ _BEST_FIRST: tuple[ReplyStatus, ...] = ("answered", "late", "malformed", "unansw
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """What came back to one image. ``text`` is the answer that counts; ``words`` say why there is none."""
+    """The reply to one image. ``text`` is the answer that counts; ``words`` says why there is none."""
 
     status: ReplyStatus
     text: str | None
     words: str
-    duplicates: int = 0  # answers beyond the one that counts
+    duplicates: int = 0  # answers after the one that counts
 
 
 def reply_to(recording: Recording, answers: Answers, number: int) -> Reply:
-    """What came back to image ``number`` of the recording.
+    """Return the reply to image ``number`` of the recording.
 
-    An answer is late if it arrived after the next image was sent, or was under way when the program ended.
-    One that was lost on its way is none. Of several answers the first that arrived in time counts.
+    An answer is late if it arrived after the next image was sent, or was in transit when the program ended. A lost
+    answer does not count. Of several answers, the first that arrived in time counts.
     """
     image = recording.images[number]
     following = recording.images[number + 1].t if number + 1 < len(recording.images) else None
@@ -75,7 +75,7 @@ def reply_to(recording: Recording, answers: Answers, number: int) -> Reply:
 
 
 def _precedence(arrived: tuple[ReplyStatus, Message]) -> tuple[int, float]:
-    """In what order answers count: by status, then by arrival; one that was still under way at the end came last."""
+    """Return the sort key of answers: by status, then by arrival. Answers in transit at the end come last."""
     status, message = arrived
     return _BEST_FIRST.index(status), math.inf if message.delivered is None else message.delivered
 
@@ -89,7 +89,7 @@ def _status(message: Message, following: float | None) -> ReplyStatus:
 
 
 def _silence(recording: Recording, answers: Answers, question: int, came: Sequence[Message]) -> Reply:
-    """Nothing arrived: the image or its answer was lost, the answer was no text, or there was none."""
+    """Return the reply if nothing arrived: image or answer was lost, the answer was not a text, or none was given."""
     if came:
         return Reply("unanswered", None, "the answer was lost on its way")
     sent = recording.messages[question] if question < len(recording.messages) else None
@@ -101,13 +101,13 @@ def _silence(recording: Recording, answers: Answers, question: int, came: Sequen
     return Reply("unanswered", None, answers.silence(question))
 
 
-#: An image taken so near to an earlier one, mm, shows the same again.
+#: An image taken this close to an earlier one shows the same again, mm.
 _SAME_PLACE = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Classified:
-    """What a recognition criterion found in its trials: each image or, where it says so, each pattern."""
+    """The result of a recognition criterion: a sample for each image or, if it says so, each pattern."""
 
     samples: tuple[Sample, ...]
     accuracy: Accuracy
@@ -116,12 +116,12 @@ class Classified:
 
     @property
     def right(self) -> int:
-        """How many samples were named rightly."""
+        """The number of samples identified correctly."""
         return sum(sample.right for sample in self.samples)
 
 
 def classify(criterion: Recognition, assignment: Assignment, trials: Indexed) -> Classified:
-    """Every image of ``trials`` (with their indices in the grade) that counts, pooled."""
+    """Classify every image of ``trials`` (with their indices in the grade) that counts, over all trials."""
     shown = shown_in(criterion, trials)
     truths = [truth for told_truths in shown.values() for _, truth in told_truths]
     labels = nameable(criterion, assignment, truths)
@@ -172,7 +172,7 @@ def classify(criterion: Recognition, assignment: Assignment, trials: Indexed) ->
 
 
 def pooled(trials: Indexed, judged: Callable[[Indexed], CriterionResult]) -> CriterionResult:
-    """The result of all trials together; where some are hidden, with what the visible ones alone come to."""
+    """Return the result over all trials. If some are hidden, also the feedback from the visible ones alone."""
     result = judged(trials)
     visible = [(index, trial) for index, trial in trials if trial.visibility == "visible"]
     if len(visible) == len(trials):
@@ -191,7 +191,7 @@ def recognised(
     curves: tuple[AccuracyCurve, ...],
     trials: Mapping[int, TrialResult],
 ) -> CriterionResult:
-    """The result that is worth ``share`` of the marks; ``words`` say why, after the tally."""
+    """Return the result for ``share`` of the marks. ``words`` gives the reason, after the tally."""
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,
@@ -207,7 +207,7 @@ def recognised(
 
 
 def told(sample: Sample) -> str:
-    """A sentence on one image."""
+    """Return a sentence on one image."""
     if sample.image is None:
         if sample.truth == NO_IMAGE:
             return f"Expected an image (IMG_DATA), but {sample.words}."
@@ -224,11 +224,11 @@ def _that_count(
     own: list[Sample],
     finder: LabelFinder,
 ) -> Sequence[Sample]:
-    """A trial's images, or its patterns; where there are none, or too few, wrong answers in their place."""
+    """Return a trial's images or patterns. Missing ones are replaced by wrong answers."""
     if criterion.each_pattern is None:
         counted = by_pattern(own, trial.recording, "majority", _SAME_PLACE)
     else:
-        # What a grey patch tells lies under the right sensor.
+        # Grey patches are read by the right sensor.
         side: Side = "right" if criterion.truth == "grey" else "left"
         apart = max(30.0, 2 * criterion.within)
         counted = by_pattern(own, trial.recording, criterion.each_pattern, apart, side)
@@ -259,7 +259,7 @@ def _accuracy(samples: Sequence[Sample], labels: tuple[str, ...], counts: Counts
 
 
 def _confidence(samples: Sequence[Sample]) -> Confidence | None:
-    """How sure the answers were that were right, and those that were wrong; None if no answer said."""
+    """Return the mean confidence of correct and wrong answers; None if no answer had one."""
     right = [sample.confidence for sample in samples if sample.right and sample.confidence is not None]
     wrong = [sample.confidence for sample in samples if not sample.right and sample.confidence is not None]
     if not right and not wrong:
@@ -268,7 +268,7 @@ def _confidence(samples: Sequence[Sample]) -> Confidence | None:
 
 
 def _evidence(index: int, own: Sequence[Sample]) -> Evidence:
-    """The first image of the trial that was named wrongly, else its last."""
+    """Return the first image of the trial that was misidentified, otherwise its last."""
     shown = next((sample for sample in own if not sample.right), own[-1])
     image = shown.image
     return Evidence(
@@ -281,7 +281,7 @@ def _evidence(index: int, own: Sequence[Sample]) -> Evidence:
 
 
 def _replies(criterion: Recognition, recording: Recording) -> list[Reply]:
-    """What came back to every image of the recording, whether it counts or not."""
+    """Return the reply to every image of the recording, including images that don't count."""
     if criterion.answer_from == "reply":
         answers = Answers(recording)
         return [reply_to(recording, answers, number) for number in range(len(recording.images))]
@@ -296,7 +296,7 @@ def _replies(criterion: Recognition, recording: Recording) -> list[Reply]:
 
 
 def _answer(criterion: Recognition, reply: Reply, finder: LabelFinder) -> tuple[str | None, str, float | None]:
-    """The label that the answer names, None if it names none or two; what happened, in words; and how sure it was."""
+    """Return the label in the answer (None unless there is exactly one), a description, and the confidence."""
     if reply.text is None:
         return None, reply.words, None
     if reply.status == "late" and criterion.late == "wrong":
@@ -318,14 +318,14 @@ def _answer(criterion: Recognition, reply: Reply, finder: LabelFinder) -> tuple[
 
 
 def _probability(value: object) -> float | None:
-    """A number from 0 to 1, as JSON has it; None for anything else."""
+    """Return a JSON number from 0 to 1; None for anything else."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
         return None
     return float(value)
 
 
 def _between(recording: Recording, image: Image, speech: bool) -> Sequence[Line]:
-    """What the robot said or printed after this image and before the next."""
+    """Return what the robot said or printed after this image and before the next."""
     following = bisect_right(recording.images, image.message, key=lambda other: other.message)
     end = recording.images[following].t if following < len(recording.images) else math.inf
     lines = recording.spoken if speech else recording.printed
@@ -337,7 +337,7 @@ def _time(line: Line) -> float:
 
 
 def counts_words(counts: Counts) -> str:
-    """``9 images sent: 7 answered, 1 late, 0 malformed, 1 unanswered; 2 duplicate answers``."""
+    """Return counts as ``9 images sent: 7 answered, 1 late, 0 malformed, 1 unanswered; 2 duplicate answers``."""
     return (
         f"{counts.sent} images sent: {counts.answered} answered, {counts.late} late, {counts.malformed} malformed, "
         f"{counts.unanswered} unanswered; {counts.duplicates} duplicate answers"
@@ -369,7 +369,7 @@ def _tally(criterion: Recognition, found: Classified) -> str:
 
 
 def _first_wrong(samples: Sequence[Sample], trials: Mapping[int, TrialResult]) -> str:
-    """Where the first image was named wrongly."""
+    """Return the place of the first misidentified image; empty if there is none."""
     first = next((sample for sample in samples if not sample.right), None)
     if first is None:
         return ""

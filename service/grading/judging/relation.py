@@ -1,6 +1,6 @@
-"""Judging whether one series of a recording goes with another, moment by moment.
+"""Judging of the correlation between two series of a recording.
 
-All values are the simulator's own; what the program made of them is judged elsewhere.
+All values come from the simulator. The program's use of them is judged elsewhere.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from service.grading.judging.outcome import Outcome, failed, passed
 from sim.recording import Floats, Recording
 from submissions.criteria.relation import Relation, Series
 
-#: Moments that are compared, each with every other.
+#: The number of moments that are compared pairwise.
 _MOMENTS = 600
-#: Less than this share of a series' range is no difference.
+#: Differences below this fraction of a series' range are ignored.
 _ALIKE = 0.05
 
 
 @judges(Relation)
 def judge_relation(criterion: Relation, trial: TrialResult) -> Outcome:
-    """The share of pairs of moments that are as asked; the score is that share beside the one that is asked for."""
+    """Judge the fraction of pairs of moments with the required relation. The score compares it with the target."""
     recording = trial.recording
     moving = np.flatnonzero(~standing(recording))
     rows = moving[np.unique(np.linspace(0, len(moving) - 1, _MOMENTS).astype(int))] if len(moving) else moving
@@ -60,7 +60,7 @@ def judge_relation(criterion: Relation, trial: TrialResult) -> Outcome:
 
 
 def _pairs(of: Floats, to: Floats) -> tuple[int, int]:
-    """In how many pairs of moments both series differ in the same direction, and in how many both differ."""
+    """Return the number of pairs in which both series differ in the same direction, and in which both differ."""
     one, other = np.triu_indices(len(of), 1)
     by_of, by_to = of[one] - of[other], to[one] - to[other]
     both = (np.abs(by_of) > _ALIKE * np.ptp(of)) & (np.abs(by_to) > _ALIKE * np.ptp(to))
@@ -68,7 +68,7 @@ def _pairs(of: Floats, to: Floats) -> tuple[int, int]:
 
 
 def _series(name: Series, recording: Recording) -> Floats:
-    """A value for each tick, shape (n,)."""
+    """Return a value for each tick, shape (n,)."""
     ticks = recording.ticks
     ahead, turned = travel(recording)
     match name:

@@ -1,7 +1,6 @@
-"""Judging what the responder answers: to given texts, or to every message that reached it.
+"""Judging of the responder's answers: to given texts, or to every message that reached it.
 
-An answer counts whether or not it arrived before the program ended; what the robot does with it is judged
-elsewhere.
+An answer counts even if it arrived after the program ended. The robot's use of it is judged elsewhere.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from sim.recorded import pose_at
 from sim.recording import Message
 from submissions.criteria.replies import Replies, right_answers
 
-#: Messages that were sent instead are named up to this count and length.
+#: Messages that were sent instead are quoted up to this number and length.
 _MOST_SENT, _LONGEST_SENT = 3, 60
 
 _NOTHING_TO_ANSWER = "The channel lost every message on its way by chance, so there was nothing to answer."
@@ -31,7 +30,7 @@ _NOTHING_TO_ANSWER = "The channel lost every message on its way by chance, so th
 
 @judges(Replies)
 def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
-    """Each text that is expected, or each different question that arrived, and what it was answered."""
+    """Judge the answer to each expected text, or to each different question that arrived."""
     pair = pair_of(criterion, trial.recording)
     recording = pair.recording
     sent = [message for message in recording.messages if message.sender == "robot"]
@@ -44,7 +43,7 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
         return _judge_expected(criterion, asked, sent, pair)
     if criterion.in_order:
         return _judge_order(criterion, asked, pair)
-    # A message that is sent again asks nothing new.
+    # A repeated message asks nothing new.
     questions: dict[str, list[tuple[int, Message]]] = {}
     for index, message in asked:
         if _is_asked_about(criterion, message.received):
@@ -79,7 +78,7 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
 
 
 def _judge_expected(criterion: Replies, asked: list[tuple[int, Message]], sent: list[Message], pair: Pair) -> Outcome:
-    """What was sent and never arrived by chance alone is left out: the responder could not answer it."""
+    """Judge the expected texts, without those lost by chance, which the responder could not answer."""
     answers = Answers(pair.recording)
     right = count = 0
     first: Outcome | None = None
@@ -116,7 +115,7 @@ def _judge_expected(criterion: Replies, asked: list[tuple[int, Message]], sent: 
 
 
 def _judge_order(criterion: Replies, asked: list[tuple[int, Message]], pair: Pair) -> Outcome:
-    """The answers to all messages that are asked about, in the order of these, against the list."""
+    """Judge the answers to all questions, in order, against the list."""
     answers = Answers(pair.recording)
     heard = [(index, each) for index, each in asked if _is_asked_about(criterion, each.received)]
     wrong = [
@@ -143,7 +142,7 @@ def _judge_order(criterion: Replies, asked: list[tuple[int, Message]], pair: Pai
 
 
 def _unsent(tries: Sequence[Message], sent: Sequence[Message]) -> str:
-    """Why a text never reached the responder, and what was sent instead."""
+    """Return why a text never reached the responder, and what was sent instead."""
     astray = next((message for message in tries if out_of_reach(message)), None)
     if astray:
         return f"the channel lost it ({loss_words(astray)})"
@@ -152,13 +151,13 @@ def _unsent(tries: Sequence[Message], sent: Sequence[Message]) -> str:
 
 
 def _wrong_answer(criterion: Replies, answers: Answers, index: int, right_ones: Sequence[object]) -> str:
-    """What is wrong with the answer to the message at ``index``; empty if it is one of the right ones."""
+    """Return the problem with the answer to the message at ``index``; empty if it is one of the correct ones."""
     mistakes = [_mismatch(criterion, answers, index, each) for each in right_ones]
     return "" if "" in mistakes else mistakes[0] if mistakes else "nothing is right"
 
 
 def _mismatch(criterion: Replies, answers: Answers, index: int, answer: object) -> str:
-    """How the answer to the message at ``index`` differs from this one; empty if it does not."""
+    """Return how the answer to the message at ``index`` differs from this one; empty if it does not."""
     reply = answers.to(index)
     if reply is None:
         return answers.silence(index)
@@ -182,7 +181,7 @@ def _mismatch(criterion: Replies, answers: Answers, index: int, answer: object) 
 
 
 def _mistake(criterion: Replies, answers: Answers, index: int) -> str:
-    """What is wrong with the answer to the message at ``index``, against the conditions; empty if nothing is."""
+    """Return how the answer to the message at ``index`` violates the conditions; empty if it does not."""
     reply = answers.to(index)
     if reply is None:
         return answers.silence(index)

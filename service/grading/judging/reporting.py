@@ -1,6 +1,6 @@
-"""Judging what a program reports: the right figures and words, in the right order, at the right place.
+"""Judging of reports: the right numbers and words, in the right order and place.
 
-How often a single text comes is judged in ``texts.py``, words one after the other in ``sequence.py``.
+``texts.py`` judges how often a text comes, and ``sequence.py`` consecutive words.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from submissions.criteria.places import Zone
 from submissions.criteria.reporting import EventAt, Events, Reports
 
 _DEEDS = {"print": "print", "speech": "say", "either": "report", "reply": "answer"}
-#: The label of a place without one.
+#: The label of a place that has none.
 NO_LABEL = "nothing"
 
 
 @judges(Reports)
 def judge_reports(criterion: Reports, trial: TrialResult) -> Outcome:
-    """The figures and words that belong to the trial's pose, looked for in order in what was told."""
+    """Judge a report by searching for the entries of the trial's pose, in order."""
     wanted = _expected_entries(criterion, trial)
     lines = _texts(criterion, trial.recording)
     told = [(token, line.t) for line in lines for token in tokens_of(line.text)]
@@ -81,19 +81,19 @@ def _expected_entries(criterion: Reports, trial: TrialResult) -> Row:
 
 
 def row_of_label(label: str) -> Row:
-    """Return the row that has to be reported where the floor has this label."""
+    """Return the row that must be reported on a floor with this label."""
     return (float(label) if label.isdecimal() else label,)
 
 
 def _rows(criterion: Reports, recording: Recording) -> frozenset[Row]:
-    """The rows of all poses; for labels, one row for each label that the floor can have."""
+    """Return the rows of all poses; for labels, one row for each label that the floor can have."""
     if criterion.expected != "label":
         return frozenset(criterion.expected)
     return frozenset(map(row_of_label, (*label_names(recording.background), NO_LABEL)))
 
 
 def label_at_start(recording: Recording) -> str:
-    """What the floor has under the left light sensor at the start, or ``NO_LABEL``."""
+    """Return the floor's label under the left light sensor at the start, or ``NO_LABEL``."""
     floor = floor_of(recording)
     label = floor.label_at(*part_at(recording, "left", recording.start)) if floor else None
     return label or NO_LABEL
@@ -103,7 +103,7 @@ def _texts(criterion: Reports, recording: Recording) -> list[Line]:
     if criterion.source == "reply":
         return [Line(m.t, m.text) for m in recording.messages if m.sender == "responder" and m.note != "duplicated"]
     printed = recording.printed if criterion.source != "speech" else ()
-    # What say() prints as well would be there twice.
+    # Text from say() is also printed, and would be counted twice.
     spoken = recording.spoken if criterion.source == "speech" else ()
     if criterion.source == "either":
         shown = {(line.t, line.text) for line in printed}
@@ -114,7 +114,7 @@ def _texts(criterion: Reports, recording: Recording) -> list[Line]:
 def _guesses(
     criterion: Reports, wanted: Sequence[Entry], told: Sequence[tuple[Token, float]], recording: Recording
 ) -> int:
-    """How many numbers nobody asked for and no sensor read; beside each reading one is its time, or its count."""
+    """Return how many numbers were neither required nor read, allowing one (its time or count) for each reading."""
     others = [
         (token.value, t)
         for token, t in told
@@ -130,10 +130,10 @@ def _is_one_of(value: float, wanted: Sequence[Entry], tolerance: float) -> bool:
 
 
 def _is_guess(criterion: Reports, wanted: Row, report: Report, count: int) -> bool:
-    """Whether the report has the first ``count`` entries of more than half of the poses, and their answers differ.
+    """Return whether the report contains the first ``count`` entries of more than half of the poses.
 
-    Once all entries of ``wanted`` are there, only whole rows of other poses count. Poses are counted, not rows: a row
-    that many poses share is easier to guess.
+    It is a guess only if the answers of these poses differ. Once all entries of ``wanted`` are found, only complete
+    rows of other poses count. Poses are counted, not rows, because a row shared by many poses is easier to guess.
     """
     if criterion.expected == "label" or not count:
         return False
@@ -150,7 +150,7 @@ def _is_guess(criterion: Reports, wanted: Row, report: Report, count: int) -> bo
 
 
 def _other_label(criterion: Reports, wanted: Row, rows: frozenset[Row], report: Report) -> str:
-    """Which other label of the floor was reported, in words; empty if none was."""
+    """Return a description of the other floor label that was reported; empty if none was."""
     if criterion.expected != "label":
         return ""
     others = sorted(_entries(row) for row in rows if report.has(row) and not suits(row, wanted, criterion.leeway))
@@ -158,7 +158,7 @@ def _other_label(criterion: Reports, wanted: Row, rows: frozenset[Row], report: 
 
 
 def _foreign(criterion: Reports, wanted: Sequence[Entry], tokens: Sequence[Token]) -> str:
-    """What was reported that must not be, in words; empty if nothing was."""
+    """Return a description of a forbidden text that was reported; empty if there is none."""
     expected = [words_of(entry) for entry in wanted if isinstance(entry, str)]
     words = [token.word for token in tokens]
     for text in criterion.among:
@@ -175,7 +175,7 @@ def _foreign(criterion: Reports, wanted: Sequence[Entry], tokens: Sequence[Token
 
 
 def _leeway(criterion: Reports, wanted: Sequence[Entry]) -> str:
-    """How far off a number may be, where it is far enough to matter to whoever compares."""
+    """Return the allowed difference of numbers in words, if it is large enough to matter."""
     numbers = any(not isinstance(entry, str) for entry in wanted)
     return f" (within {criterion.leeway:g})" if numbers and criterion.leeway >= 1 else ""
 
@@ -186,7 +186,7 @@ def _entries(entries: Sequence[Entry]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Mention:
-    """A line that names texts of events, and the place of the sensor when it came."""
+    """A line that names texts of events, and the position of the sensor at that time."""
 
     line: Line
     texts: frozenset[str]
@@ -195,9 +195,9 @@ class _Mention:
 
 @judges(Events)
 def judge_events(criterion: Events, trial: TrialResult) -> Outcome:
-    """Each event is looked for after the one before it; the first mention at the right place counts.
+    """Judge the events, each after the previous one. The first mention at the right place counts.
 
-    A mention where another event belongs as well does not tell the places apart, and does not count.
+    A mention at a place where another event also belongs does not distinguish the places, and does not count.
     """
     mentions = _mentions(criterion, trial.recording)
     outcome = _found_in_places(criterion, mentions, trial.recording)
@@ -257,7 +257,7 @@ def _happens(criterion: Events, event: EventAt, mention: _Mention) -> bool:
 
 
 def _elsewhere(criterion: Events, mentions: Sequence[_Mention]) -> int:
-    """Return how many texts of events came outside of every place that they belong to."""
+    """Return how many texts of events came outside all places that they belong to."""
     own: dict[tuple[str, ...], list[Zone]] = {}
     for event in criterion.events:
         own.setdefault(event.text, []).append(event.zone)
@@ -270,14 +270,14 @@ def _elsewhere(criterion: Events, mentions: Sequence[_Mention]) -> int:
 
 
 def _strays(criterion: Events, mentions: Sequence[_Mention]) -> dict[EventAt, _Mention]:
-    """For each event that was mentioned at the place of one with other words the first such mention."""
+    """Return the first mention of each event at the place of an event with different words."""
     strays: dict[EventAt, _Mention] = {}
     for mention in mentions:
         here = [other for other in criterion.events if _is_at(criterion, other, mention)]
         for event in criterion.events:
             if event in strays or not _names(mention, event):
                 continue
-            # At the place of an event with the same words, it belongs.
+            # At the place of an event with the same words, the mention is right.
             if here and all(set(event.text).isdisjoint(other.text) for other in here):
                 strays[event] = mention
     return strays

@@ -1,6 +1,6 @@
-"""Judging how long images are named rightly as one swept condition gets harder: what the curve is worth.
+"""Judging of recognition under a swept condition: the marks for the accuracy curve.
 
-What each image was taken for is found in ``recognition.py``, the curves in ``sweeps.py``.
+``recognition.py`` classifies the images, and ``sweeps.py`` makes the curves.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _MOST_LEVELS_TOLD = 12
 
 @judges_case(Robustness)
 def judge_robustness(criterion: Robustness, case: Case) -> CriterionResult:
-    """The curve of accuracy along the swept condition, and the marks for it."""
+    """Judge the accuracy curve along the swept condition."""
 
     def judged(trials: Indexed) -> CriterionResult:
         levels = levels_along(criterion.along, dict(trials))
@@ -38,7 +38,7 @@ def judge_robustness(criterion: Robustness, case: Case) -> CriterionResult:
 
 
 def _share(criterion: Robustness, curve: AccuracyCurve) -> Fraction:
-    """What part of the marks the curve is worth."""
+    """Return the fraction of the marks for the curve."""
     reached = area(curve.levels) if criterion.level is None else part_above(curve.levels, criterion.level)
     if criterion.at_least is None:
         return reached

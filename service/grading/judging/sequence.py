@@ -1,6 +1,6 @@
-"""Judging words that have to come one after the other in what is said or printed, a count or a spelling.
+"""Judging of consecutive words in what is said or printed: a count or a spelling.
 
-Single texts are judged in ``texts.py``.
+``texts.py`` judges single texts.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from sim.recorded import pose_at
 from sim.recording import Line, Recording
 from submissions.criteria.sequence import WordSequence
 
-_SPEECH_ROUNDING = 0.011  # a waiting program looks every 10 ms
+_SPEECH_ROUNDING = 0.011  # a waiting program checks every 10 ms
 
 
 @judges(WordSequence)
 def judge_word_sequence(criterion: WordSequence, trial: TrialResult) -> Outcome:
-    """Words one after the other in what was said or printed; of several beginnings the best counts."""
+    """Judge consecutive words in what was said or printed. The best of several beginnings counts."""
     recording = trial.recording
     lines = recording.spoken if criterion.source == "speech" else recording.printed
     verb, past = ("say", "said") if criterion.source == "speech" else ("print", "printed")
@@ -42,7 +42,7 @@ def judge_word_sequence(criterion: WordSequence, trial: TrialResult) -> Outcome:
 def _in_sequence(
     criterion: WordSequence, recording: Recording, heard: Sequence[tuple[str, Line]], found: int, end: int
 ) -> Outcome:
-    """What the best run is worth: ``found`` of the words came, and ``end`` is where the next word is."""
+    """Return the outcome of the best run: ``found`` words came, and ``end`` is the place of the next word."""
     lines = recording.spoken if criterion.source == "speech" else recording.printed
     verb, past = ("say", "said") if criterion.source == "speech" else ("print", "printed")
     count, shown = len(criterion.words), _shown(criterion)
@@ -83,10 +83,10 @@ def _in_sequence(
 
 
 def _best_run(criterion: WordSequence, wanted: Sequence[Sequence[list[str]]], words: list[str]) -> tuple[int, int, int]:
-    """Where the best run begins, how many of the wanted words it has, and where the next word is.
+    """Return the start of the best run, how many wanted words it has, and the place of the next word.
 
-    Of runs with equally many words the one is best that leaves least where nothing else may come: after it, or, with
-    ``more``, anywhere beside it.
+    Among runs with equally many words, the one with the last end wins. If words are missing, or with ``more``, the one
+    with the longest text from start to end wins.
     """
 
     def worth(run: tuple[int, int, int]) -> tuple[int, int]:
@@ -99,7 +99,7 @@ def _best_run(criterion: WordSequence, wanted: Sequence[Sequence[list[str]]], wo
 
 
 def _run(wanted: Sequence[Sequence[list[str]]], words: list[str], start: int) -> tuple[int, list[int]]:
-    """How many of the wanted words come without a gap from ``start`` on, and where the next word may be."""
+    """Return how many wanted words follow without a gap from ``start``, and the possible places of the next word."""
     places = [start]
     for count, alternatives in enumerate(wanted):
         after = {
@@ -112,7 +112,7 @@ def _run(wanted: Sequence[Sequence[list[str]]], words: list[str], start: int) ->
 
 
 def _hurried(lines: Sequence[Line]) -> Line | None:
-    """The first text that was said before the one before it had been spoken to its end."""
+    """Return the first text that was said before the previous one had been spoken to its end, or None."""
     for until, after in zip(spoken_until(lines), lines[1:], strict=False):
         if after.t < until - _SPEECH_ROUNDING:
             return after

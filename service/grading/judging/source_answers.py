@@ -1,6 +1,6 @@
-"""What the reader in the sandbox found in the text of a part: where it has what the rules of a criterion name.
+"""Results of the sandboxed source reader: the places in a part's source that a criterion's rules name.
 
-What is missing, and what should not be there, is judged in ``code.py``.
+``code.py`` judges what is missing and what should not be there.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 
 from submissions.criteria.code import SourceRules
 
-#: What makes the robot speak.
+#: The calls that make the robot speak.
 SPEECH = ("say()", "speak()")
 _UNREADABLE = "it cannot be read"
 
@@ -29,10 +29,10 @@ class MentionPlace:
 
 @dataclass(frozen=True, slots=True)
 class SourceAnswers:
-    """Where a part has what each rule of a criterion names, in the order of the rules; None where it has it not.
+    """The places that match each rule of a criterion, in the order of the rules; None without a match.
 
-    ``error``: why it cannot be read. ``unread``: a file beside it that cannot be, and why. ``doubts`` are places that
-    can do more than their text shows.
+    ``error`` says why the part cannot be read. ``unread`` is a neighbouring file that cannot be read, with the reason.
+    ``doubts`` are places that can do more than their text shows.
     """
 
     uses: tuple[MentionPlace | None, ...] = ()
@@ -46,7 +46,7 @@ class SourceAnswers:
 
     @classmethod
     def read(cls, told: Any, criterion: SourceRules) -> SourceAnswers:
-        """From what the reader in the sandbox returned, which is not believed to have any form."""
+        """Parse the result of the sandboxed reader. Its form is not trusted."""
         try:
             name, why, line = told["unread"] or ("", "", None)
             where = f" (line {int(line)})" if line is not None else ""
@@ -66,7 +66,7 @@ class SourceAnswers:
 
 
 def _places(told: Any, rules: Sequence[str]) -> tuple[MentionPlace | None, ...]:
-    """Raises one of Python's errors for what is no answer to each of the rules."""
+    """Parse the places of each rule. Raises a standard Python exception if the data is malformed."""
     return tuple(None if place is None else _place(*place) for _, place in zip(rules, told, strict=True))
 
 

@@ -1,6 +1,6 @@
-"""Judging what is under a light sensor when the robot stops.
+"""Judging of what is under a light sensor when the robot stops.
 
-The end of a run is the last tick that was reached; motors that are still on do not move a robot whose program ended.
+A run ends at the last tick that was reached. Motors left on don't move the robot after its program has ended.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Side = Literal["left", "right"]
 
 @judges(StopOn)
 def judge_stop_on(criterion: StopOn, trial: TrialResult) -> Outcome:
-    """What the light sensor saw where the robot stopped; of two sensors the better one counts."""
+    """Judge the light sensor's view where the robot stopped. Of two sensors, the better one counts."""
     recording = trial.recording
     fault = cut(recording)
     if fault is not None and fault.verdict is not Verdict.PROGRAM_ERROR:
@@ -43,9 +43,9 @@ def _judge_side(criterion: StopOn, side: Side, recording: Recording) -> Outcome:
     place = part_at(recording, side, recording.end)
     rgb = (recording.ticks.left_rgb if side == "left" else recording.ticks.right_rgb)[-1]
     reflected = 100 * int(rgb[0]) / 255
-    checks: list[tuple[bool, str, str]] = []  # whether it holds, what was expected, what there was
+    checks: list[tuple[bool, str, str]] = []  # whether it holds, the expected value, the actual value
     where = f"at ({place[0]:.1f}, {place[1]:.1f})"
-    # Beside the floor all is black: what is not floor is left out of the reading.
+    # Everything off the floor is black, so the reading covers only the floor.
     floor = 1.0 if criterion.off_floor else floor_share(recording, side, recording.end)
     beside = "" if floor == 1 else ", partly beside the floor" if floor else ", beside the floor"
     if criterion.zone is not None:
@@ -95,7 +95,7 @@ def _judge_side(criterion: StopOn, side: Side, recording: Recording) -> Outcome:
 
 
 def _stood_still(recording: Recording) -> float:
-    """Seconds before the end in which the robot neither drove nor turned."""
+    """Return the seconds before the end in which the robot neither drove nor turned."""
     moved = np.flatnonzero(~standing(recording))
     ticks = len(recording.ticks)
     return seconds_at(recording, ticks - 1 - int(moved[-1]) if len(moved) else ticks)

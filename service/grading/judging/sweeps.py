@@ -1,6 +1,6 @@
-"""Accuracy along the conditions that a scenario sweeps: the curves, and what their heights come to.
+"""Accuracy curves along the conditions that a scenario sweeps, and their measures.
 
-Exact fractions; what a curve is worth is decided in ``robustness.py``.
+Values are exact fractions. ``robustness.py`` decides the marks.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _NOISES = ("light_noise", "motor_noise")
 
 
 def curves_of(samples: Iterable[Sample], trials: Mapping[int, TrialResult]) -> tuple[AccuracyCurve, ...]:
-    """A curve for every condition that the trials (by index in the grade) were swept over, in a fixed order."""
+    """Return a curve for every condition that the trials (by index in the grade) sweep, in a fixed order."""
     samples = tuple(samples)
     return tuple(
         curve for condition in CONDITIONS if len((curve := curve_along(condition, samples, trials)).levels) > 1
@@ -26,7 +26,7 @@ def curves_of(samples: Iterable[Sample], trials: Mapping[int, TrialResult]) -> t
 
 
 def curve_along(condition: str, samples: Iterable[Sample], trials: Mapping[int, TrialResult]) -> AccuracyCurve:
-    """The accuracy at each level of ``condition``; trials that were not swept over it are left out."""
+    """Return the accuracy at each level of ``condition``, without trials that don't sweep it."""
     levels = levels_along(condition, trials)
     counts: dict[float, tuple[int, int]] = {}
     for sample in samples:
@@ -38,7 +38,7 @@ def curve_along(condition: str, samples: Iterable[Sample], trials: Mapping[int, 
 
 
 def area(levels: Sequence[Level]) -> Fraction:
-    """The mean height of the curve between its first level and its last: the area under its straight lines."""
+    """Return the mean height of the piecewise linear curve between its first and last level."""
     if len(levels) < 2:
         return _height(levels[0]) if levels else Fraction(0)
     below = sum(
@@ -48,7 +48,7 @@ def area(levels: Sequence[Level]) -> Fraction:
 
 
 def part_above(levels: Sequence[Level], level: float) -> Fraction:
-    """What part of the sweep lies round its easiest level, the one nearest to 0, without falling below ``level``."""
+    """Return the fraction of the sweep around its easiest level (nearest to 0) that stays at ``level`` or above."""
     held = range_above(levels, level)
     if held is None:
         return Fraction(0)
@@ -58,7 +58,7 @@ def part_above(levels: Sequence[Level], level: float) -> Fraction:
 
 
 def range_above(levels: Sequence[Level], level: float) -> tuple[Level, Level] | None:
-    """The first and the last level of that part; None if it falls below at the easiest already."""
+    """Return the first and last level of that range; None if even the easiest level is below ``level``."""
     if not levels:
         return None
     enough = Fraction(str(level))
@@ -73,7 +73,7 @@ def range_above(levels: Sequence[Level], level: float) -> tuple[Level, Level] | 
 
 
 def levels_along(condition: str, trials: Mapping[int, TrialResult]) -> dict[int, float]:
-    """The level of each trial that belongs to the curve; noise that a scenario lists counts as swept."""
+    """Return the level of each trial of the curve. Noise levels listed by a scenario count as a sweep."""
     levels = {index: dict(trial.sweep)[condition] for index, trial in trials.items() if condition in dict(trial.sweep)}
     if levels or condition not in _NOISES:
         return levels

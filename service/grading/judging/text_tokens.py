@@ -1,4 +1,4 @@
-"""Texts taken apart for comparing: words, numbers, labels, and when an utterance has been spoken."""
+"""Tokens of texts for comparison: words, numbers, labels, and the times when utterances end."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ _TENS = ["thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety", "hu
 _NUMBERS = {word: str(number) for number, word in enumerate(_SMALL)} | {
     word: str(number) for number, word in zip(range(30, 101, 10), _TENS, strict=True)
 }
-#: Longest text of a student's that is taken apart.
+#: The longest student text that is tokenized.
 _MOST = 20_000
 _MOST_OF_AN_ANSWER = 10_000
 _WORD = re.compile(r"[^\W_]+")
-#: A number as Python writes it, or a word. Runs of digits are possessive: what was read of them is not read again.
+#: A number as Python writes it, or a word. Runs of digits are possessive, which avoids backtracking.
 _TOKEN = re.compile(r"(?P<number>(?<![\w.])[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d{1,3})?(?![^\W_]))|[^\W_]++")
 
 
 def words_of(text: str) -> list[str]:
-    """The words in order, without case and punctuation; "ten" is "10", "one hundred" is "100"."""
+    """Return the words in order, without case and punctuation; "ten" is "10", "one hundred" is "100"."""
     words = [_NUMBERS.get(word, word) for word in _WORD.findall(text[:_MOST].casefold())]
     joined = [word for word, after in pairwise([*words, ""]) if not (word in ("1", "a") and after == "100")]
     return joined
@@ -60,7 +60,7 @@ class Token:
 
 
 def tokens_of(text: str) -> list[Token]:
-    """The words and numbers in order, numbers as Python writes them."""
+    """Return the words and numbers in order, with numbers in Python's notation."""
     found = []
     for match in _TOKEN.finditer(text[:_MOST].casefold()):
         word = _NUMBERS.get(match[0], match[0])
@@ -69,7 +69,7 @@ def tokens_of(text: str) -> list[Token]:
 
 
 def find_words(words: Sequence[str], wanted: Sequence[str], start: int = 0) -> int | None:
-    """The first place from ``start`` on where ``wanted`` stands word for word."""
+    """Return the first place from ``start`` on that matches all of ``wanted``, or None."""
     wanted = list(wanted)
     for place in range(start, len(words) - len(wanted) + 1):
         if list(words[place : place + len(wanted)]) == wanted:
@@ -78,7 +78,7 @@ def find_words(words: Sequence[str], wanted: Sequence[str], start: int = 0) -> i
 
 
 def spoken_until(lines: Sequence[Line]) -> list[float]:
-    """When each utterance has been spoken to its end, seconds: they queue up, at 130 words a minute."""
+    """Return the end time of each utterance, in seconds: they queue up, at 130 words a minute."""
     ends: list[float] = []
     for line in lines:
         begin = max(line.t, ends[-1] if ends else 0.0)
@@ -87,7 +87,7 @@ def spoken_until(lines: Sequence[Line]) -> list[float]:
 
 
 class LabelFinder:
-    """Finds labels and their other names in a text, the longest first, as whole words."""
+    """Finds labels and their aliases in a text, the longest first, as whole words."""
 
     def __init__(self, labels: Iterable[str], aliases: Mapping[str, Sequence[str]]) -> None:
         self._names: dict[str, str] = {}
@@ -101,11 +101,11 @@ class LabelFinder:
         self._pattern = re.compile(rf"(?<!\w)(?:{alternatives})(?!\w)") if alternatives else None
 
     def canonical(self, label: str) -> str:
-        """The label as the criterion spells it."""
+        """Return the label in the criterion's spelling."""
         return self._names.get(_spelled(label), label)
 
     def labels_in(self, text: str) -> list[str]:
-        """The different labels that a text names, in the order in which it names them."""
+        """Return the different labels in a text, in order."""
         if self._pattern is None:
             return []
         found = self._pattern.findall(_spelled(text[:_MOST_OF_AN_ANSWER]))
@@ -113,5 +113,5 @@ class LabelFinder:
 
 
 def _spelled(text: str) -> str:
-    """Without case, hyphens, underscores and extra spaces."""
+    """Return the text without case, hyphens, underscores and extra spaces."""
     return " ".join(re.sub(r"[-‐-―_]", " ", text).casefold().split())

@@ -1,6 +1,6 @@
-"""Judging what was printed, said and sent: which texts count, how many there are, and in which order they came.
+"""Judging of printed, said and sent texts: which ones count, how many there are, and their order.
 
-The texts are a student's, patterns are the instructor's; no pair of them takes longer than the text is long.
+The texts come from students, the patterns from instructors. Matching takes time linear in the length of the text.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from submissions.criteria.texts import Messages, Prints, Says, TextConditions, T
 
 @dataclass(frozen=True, slots=True)
 class Deed:
-    """The words for what is judged: the robot, say, said; what is addressed to somebody is no note to oneself."""
+    """The wording for a kind of text: the robot, say, said. ``addressed`` texts have a receiver, unlike prints."""
 
     who: str
     verb: str
@@ -36,9 +36,9 @@ class Deed:
     addressed: bool = False
 
 
-#: How conditions begin that are more than quoted texts.
+#: The beginning of conditions that are more than quoted texts.
 _SOMETHING = "something that "
-#: What of a text decides whether it is like another.
+#: The beginning of a text that is compared, in characters.
 _LONG = 200
 _NUMBER = re.compile(r"[-+]?\d[\d.,]*")
 
@@ -50,13 +50,13 @@ _SEND = Deed("the robot", "send", "sent", addressed=True)
 _RECEIVE = Deed("the robot", "receive", "received")
 
 
-#: What stands above the output of each cell in a notebook's recording.
+#: The heading of each cell's output in a notebook's recording.
 _CELL_HEADING = re.compile(r"--- cell \d+ ---")
 
 
 @judges(Prints)
 def judge_prints(criterion: Prints, trial: TrialResult) -> Outcome:
-    """What the program printed, call by call; what the responder or a notebook's cells printed, line by line."""
+    """Judge the program's prints call by call, or the responder's and notebook cells' prints line by line."""
     recording = trial.recording
     if criterion.of == "responder":
         return judge_sequence(criterion, _responder_lines(recording), _RESPONDER_PRINT, recording)
@@ -64,20 +64,20 @@ def judge_prints(criterion: Prints, trial: TrialResult) -> Outcome:
 
 
 def _responder_lines(recording: Recording) -> tuple[Line, ...]:
-    """What the responder printed; the recording has no times of it, so all of it came at the end."""
+    """Return the lines that the responder printed, with the end as their time, because no times are recorded."""
     texts = recording.responder_output.split("\n") if recording.responder_output else ()
     return tuple(Line(recording.end_t, text) for text in texts if not _CELL_HEADING.fullmatch(text))
 
 
 @judges(Says)
 def judge_says(criterion: Says, trial: TrialResult) -> Outcome:
-    """What the robot said, in order."""
+    """Judge what the robot said, in order."""
     return judge_sequence(criterion, trial.recording.spoken, _SAY, trial.recording)
 
 
 @judges(Messages)
 def judge_messages(criterion: Messages, trial: TrialResult) -> Outcome:
-    """What the robot sent, or what its queue got; with ``queue_grows`` both that and any other condition count."""
+    """Judge what the robot sent, or what its queue received; with ``queue_grows`` also the queue's growth."""
     recording = trial.recording
     if not criterion.queue_grows:
         return _judge_texts(criterion, recording)
@@ -91,7 +91,7 @@ def judge_messages(criterion: Messages, trial: TrialResult) -> Outcome:
 
 
 def judge_sequence(criterion: TextSequence, lines: Sequence[Line], deed: Deed, recording: Recording) -> Outcome:
-    """Whether the right texts are among ``lines``; everything is compared with its runs of spaces as one."""
+    """Judge whether the right texts are among ``lines``. Repeated spaces count as one."""
     if criterion.last:
         return _judge_last(criterion, lines, deed, recording)
     chosen = [line for line in lines if meets(criterion, line.text)]
@@ -104,7 +104,7 @@ def judge_sequence(criterion: TextSequence, lines: Sequence[Line], deed: Deed, r
 
 
 def meets(criterion: TextConditions, text: str) -> bool:
-    """Whether a text meets every condition that is given."""
+    """Return whether a text meets all given conditions."""
     fold = criterion.ignore_case
     plain = _plain(text, fold)
     if criterion.equals and plain not in [_plain(wanted, fold) for wanted in criterion.equals]:
@@ -119,7 +119,7 @@ def meets(criterion: TextConditions, text: str) -> bool:
 
 
 def conditions(criterion: TextConditions) -> str:
-    """What is looked for, in words: ``"x" or "y"``, ``something that contains "x"``; empty without conditions."""
+    """Return the conditions in words: ``"x" or "y"``, ``something that contains "x"``; empty without conditions."""
     others = criterion.starts_with or criterion.contains or criterion.among or criterion.matches is not None
     if criterion.equals and not others:
         return listed(criterion.equals, "or")
@@ -138,7 +138,7 @@ def conditions(criterion: TextConditions) -> str:
 
 
 def same_text(text: str, wanted: str, ignore_case: bool) -> bool:
-    """Whether two texts are the same but for blanks at their ends, runs of blanks and, if so asked, case."""
+    """Return whether two texts are equal apart from blanks at the ends, repeated blanks and, if requested, case."""
     return _plain(text, ignore_case) == _plain(wanted, ignore_case)
 
 
@@ -162,7 +162,7 @@ def _judge_last(criterion: TextSequence, lines: Sequence[Line], deed: Deed, reco
 def _judge_order(
     criterion: TextSequence, chosen: Sequence[Line], lines: Sequence[Line], deed: Deed, recording: Recording
 ) -> tuple[Outcome, Sequence[Line]]:
-    """The outcome, and the texts that were taken for those in order."""
+    """Return the outcome, and the lines matched to the texts in order."""
     wanted = criterion.in_order
     found: list[Line] = []
     extra: Line | None = None
@@ -195,7 +195,7 @@ def _judge_order(
 
 
 def _stands_for(criterion: TextSequence, text: str, wanted: str) -> bool:
-    """Whether a text is the one that is wanted; one that contains half of the others or more is none of them."""
+    """Return whether a text matches the wanted one. A text that contains at least half of the others matches none."""
     if criterion.compare != "contains" or not _compares(criterion, text, wanted):
         return _compares(criterion, text, wanted)
     others = {other for other in criterion.in_order if not _compares(criterion, wanted, other)}
@@ -203,12 +203,12 @@ def _stands_for(criterion: TextSequence, text: str, wanted: str) -> bool:
 
 
 def _out_of_order(criterion: TextSequence, chosen: Sequence[Line], found: Sequence[Line], deed: Deed) -> Strays:
-    """What of the texts that count, or of those that are asked for, came beside those found."""
+    """Return the other lines that count or match a required text, besides those found."""
     if criterion.only:
-        # Each further text has lowered the score already.
+        # Each additional text has already lowered the score.
         return Strays("")
     taken = set(map(id, found))
-    # A loop that is stuck on one text has not named everything.
+    # A loop that repeats one text does not name everything.
     changed = [line for place, line in enumerate(chosen) if not place or line.text != chosen[place - 1].text]
     every = criterion.has_conditions or deed.addressed
     extra = sum(
@@ -217,7 +217,7 @@ def _out_of_order(criterion: TextSequence, chosen: Sequence[Line], found: Sequen
         if id(line) not in taken
     )
     words = f"texts of this sort were {deed.past} {extra} times where they do not belong"
-    # What merely contains "1" may be about anything.
+    # A text that only contains "1" may be about anything.
     sure = every or criterion.compare == "equals"
     return Strays(words, misplaced=extra) if sure else Strays(words, others=extra)
 
@@ -245,7 +245,11 @@ def _judge_count(
 
 
 def _beside(criterion: TextSequence, lines: Sequence[Line], chosen: Sequence[Line], deed: Deed) -> Strays:
-    """The texts beside those that must come; of those that differ in numbers alone one, but for guesses at these."""
+    """Return the other lines besides the required ones.
+
+    Lines that differ only in numbers count once, unless they differ from a required line only in numbers: then each
+    counts.
+    """
     if not (chosen and criterion.has_conditions and _bounds(criterion)[0]):
         return Strays("")
     guessed = {_form(line.text) for line in chosen}
@@ -256,7 +260,7 @@ def _beside(criterion: TextSequence, lines: Sequence[Line], chosen: Sequence[Lin
 
 
 def _form(text: str) -> str:
-    """A text without its numbers."""
+    """Return a text without its numbers."""
     return _NUMBER.sub("#", " ".join(text[:_LONG].casefold().split()))
 
 
@@ -296,7 +300,7 @@ def _judge_texts(criterion: Messages, recording: Recording) -> Outcome:
     astray = [message for message in recording.messages if message.sender == "responder" and by_chance(message)]
     if outcome.passed or not astray:
         return outcome
-    # As if chance had done nothing to the answers: the program cannot help what it did.
+    # Judge the answers as if there were no random losses, because the program cannot prevent them.
     as_answered = {id(message): (message.delivered or message.t, message.text) for message in (*arrived, *astray)}
     excused = judge_sequence(criterion, _lines(criterion, as_answered.values()), _RECEIVE, recording)
     if excused.score <= outcome.score:
@@ -305,7 +309,7 @@ def _judge_texts(criterion: Messages, recording: Recording) -> Outcome:
 
 
 def _lines(criterion: Messages, answers: Iterable[tuple[float, str]]) -> list[Line]:
-    """What joins the robot's queue of answers with their times, in the order of these; of each what is asked for."""
+    """Return the answers that join the robot's queue, in order of time, reduced to the requested value."""
     lines = []
     for t, text in sorted(answers, key=lambda answer: answer[0]):
         value = parsed(text)
@@ -316,7 +320,7 @@ def _lines(criterion: Messages, answers: Iterable[tuple[float, str]]) -> list[Li
 
 
 def _joined(message: Message) -> bool:
-    """Whether it is an answer that joined the robot's queue."""
+    """Return whether it is an answer that joined the robot's queue."""
     if message.sender != "responder" or message.delivered is None:
         return False
     if message.arrived_as is not None:
@@ -325,9 +329,9 @@ def _joined(message: Message) -> bool:
 
 
 def _queue_grows(recording: Recording) -> Outcome:
-    """Every PY:: message that reached the responder has its JSON:: answer in the queue, in the order of sending.
+    """Judge whether every PY:: message that reached the responder has its JSON:: answer in the queue, in order.
 
-    An answer that the channel lost by chance, or that came when the message was sent again, is not missed.
+    Answers that the channel lost by chance, or that came when the message was sent again, are not missed.
     """
     sent = [
         (index, message)
@@ -346,7 +350,7 @@ def _queue_grows(recording: Recording) -> Outcome:
     replies = [(message, _reply(answers, index)) for index, message in asked]
     arrivals = [reply.delivered for _, reply in replies if reply is not None and _joined(reply)]
     came = {message.text for message, reply in replies if reply is not None and _joined(reply)}
-    # A message that is sent again shows nothing new.
+    # A repeated message shows nothing new.
     different = {message.text for _, message in asked}
     missed = [(message, reply) for message, reply in replies if not _excused(message, reply, came)]
     score = Fraction(len(different - {message.text for message, _ in missed}), len(different))
@@ -375,12 +379,12 @@ def _queue_grows(recording: Recording) -> Outcome:
 
 
 def _reply(answers: Answers, index: int) -> Message | None:
-    """The answer to a message that joined the queue, of several copies the first; else the first that there is."""
+    """Return the answer that joined the queue, the first of several copies; otherwise the first answer."""
     return next(filter(_joined, answers.all_to(index)), answers.to(index))
 
 
 def _excused(message: Message, reply: Message | None, came: Container[str]) -> bool:
-    """Whether a message's answer is in the queue, or not there because of the channel alone."""
+    """Return whether a message's answer is in the queue, or missing only because of the channel."""
     if reply is None:
         return False
     return _joined(reply) or by_chance(reply) or (out_of_reach(reply) and message.text in came)
@@ -400,7 +404,7 @@ def _compares(criterion: TextSequence, text: str, wanted: str) -> bool:
 
 
 def _named(choices: Sequence[str], text: str) -> list[str]:
-    """Those of the choices that a text has in it, as whole words."""
+    """Return the choices that a text contains as whole words."""
     words = words_of(text)
     return [choice for choice in choices if find_words(words, words_of(choice)) is not None]
 

@@ -1,6 +1,6 @@
-"""Judging how long something took, and what a figure that another criterion measured is worth.
+"""Judging of durations, and of values that another criterion measured.
 
-All times are simulated: how fast the machine was makes no difference.
+All times are simulated, so the speed of the machine makes no difference.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from sim.recorded import seconds_at
 from sim.recording import Recording
 from submissions.criteria.timing import Ranking, Timing
 
-_STILL = 1e-6  # mm or degrees a tick
+_STILL = 1e-6  # mm or degrees per tick
 
 
 @judges(Timing)
 def judge_timing(criterion: Timing, trial: TrialResult) -> Outcome:
-    """How long it took, simulated seconds; the bounds are allowed."""
+    """Judge the duration in simulated seconds. The bounds are included."""
     recording = trial.recording
     seconds, what = _seconds(criterion, recording)
     least, most = criterion.between
@@ -39,13 +39,13 @@ def judge_timing(criterion: Timing, trial: TrialResult) -> Outcome:
 
 @judges_case(Ranking)
 def judge_ranking(criterion: Ranking, case: Case) -> CriterionResult:
-    """The figure that another criterion measured in each trial, and the share of the marks for it."""
+    """Judge the value that another criterion measured in each trial."""
     other = case.results.get(criterion.of)
     return by_trial(criterion, case, lambda index, _: _ranked(criterion, index, other))
 
 
 def _ranked(criterion: Ranking, place: int, other: CriterionResult | None) -> Outcome:
-    """What the figure of trial ``place`` is worth; nothing where the other criterion failed."""
+    """Return the outcome for the value of trial ``place``; no marks if the other criterion failed."""
     evidence = next((each for each in other.evidence if each.trial == place), None) if other else None
     measure = _measure(criterion, evidence)
     if evidence is None or measure is None:
@@ -53,14 +53,14 @@ def _ranked(criterion: Ranking, place: int, other: CriterionResult | None) -> Ou
     unit = f" {measure.unit}" if measure.unit else ""
     found = f"{criterion.measure}: {measure.value:.2f}{unit}"
     if not evidence.passed:
-        # A figure that does not count stands in no table of ranks.
+        # Values that don't count are left out of the ranking.
         return failed(f"The {found} does not count: {evidence.message}", evidence.t, evidence.pose)
     share = _share(criterion, measure.value)
     best = criterion.steps[0][0]
     if share == 1:
         return passed(f"The {found}.", evidence.t, evidence.pose, (measure,))
     bound = "at least" if criterion.highest else "at most"
-    # The share is the instructor's own number: it is not kept below a bound as a measured score is.
+    # The instructor defined the share, so it is not capped like a measured score.
     return Outcome(
         False,
         share,

@@ -1,6 +1,6 @@
-"""Judging how far two robots were apart.
+"""Judging of the distance between two robots.
 
-Where each of them went by itself is judged in the other modules.
+The other modules judge each robot's own path.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from submissions.criteria.together import Apart
 
 @judges(Apart)
 def judge_apart(criterion: Apart, trial: TrialResult) -> Outcome:
-    """The distance after each tick until the last program has ended; a robot whose program has ended stands."""
+    """Judge the distance after each tick until the last program ends. A robot stops when its program ends."""
     recording = trial.recording
     distances = _distances(recording)
     if distances is None:
@@ -68,7 +68,7 @@ def judge_apart(criterion: Apart, trial: TrialResult) -> Outcome:
 
 
 def _distances(recording: Recording) -> Floats | None:
-    """How far apart at the start and after each tick, mm."""
+    """Return the distance at the start and after each tick, mm; None if there is one robot."""
     if recording.partner is None:
         return None
     ways = [_way(recording), _way(recording.partner)]

@@ -1,6 +1,6 @@
-"""What each image shows: as the floor, its grey patch, the instructor's places or the assignment's list has it.
+"""The true label of each image, from the floor, its grey patch, the instructor's places or a list.
 
-Which images count, too; what was answered is none of this module's business.
+The module also decides which images count. It does not handle answers.
 """
 
 from __future__ import annotations
@@ -19,31 +19,31 @@ from submissions.assignment.definition import Assignment
 from submissions.assignment.truth_file import LabelledPlace
 from submissions.criteria.recognition import Recognition
 
-#: Stands for the truth of an image that was never sent, where the assignment does not tell it.
+#: The truth of an image that was never sent, if the assignment does not define it.
 NO_IMAGE = "(no image)"
 
-#: The number of an image in its recording, and what it shows.
+#: The number of an image in its recording, and its true label.
 NumberedTruth = tuple[int, str]
 
 
 def shown_in(criterion: Recognition, trials: Indexed) -> Mapping[int, Sequence[NumberedTruth]]:
-    """For each trial (by its index in the grade) the images that count, in the order in which they were sent.
+    """Return the images that count for each trial (by its index in the grade), in the order sent.
 
-    Images of floor that has no name show nothing to name, and do not count.
+    Images of unlabelled floor don't count.
     """
     return {index: _counted(criterion, _known(criterion, trial)) for index, trial in trials}
 
 
 def missing_truth(criterion: Recognition, trial: TrialResult) -> str:
-    """What a trial without an image should have shown, where the assignment tells it."""
+    """Return the true label of a missing image, if the assignment defines it; otherwise ``NO_IMAGE``."""
     return _told(criterion, trial) or NO_IMAGE
 
 
 def nameable(criterion: Recognition, assignment: Assignment, truths: Sequence[str]) -> tuple[str, ...]:
-    """All that can be named: as the criterion lists it, else what the floor, the truths and the aliases have."""
+    """Return all possible labels: the criterion's list, otherwise those of the floor, truths and aliases."""
     if criterion.labels:
         return criterion.labels
-    # The instructor's own places have labels of their own; everything else may be what the floor has.
+    # The instructor's places have their own labels. Otherwise, all labels of the floor are possible.
     on_floor = () if criterion.truth == "places" else label_names(assignment.world.background)
     listed = criterion.truth if isinstance(criterion.truth, tuple) else ()
     placed = tuple(label for _, _, label in _places(criterion))
@@ -85,7 +85,7 @@ def _known(criterion: Recognition, trial: TrialResult) -> list[NumberedTruth]:
 
 
 def _greys(criterion: Recognition, recording: Recording) -> Mapping[int, str]:
-    """The label of each grey: the assignment's own, else what the floor's patches are."""
+    """Return the label of each grey: the assignment's own, otherwise those of the floor's patches."""
     if isinstance(criterion.greys, str):
         return CODES[criterion.greys]
     own = {grey: label for label, grey in criterion.greys.items()}
@@ -93,12 +93,12 @@ def _greys(criterion: Recognition, recording: Recording) -> Mapping[int, str]:
 
 
 def _look_from_start(recording: Recording, pose: Pose) -> float:
-    """How far the left sensor is, with the robot at ``pose``, from where it was at the start, mm."""
+    """Return the distance of the left sensor, with the robot at ``pose``, from its start position, mm."""
     return math.dist(part_at(recording, "left", pose), part_at(recording, "left", recording.start))
 
 
 def _look_from_spot(criterion: Recognition, recording: Recording, pose: Pose) -> float:
-    """How far the left sensor is, with the robot at ``pose``, from the middle of the nearest thing with a label, mm."""
+    """Return the distance of the left sensor, at ``pose``, from the centre of the nearest labelled thing, mm."""
     look = part_at(recording, "left", pose)
     floor = floor_of(recording)
     labels = () if floor is None else floor.labels
@@ -108,13 +108,13 @@ def _look_from_spot(criterion: Recognition, recording: Recording, pose: Pose) ->
 
 
 def _told(criterion: Recognition, trial: TrialResult) -> str | None:
-    """The label that the criterion lists for the pose that the trial starts from, if it lists one."""
+    """Return the label that the criterion lists for the trial's start pose, or None."""
     truths = criterion.truth
     return truths[trial.place] if isinstance(truths, tuple) and trial.place < len(truths) else None
 
 
 def _places(criterion: Recognition) -> Sequence[LabelledPlace]:
-    """The instructor's places; a file's name has been replaced by its rows when the assignment was read."""
+    """Return the instructor's places. A file name was replaced by its rows when the assignment was read."""
     return () if isinstance(criterion.places, str) else criterion.places
 
 
