@@ -1,1 +1,1 @@
-"""What people and programs read of grades: pages, tables, texts and plots."""
+"""Output of grades for people and programs: pages, tables, texts and plots."""

@@ -1,6 +1,6 @@
-"""Why a grade has not all its marks, decided once for every format: the one cause, what to do next, and the lines.
+"""Explanation of lost marks, shared by all formats: one main cause, the next step, and the source lines.
 
-It explains and never judges: no mark depends on it, and it sees only what the reader of a view may see.
+It explains and does not judge: marks don't depend on it. It uses only what the reader of the view may see.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from submissions.submission import Submission
 
 _PLACE = re.compile(r"[Ll]ine (\d+) of (cell \d+|\S+?)(?=[:,]? )")
 _QUOTED = re.compile(r'"([^"]{2,})"')
-#: A hint on one text that is nearly what is asked for: found, then expected. Nothing else comes of it.
+#: A hint on one text that is almost right: found, then expected. It does not affect other criteria.
 _NEARLY = re.compile(r'"; expected "')
 
 
 @dataclass(frozen=True, slots=True)
 class Excerpt:
-    """Lines of the student's own file or cell, with the line that the cause is in."""
+    """Lines of the student's file or cell around the cause."""
 
     name: str
     lines: tuple[SourceLine, ...]
@@ -43,9 +43,9 @@ class Excerpt:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """What is told first. ``cause`` and ``next_step`` are sentences; ``further`` are causes that come after.
+    """The main explanation. ``cause`` and ``next_step`` are sentences; ``further`` are secondary causes.
 
-    ``lost`` are the criteria that lost marks by this cause, by their index.
+    ``lost`` has the indices of the criteria that lost marks by this cause.
     """
 
     cause: str
@@ -56,24 +56,24 @@ class Diagnosis:
 
 
 def excerpt_lines(diagnosis: Diagnosis) -> list[str]:
-    """The excerpt as lines of text, an arrow before the one that the cause is in."""
+    """Return the excerpt as lines of text, with an arrow before the line of the cause."""
     lines = () if diagnosis.excerpt is None else diagnosis.excerpt.lines
     return [f"{'→' if line.marked else ' '} {line.number:>4}  {line.text}".rstrip() for line in lines]
 
 
 def ended(grade: Grade, diagnosis: Diagnosis, language: Language = ENGLISH) -> str:
-    """How it ended and whose doing that is, without what the cause, in the same language, has said."""
+    """Describe how the grade's run ended and who caused it, without repeating the cause."""
     words = grade_words(grade, language)
     return words.whose if words.happened in diagnosis.cause else f"{words.happened} {words.whose}"
 
 
 def diagnose(grade: Grade, submission: Submission | None = None, language: Language = ENGLISH) -> Diagnosis:
-    """The one cause: what a hint names, else a fault that cost marks, a missing part, what the dearest criterion lacks.
+    """Return the main cause: a hint, else a costly fault, a missing part, or the finding of the costliest criterion.
 
     Excerpts need the ``submission``.
     """
     words = grade_words(grade, language)
-    # What was set by hand is told in the words of whoever set it.
+    # Staff adjustments are described in the words of the person who made them.
     graded = {index: each for index, each in enumerate(grade.criteria) if each.set_by_hand is None}
     lost = {index: each for index, each in graded.items() if each.marks < each.max_marks}
     if is_ours(grade.verdict):
@@ -84,7 +84,7 @@ def diagnose(grade: Grade, submission: Submission | None = None, language: Langu
     if hints:
         return _of_hint(grade, hints, lost, submission, language)
     fault = _costly_fault(grade, lost)
-    # A program that waits for an answer which nobody gives runs until the time is up.
+    # A program that waits for an answer from a missing responder runs until the time limit.
     waited_in_vain = bool(grade.missing) and fault is not None and fault.verdict is Verdict.TIME_LIMIT
     if fault is not None and not waited_in_vain:
         return _of_fault(grade, fault, lost, submission, language)
@@ -95,7 +95,7 @@ def diagnose(grade: Grade, submission: Submission | None = None, language: Langu
 
 
 def _of_full_marks(hints: tuple[str, ...], submission: Submission | None, language: Language) -> Diagnosis:
-    """Full marks, and what was accepted although the assignment asks for something else."""
+    """Return the diagnosis for full marks, with what was accepted although it differs from the assignment."""
     full = language.say(FULL_MARKS)
     if not hints:
         return Diagnosis(full, language.say("No changes needed."))
@@ -164,7 +164,7 @@ def _of_criterion(grade: Grade, lost: dict[int, CriterionResult], language: Lang
 
 
 def _practised(grade: Grade, result: CriterionResult, language: Language) -> str:
-    """What is to be seen in practice, where nothing may be told of what is marked."""
+    """Return the findings of an unmarked criterion, if nothing on the marked one may be shown."""
     if _failed(result):
         return ""
     seen = (each for each in grade.criteria if not each.max_marks and _failed(each))
@@ -177,7 +177,7 @@ def _failed(result: CriterionResult) -> list[Evidence]:
 
 
 def found(grade: Grade, result: CriterionResult, language: Language = ENGLISH) -> str:
-    """What a criterion found instead of what it asked for, in a sentence or two."""
+    """Return what a criterion found instead of what it expected, in one or two sentences."""
     if result.set_by_hand is not None:
         return readable(result.message, 1000, lines=12)
     accuracy = result.accuracy
@@ -224,7 +224,7 @@ def _where(grade: Grade, evidence: Evidence, language: Language) -> str:
 
 
 def _costly_fault(grade: Grade, lost: dict[int, CriterionResult]) -> Fault | None:
-    """The first fault; time that was up only where a criterion names it, for by itself it costs nothing."""
+    """Return the first fault. A time limit counts only if a criterion names it, because alone it costs nothing."""
     told = [each.message for result in lost.values() for each in _failed(result)]
     return next(
         (
@@ -241,7 +241,7 @@ def _faults(grade: Grade) -> Iterator[Fault]:
 
 
 def _lost_by(grade: Grade, fault: Fault, lost: dict[int, CriterionResult]) -> frozenset[int]:
-    """Those that failed only in trials which had this fault, and nowhere before it."""
+    """Return the criteria that failed only in trials with this fault, and not before it."""
     when = {
         index: min(each.t for each in same)
         for index, trial in enumerate(grade.trials)
@@ -260,7 +260,7 @@ def _after(evidence: Evidence, t: float, fault: Fault) -> bool:
 
 
 def _alike(grade: Grade, one: CriterionResult, other: CriterionResult) -> bool:
-    """Whether two lost marks by the same mistake: the same confusions, or the same moment on the way."""
+    """Return whether two criteria lost marks by the same mistake: equal confusions, or the same moment of the run."""
     confused = _confused(one)
     if confused or _confused(other):
         return set(confused) == set(_confused(other))
@@ -268,7 +268,7 @@ def _alike(grade: Grade, one: CriterionResult, other: CriterionResult) -> bool:
 
 
 def _moments(grade: Grade, result: CriterionResult) -> Iterator[tuple[int, float]]:
-    """Where on its way it failed in each trial: at the end much comes together that has nothing to do with it."""
+    """Yield trial and time of each failure before the end. At the end, unrelated failures coincide."""
     for each in _failed(result):
         if each.t is None or not 0 <= each.trial < len(grade.trials):
             continue
@@ -277,7 +277,7 @@ def _moments(grade: Grade, result: CriterionResult) -> Iterator[tuple[int, float
 
 
 def _confused(result: CriterionResult) -> list[tuple[str, str]]:
-    """What was taken for what, the most often first."""
+    """Return pairs of true and assigned label for misidentified images, the most frequent first."""
     if result.accuracy is None:
         return []
     counts: Counter[tuple[str, str]] = Counter()

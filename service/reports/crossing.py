@@ -1,6 +1,6 @@
-"""What befell a message on its way between robot and responder, in the few words that a table or an arrow has room for.
+"""Short descriptions of message losses and changes between robot and responder, for tables and arrows.
 
-Whose doing it was is judged elsewhere.
+Other modules judge who caused them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _REASONS: Mapping[LossReason, str] = MappingProxyType(
         "blocked": translatable("blocked"),
     }
 )
-#: What the bridge notes of a message.
+#: The bridge's notes on messages.
 _NOTES: Mapping[str, str] = MappingProxyType(
     {
         "duplicated": translatable("duplicated"),
@@ -34,7 +34,7 @@ _NOTES: Mapping[str, str] = MappingProxyType(
 
 
 def befell(message: Message, language: Language = ENGLISH) -> str:
-    """What befell a message on its way, in a few words; empty if it arrived once and as it was sent."""
+    """Describe a message's loss or corruption in a few words; empty if it arrived once and unchanged."""
     note = note_words(message.note, language)
     if message.arrived_as is not None:
         words = language.say("corrupted to %(text)s", text=message_words(message.arrived_as, 40))
@@ -43,12 +43,12 @@ def befell(message: Message, language: Language = ENGLISH) -> str:
 
 
 def note_words(note: str, language: Language = ENGLISH) -> str:
-    """What was noted of a message; empty if nothing was."""
+    """Return the note on a message in words; empty if there is none."""
     return language.say(_NOTES[note]) if note in _NOTES else one_line(note, 40)
 
 
 def out_of_reach_by(message: Message, language: Language = ENGLISH) -> str:
-    """How far away a message was lost, or how much the robot faced away; empty if that is not why."""
+    """Return how far away a message was lost, or how far the robot faced away; empty for other reasons."""
     if message.lost == "out of range" and message.distance is not None:
         return language.say("%(distance)s mm away", distance=math.ceil(message.distance))
     if message.lost == "facing away" and message.angle is not None:
@@ -57,5 +57,5 @@ def out_of_reach_by(message: Message, language: Language = ENGLISH) -> str:
 
 
 def befell_in_full(message: Message, language: Language = ENGLISH) -> str:
-    """The same with how far out of reach it was."""
+    """Describe the loss as ``befell`` does, with the distance or angle."""
     return ", ".join(filter(None, (befell(message, language), out_of_reach_by(message, language))))

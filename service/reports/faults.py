@@ -1,6 +1,6 @@
-"""The faults of a grade's trials, the same ones counted together, with the student's own line beside them.
+"""The faults of a grade's trials, with equal faults grouped and the student's source lines.
 
-Faults are told, never judged; marks do not depend on anything here.
+Faults are reported, not judged. Marks don't depend on this module.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _WHERE: Mapping[str, str] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class SourceLine:
-    """One line of the student's file; ``marked`` is the line at fault, the others stand around it."""
+    """One line of the student's file. ``marked`` is the line of the fault; the others are its context."""
 
     number: int
     text: str
@@ -44,7 +44,7 @@ class SourceLine:
 
 @dataclass(frozen=True, slots=True)
 class FaultGroup:
-    """One fault and how often it came. All texts are fit to be shown."""
+    """One fault and its frequency. All texts are safe to show."""
 
     verdict: Verdict
     where: str
@@ -55,7 +55,7 @@ class FaultGroup:
 
 
 def faults_beside(cause: str, grade: Grade, submission: Submission | None = None) -> Iterator[tuple[str, FaultGroup]]:
-    """Each fault with what is to be told of it where the cause has been told: of the cause's own, only where."""
+    """Yield each fault with its description, shortened to the place if the cause already has its message."""
     for group in fault_groups(grade, submission, limit=10):
         told = group.message.rstrip(".") in cause
         yield (group.where if told else f"{group.where}: {group.message}"), group
@@ -64,7 +64,7 @@ def faults_beside(cause: str, grade: Grade, submission: Submission | None = None
 def fault_groups(
     grade: Grade, submission: Submission | None = None, limit: int = 12, language: Language = ENGLISH
 ) -> tuple[FaultGroup, ...]:
-    """At most ``limit`` different faults in the order they first came; excerpts only with a ``submission``."""
+    """Return at most ``limit`` different faults in order of first occurrence. Excerpts need a ``submission``."""
     found: dict[tuple[str, str, str], list[tuple[int, Fault]]] = {}
     for index, trial in enumerate(grade.trials):
         for fault in faults_of(trial.recording):
@@ -73,7 +73,7 @@ def fault_groups(
 
 
 def place_words(fault: Fault, language: Language = ENGLISH) -> str:
-    """Where in the student's own text it was: ``cell 7, line 3``, ``line 3 of helper.py``; empty if nobody knows."""
+    """Return the position in the student's text: ``cell 7, line 3``, ``line 3 of helper.py``; empty if unknown."""
     within = [fault.agent] if fault.agent else []
     within += [language.say("cell %(number)s", number=fault.cell)] if fault.cell is not None else []
     if fault.line is not None and fault.file:
@@ -128,7 +128,7 @@ def _source(fault: Fault, submission: Submission | None) -> Code | None:
 
 
 def source_called(name: str, submission: Submission) -> Code | None:
-    """What a hint calls by this name: ``cell 3``, a part, or a file beside it."""
+    """Return the source that a hint names: ``cell 3``, a part, or a neighbouring file."""
     if name.startswith("cell ") and submission.notebook is not None:
         cells = {f"cell {cell.number}": cell.source for cell in submission.notebook.cells}
         return Code(name, cells[name]) if name in cells else None
@@ -137,14 +137,14 @@ def source_called(name: str, submission: Submission) -> Code | None:
 
 
 def _beside(file: str, submission: Submission) -> Code | None:
-    """A process has named the file, so it may be any, or none."""
+    """Return the named file, or None. The name comes from student code, so it may be anything."""
     with contextlib.suppress(UsageError):
         return submission.code(file)
     return None
 
 
 def excerpt_around(source: Code, line: int, around: int = 2) -> tuple[SourceLine, ...]:
-    """The line with those around it; nothing where the source has no such line."""
+    """Return the line and its neighbours; empty if the source has no such line."""
     lines = source.text.rstrip("\n").split("\n")
     if not 1 <= line <= len(lines):
         return ()

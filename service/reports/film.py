@@ -1,7 +1,7 @@
-"""A film of one trial, a GIF: the robot on its floor with its pen, the time, and what is printed, said and sent.
+"""An animated GIF of one trial: the robot on its floor with its pen, the time, and printed, said and sent texts.
 
-It shows what the replay shows, for where nothing can run. It is a minute's work at most, however long the trial was:
-time runs so fast that a few hundred frames are enough.
+It shows the same as the replay, for places that cannot run scripts. It plays for less than a minute, however long the
+trial was: time is sped up so that a few hundred frames are enough.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from sim.robot import LightSensor
 Pixels = NDArray[np.uint8]
 Point = tuple[float, float]
 
-#: Milliseconds; a GIF counts hundredths of a second.
+#: Frame duration in milliseconds. A GIF counts in hundredths of a second.
 FRAME = 80
 MOST_FRAMES = 300
 _LAST_FRAME = 2000
@@ -41,15 +41,15 @@ _FLOOR_WIDTH, _FLOOR_HEIGHT = 2362, 1143  # mm
 _OFF_THE_FLOOR, _PAPER, _OBSTACLE, _RAY = "#a3aab1", "#ffffff", "#c8cdd2", "#3f7d3c"
 _COLOURS = (INK, LEFT, RIGHT, PEN, FAULT, SECOND_ROBOT, FAINT, RULE, _OFF_THE_FLOOR, _PAPER, _OBSTACLE, _RAY)
 _FOUND_COLOURS, _TOO_NEAR = 150, 8
-_FINER = 3  # what is drawn is so much larger at first, so that it has no steps
+_FINER = 3  # drawings are enlarged by this factor first, for smooth edges
 _NOTHING_SEEN = 2550  # mm
-#: Frames for which a text stays at least, and at most.
+#: The shortest and longest display of a text, in frames.
 _SHORTEST, _LONGEST = 10, 25
 
 
 @dataclass(frozen=True, slots=True)
 class _Sight:
-    """The part of the world that is filmed: its upper left corner, mm, and how many pixels a mm has."""
+    """The part of the world that is shown: its upper left corner in mm, and the scale in pixels per mm."""
 
     left: float
     top: float
@@ -61,7 +61,7 @@ class _Sight:
 
 
 def film(trial: TrialResult, own_floors: Mapping[str, Pixels]) -> bytes:
-    """The trial as a GIF; ``own_floors`` are those that are not built in, by name."""
+    """Return the trial as a GIF. ``own_floors`` are floors that are not built in, by name."""
     recording = trial.recording
     sight = _sight(recording)
     ground = _ground(recording, own_floors.get(recording.background), sight)
@@ -83,7 +83,7 @@ def film(trial: TrialResult, own_floors: Mapping[str, Pixels]) -> bytes:
 def _frames(
     trial: TrialResult, ground: Image.Image, sight: _Sight, speed: int, moments: list[float] | tuple[float, ...]
 ) -> Iterator[Image.Image]:
-    """A frame for each moment; what the robots leave behind is drawn on ``ground``."""
+    """Yield a frame for each moment. Trails of the robots are drawn on ``ground``."""
     recording = trial.recording
     words = _Words(trial)
     robots = [own for _, own in robots_of(recording)]
@@ -104,7 +104,7 @@ def _frames(
 
 
 def _sight(recording: Recording) -> _Sight:
-    """Where the robots have been, with some room around, in the shape of a screen."""
+    """Return the region that the robots visited, with a margin, in the aspect ratio of a screen."""
     places = np.vstack([_places(own) for _, own in robots_of(recording)])
     if recording.beacon is not None:
         places = np.vstack((places, recording.beacon))
@@ -125,7 +125,7 @@ def _places(own: Recording) -> NDArray[np.float64]:
 
 
 def _ground(recording: Recording, own: Pixels | None, sight: _Sight) -> Image.Image:
-    """The floor as it was, white where nobody has it any more, with what stands on it."""
+    """Return the floor of the trial with its obstacles; white if the floor image is not available any more."""
     ground = Image.new("RGB", (_WIDTH, sight.height), _OFF_THE_FLOOR)
     built_in = floor_of(recording) if own is None else None
     pixels = own if built_in is None else built_in.pixels
@@ -156,7 +156,7 @@ def _ground(recording: Recording, own: Pixels | None, sight: _Sight) -> Image.Im
 
 
 def _leave_trail(ground: Image.Image, own: Recording, sight: _Sight, since: int, until: int, colour: str) -> None:
-    """The way from one tick to the other, and what the pen drew on it."""
+    """Draw the path from one tick to the other, and the pen strokes on it."""
     until = min(until, len(own.ticks))
     if until <= since:
         return
@@ -171,13 +171,13 @@ def _leave_trail(ground: Image.Image, own: Recording, sight: _Sight, since: int,
 
 
 def _seen(own: Recording, sight: _Sight, since: int, until: int) -> list[Point]:
-    """Where on the frame the robot was from one tick to the other, as far as it is known."""
+    """Return the robot's known positions on the frame, from one tick to the other."""
     poses = (pose_after(own, tick) for tick in range(since, until + 1))
     return [sight.at(pose.x, pose.y) for pose in poses if math.isfinite(pose.x + pose.y)]
 
 
 def _strokes(own: Recording) -> list[tuple[int, int]]:
-    """From each tick at which the pen goes down to the one at which it goes up."""
+    """Return the ticks at which the pen goes down and up, as pairs."""
     strokes: list[tuple[int, int]] = []
     since = None
     for tick, down in (*own.pen, (len(own.ticks), False)):
@@ -190,7 +190,7 @@ def _strokes(own: Recording) -> list[tuple[int, int]]:
 
 
 def _leave_marks(ground: Image.Image, own: Recording, sight: _Sight, since: float, until: float) -> None:
-    """A cross for each touch after the one moment until the other."""
+    """Draw a cross for each touch after ``since`` up to ``until``."""
     for touch in own.touches:
         if since < touch.t <= until and math.isfinite(touch.pose.x + touch.pose.y):
             x, y = sight.at(touch.pose.x, touch.pose.y)
@@ -234,7 +234,7 @@ def _light_radius(sensor: LightSensor, sight: _Sight) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Placed:
-    """A robot's own points on the frame: x to its right, y forward, mm."""
+    """Converts a robot's own points to the frame: x to its right, y forward, mm."""
 
     pose: Pose
     sight: _Sight
@@ -246,7 +246,7 @@ class _Placed:
         )
 
     def rounded(self, left: float, back: float, right: float, front: float, radius: float) -> list[Point]:
-        """A rectangle with round corners."""
+        """Return a rectangle with round corners."""
         corners = ((right, front, 0), (left, front, 90), (left, back, 180), (right, back, 270))
         points = []
         for x, y, begin in corners:
@@ -259,7 +259,7 @@ class _Placed:
 
 
 class _Layer:
-    """The part of an image around some points, to draw on without steps; it lies on the image when it is left."""
+    """A part of an image around some points, drawn enlarged and scaled down onto the image on exit."""
 
     def __init__(self, image: Image.Image, points: list[Point], room: int = 8) -> None:
         self._image = image
@@ -309,7 +309,7 @@ class _Layer:
 
 
 class _Words:
-    """What is told below the floor: the latest text, for as long as it takes to read it."""
+    """The text below the floor: the latest one, shown long enough to read."""
 
     def __init__(self, trial: TrialResult) -> None:
         told = trial_data(trial, Sources())
@@ -319,7 +319,7 @@ class _Words:
         self._count, self._since = 0, 0
 
     def at(self, t: float, frame: int) -> tuple[str, str]:
-        """The text and its colour; the frames are asked for in their order."""
+        """Return the text and its colour. Frames must be requested in order."""
         count = bisect_right(self._moments, t + 1e-6)
         if count > self._count and (not self._count or frame - self._since >= _SHORTEST):
             self._count, self._since = count, frame
@@ -336,7 +336,7 @@ def _told(text: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def _draw_strip(frame: Image.Image, top: int, t: float, end: float, speed: int, words: tuple[str, str]) -> None:
-    """How far it is, as a bar and in figures, and what was told last."""
+    """Draw the progress as a bar and as a time, and the latest text."""
     draw = ImageDraw.Draw(frame)
     draw.rectangle((0, top, _WIDTH, top + 3), fill=RULE)
     draw.rectangle((0, top, round(_WIDTH * t / end) if end else _WIDTH, top + 3), fill=LEFT)
@@ -361,7 +361,7 @@ def _font() -> ImageFont.FreeTypeFont:
 
 
 def _palette(frames: Iterator[Image.Image]) -> Image.Image:
-    """One for the whole film: those of its first and last frame, and all that anything is drawn in."""
+    """Return one palette for the whole film, from its first and last frame and all drawing colours."""
     first, last = (frame.copy() for frame in frames)
     sample = Image.new("RGB", (_WIDTH, first.height + last.height))
     sample.paste(first)
@@ -369,7 +369,7 @@ def _palette(frames: Iterator[Image.Image]) -> Image.Image:
     quantized = sample.quantize(_FOUND_COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
     found = np.reshape(quantized.getpalette() or [], (-1, 3))[:_FOUND_COLOURS]
     exact = np.array([ImageColor.getrgb(colour) for colour in _COLOURS])
-    # A pixel is given the first colour that comes near it, which would tint what is white.
+    # A pixel gets the first colour that is close, so similar colours would tint white areas.
     others = found[np.abs(found[:, None] - exact).max(axis=2).min(axis=1) > _TOO_NEAR]
     palette = Image.new("P", (1, 1))
     palette.putpalette(np.vstack((exact, others)).ravel().tolist())

@@ -1,7 +1,7 @@
-"""A grade as one self-contained HTML file; the index of a batch; the page of floors.
+"""A grade as one self-contained HTML file, the index of a batch, and the page of floors.
 
-Everything shown goes through one filter that spells out invisible characters, and then through autoescape;
-the pages load nothing, send nothing, and run nothing but the replay's own script.
+All shown text passes one filter that spells out invisible characters, and then autoescape. The pages load nothing, send
+nothing, and run only the replay's script.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from service.reports.words import verdict_words
 from sim.recording import Verdict
 from submissions.submission import Submission
 
-#: What is expected of a submission where a refusal does not say.
+#: The expected form of a submission, for rejections that don't state it.
 _USUAL = "robot.py and responder.py, or a notebook: side by side, in a folder or a .zip"
 _SHOWN = 100 / DPI
 _NO_FLOORS: Mapping[str, Pixels] = MappingProxyType({})
@@ -43,7 +43,7 @@ _NO_FLOORS: Mapping[str, Pixels] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class BatchRow:
-    """One student of a batch. ``report`` is a path relative to the index page; marks are None until graded."""
+    """One student of a batch. ``report`` is a path relative to the index page. Marks are None until graded."""
 
     student: str
     marks: Decimal | None = None
@@ -51,12 +51,12 @@ class BatchRow:
     verdict: Verdict | None = None
     report: str | None = None
     note: str = ""
-    name: str = ""  # the student's, where that is not what they are called by
+    name: str = ""  # the student's name, if it differs from ``student``
 
 
 @dataclass(frozen=True, slots=True)
 class PrintedFloor:
-    """A floor on the page of floors: its image as a PNG, and the labels that places on it have."""
+    """A floor on the page of floors: its image as a PNG, and the labels of its places."""
 
     name: str
     image: bytes
@@ -65,7 +65,7 @@ class PrintedFloor:
 
 @dataclass(frozen=True, slots=True)
 class ShownImage:
-    """A plot in a report and its size in CSS pixels, at which the smallest of its type can be read."""
+    """A plot in a report with its size in CSS pixels, at which its smallest type is readable."""
 
     uri: Markup
     width: int
@@ -73,7 +73,7 @@ class ShownImage:
 
 
 def gallery(floors: Sequence[PrintedFloor]) -> str:
-    """A page with every floor."""
+    """Return a page with every floor."""
     shown = [
         {"name": floor.name, "image": _data_uri(floor.image), "labels": ", ".join(floor.labels)} for floor in floors
     ]
@@ -82,11 +82,11 @@ def gallery(floors: Sequence[PrintedFloor]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ReportParts:
-    """A report without a frame: the HTML for a page's ``main``, and the style and the script that it needs.
+    """A report without a frame: the HTML for a page's ``main``, and the style and script that it needs.
 
-    ``style`` is the same for every report, and so is ``script``, which runs when the body is there (``defer``), so that
-    a site can serve them as files. The body has no style and no script of its own: its images are data URIs
-    (``img-src data:``), and its replay is data that no browser runs.
+    ``style`` and ``script`` are the same for every report, so a site can serve them as files. The script runs once the
+    body is loaded (``defer``). The body has no style or script of its own: its images are data URIs (``img-src
+    data:``), and its replay is data that no browser runs.
     """
 
     title: str
@@ -102,10 +102,14 @@ def report_parts(
     own_floors: Mapping[str, Pixels] = _NO_FLOORS,
     others: OtherTrials = NO_OTHERS,
 ) -> ReportParts:
-    """One grade, with its replay, and with the student's source if the submission is given.
+    """Return one grade with its replay, and with the student's source if the submission is given.
 
-    ``plots`` are those of ``draw_all``; the ones that are missing are left out. ``own_floors`` are those that are not
-    built in, by name; ``others`` lie over the trials in the replay.
+    Args:
+        view: The grade as its reader may see it.
+        plots: The result of ``draw_all``. Missing plots are left out.
+        submission: The submission, for its source.
+        own_floors: Floors that are not built in, by name.
+        others: Trials to draw over those of the replay.
     """
     images = {name: ShownImage(_data_uri(data), *_shown_size(data)) for name, data in plots.items()}
     replay = replay_of_grade(view, submission, own_floors, REPORT_BYTES, others) if view.grade.trials else None
@@ -122,19 +126,19 @@ def report_parts(
 
 
 def prepare() -> None:
-    """Load what the reports of a batch are rendered with, in English, for whoever has to wait for their grades."""
+    """Preload the English templates of a batch's reports, to save time later."""
     for template in ("report.html", "report_body.html", "batch.html"):
         _environment(ENGLISH).get_template(template)
 
 
 def report_style() -> str:
-    """What every report is laid out with."""
+    """Return the style sheet of all reports."""
     return _style("report.css", "replay.css")
 
 
 @lru_cache(maxsize=1)
 def report_script() -> str:
-    """What plays the replay of every report: its files in the order of their names, with names of their own."""
+    """Return the replay script of all reports: its files in order of name, in a scope of their own."""
     folder = files("service.reports.replay").joinpath("component")
     parts = sorted((each for each in folder.iterdir() if each.name.endswith(".js")), key=lambda each: each.name)
     code = "\n".join(part.read_text(encoding="utf-8") for part in parts)
@@ -148,26 +152,26 @@ def report(
     own_floors: Mapping[str, Pixels] = _NO_FLOORS,
     others: OtherTrials = NO_OTHERS,
 ) -> str:
-    """The page of one grade: its parts in one file."""
+    """Return the page of one grade, with all parts in one file."""
     parts = report_parts(view, plots, submission, own_floors, others)
     script = parts.script if view.grade.trials else ""
     return _render("report.html", parts.style, script, {"title": parts.title, "body": parts.body}, view.language)
 
 
 def replay_page(replay: Mapping[str, Any], language: Language = ENGLISH) -> str:
-    """A page with nothing but a replay, whose document is in the same language."""
+    """Return a page with only a replay. ``language`` must be that of its document."""
     context = {"title": replay["title"], "replay": _written_out(replay), "words": replay_words(language)}
     return _render("replay.html", report_style(), report_script(), context, language)
 
 
 def replay_section(document: bytes, language: Language = ENGLISH) -> Markup:
-    """A replay, ``packed``, as a part of a page that has the style and the script of reports."""
+    """Return a ``packed`` replay as a part of a page that has the style and script of reports."""
     written = Markup(base64.b64encode(document).decode("ascii"))
     return render_part("replay_section.html", language, replay=written, words=replay_words(language))
 
 
 def refusal_page(row: TableRow[Grade]) -> str:
-    """The page of one whose submission was refused: what was found, what was expected, what to do next."""
+    """Return the page of a rejected submission: what was found, what was expected, what to do next."""
     found, _, expected = row.reason.partition(", expected ")
     return render(
         "refusal.html",
@@ -182,7 +186,7 @@ def refusal_page(row: TableRow[Grade]) -> str:
 def batch_index(
     rows: Sequence[BatchRow], title: str = "Batch", sandbox: str = "", ranks: Sequence[RankTable] = ()
 ) -> str:
-    """A page with one row a student: marks, verdict, and a link to the report; and the tables of ranks."""
+    """Return a page with one row per student (marks, verdict, link to the report), and the ranking tables."""
     graded = [row for row in rows if row.marks is not None]
     cells = [
         {
@@ -201,12 +205,12 @@ def batch_index(
 
 
 def render_part(template: str, language: Language, **context: object) -> Markup:
-    """A part of a page that has the style of reports."""
+    """Render a part of a page that has the style of reports."""
     return Markup(_environment(language).get_template(template).render(**context))
 
 
 def render(template: str, **context: object) -> str:
-    """A page of ``templates`` in English, with the one style and a policy that lets it load and run nothing."""
+    """Render a page from ``templates`` in English, with the report style and a policy without loading or scripts."""
     return _render(template, _style("report.css"), "", context, ENGLISH)
 
 
@@ -236,7 +240,7 @@ def _environment(language: Language) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    # A sentence with its parts is text like any other: spelled out and escaped as a whole.
+    # A translated sentence with its parameters is ordinary text: filtered and escaped as a whole.
     environment.globals["_"] = language.say
     return environment
 
@@ -248,7 +252,7 @@ def _style(*names: str) -> str:
 
 
 def _shown(value: object) -> object:
-    """Applied to every expression of a template, before it is escaped."""
+    """Make a value readable. Applied to every expression of a template, before escaping."""
     return readable(value, 20_000, lines=400) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
@@ -257,18 +261,18 @@ def _data_uri(data: bytes) -> Markup:
 
 
 def _shown_size(image: bytes) -> tuple[int, int]:
-    """Of a PNG, as its header has it: 100 CSS pixels an inch, at which type of 8 points is 11 pixels high."""
+    """Return the display size of a PNG from its header: 100 CSS pixels an inch, so 8 point type is 11 pixels high."""
     across, down = (int.from_bytes(image[start : start + 4], "big") for start in (16, 20))
     return round(across * _SHOWN), round(down * _SHOWN)
 
 
 def _breakable(name: str) -> Markup:
-    """A name that a narrow screen breaks where its parts meet, not inside a word."""
+    """Return a name that a narrow screen breaks between its parts, not inside a word."""
     return Markup(re.sub(r"([_.@])", r"\1<wbr>", str(escape(readable(name, 400)))))
 
 
 def _relative_link(path: str) -> str:
-    # A colon that is quoted cannot start a scheme, and two slashes cannot name a host.
+    # A quoted colon cannot start a scheme, and without leading slashes no host can be named.
     return quote(path.encode("utf-8", "replace").decode("utf-8").lstrip("/"), safe="/")
 
 

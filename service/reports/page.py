@@ -1,6 +1,6 @@
-"""What a report page tells of a grade, section by section, as plain data that a template lays out.
+"""The content of a report page, section by section, as plain data for a template.
 
-Nothing is escaped here, and nothing is hidden: what comes in is the reader's view already.
+Nothing is escaped or hidden here: the input is already the reader's view.
 """
 
 from __future__ import annotations
@@ -49,9 +49,10 @@ PROCESS_LIMITS = "process limits only"
 
 @dataclass(frozen=True, slots=True)
 class CriterionLine:
-    """One row of the criteria table; ``share`` is per cent, ``where`` points at the first failure.
+    """One row of the criteria table. ``share`` is a percentage, ``where`` is the place of the first failure.
 
-    ``told`` says in short what was found; empty where it is told already, or nothing was lost. ``message`` is all.
+    ``told`` is a short form of the findings, empty if they are already shown or nothing was lost. ``message`` is the
+    full form.
     """
 
     title: str
@@ -63,14 +64,14 @@ class CriterionLine:
     state: str  # full, part, none, excused
     visibility: str
     where: str
-    moment: str  # a link to where the replay shows it, and what it says; empty if it does not
+    moment: str  # a link to the moment in the replay, with its text; empty if there is none
     watch: str
     for_staff: str
 
 
 @dataclass(frozen=True, slots=True)
 class TimelineEntry:
-    """One moment of a timeline; ``t`` is empty for a line that says how many were left out. ``what`` says its kind."""
+    """One moment of a timeline. ``t`` is empty for a line that counts omitted moments. ``what`` names the kind."""
 
     t: str
     kind: str
@@ -80,9 +81,9 @@ class TimelineEntry:
 
 @dataclass(frozen=True, slots=True)
 class MessageLine:
-    """One row of the messages table; ``kind`` is ``wrong``, or ``inner`` for what a responder asked of others.
+    """One row of the messages table. ``kind`` is ``wrong``, or ``inner`` for a responder's own requests.
 
-    ``lost`` is what never arrived.
+    ``lost`` marks messages that never arrived.
     """
 
     t: str
@@ -110,7 +111,7 @@ class TrialLine:
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What was seen and answered, once for all criteria that judge the same answers."""
+    """Recognition results, shown once for all criteria that judge the same answers."""
 
     title: str
     tables: tuple[RecognitionTable, ...]
@@ -120,7 +121,7 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class TextOutput:
-    """What a process printed or logged, under what it is called."""
+    """The printed or logged text of a process, with its title."""
 
     title: str
     text: str
@@ -128,7 +129,7 @@ class TextOutput:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A closer look at one trial of a scenario: the one that lost most. ``where`` says which, if there are several."""
+    """Details of one trial of a scenario: the one that lost most. ``where`` identifies it, if there are several."""
 
     where: str
     plots: tuple[Plot, ...]
@@ -142,19 +143,19 @@ class Scene:
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """All that the template needs."""
+    """All data for the template."""
 
     grade: Grade
     marks: str
     max_marks: str
     share: float
-    state: str  # as of a criterion: the colour of the bar
+    state: str  # as for a criterion; gives the colour of the bar
     words: VerdictWords
     ended: str
     diagnosis: Diagnosis
     comments: tuple[str, ...]
     criteria: tuple[CriterionLine, ...]
-    lost: tuple[CriterionLine, ...]  # by the cause, which has told of them already
+    lost: tuple[CriterionLine, ...]  # criteria lost by the cause, which is shown first
     others: tuple[CriterionLine, ...]
     faults: tuple[FaultGroup, ...]
     faults_title: str
@@ -172,7 +173,7 @@ class Page:
 
 
 def page_of(view: View, submission: Submission | None = None, played: frozenset[int] = frozenset()) -> Page:
-    """Everything a report says of what the reader may see; ``played`` are the trials of its replay, from 1."""
+    """Return the content of a report from a reader's view. ``played`` are the trials of its replay, from 1."""
     grade, language = view.grade, view.language
     plots = plots_of(grade, language)
     lines = tuple(_trial_line(trial, language) for trial in grade.trials[:_MOST_TRIALS])
@@ -213,7 +214,7 @@ def page_of(view: View, submission: Submission | None = None, played: frozenset[
 
 
 def timeline(recording: Recording, language: Language = ENGLISH) -> tuple[TimelineEntry, ...]:
-    """What was printed, said, touched and went wrong, by time; the middle is left out where there is too much."""
+    """Return prints, speech, touches and faults by time. If there are too many, the middle is left out."""
     moments: list[tuple[float, str, str]] = []
     for robot, own in robots_of(recording):
         whose = "" if own is recording else f"{called(robot, language)}: "
@@ -231,7 +232,7 @@ def timeline(recording: Recording, language: Language = ENGLISH) -> tuple[Timeli
 
 
 def _kind(fault: Fault) -> str:
-    """Time that is up is no fault by itself."""
+    """Return the kind of a fault. A time limit alone is not a fault."""
     return "stopped" if fault.verdict is Verdict.TIME_LIMIT else "fault"
 
 
@@ -317,9 +318,9 @@ def _seen(grade: Grade, alike: tuple[int, ...], plots: tuple[Plot, ...], languag
 
 
 def _message_lines(recording: Recording, language: Language) -> Iterator[MessageLine]:
-    """Each message of the robot's is followed by what was called and what agents said until it was answered.
+    """Yield each message of the robot, followed by the calls and agent messages until its answer.
 
-    Two robots have no agents, so the index of a message among those told is its index in the recording.
+    Two robots have no agents, so a message's index in this list equals its index in the recording.
     """
     yield from (_inner_line(step, language) for step in inside(recording, -1))
     for index, (sender, message) in enumerate(messages_of(recording, language)):
@@ -358,7 +359,7 @@ def _trial_line(trial: TrialResult, language: Language) -> TrialLine:
 
 
 def _channel_words(trial: TrialResult, language: Language) -> str:
-    """What the channel was swept to; offsets and noise have columns of their own."""
+    """Return the swept channel settings in words. Offsets and noise have columns of their own."""
     words = {"loss": language.say("loss"), "delay": language.say("delay")}
     return "".join(f"; {words[condition]} {level:g}" for condition, level in trial.sweep if condition in words)
 

@@ -1,6 +1,6 @@
-"""Makes text that a student's program wrote fit to be shown: visible, one direction, capped.
+"""Conversion of student-written text for display: visible, in one direction, limited in length.
 
-It does not escape for HTML, XML or a terminal's markup; whoever writes those formats does that too.
+It does not escape for HTML, XML or terminal markup. The writers of those formats do that.
 """
 
 from __future__ import annotations
@@ -10,22 +10,22 @@ import re
 import unicodedata
 from decimal import Decimal
 
-#: Joiners that emoji and several scripts need; every other invisible format character is spelled out.
+#: Joiners that emoji and several scripts need. All other invisible format characters are spelled out.
 _JOINERS = "\u200c\u200d"
-_LONGEST_MARKS = 6  # combining marks on one letter; no living script needs more
+_LONGEST_MARKS = 6  # combining marks on one letter; living scripts need no more
 _HIDDEN_CATEGORIES = frozenset({"Cc", "Cf", "Cs", "Cn", "Zl", "Zp"})
 
 
 def readable(text: str, limit: int = 2000, *, lines: int = 40) -> str:
-    r"""``text`` with nothing invisible left in it, at most ``limit`` characters and ``lines`` lines long.
+    r"""Return ``text`` without invisible characters, at most ``limit`` characters and ``lines`` lines long.
 
-    Control characters, bidirectional overrides, lone surrogates and their like become escapes such as ``\x1b``
-    and ``\u202e``; line feeds stay, tabs become four spaces. What was cut is said at the end.
+    Control characters, bidirectional overrides, lone surrogates and similar become escapes such as ``\x1b`` and
+    ``\u202e``. Line feeds stay, and tabs become four spaces. A note at the end says how much was cut.
     """
     head = text[:limit]
     kept = head.replace("\r\n", "\n").split("\n")[:lines]
     shown = "\n".join(_spelled(line) for line in kept)
-    if len(shown) > 6 * limit:  # escapes are longer than what they stand for
+    if len(shown) > 6 * limit:  # escapes are longer than the characters they replace
         shown = shown[: 6 * limit]
     missing_lines = text.count("\n") + 1 - len(kept)
     if len(text) > limit:
@@ -36,41 +36,41 @@ def readable(text: str, limit: int = 2000, *, lines: int = 40) -> str:
 
 
 def one_line(text: str, limit: int = 120) -> str:
-    """``text`` on one line, at most ``limit`` characters, an ellipsis where it was cut."""
+    """Return ``text`` on one line, at most ``limit`` characters, with an ellipsis if it was cut."""
     spelled = _spelled(re.sub(r"\s*[\r\n]\s*", " ⏎ ", text[: 4 * limit + 4].strip()))
     return spelled if len(spelled) <= limit and len(text) <= 4 * limit else spelled[: limit - 1].rstrip() + "…"
 
 
 def flowing(text: str) -> str:
-    """Paragraphs on one line each, to be broken by whoever shows them; lists and indented lines stay."""
+    """Return paragraphs on one line each, for wrapping at display. Lists and indented lines stay."""
     return re.sub(r"(?<=\S)\n(?=[^\W\d])", " ", text)
 
 
 def message_words(text: str, limit: int = 120) -> str:
-    """A message on one line; the thousands of numbers of an image are named instead of listed."""
+    """Return a message on one line. The thousands of numbers of an image are abbreviated."""
     if text.startswith("IMG_DATA::{") and len(text) > 200:
         return "IMG_DATA::{left, right}"
     return one_line(text, limit)
 
 
 def whole(value: float) -> str:
-    """``value`` without decimals, with a true minus sign and never as minus nought."""
+    """Return ``value`` without decimals, with a true minus sign and never as minus zero."""
     return str(round(value)).replace("-", "\N{MINUS SIGN}") if math.isfinite(value) else "?"
 
 
 def turned(heading: float) -> str:
-    """A heading as whole degrees from 0 to 359, however often the robot has turned round."""
+    """Return a heading as whole degrees from 0 to 359."""
     return str(round(heading) % 360) if math.isfinite(heading) else "?"
 
 
 def number(value: Decimal) -> str:
-    """Marks as people write them: ``4``, ``2.5``, never ``4.00`` or ``0E+1``."""
+    """Return marks as people write them: ``4``, ``2.5``, never ``4.00`` or ``0E+1``."""
     plain = f"{value:f}"
     return plain.rstrip("0").rstrip(".") if "." in plain else plain
 
 
 def json_number(value: Decimal) -> int | float:
-    """A Decimal as JSON writes it: whole numbers without a point."""
+    """Return a Decimal as a JSON number: whole numbers without a decimal point."""
     return int(value) if value == value.to_integral_value() else float(value)
 
 

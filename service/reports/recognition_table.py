@@ -1,6 +1,6 @@
-"""What a report tells of recognition in figures: what became of the images, and each class's precision and recall.
+"""Recognition figures of a report: image counts, and each class's precision and recall.
 
-Plain texts for a template; everything was counted when the work was marked.
+Plain texts for a template. All counts come from the grading.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from service.reports.words import accuracy_counted
 
 @dataclass(frozen=True, slots=True)
 class ClassLine:
-    """One class: how many showed it, how many were called it, how many both, precision and recall."""
+    """One class: images that show it, images identified as it, images with both, precision and recall."""
 
     label: str
     shown: int
@@ -38,7 +38,7 @@ class RecognitionTable:
 
 
 def recognition_table(result: CriterionResult, language: Language = ENGLISH) -> RecognitionTable:
-    """The figures of a criterion that measured an accuracy."""
+    """Return the figures of a criterion that measured an accuracy."""
     accuracy = result.accuracy
     assert accuracy is not None
     return RecognitionTable(

@@ -1,6 +1,6 @@
-"""Two robots told as one: who said a text, and all that they sent, each text once.
+"""Combination of two robots: the sender of each text, and all their messages without duplicates.
 
-With one robot it is that robot's recording as it is.
+With one robot, this is that robot's recording.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from service.language import ENGLISH, Language, translatable
 from sim.recorded import without_responder
 from sim.recording import Message, Recording
 
-#: What the second robot is called.
+#: The name of the second robot.
 SECOND = "robot 2"
-#: Whom each robot talks to where there is no responder.
+#: The receiver of each robot's messages without a responder.
 PARTNER_OF: Mapping[str, str] = MappingProxyType({"robot": SECOND, SECOND: "robot"})
 
-#: Who answers where there is no responder.
+#: The name of the answering party without a responder.
 SIMULATOR = "simulator"
 
-#: What whoever takes part is called, or whose fault it was.
+#: Display names of the parties.
 CALLED: Mapping[str, str] = MappingProxyType(
     {
         "robot": translatable("robot"),
@@ -38,30 +38,30 @@ CALLED: Mapping[str, str] = MappingProxyType(
 
 
 def called(party: str, language: Language) -> str:
-    """What whoever takes part is called; agents, and what else has a name in the student's own text, are called so."""
+    """Return the display name of a party. Agents and other parties named by the student keep their names."""
     return language.say(CALLED[party]) if party in CALLED else party
 
 
 def answering(recording: Recording) -> str:
-    """Who answers a robot that has no other robot to talk to."""
+    """Return the party that answers a robot that has no other robot to talk to."""
     return SIMULATOR if without_responder(recording) else "responder"
 
 
 def robots_of(recording: Recording) -> Iterator[tuple[str, Recording]]:
-    """What each robot is called, and its recording."""
+    """Yield each robot's name and recording."""
     yield "robot", recording
     if recording.partner is not None:
         yield SECOND, recording.partner
 
 
 def messages_of(recording: Recording, language: Language = ENGLISH) -> list[tuple[str, Message]]:
-    """Every text with who said it, by the time at which it was sent."""
+    """Return every message with its sender, in order of sending."""
     said = []
     for name, own in robots_of(recording):
         robot, responder = called(name, language), called(answering(own), language)
         if own is not recording and not without_responder(own):
             responder = language.say("responder to %(robot)s", robot=robot)
         for message in own.messages:
-            if message.sender != "partner":  # it is told as the other robot's
+            if message.sender != "partner":  # the other robot's list has it
                 said.append((robot if message.sender == "robot" else responder, message))
     return said if recording.partner is None else sorted(said, key=lambda each: each[1].t)

@@ -1,6 +1,6 @@
-"""The rows of a table of submissions: whose each is and its grade, or why it has none.
+"""The rows of a table of submissions: each student and grade, or the reason why there is none.
 
-What a table shows of a grade is its format's; which rows there are is for whoever has them.
+The formats decide what to show of a grade, and the callers which rows there are.
 """
 
 from __future__ import annotations
@@ -18,15 +18,14 @@ _W = TypeVar("_W")
 
 @dataclass(frozen=True, slots=True)
 class TableRow(Generic[_V]):
-    """One submission. ``grade`` is what is shown of its grade, None where it has none; ``reason`` says why.
+    """One submission. ``grade`` is the visible grade, or None; ``reason`` says why there is none.
 
-    A grade has a reason as well where a part was not submitted. ``refused`` is what could not be taken in, so that no
-    grade will come. ``told`` is the reason in words for its student, where those are others; a row that is
-    ``for_staff`` is shown to no student.
+    A grade also has a reason if a part was not submitted. ``refused`` marks a rejected submission, which will not get a
+    grade. ``told`` is the reason for the student, if it differs. A row that is ``for_staff`` is not shown to students.
     """
 
     student: Student
-    source: str  # the name it came under
+    source: str  # its original name
     assignment: str
     grade: _V | None = None
     reason: str = ""
@@ -36,11 +35,11 @@ class TableRow(Generic[_V]):
 
     @property
     def who(self) -> str:
-        """The student's id; what the submission is called, where nobody knows whose it is."""
+        """The student's id, or the name of the submission if the student is unknown."""
         return self.student.id or self.source
 
     def shown(self, view: Callable[[_V], _W]) -> TableRow[_W]:
-        """The row with what ``view`` leaves of its grade."""
+        """Return the row with its grade as seen through ``view``."""
         grade = None if self.grade is None else view(self.grade)
         return TableRow(
             self.student, self.source, self.assignment, grade, self.reason, self.refused, self.told, self.for_staff
@@ -48,7 +47,7 @@ class TableRow(Generic[_V]):
 
 
 def rows_for_students(rows: Iterable[TableRow[_V]]) -> list[TableRow[_V]]:
-    """The rows as students may read them in a gradebook: none that is for staff alone, and no fault of ours."""
+    """Return the rows for students in a gradebook, without rows for staff only and without internal errors."""
     return [replace(row, reason=row.told or row.reason) for row in rows if not row.for_staff]
 
 
@@ -61,5 +60,5 @@ class ReportPage:
 
 
 def missing_words(missing: str) -> str:
-    """That a part was not submitted; empty where none is missing."""
+    """Return a note that a part was not submitted; empty if none is missing."""
     return f"there is no {missing}; the rest was graded" if missing else ""

@@ -1,6 +1,6 @@
-"""What is alike in a batch, told to staff: as rows of a table, as JSON, and as a page with the evidence side by side.
+"""Similar submissions of a batch, for staff: as table rows, as JSON, and as a page with the evidence side by side.
 
-What is alike was decided before; who may see it is ``view.py``'s. What students wrote is shown as text and never run.
+The similarities were found before, and ``view.py`` decides who may see them. Student text is shown and never run.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from service.similarity.behaviour import Aspect, SameInTrial
 from service.similarity.pairs import Similarity, SimilarPair
 from service.similarity.writing import FEWEST_TOKENS, AlikeSources, Stretch
 
-#: In which two students did the same.
+#: The aspects in which two students' trials can be the same.
 _ASPECTS: Mapping[Aspect, str] = MappingProxyType(
     {"path": translatable("path"), "messages": translatable("messages"), "faults": translatable("faults")}
 )
-#: Gives the text of a source by assignment, student and file.
+#: Returns the text of a source by assignment, student and file.
 Texts = Callable[[str, str, str], str]
 
-#: Of a pair's sources; of a stretch; and of a line.
+#: Limits of a pair's stretches, of a stretch's lines, and of a line's characters.
 _MOST_STRETCHES, _MOST_LINES, _MOST_OF_LINE = 12, 60, 160
 
 
 def what_it_says(found: Similarity, language: Language = ENGLISH) -> str:
-    """One sentence on an assignment: how many pairs, and of what nothing can be said."""
+    """Return a sentence on an assignment: the number of pairs, and what could not be compared."""
     parts: dict[str, object] = {"assignment": found.assignment, "students": found.students}
     groups = len({*found.same, *found.same_recordings})
     said = language.say("%(assignment)s: no pairs are alike among %(students)s students", **parts)
@@ -66,7 +66,7 @@ def what_it_says(found: Similarity, language: Language = ENGLISH) -> str:
 
 
 def similarity_rows(found: Similarity, language: Language = ENGLISH) -> list[tuple[str, ...]]:
-    """Both students, how much of a source is alike, where, and in how many trials both did the same."""
+    """Return rows with both students, the similar fraction of a source, its place, and the trials in common."""
     return [
         (*pair.students, f"{pair.share:.0%}" if pair.sources else "", _where(pair, language), _same(pair, language))
         for pair in found.pairs
@@ -74,7 +74,7 @@ def similarity_rows(found: Similarity, language: Language = ENGLISH) -> list[tup
 
 
 def as_plain(view: SimilarityView) -> list[dict[str, Any]]:
-    """Everything that was found, an assignment each, as JSON has it."""
+    """Return all findings by assignment, as plain JSON values."""
     return [
         {**asdict(found), "pairs": [{**asdict(pair), "share": pair.share} for pair in found.pairs]}
         for found in view.found
@@ -82,12 +82,12 @@ def as_plain(view: SimilarityView) -> list[dict[str, Any]]:
 
 
 def similarity_page(view: SimilarityView, texts: Texts, title: str, most: int) -> str:
-    """A page with the first ``most`` pairs of each assignment."""
+    """Return a page with the first ``most`` pairs of each assignment."""
     return render("similarity.html", title=title, assignments=_assignments(view, texts, most), links={})
 
 
 def similarity_body(view: SimilarityView, texts: Texts, most: int, links: Mapping[tuple[str, str], str]) -> Markup:
-    """The same as a part of another page, with ``links`` by assignment and student."""
+    """Return the findings as a part of another page, with ``links`` by assignment and student."""
     return render_part("similarity_body.html", view.language, assignments=_assignments(view, texts, most), links=links)
 
 
@@ -161,7 +161,7 @@ def _numbered(lines: Sequence[str], span: tuple[int, int]) -> list[tuple[str, st
 
 
 def _depth(line: str) -> int:
-    """How far a line is indented, in steps of four."""
+    """Return how far a line is indented, in steps of four."""
     start = line[: 4 * 10].expandtabs(4)
     return (len(start) - len(start.lstrip())) // 4
 

@@ -1,6 +1,6 @@
-"""A recording as plain numbers and strings, for ``robomark run --trace`` and whoever wants to compute with it.
+"""A recording as plain numbers and strings, for ``robomark run --trace`` and for calculations.
 
-It leaves nothing out but the chain's inner steps, and never holds a number that JSON cannot.
+It contains everything except the inner steps of the hash chain, and only numbers that JSON allows.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from sim.recording import Image, Line, Pose, Recording
 
 
 def trace(recording: Recording) -> dict[str, Any]:
-    """``recording`` as a JSON-serialisable dict: one row a tick under ``ticks``, then what was said and sent.
+    """Return ``recording`` as a JSON-serialisable dict: one row per tick under ``ticks``, then texts and messages.
 
-    Times are seconds, lengths mm, headings degrees anticlockwise and unwrapped, light 0..255, gyro degrees
-    clockwise, encoders degrees. A value that is not finite becomes None. Light images are flat RGBA lists. Of two
-    robots this is the first; the second is its ``partner``.
+    Times are seconds, lengths mm, headings degrees anticlockwise and unwrapped, light 0..255, gyro degrees clockwise,
+    encoders degrees. A value that is not finite becomes None. Light images are flat RGBA lists. With two robots, this
+    is the first; the second is its ``partner``.
     """
     return {
         "ticks": {name: _numbers(column.tolist()) for name, column in recording.ticks.told().items()},
@@ -60,7 +60,7 @@ def trace(recording: Recording) -> dict[str, Any]:
 
 
 def agent_messages(recording: Recording) -> dict[str, Any]:
-    """What the responder and its agents said to each other, under its key; nothing where there was nothing."""
+    """Return the messages between the responder and its agents, under their key; empty if there are none."""
     told = [
         {
             "t": _finite(each.t),
@@ -77,12 +77,12 @@ def agent_messages(recording: Recording) -> dict[str, Any]:
 
 
 def storable(text: str) -> str:
-    """``text`` with lone surrogates replaced, so that any JSON reader and any encoding takes it."""
+    """Return ``text`` with lone surrogates replaced, so that every JSON reader and encoding accepts it."""
     return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def _images(recording: Recording) -> list[dict[str, Any]]:
-    """What ``IMG_DATA`` sent (both sides, with pose) and what ``image_data`` collected (one side), by tick."""
+    """Return images sent by ``IMG_DATA`` (both sides, with pose) and logged by ``image_data`` (one side), by tick."""
     rows = [_sent(image) for image in recording.images]
     for side, csv, tick in recording.image_log:
         rows.append(

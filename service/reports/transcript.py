@@ -1,4 +1,4 @@
-"""What a run said, moment by moment: printed, spoken, answered and lost, in order. Nothing is escaped."""
+"""The transcript of a run: printed, spoken, answered and lost texts, in order. Nothing is escaped."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _ANSWERED: Mapping[str, str] = MappingProxyType({"responder": "answer", SIMULATO
 
 
 def transcript(recording: Recording) -> list[tuple[float, str]]:
-    """The simulated second and the line of each, both robots' where there are two."""
+    """Return the simulated second and the line of each text, from all robots."""
     shown: list[tuple[float, int, str]] = []
     for which, own in robots_of(recording):
         whose = "" if own is recording else f"{which}: "

@@ -1,7 +1,7 @@
-"""What a reader may see of a grade, decided once: staff, a student, or a gradebook that students look into.
+"""The parts of a grade that a reader may see: staff, a student, or a gradebook with student access.
 
-It hides, it never re-marks: what is left keeps its marks, and its messages after what was set by hand. Nothing is
-rendered here, and what renders a view asks no more who reads it.
+It hides and never re-marks: visible parts keep their marks, and their messages after staff adjustments. Nothing is
+rendered here, and renderers of a view don't check the reader again.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from submissions.assignment.folder import REFERENCE
 if TYPE_CHECKING:
     from service.similarity.pairs import Similarity
 
-#: What a student sees before anything is published.
+#: Visibilities that students see before publication.
 BEFORE_PUBLICATION = frozenset({"visible"})
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A grade as one reader may see it, and in which language they read of it.
+    """A grade as one reader may see it, with the reader's language.
 
-    ``grade`` is what is left of it, ``withheld`` says that it is not all.
+    ``grade`` is the visible part. ``withheld`` says whether anything is hidden.
     """
 
     grade: Grade
@@ -43,9 +43,10 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class GradebookView:
-    """A grade for a gradebook: ``entry`` has every criterion, told as to whoever may see it, and no trials.
+    """A grade for a gradebook, without trials.
 
-    ``shown`` is what the student sees at once.
+    ``entry`` has every criterion, each with text for the readers who may see it. ``shown`` is what the student sees
+    immediately.
     """
 
     entry: Grade
@@ -53,13 +54,13 @@ class GradebookView:
 
     @property
     def marks(self) -> Decimal | None:
-        """The marks out of all that the assignment gives, as a gradebook knows but that; None if all is excused."""
+        """The marks scaled to the assignment's maximum, which is all a gradebook knows; None if all are excused."""
         return marks_out_of_all(self.entry.marks, self.entry.max_marks, self.entry.worth)
 
 
 @dataclass(frozen=True, slots=True)
 class OtherTrials:
-    """What may be drawn over the trials of a view: whose it is, and by a trial's index the one that lies over it."""
+    """Trials that may be drawn over those of a view: the owner's name, and the trials by index in the view."""
 
     name: str
     trials: Mapping[int, TrialResult]
@@ -67,35 +68,35 @@ class OtherTrials:
 
 @dataclass(frozen=True, slots=True)
 class SimilarityView:
-    """What is alike in a batch, as staff may see it; a student has no view of it, and no grade has anything of it."""
+    """The similarities of a batch, for staff. Students have no view of them, and grades don't contain them."""
 
     found: tuple[Similarity, ...]
     language: Language = ENGLISH
 
 
-#: Where no trial lies over another.
+#: No trials to draw over others.
 NO_OTHERS = OtherTrials("", MappingProxyType({}))
 
 
 def staff_similarity(found: Sequence[Similarity], language: Language = ENGLISH) -> SimilarityView:
-    """All of it."""
+    """Return everything."""
     return SimilarityView(tuple(found), language)
 
 
 def staff_view(grade: Grade, language: Language = ENGLISH) -> View:
-    """All of it."""
+    """Return everything."""
     told = tuple(_with_by_hand(result, language) for result in grade.criteria)
     return View(replace(grade, criteria=told), staff=True, withheld=False, language=language)
 
 
 def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION, language: Language = ENGLISH) -> View:
-    """``grade`` without what is for staff, what it cost, and what has a visibility that is not in ``released``.
+    """Return ``grade`` for a student: without staff notes, cost, and parts whose visibility is not in ``released``.
 
-    A comment on a criterion is seen with that, one on all of the submission with whatever is seen of it.
+    A comment on a criterion is visible with the criterion, one on the whole submission with any visible part.
 
-    Evidence and images from hidden trials go too; of a criterion that loses trials the message, the accuracy and
-    the curves are those of the visible trials alone. So nothing is left of hidden trials but the marks. Totals are
-    then those of the criteria shown.
+    Evidence and images from hidden trials are removed. If a criterion loses trials, its message, accuracy and curves
+    are those of the visible trials. So only the marks depend on hidden trials. Totals are those of the visible
+    criteria.
     """
     kept = [index for index, trial in enumerate(grade.trials) if trial.visibility in released]
     new_index = {old: new for new, old in enumerate(kept)}
@@ -109,7 +110,7 @@ def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION, la
         ),
         trials=tuple(grade.trials[index] for index in kept),
         notes=_notes_on(grade, shown),
-        cost=None,  # the limit of CPU time grows with the number of trials, hidden ones included
+        cost=None,  # the CPU limit depends on the number of trials, including hidden ones
         comments=tuple(each for each in grade.comments if shown and each.criterion in ("", *shown)),
     )
     withheld = len(left.criteria) < len(grade.criteria) or len(left.trials) < len(grade.trials)
@@ -117,17 +118,21 @@ def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION, la
 
 
 def _notes_on(grade: Grade, shown: Set[str]) -> tuple[str, ...]:
-    """The notes on a grade, of which the one on unjudged criteria counts those that are shown and no others."""
+    """Return the notes on a grade. The note on unjudged criteria counts only visible ones."""
     seen = [result for result in grade.criteria if result.id in shown]
     notes = [note for note in grade.notes if note not in unjudged_notes(grade.criteria)]
     return (*notes, *unjudged_notes(seen))
 
 
 def other_trials(view: View, other: Grade, name: str, released: frozenset[str]) -> OtherTrials:
-    """The trials of ``other`` that were run as those of the view were, as far as its reader may see them.
+    """Return the trials of ``other`` with the same settings as those of the view, as far as the reader may see them.
 
-    Staff see all. Students see their own, and the reference's (who is called as that example is) once the grade that
-    they read is published; of both what has a visibility in ``released``. Raises UsageError where nothing is left.
+    Staff see all. Students see their own. They also see the reference solution's once the grade that they read is
+    published; the student of the reference is named like that example. Both are limited to visibilities in
+    ``released``.
+
+    Raises:
+        UsageError: Nothing is left.
     """
     if view.staff:
         seen = other.trials
@@ -149,18 +154,18 @@ def other_trials(view: View, other: Grade, name: str, released: frozenset[str]) 
 
 
 def gradebook_view(grade: Grade) -> GradebookView:
-    """All marks with their visibilities, which the gradebook heeds by itself."""
+    """Return all marks with their visibilities, which the gradebook applies itself."""
     told = tuple(_told(grade, result) for result in grade.criteria)
     return GradebookView(replace(grade, criteria=told, trials=()), student_view(grade).grade)
 
 
 def is_for_staff(visibility: str) -> bool:
-    """Whether what has this visibility is kept from students before publication."""
+    """Return whether this visibility is hidden from students before publication."""
     return visibility not in BEFORE_PUBLICATION
 
 
 def tells_of_hidden(grade: Grade, result: CriterionResult) -> bool:
-    """Whether a criterion is hidden itself, or shows what was seen in hidden trials."""
+    """Return whether a criterion is hidden, or shows images from hidden trials."""
     return is_for_staff(result.visibility) or any(
         is_for_staff(grade.trials[prediction.trial].visibility)
         for prediction in result.predictions
@@ -169,10 +174,10 @@ def tells_of_hidden(grade: Grade, result: CriterionResult) -> bool:
 
 
 def worst_trial(grade: Grade, scenario: str) -> int:
-    """Index, in ``grade.trials``, of the scenario's trial that lost most; the first of equals.
+    """Return the index in ``grade.trials`` of the scenario's trial that lost most, the first among equals.
 
-    A trial loses the marks of every criterion it failed; of those equal in that, one that ended in a fault is
-    worse than one that ran out of time, and that is worse than one that finished.
+    A trial loses the marks of every criterion it failed. Among equals, a fault is worse than a time limit, and a time
+    limit is worse than finishing.
     """
     lost = [Decimal(0)] * len(grade.trials)
     for result in grade.criteria:
@@ -184,12 +189,12 @@ def worst_trial(grade: Grade, scenario: str) -> int:
 
 
 def scenarios(grade: Grade) -> tuple[str, ...]:
-    """The scenarios of the grade's trials, in the order they were run."""
+    """Return the scenarios of the grade's trials, in the order they were run."""
     return tuple(dict.fromkeys(trial.scenario for trial in grade.trials))
 
 
 def _circumstances(trial: TrialResult) -> Hashable:
-    """What two trials share of which one can lie over the other: another version may have changed any of it."""
+    """Return the settings that two trials must share to be drawn together. A new version may change any of them."""
     recording = trial.recording
     ground = (recording.background, recording.label_patches, recording.sheet, recording.obstacles)
     noise = (trial.light_noise, trial.motor_noise, trial.sweep)
@@ -197,7 +202,7 @@ def _circumstances(trial: TrialResult) -> Hashable:
 
 
 def _told(grade: Grade, result: CriterionResult) -> CriterionResult:
-    """The criterion with what is told to whoever sees it."""
+    """Return the criterion with the text for the readers it is visible to."""
     view = student_view(replace(grade, criteria=(result,)), BEFORE_PUBLICATION | {result.visibility})
     return replace(view.grade.criteria[0], evidence=(), predictions=())
 
@@ -223,6 +228,6 @@ def _without_hidden_trials(result: CriterionResult, new_index: dict[int, int]) -
     kept = replace(result, evidence=evidence, predictions=predictions)
     if len(evidence) == len(result.evidence):
         return replace(kept, shown=None)
-    # A grade of before this was kept apart tells nothing.
+    # Older grades without a separate visible part show nothing.
     shown = result.shown or Shown(shown_words(""))
     return replace(kept, message=shown.message, accuracy=shown.accuracy, curves=shown.curves, shown=None)

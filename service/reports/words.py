@@ -1,6 +1,6 @@
-"""What is said of a grade in sentences: each verdict in a student's words, its accuracy, what its trials cost.
+"""Sentences about a grade: each verdict for students, the accuracy, and the cost of the trials.
 
-It knows no marks and no particular trial; the faults of a recording say where and when.
+It has no marks and no single trials. The faults of a recording give place and time.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _MEGABYTE = 1 << 20
 
 @dataclass(frozen=True, slots=True)
 class VerdictWords:
-    """``short`` fits a table cell; the other three are sentences. ``tone`` is how loud a report should be."""
+    """The words for a verdict. ``short`` fits a table cell; the others are sentences. ``tone`` is the urgency."""
 
     short: str
     happened: str
@@ -151,12 +151,12 @@ _LOSSES: Mapping[LossReason, str] = MappingProxyType(
 )
 
 
-#: What an accuracy is of.
+#: The units of an accuracy.
 _COUNTED: Mapping[str, str] = MappingProxyType({"images": translatable("images"), "patterns": translatable("patterns")})
 
 
 def verdict_words(verdict: Verdict, language: Language = ENGLISH) -> VerdictWords:
-    """The words for ``verdict``; every verdict has some."""
+    """Return the words for ``verdict``. Every verdict has some."""
     return _said(_WORDS[verdict], language)
 
 
@@ -165,7 +165,7 @@ def _said(words: VerdictWords, language: Language) -> VerdictWords:
     return VerdictWords(say(words.short), say(words.happened), say(words.whose), say(words.next_step), words.tone)
 
 
-#: Where no robot was run: only functions were called and texts were read.
+#: No robot was run: functions were called and the source was checked.
 _NO_ROBOT = VerdictWords(
     translatable("code checked"),
     translatable("Your functions were called and your code was read; no robot was run."),
@@ -175,7 +175,7 @@ _NO_ROBOT = VerdictWords(
 )
 
 
-#: Where there was a part to grade, and the other not.
+#: One part was graded, and the other is missing.
 _WITHOUT: Mapping[str, VerdictWords] = MappingProxyType(
     {
         "robot.py": VerdictWords(
@@ -197,7 +197,7 @@ _WITHOUT: Mapping[str, VerdictWords] = MappingProxyType(
     }
 )
 
-#: Where an agent of the responder's failed.
+#: An agent of the responder failed.
 _AGENT_ERROR = VerdictWords(
     translatable("error in an agent"),
     translatable("An agent of yours raised an error, so whoever asked it got no answer."),
@@ -210,13 +210,13 @@ _AGENT_ERROR = VerdictWords(
 
 
 def grade_words(grade: Grade, language: Language = ENGLISH) -> VerdictWords:
-    """The words for a grade's verdict, for what was not submitted, or that nothing was run; and what to do next."""
+    """Return the words for a grade's verdict, or for a missing part or run, with the next step."""
     words = _what_happened(grade, language)
     return replace(words, next_step=_next_step(grade, words, language))
 
 
 def _next_step(grade: Grade, words: VerdictWords, language: Language) -> str:
-    """The verdict's advice if something went wrong, else what would gain most marks, if any are missing."""
+    """Return the verdict's advice if there was a problem, otherwise where most marks can be gained."""
     if words.tone == "bad" or is_ours(grade.verdict):
         return words.next_step
     lost = max(grade.criteria, key=lambda result: result.max_marks - result.marks, default=None)
@@ -235,7 +235,7 @@ def _next_step(grade: Grade, words: VerdictWords, language: Language) -> str:
 
 
 def _costs_marks_by_time(grade: Grade) -> bool:
-    """Whether the advice on the grade's verdict is due: time that was up counts only where a criterion names it."""
+    """Return whether the verdict's advice applies: a time limit counts only if a criterion names it."""
     if grade.missing or grade.verdict is not Verdict.TIME_LIMIT:
         return True
     told = [each.message for one in grade.criteria if one.marks < one.max_marks for each in one.evidence]
@@ -264,7 +264,7 @@ def _is_of_an_agent(grade: Grade) -> bool:
     return bool(faults and faults[0].agent)
 
 
-#: What can happen in a trial.
+#: The kinds of events in a trial.
 KINDS: Mapping[str, str] = MappingProxyType(
     {
         "printed": translatable("printed"),
@@ -277,32 +277,32 @@ KINDS: Mapping[str, str] = MappingProxyType(
 
 
 def trial_words(trial: TrialResult, language: Language = ENGLISH, longest: int = 60) -> str:
-    """Which trial it is: of which scenario, and its number there."""
+    """Return the name of a trial: its scenario and its number."""
     scenario = one_line(trial.scenario, longest)
     return language.say("%(scenario)s, trial %(number)s", scenario=scenario, number=trial.index + 1)
 
 
 def hints_of(grade: Grade) -> tuple[str, ...]:
-    """What probably cost marks, as sentences that are fit to be shown; to be said before anything else."""
+    """Return the likely causes of lost marks as sentences that are safe to show, before anything else."""
     told = (readable(hint, 600).rstrip(".") for hint in grade.hints)
-    # The name of a file stays as it is.
+    # A file name keeps its case.
     began = (hint if "." in hint.partition(" ")[0] else hint[:1].upper() + hint[1:] for hint in told)
     return tuple(hint if hint.endswith("?") else f"{hint}." for hint in began)
 
 
 def is_ours(verdict: Verdict) -> bool:
-    """Whether the student has nothing to fix."""
+    """Return whether the student has nothing to fix."""
     return verdict in (Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
 
 
 def accuracy_counted(accuracy: Accuracy, language: Language = ENGLISH) -> tuple[int, str]:
-    """How many were named rightly, and what is counted."""
+    """Return how many were identified correctly, and the unit."""
     of = accuracy.counts.of if accuracy.counts else "images"
     return round(accuracy.value * accuracy.n), language.say(_COUNTED.get(of, "%(of)s"), of=of)
 
 
 def by_hand_words(result: CriterionResult, language: Language = ENGLISH) -> str:
-    """What an instructor set in place of the grader's marks, and why; empty where nobody did."""
+    """Return a sentence on a staff adjustment and its reason; empty if there is none."""
     said = result.set_by_hand
     if said is None:
         return ""
@@ -325,14 +325,14 @@ def by_hand_words(result: CriterionResult, language: Language = ENGLISH) -> str:
 
 
 def comments_of(grade: Grade) -> tuple[str, ...]:
-    """What instructors wrote, with the criterion that it is about; to be said beside the marks."""
+    """Return the instructors' comments with their criterion, for display beside the marks."""
     titles = {result.id: one_line(result.title, 200) for result in grade.criteria}
     about = ((titles.get(each.criterion, ""), readable(each.text, 2000)) for each in grade.comments)
     return tuple(f"{title}: {text}" if title else text for title, text in about)
 
 
 def accuracy_words(grade: Grade) -> str:
-    """One sentence with value, interval and n; empty without a classification. It says if none of it is marked."""
+    """Return a sentence with value, interval and n, and whether it is unmarked; empty without a classification."""
     result, accuracy = grade.recognition, grade.accuracy
     if result is None or accuracy is None:
         return ""
@@ -344,7 +344,7 @@ def accuracy_words(grade: Grade) -> str:
 
 
 def channel_words(grade: Grade, language: Language = ENGLISH) -> str:
-    """A sentence or two on what the channel lost in all trials, and why; empty where it lost nothing."""
+    """Return one or two sentences on the channel's losses in all trials, and the reasons; empty without losses."""
     messages = [message for trial in grade.trials for message in trial.recording.messages]
     lost: Counter[LossReason] = Counter(message.lost for message in messages if message.lost)
     if not lost:
@@ -361,7 +361,7 @@ def channel_words(grade: Grade, language: Language = ENGLISH) -> str:
 
 
 def cost_words(grade: Grade, language: Language = ENGLISH) -> str:
-    """Return one sentence with what all trials cost together; empty where that is not shown."""
+    """Return one sentence with what all trials cost together; empty if that is not shown."""
     if grade.cost is None or grade.cost.spent is None:
         return ""
     limits, spent = grade.cost.limits, grade.cost.spent

@@ -1,6 +1,6 @@
-"""Reports as files in a folder: one HTML page a submission. Making the page is ``html.py``'s.
+"""Reports as files in a folder: one HTML page per submission. ``html.py`` makes the pages.
 
-What makes and draws them is loaded when something is written: a folder is prepared before there is anything.
+The rendering modules are loaded on first use, because the folder is prepared before there is anything to write.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     from service.grading.grade import Grade, TrialResult
     from submissions.submission import Submission
 
-#: Of a name, in a file's name; a file system allows 255 for all of it.
+#: The longest name within a file name, in bytes. A file system allows 255 in total.
 _MOST_BYTES = 80
 
 
 def file_stem(student: str, assignment: str = "") -> str:
-    """What a student's files are called: no two names give the same, whatever is written into one folder.
+    """Return the stem of a student's file names. Different names give different stems in one folder.
 
-    A space becomes a dash, and a dash two. A name from which more is lost, or that is too long, goes on with a hash.
-    With ``assignment``, the student's files for this one.
+    A space becomes a dash, and a dash two. A name that loses more, or is too long, gets a hash. With ``assignment``,
+    the stem is for the student's files of that assignment.
     """
     plain = re.sub(r"[^\w.-]+", "-", student.replace("-", "--").replace(" ", "-"))
     short = plain.encode()[:_MOST_BYTES].decode(errors="ignore").strip("-.")
@@ -45,7 +45,7 @@ def file_stem(student: str, assignment: str = "") -> str:
 
 
 def file_stems(graded: Sequence[tuple[str, str]]) -> list[str]:
-    """A stem for each (student, assignment); only a student with several assignments has them in it.
+    """Return a stem for each (student, assignment). It contains the assignment only if the student has several.
 
     Each pair may come once.
     """
@@ -54,16 +54,20 @@ def file_stems(graded: Sequence[tuple[str, str]]) -> list[str]:
 
 
 def refused_stems(refused: Sequence[tuple[str, str]]) -> list[str]:
-    """A stem for each (name it came under, student) that was refused.
+    """Return a stem for each (original name, student) that was rejected.
 
-    One student may be refused several times, and several for what they submitted together.
+    One student may be rejected several times, and several students for one joint submission.
     """
     many = Counter(source for source, _ in refused)
     return [file_stem(f"{source} {student}" if many[source] > 1 else source, "refused") for source, student in refused]
 
 
 def prepare_folder(folder: Path) -> None:
-    """Make the folder, before any work is done for it. Raises UsageError when nothing can be written there."""
+    """Create the folder before other work is done.
+
+    Raises:
+        UsageError: It cannot be written to.
+    """
     try:
         with for_the_user():
             folder.mkdir(parents=True, exist_ok=True)
@@ -75,12 +79,20 @@ def prepare_folder(folder: Path) -> None:
 
 
 def write_page(folder: Path, name: str, page: str) -> Path:
-    """Write one page. Raises UsageError when the folder cannot be written to."""
+    """Write one page.
+
+    Raises:
+        UsageError: The folder cannot be written to.
+    """
     return write_file(folder, name, page.encode())
 
 
 def write_replay(path: Path, replay: Mapping[str, Any], language: Language = ENGLISH) -> None:
-    """Write the page that plays it, or its data as JSON if the file is called so. Raises UsageError if it cannot be."""
+    """Write the replay page, or its data if the file name ends in .json.
+
+    Raises:
+        UsageError: The file cannot be written.
+    """
     from service.reports.html import replay_page
 
     page = json.dumps(replay, allow_nan=False) if path.suffix.lower() == ".json" else replay_page(replay, language)
@@ -88,14 +100,22 @@ def write_replay(path: Path, replay: Mapping[str, Any], language: Language = ENG
 
 
 def write_film(path: Path, trial: TrialResult, own_floors: Mapping[str, NDArray[np.uint8]]) -> None:
-    """Write a film of the trial. Raises UsageError if it cannot be written."""
+    """Write an animation of the trial.
+
+    Raises:
+        UsageError: The file cannot be written.
+    """
     from service.reports.film import film
 
     write_file(path.parent, path.name, film(trial, own_floors))
 
 
 def write_file(folder: Path, name: str, data: bytes) -> Path:
-    """Write one file. Raises UsageError when the folder cannot be written to."""
+    """Write one file.
+
+    Raises:
+        UsageError: The folder cannot be written to.
+    """
     path = folder / name
     try:
         with for_the_user():
@@ -107,7 +127,7 @@ def write_file(folder: Path, name: str, data: bytes) -> Path:
 
 
 def write_report(folder: Path, grade: Grade, submission: Submission, written: str, language: Language) -> Path:
-    """Draw the plots of a grade and write the report, called after the student as the name was written; where it is."""
+    """Draw the plots of a grade and write the report, named after the student as ``written``. Return its path."""
     from service.reports.html import report
     from service.reports.plots.drawn import draw_all
     from service.reports.view import student_view

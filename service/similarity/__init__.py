@@ -1,1 +1,1 @@
-"""How alike submissions are, in what is written and in what their robots did: for staff to look at, never marks."""
+"""Similarity of submissions, in their source and in their robots' behaviour. For staff, never for marks."""

@@ -1,8 +1,8 @@
-"""What robots did the same in the same trials, where few others of the batch did.
+"""Equal behaviour of robots in the same trials that is rare in the batch.
 
-A trial's world is the same for everybody, its noise too, so whoever gives the same commands at the same moments has the
-same path; that alone says nothing. What a student's own ``random`` draws depends on the submission, so that a copy that
-draws may do something else.
+A trial's world, including its noise, is the same for everyone. Equal commands at equal times therefore give equal
+paths, which alone proves nothing. A student's own ``random`` depends on the submission, so a copy that uses it may
+behave differently.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from sim.recorded import faults_of
 from sim.recording import Fault, Recording, Verdict
 
 Aspect = Literal["path", "messages", "faults"]
-#: Students who did anything in a trial, from which on it can be told what is rare among them.
+#: The smallest number of active students in a trial for which rarity can be judged.
 FEWEST_STUDENTS = 8
-#: The part of them that may share what is rare; always two.
+#: The largest fraction of them that may share rare behaviour; always at least two.
 RARE_PART = 0.1
 
-#: Changes between left and right from which on a path is winding: more than a way that was planned has.
+#: Changes between left and right that make a path winding: more than a planned path has.
 WINDING_TURNS = 20
 
-#: The machine decides how far such a trial comes.
+#: The machine decides how far such a trial gets.
 _CUT = frozenset({Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR})
 
 
 @dataclass(frozen=True, slots=True)
 class TrialName:
-    """A trial of an assignment; ``noisy`` if light, motors or the channel had chance in them."""
+    """A trial of an assignment. ``noisy`` means that light, motors or the channel were random."""
 
     scenario: str
     index: int
@@ -44,7 +44,7 @@ class TrialName:
 
 @dataclass(frozen=True, slots=True)
 class SameInTrial:
-    """A trial in which two did the same: what of it, how many students did so, of how many that did anything there."""
+    """A trial in which two students behaved equally: the aspect, how many shared it, and how many were active."""
 
     trial: TrialName
     aspect: Aspect
@@ -54,20 +54,20 @@ class SameInTrial:
 
 @dataclass(frozen=True, slots=True)
 class Behaviour:
-    """What is compared of a student's trials."""
+    """The compared data of a student's trials."""
 
-    aspects: Mapping[tuple[TrialName, Aspect], str]  # a digest of each; what did not happen has none
-    winding: frozenset[TrialName]  # trials in which the robot turned often enough that few come upon the same path
-    recordings: str  # a digest of all recordings; empty where a trial was cut short, or nothing was done or said
+    aspects: Mapping[tuple[TrialName, Aspect], str]  # a digest of each, if it occurred
+    winding: frozenset[TrialName]  # trials with so many turns that the same path is unlikely by chance
+    recordings: str  # a digest of all recordings; empty if a trial was cut short, or nothing happened
 
     @property
     def trials(self) -> int:
-        """How many trials can be compared."""
+        """The number of comparable trials."""
         return len({trial for trial, _ in self.aspects})
 
 
 def behaviour_of(trials: Iterable[TrialResult]) -> Behaviour:
-    """What is compared of a student's trials; those that the machine cut short are not."""
+    """Return the data to compare of a student's trials, without those that the machine cut short."""
     trials = list(trials)
     compared = [trial for trial in trials if trial.verdict not in _CUT]
     aspects = {(_name(trial), aspect): digest for trial in compared for aspect, digest in _aspects(trial.recording)}
@@ -81,7 +81,7 @@ def behaviour_of(trials: Iterable[TrialResult]) -> Behaviour:
 
 
 def same_recordings(behaviours: Mapping[str, Behaviour]) -> tuple[tuple[str, ...], ...]:
-    """Groups of students all of whose recordings are the same, the largest first, however many they are."""
+    """Return groups of students with equal recordings, the largest first, however large."""
     groups: dict[str, list[str]] = defaultdict(list)
     for student in sorted(behaviours):
         groups[behaviours[student].recordings].append(student)
@@ -92,7 +92,7 @@ def same_recordings(behaviours: Mapping[str, Behaviour]) -> tuple[tuple[str, ...
 
 
 def same_in_trials(behaviours: Mapping[str, Behaviour]) -> dict[tuple[str, str], tuple[SameInTrial, ...]]:
-    """For each two students what they did the same and few others did, by their names in order."""
+    """Return the rare equal behaviour of each two students, by their names in order."""
     sharing: dict[tuple[TrialName, Aspect], dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
     active: dict[TrialName, set[str]] = defaultdict(set)
     for student in sorted(behaviours):
@@ -140,7 +140,7 @@ def _whole(trial: TrialResult) -> bytes:
 
 
 def _turns(recording: Recording) -> int:
-    """How often the robot changed from turning left to turning right, or back."""
+    """Return how often the robot changed between turning left and turning right."""
     turning = np.sign(np.diff(recording.ticks.heading).round(3))
     turning = turning[turning != 0]
     return int(np.count_nonzero(turning[1:] != turning[:-1]))
@@ -152,7 +152,7 @@ def _moved(recording: Recording) -> bool:
 
 
 def _mistakes(recording: Recording) -> list[Fault]:
-    """A program that is stopped when its time is over has none in that: many may run for ever."""
+    """Return the faults without time limits, because many programs may run forever."""
     return [fault for fault in faults_of(recording) if fault.verdict is not Verdict.TIME_LIMIT]
 
 

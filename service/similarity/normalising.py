@@ -1,6 +1,6 @@
-"""Statements in one spelling: the order of operands, brackets that change nothing, and places of a pair do not count.
+"""Normal form of statements, independent of operand order, redundant brackets and the places of a pair.
 
-Nothing is parsed: whatever is no Python, or nested too deeply, stays nearly as it is.
+Nothing is parsed. Text that is not Python, or nested too deeply, stays almost unchanged.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 from keyword import iskeyword
 from typing import TypeAlias
 
-#: Brackets in brackets, beyond which a statement stays as it is.
+#: The deepest nesting of brackets; statements beyond it stay unchanged.
 _DEEPEST = 20
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
-#: From those that bind least on; of each level, whether operands may change places.
+#: From the weakest binding on; for each level, whether operands may be swapped.
 _LEVELS: tuple[tuple[frozenset[str], bool], ...] = (
     (frozenset({"or"}), True),
     (frozenset({"and"}), True),
@@ -27,13 +27,13 @@ _LEVELS: tuple[tuple[frozenset[str], bool], ...] = (
 )
 _OPERATORS = frozenset().union(*(operators for operators, _ in _LEVELS))
 _FLIPPED = {">": "<", ">=": "<="}
-#: An operand that comes first has this operator, where its level has one that can also be another.
+#: The implicit operator of a first operand, if its level has two operators.
 _UNWRITTEN = {"-": "+", "/": "*"}
 
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """One token as it is compared, and its line."""
+    """One token in its compared form, and its line."""
 
     text: str
     line: int
@@ -41,7 +41,7 @@ class Word:
 
 @dataclass(slots=True)
 class _Group:
-    """What is between two brackets."""
+    """The items between two brackets."""
 
     opening: Word
     items: list[_Item] = field(default_factory=list)
@@ -52,13 +52,13 @@ _Item: TypeAlias = "Word | _Group"
 
 
 def normalised(statement: Sequence[Word]) -> list[Word]:
-    """The words of a statement in one spelling, each with the line it was on."""
+    """Return the words of a statement in normal form, each with its original line."""
     items = _grouped(statement)
     return list(statement) if items is None else list(_segments(items))
 
 
 def _grouped(statement: Sequence[Word]) -> list[_Item] | None:
-    """What is in brackets as groups; None where brackets do not match, or are nested too deeply."""
+    """Return the items with brackets as groups; None if brackets don't match or are nested too deeply."""
     items: list[_Item] = []
     open_groups: list[_Group] = []
     for word in statement:
@@ -78,7 +78,7 @@ def _grouped(statement: Sequence[Word]) -> list[_Item] | None:
 
 
 def _segments(items: Sequence[_Item]) -> Iterator[Word]:
-    """The expressions between commas, colons, assignments and keywords, each in one spelling."""
+    """Yield the expressions between commas, colons, assignments and keywords, each in normal form."""
     expression: list[_Item] = []
     for item in items:
         if isinstance(item, Word) and _separates(item.text):
@@ -107,7 +107,7 @@ def _expression(items: Sequence[_Item]) -> list[Word]:
 
 
 def _split(items: Sequence[_Item], operators: frozenset[str]) -> list[tuple[Word | None, list[_Item]]]:
-    """The operands between these operators, each with the one before it."""
+    """Return the operands between these operators, each with the operator before it."""
     operands: list[tuple[Word | None, list[_Item]]] = [(None, [])]
     if "-" in operators and len(items) > 1 and isinstance(items[0], Word) and items[0].text in operators:
         operands, items = [(items[0], [])], items[1:]
@@ -127,7 +127,7 @@ def _ends_operand(items: Sequence[_Item]) -> bool:
 def _joined(operands: Sequence[tuple[Word | None, list[_Item]]], may_swap: bool) -> list[Word]:
     written = [(operator, _expression(items)) for operator, items in operands]
     first = next(operator for operator, _ in written if operator is not None)
-    # Texts are put together in the order that they have.
+    # The order of concatenated texts matters.
     if not may_swap or any(words and words[0].text == "text" for _, words in written):
         return _compared(written) if len(written) == 2 else [word for each in written for word in _with_operator(*each)]
     unwritten = Word(_UNWRITTEN.get(first.text, first.text), first.line)
@@ -153,7 +153,7 @@ def _with_operator(operator: Word | None, words: Sequence[Word]) -> list[Word]:
 
 
 def _atoms(items: Sequence[_Item]) -> Iterator[Word]:
-    """Names, calls, subscripts and brackets; brackets that only group are left out."""
+    """Yield names, calls, subscripts and brackets, without brackets that only group."""
     before: _Item | None = None
     for place, item in enumerate(items):
         if isinstance(item, Word):
@@ -172,18 +172,18 @@ def _atoms(items: Sequence[_Item]) -> Iterator[Word]:
 
 
 def _is_called(before: _Item | None) -> bool:
-    """Whether brackets after this are those of a call or a subscript."""
+    """Return whether brackets after this item are those of a call or a subscript."""
     return isinstance(before, _Group) or (before is not None and before.text.isidentifier())
 
 
 def _is_place(group: _Group) -> bool:
-    """Whether it is ``[0]``: a variable of a pair is like a variable."""
+    """Return whether it is ``[0]``: a place of a pair counts like a variable."""
     inside = [item.text for item in group.items if isinstance(item, Word)]
     return group.opening.text == "[" and len(group.items) == 1 and inside == ["number"]
 
 
 def _summands(items: Sequence[_Item]) -> list[_Item]:
-    """``a + b`` of the brackets in ``sum([a, b])``; nothing of other brackets."""
+    """Return the ``a + b`` of the brackets in ``sum([a, b])``; empty for other brackets."""
     match items:
         case [_Group(items=[_Group(items=list() as inside, opening=Word("[" | "("))])]:
             return [Word("+", item.line) if isinstance(item, Word) and item.text == "," else item for item in inside]

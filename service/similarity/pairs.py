@@ -1,6 +1,6 @@
-"""Two students whose work is alike, with all that was found of it: what they wrote and what their robots did.
+"""Pairs of students with similar work: their similar sources and their robots' equal behaviour.
 
-The order is one to look at them in; nothing here accuses, and nothing here is a mark.
+The order is for review only. It is not an accusation and not a mark.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from service.similarity.behaviour import Behaviour, SameInTrial, same_in_trials, same_recordings
 from service.similarity.writing import AlikeSources, Source, compare
 
-#: The part of the trials, and at least so many, in which robots with the same path make a pair without alike sources;
-#: a winding path counts twice. The same messages make none: where few are right, those few say the same.
+#: The fraction and least number of trials with the same path that make a pair without similar sources. A winding path
+#: counts twice. Equal messages make no pair: if few are right, those few send the same.
 SAME_PART, FEWEST_TRIALS = 0.5, 2
 
 
 @dataclass(frozen=True, slots=True)
 class SimilarPair:
-    """Two students, their sources that are alike, and the trials in which their robots did what few others' did."""
+    """Two students, their similar sources, and the trials in which their robots shared rare behaviour."""
 
     students: tuple[str, str]
     sources: tuple[AlikeSources, ...]
@@ -26,27 +26,27 @@ class SimilarPair:
 
     @property
     def share(self) -> float:
-        """The largest part of a source that is in the other's; 0 where no sources are alike."""
+        """The largest fraction of a source found in the other's; 0 without similar sources."""
         return max((each.share for each in self.sources), default=0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Similarity:
-    """The similar pairs of one assignment in a batch, the most similar first, and what could not be told."""
+    """The similar pairs of one assignment in a batch, the most similar first, and what could not be compared."""
 
     assignment: str
     students: int
     pairs: tuple[SimilarPair, ...]
-    too_short: tuple[str, ...]  # who has too little of their own to compare; their robots are compared
-    not_compared: int = 0  # pairs of sources that were too many to compare
-    same: tuple[tuple[str, ...], ...] = ()  # groups who have a whole file in common, however many they are
-    same_recordings: tuple[tuple[str, ...], ...] = ()  # groups whose recordings are all the same
+    too_short: tuple[str, ...]  # students whose sources are too short; their robots are still compared
+    not_compared: int = 0  # pairs of sources beyond the limit
+    same: tuple[tuple[str, ...], ...] = ()  # groups that share a whole file, however large
+    same_recordings: tuple[tuple[str, ...], ...] = ()  # groups with equal recordings
 
 
 def similarity(
     assignment: str, sources: Sequence[Source], given: Sequence[str], behaviours: Mapping[str, Behaviour]
 ) -> Similarity:
-    """All similar pairs among these students' submissions."""
+    """Return all similar pairs among these students' submissions."""
     writing = compare(sources, given)
     alike: dict[tuple[str, str], list[AlikeSources]] = {}
     for each in writing.alike:

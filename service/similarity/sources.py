@@ -1,6 +1,6 @@
-"""What of a submission is compared: its program, its responder, its notebook's cells, and Python files beside them.
+"""The compared sources of a submission: its program, its responder, its notebook's cells, and other Python files.
 
-Also what is not the student's own: the code that was given for the assignment.
+It also returns code that is not the student's own: what was given for the assignment.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from submissions.assignment.folder import assignment_folder, catalogue
 from submissions.source_text import decode_source
 from submissions.submission import Submission
 
-#: Files of one submission that are read; what lies beside them is not compared.
+#: The number of files that are read per submission. Further files are not compared.
 MOST_FILES = 20
 
 
 def sources_of(submission: Submission) -> Mapping[str, str]:
-    """The texts by their names; a notebook's code cells are one text, one below the other."""
+    """Return the texts by name. A notebook's code cells form one text, in order."""
     found: dict[str, str] = {}
     for part in (submission.program, submission.responder):
         if part is not None:
@@ -33,9 +33,12 @@ def sources_of(submission: Submission) -> Mapping[str, str]:
 
 
 def given_with(assignment: Assignment, more: Path | None = None) -> tuple[str, ...]:
-    """The code that students are given: the assignment's, its starter, the library's responders, what is in ``more``.
+    """Return the code that students are given: the assignment's, its starter, the library's responders, and ``more``.
 
-    The starter is the catalogue's: an assignment is kept without. Raises UsageError where ``more`` cannot be read.
+    Only the catalogue has starters, because stored assignments lack them.
+
+    Raises:
+        UsageError: ``more`` cannot be read.
     """
     texts = [*assignment.given_parts.values(), *(text for _, text in _python_in(assignment.given))]
     texts += map(library.source, library.names())
@@ -51,7 +54,7 @@ def _python_in(files: Mapping[str, bytes]) -> Iterator[tuple[str, str]]:
             try:
                 yield name, decode_source(data, name).text
             except UsageError:
-                continue  # no text, so nothing was written that could be like anything
+                continue  # not a text, so there is nothing to compare
 
 
 @cache

@@ -1,6 +1,6 @@
-"""Python source as a stream of tokens in which what a copyist changes first is the same: names, numbers, texts, layout.
+"""Python source as tokens without the details that are changed first in a copy: names, numbers, texts, layout.
 
-Nothing is parsed and nothing can fail: whatever is no Python has tokens all the same, in time linear in its length.
+Nothing is parsed and nothing can fail: text that is not Python also has tokens. The time is linear in its length.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from service.similarity.normalising import Word, normalised
 
-#: What is read of one file; a program of a thousand lines has about 10 000 tokens.
+#: The number of tokens read per file. A program of a thousand lines has about 10 000.
 MOST_TOKENS = 20_000
 
-#: Every branch takes what is there or fails at once, and a text without an end ends with its line or the file.
+#: Every branch matches or fails without backtracking. An unclosed text ends with its line or the file.
 _TOKEN = re.compile(
     r"""(?P<blank>[ \t\f\r\\]++|\#[^\n]*+)
     |(?P<newline>\n)
@@ -32,13 +32,13 @@ _TOKEN = re.compile(
 )
 _ASSIGNING = frozenset({"=", ":=", *(f"{operator}=" for operator in "+-*/%@&|^"), "**=", "//=", "<<=", ">>="})
 _OPENING, _CLOSING = frozenset("([{"), frozenset(")]}")
-#: The names after these, up to the mark, are the author's own.
+#: The names after these words, up to the mark, are the author's own.
 _BINDING = {"def": ":", "class": ":", "for": "in", "lambda": ":", "as": ":"}
 
 
 @dataclass(frozen=True, slots=True)
 class Tokens:
-    """The tokens of one file: a number for each, equal where they count as equal, and the line it is on, from 1."""
+    """The tokens of one file: a number for each, equal for equal tokens, and its line, from 1."""
 
     numbers: NDArray[np.uint64]
     lines: NDArray[np.int64]
@@ -55,9 +55,9 @@ class _Piece:
 
 
 def tokens_of(source: str) -> Tokens:
-    """The tokens of a Python file; comments, layout, imports and texts that nothing is done with are none.
+    """Return the tokens of a Python file, without comments, layout, imports and unused texts.
 
-    Operands that may change places are in one order, so that lines need not ascend within a statement.
+    Operands that may be swapped are in a fixed order, so line numbers need not ascend within a statement.
     """
     statements = [_worth_comparing(statement) for statement in _statements(source)]
     own = _own_names([piece for statement in statements for piece in statement])
@@ -73,7 +73,7 @@ def tokens_of(source: str) -> Tokens:
 
 
 def _statements(source: str) -> Iterator[list[_Piece]]:
-    """Line by line, where a line goes on while a bracket is open."""
+    """Yield the statements: lines, joined while a bracket is open."""
     statement: list[_Piece] = []
     line, depth, count = 1, 0, 0
     for match in _TOKEN.finditer(source):
@@ -98,7 +98,7 @@ def _worth_comparing(statement: list[_Piece]) -> list[_Piece]:
 
 
 def _own_names(pieces: Sequence[_Piece]) -> frozenset[str]:
-    """The names that the author chose, as far as their places tell: what is assigned, defined, looped over."""
+    """Return the names that the author chose, as their places show: assigned, defined, looped over."""
     own: set[str] = set()
     until = ""
     target: list[str] = []

@@ -1,7 +1,8 @@
-"""Token streams cut into grams, and the few of them that winnowing picks as a stream's fingerprints.
+"""Division of token streams into grams, and selection of fingerprints by winnowing.
 
-S. Schleimer, D. Wilkerson, A. Aiken: Winnowing: Local Algorithms for Document Fingerprinting. SIGMOD 2003. Whatever two
-streams share of GRAM + WINDOW - 1 tokens in a row gives both a fingerprint; what is shorter than GRAM never does.
+S. Schleimer, D. Wilkerson, A. Aiken: Winnowing: Local Algorithms for Document Fingerprinting. SIGMOD 2003. If two
+streams share GRAM + WINDOW - 1 consecutive tokens, both have the same fingerprint. Matches shorter than GRAM are never
+found.
 """
 
 from __future__ import annotations
@@ -12,16 +13,16 @@ from numpy.typing import NDArray
 
 from service.similarity.tokens import Tokens
 
-#: Tokens in a gram, and the neighbours of which one is picked.
+#: The number of tokens in a gram, and of neighbours from which one is selected.
 GRAM, WINDOW = 8, 3
-#: Different tokens in a gram that says something; ``[number], [number]`` has four.
+#: The least number of different tokens in a significant gram; ``[number], [number]`` has four.
 FEWEST_DIFFERENT = 5
 
 _FACTOR, _MIX = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9)
 
 
 def grams(tokens: Tokens) -> NDArray[np.uint64]:
-    """A number for each run of GRAM tokens, in their order; equal where the runs are."""
+    """Return a number for each run of GRAM tokens, in order; equal runs have equal numbers."""
     if len(tokens) < GRAM:
         return np.empty(0, np.uint64)
     mixed = (tokens.numbers + np.uint64(1)) * _FACTOR
@@ -33,7 +34,7 @@ def grams(tokens: Tokens) -> NDArray[np.uint64]:
 
 
 def varied(tokens: Tokens) -> NDArray[np.bool_]:
-    """Of each gram, whether it has enough different tokens to say something; those of tables of numbers have not."""
+    """Return for each gram whether it has enough different tokens. Grams of number tables don't."""
     if len(tokens) < GRAM:
         return np.empty(0, np.bool_)
     in_order = np.sort(sliding_window_view(tokens.numbers, GRAM), axis=1)
@@ -42,7 +43,7 @@ def varied(tokens: Tokens) -> NDArray[np.bool_]:
 
 
 def winnowed(numbers: NDArray[np.uint64]) -> NDArray[np.int64]:
-    """The places of the fingerprints: in every window the least number, of equals the last."""
+    """Return the places of the fingerprints: the smallest number in every window, the last among equals."""
     if len(numbers) == 0:
         return np.empty(0, np.int64)
     size = min(WINDOW, len(numbers))
@@ -52,7 +53,7 @@ def winnowed(numbers: NDArray[np.uint64]) -> NDArray[np.int64]:
 
 
 def covered(places: NDArray[np.bool_], tokens: int) -> NDArray[np.bool_]:
-    """Which tokens are in a gram that is marked."""
+    """Return which tokens are in a marked gram."""
     edges = np.zeros(tokens + 1, np.int64)
     np.add.at(edges, np.flatnonzero(places), 1)
     np.add.at(edges, np.flatnonzero(places) + GRAM, -1)

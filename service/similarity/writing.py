@@ -1,7 +1,7 @@
-"""Which sources of a batch are alike, what of them, and where: given code and code that many share is left out.
+"""Search for similar sources of a batch, with the similar lines. Given code and common code are ignored.
 
-Candidates come from an inverted index of fingerprints, so that no source is compared with every other; only theirs are
-then compared gram by gram. Who should be asked about it is for people to say.
+Candidates come from an inverted index of fingerprints, so not all pairs of sources are compared. Only candidates are
+compared gram by gram. People decide about consequences.
 """
 
 from __future__ import annotations
@@ -16,24 +16,25 @@ from numpy.typing import NDArray
 from service.similarity.tokens import Tokens, tokens_of
 from service.similarity.winnowing import GRAM, covered, grams, varied, winnowed
 
-#: Of a source's own tokens, the part that is in another's from which on two are alike.
+#: The fraction of a source's own tokens found in another that makes the two similar.
 ALIKE = 0.6
-#: Own tokens, about ten lines, below which everybody writes the same and nothing is said.
+#: The least number of own tokens, about ten lines. Shorter sources are written alike by everyone.
 FEWEST_TOKENS = 60
-#: What this part of the students has, and at least so many, is common to them: a page of the docs, a hint in class.
+#: Code in at least this fraction and number of the students' work is common: from the docs, or a hint in class.
 COMMON_PART, FEWEST_IN_COMMON = 1 / 3, 5
-#: A whole file that more than this part of the students has is nobody's own.
+#: A file shared by more than this fraction of the students is not a student's own.
 NEARLY_ALL = 2 / 3
-#: Pairs that are compared, those with most in common; hundreds of copies of one large file are thousands of pairs.
+#: The number of pairs compared, those with most in common. Hundreds of copies of one large file make thousands of
+#: pairs.
 MOST_PAIRS = 2000
-#: Places of the same gram that a stretch may go on from.
+#: The number of places of a gram at which a stretch may continue.
 _MOST_PLACES = 8
 _MOST_STRETCHES = 50
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """One file of one student's."""
+    """One file of one student."""
 
     student: str
     file: str
@@ -42,7 +43,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Lines of one source, from the first to the last, that are like those of another; lines count from 1."""
+    """Similar lines of two sources, from first to last, counted from 1."""
 
     lines: tuple[int, int]
     other_lines: tuple[int, int]
@@ -51,7 +52,7 @@ class Stretch:
 
 @dataclass(frozen=True, slots=True)
 class AlikeSources:
-    """Two sources of two students'. A share is the part of a source's own tokens that the other has too."""
+    """Similar sources of two students. A share is the fraction of a source's own tokens that the other contains."""
 
     students: tuple[str, str]
     files: tuple[str, str]
@@ -61,16 +62,16 @@ class AlikeSources:
 
     @property
     def share(self) -> float:
-        """The larger of both: what was copied may be all of one and half of the other."""
+        """The larger share: a copy may be all of one source and half of the other."""
         return max(self.shares)
 
 
 @dataclass(frozen=True, slots=True)
 class Writing:
-    """What is alike in a batch, the most alike first.
+    """The similar sources of a batch, the most similar first.
 
-    ``same`` are groups of students who have a whole file in common but for names, comments and layout, however many
-    they are; ``too_short`` those with too little of their own, ``not_compared`` how many pairs were too many.
+    ``same`` are groups that share a whole file apart from names, comments and layout, however large. ``too_short`` are
+    students with too little own code. ``not_compared`` is the number of pairs beyond the limit.
     """
 
     alike: tuple[AlikeSources, ...]
@@ -83,8 +84,8 @@ class Writing:
 class _Indexed:
     source: Source
     grams: NDArray[np.uint64]
-    is_own: NDArray[np.bool_]  # of each gram: neither given nor common, and varied
-    own_tokens: NDArray[np.bool_]  # of each token: in a varied gram, and in none that is given or common
+    is_own: NDArray[np.bool_]  # for each gram: varied, and neither given nor common
+    own_tokens: NDArray[np.bool_]  # for each token: in a varied gram, and in none that is given or common
     fingerprints: NDArray[np.uint64]
 
     @property
@@ -93,14 +94,14 @@ class _Indexed:
 
 
 def source_of(student: str, file: str, text: str) -> Source:
-    """The text as it is compared; it is not kept."""
+    """Return the text in its compared form. The text itself is not kept."""
     return Source(student, file, tokens_of(text))
 
 
 def compare(sources: Sequence[Source], given: Sequence[str], alike: float = ALIKE) -> Writing:
-    """All pairs of different students' sources of which one has the part ``alike`` of its own tokens in the other.
+    """Return all pairs of different students' sources of which one shares the fraction ``alike`` of its own tokens.
 
-    The students of a pair stand in the order of their names.
+    The students of a pair are in order of name.
     """
     sources = sorted(sources, key=lambda source: source.student)
     all_grams = [grams(source.tokens) for source in sources]
@@ -127,7 +128,7 @@ def _given(texts: Sequence[str]) -> NDArray[np.uint64]:
 def _same(
     sources: Sequence[Source], all_grams: Sequence[NDArray[np.uint64]], given: NDArray[np.uint64]
 ) -> tuple[tuple[str, ...], ...]:
-    """Who shares a whole file of which enough is not given; what nearly all have was given in some other way."""
+    """Return groups that share a whole file that is not mostly given. A file that nearly all have counts as given."""
     students: dict[bytes, set[str]] = {}
     for source, own in zip(sources, all_grams, strict=True):
         size = len(source.tokens)
@@ -156,7 +157,7 @@ def _index(source: Source, own: NDArray[np.uint64], left_out: NDArray[np.uint64]
 
 
 def _candidates(indexed: Sequence[_Indexed], alike: float) -> Iterator[tuple[float, _Indexed, _Indexed]]:
-    """Pairs with so many fingerprints in common that they may be alike, and what part of them that is."""
+    """Yield pairs with enough common fingerprints to be similar, and the common fraction."""
     if not indexed:
         return
     numbers = np.concatenate([each.fingerprints for each in indexed])
@@ -171,7 +172,7 @@ def _candidates(indexed: Sequence[_Indexed], alike: float) -> Iterator[tuple[flo
         for number in (np.flatnonzero(shared[place + 1 :]) + place + 1).tolist():
             other = indexed[number]
             part = shared[number] / min(len(one.fingerprints), len(other.fingerprints))
-            # Half of what is asked for, as fingerprints are a sample.
+            # Half of the threshold, because fingerprints are a sample.
             if part >= alike / 2 and one.source.student != other.source.student:
                 yield float(part), one, other
 
@@ -194,7 +195,7 @@ def _share(one: _Indexed, like: NDArray[np.bool_]) -> float:
 
 
 def _stretches(one: _Indexed, other: _Indexed, like: NDArray[np.bool_]) -> tuple[Stretch, ...]:
-    """From the top of one source, each time the longest that the other has too; the longest first."""
+    """Return the longest common stretches, found from the top of one source, the longest first."""
     own, others = _own_grams(one), _own_grams(other)
     places: dict[int, list[int]] = {}
     for place, number in others.items():
@@ -217,7 +218,7 @@ def _own_grams(indexed: _Indexed) -> dict[int, int]:
 
 
 def _run(own: Mapping[int, int], others: Mapping[int, int], begin: int, at: int) -> int:
-    """How many grams in a row are the same from there on."""
+    """Return how many consecutive grams are equal from there on."""
     length = 0
     while (number := own.get(begin + length)) is not None and number == others.get(at + length):
         length += 1

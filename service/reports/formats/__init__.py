@@ -1,4 +1,4 @@
-"""The output formats, a module a family: what ``robomark grade`` prints and ``robomark batch export`` writes."""
+"""The output formats, one module per family, for ``robomark grade`` and ``robomark batch export``."""
 
 from service.reports.formats.registry import FORMATS, Format
 from sim.discovery import import_all

@@ -1,6 +1,6 @@
-"""The grades of a batch as comma-separated values, for spreadsheets: a row a submission, or a row a criterion.
+"""The grades of a batch as comma-separated values: one row per submission, or one row per criterion.
 
-Cells that a spreadsheet would take for a formula are defused; nothing here decides who is in a batch.
+Cells that a spreadsheet would interpret as a formula are neutralised. The caller selects the rows.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from service.reports.rows import TableRow
 from service.reports.view import View, staff_view
 from service.reports.words import comments_of, hints_of
 
-#: What a spreadsheet takes for a formula at the start of a cell. Where lists are separated by semicolons (German Excel)
-#: or tabs, a cell of ours is several of its own.
+#: The beginning of a formula in a cell. Spreadsheets that separate by semicolons (German Excel) or tabs split one of
+#: our cells into several.
 _FORMULA = re.compile(r"(^|[;\t])(?=[\s'\"]*[=+\-@\t\r\uff1d\uff0b\uff0d\uff20])")
 _WHO = ("student", "name", "email", "assignment")
 _MEASURED = ("accuracy", "accuracy_low", "accuracy_high", "accuracy_n", "submission", "assignment_version")
@@ -26,7 +26,7 @@ _MEASURED = ("accuracy", "accuracy_low", "accuracy_high", "accuracy_n", "submiss
 
 @table("csv", ".csv", staff_view)
 def marks_csv(rows: Sequence[TableRow[View]]) -> str:
-    """One row a submission: who, marks, verdict, accuracy, hashes, a column a criterion, for staff, hints, reason."""
+    """Return one row per submission: student, marks, verdict, accuracy, hashes, each criterion, notes and hints."""
     grades = [row.grade.grade for row in rows if row.grade is not None]
     criteria = list(dict.fromkeys(result.id for grade in grades for result in grade.criteria))
     header = [*_WHO, "marks", "max_marks", "verdict", *_MEASURED]
@@ -36,25 +36,25 @@ def marks_csv(rows: Sequence[TableRow[View]]) -> str:
 
 @table("csv-long", ".csv", staff_view)
 def criteria_csv(rows: Sequence[TableRow[View]]) -> str:
-    """One row a criterion of a submission; one without marks where the submission has no grade."""
+    """Return one row per criterion of each submission; a submission without a grade has one row without marks."""
     header = [*_WHO, "criterion", "title", "marks", "max_marks", "message", "hints", "file", "reason"]
     return csv_text([header, *(cells for row in rows for cells in _long(row))])
 
 
 def csv_text(rows: Iterable[Sequence[str]]) -> str:
-    """The rows as a file, harmless in a spreadsheet."""
+    """Return the rows as a file that is safe to open in a spreadsheet."""
     return rows_as_given([safe_cell(value) for value in row] for row in rows)
 
 
 def rows_as_given(rows: Iterable[Sequence[str]], separator: str = ",", ending: str = "\r\n") -> str:
-    """The rows as a file, every cell as it is: for tables that somebody gave us, and wants back."""
+    """Return the rows as a file with unchanged cells, for tables from others that are returned to them."""
     stream = io.StringIO()
     csv.writer(stream, delimiter=separator, lineterminator=ending).writerows(rows)
     return stream.getvalue()
 
 
 def safe_cell(value: str) -> str:
-    """A cell on one line that is no formula, whatever a spreadsheet separates cells by."""
+    """Return the cell on one line, neutralised as a formula for any cell separator."""
     return _FORMULA.sub(r"\1'", one_line(value, 4000))
 
 

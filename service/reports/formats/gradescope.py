@@ -1,7 +1,7 @@
-"""A grade as Gradescope's ``results.json``: one test a criterion, with its own visibility.
+"""A grade as Gradescope's ``results.json``: one test per criterion, with its own visibility.
 
-Gradescope hides what is not ``visible`` by itself, so all criteria go in; the top-level text, which every student
-reads, tells nothing of hidden parts, and a test's text nothing of trials that are hidden for longer than the test.
+Gradescope itself hides tests that are not ``visible``, so all criteria are included. The top-level text, which every
+student reads, has nothing about hidden parts. A test's text has nothing about trials that stay hidden longer.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from submissions.submission import Submission
 
 
 def gradescope_document(view: GradebookView, submission: Submission | None = None) -> dict[str, Any]:
-    """The grade in the schema of gradescope-autograders.readthedocs.io (specifications, output format)."""
+    """Return the grade in the schema of gradescope-autograders.readthedocs.io (specifications, output format)."""
     grade = view.entry
     return {
         "score": json_number(view.marks or Decimal(0)),
@@ -46,19 +46,19 @@ def gradescope_document(view: GradebookView, submission: Submission | None = Non
 
 @document("gradescope", ".json", gradebook_view)
 def gradescope_text(view: GradebookView, submission: Submission | None = None) -> str:
-    """The document as indented ASCII JSON."""
+    """Return the document as indented ASCII JSON."""
     return _text(gradescope_document(view, submission))
 
 
 @refusal("gradescope")
 def gradescope_refusal(row: TableRow[Grade]) -> str:
-    """No marks, and why."""
+    """Return a document with 0 marks and the reason."""
     return _text({"score": 0, **_told(row.reason)})
 
 
 @table("gradescope", ".json", gradebook_view)
 def gradescope_list(rows: Sequence[TableRow[GradebookView]]) -> str:
-    """The documents of several, each with its student and file; without a score where there is no grade."""
+    """Return the documents of several rows, each with its student and file, without a score if there is no grade."""
     return _text([_of_several(row) for row in rows_for_students(rows)])
 
 

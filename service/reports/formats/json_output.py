@@ -1,6 +1,6 @@
 """A grade, or the grades of a batch, as JSON.
 
-Whoever reads it, it shows all of the view it is given.
+It contains everything in the view, whoever reads it.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ SCHEMA = 1
 
 
 def json_document(view: View, submission: Submission | None = None) -> dict[str, Any]:
-    """The grade as plain data; marks are numbers, times seconds, ``accuracy`` None without a classification.
+    """Return the grade as plain data: marks are numbers, times seconds, ``accuracy`` None without a classification.
 
-    The lines at fault are in ``excerpt`` only with the ``submission``.
+    The source lines in ``excerpt`` need the ``submission``.
     """
     grade = view.grade
     diagnosis = diagnose(grade, submission)
@@ -77,19 +77,19 @@ def json_document(view: View, submission: Submission | None = None) -> dict[str,
 
 @document("json", ".json", staff_view)
 def json_text(view: View, submission: Submission | None = None) -> str:
-    """The document as indented ASCII JSON."""
+    """Return the document as indented ASCII JSON."""
     return json.dumps(json_document(view, submission), indent=2, allow_nan=False) + "\n"
 
 
 @refusal("json")
 def json_refusal(row: TableRow[Grade]) -> str:
-    """Who was refused, and why."""
+    """Return the student and the reason of a rejection."""
     return json.dumps(_of_several(row.shown(staff_view)), indent=2) + "\n"
 
 
 @table("json", ".json", staff_view)
 def json_list(rows: Sequence[TableRow[View]]) -> str:
-    """The documents of several, each with its student and file; without marks where there is no grade."""
+    """Return the documents of several rows, each with its student and file, without marks if there is no grade."""
     return json.dumps([_of_several(row) for row in rows], indent=2) + "\n"
 
 
@@ -109,7 +109,7 @@ def _excerpt(excerpt: Excerpt) -> dict[str, Any]:
 
 
 def _by_hand(said: SetByHand) -> dict[str, Any]:
-    """What the grader gave of how much, None where it could not be judged; and what was done about it."""
+    """Return a staff adjustment: the grader's marks (None if it could not judge), the maximum, and the change."""
     graded = None if said.graded is None else json_number(said.graded)
     return {"from": graded, "of": json_number(said.worth), "excused": said.excused, "reason": storable(said.reason)}
 
@@ -122,7 +122,7 @@ def _said(recording: Recording) -> dict[str, Any]:
 
 
 def _message(message: Message) -> dict[str, Any]:
-    """A text with its time; where the channel lost or corrupted it, what it did and where the robot was."""
+    """Return a message with its time and, if the channel lost or corrupted it, how, and the robot's position."""
     words: dict[str, Any] = {"t": message.t, "sender": message.sender, "text": storable(message.text)}
     if message.lost:
         words["lost"] = message.lost

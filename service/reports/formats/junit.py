@@ -1,6 +1,6 @@
-"""A grade as JUnit XML: one test case a criterion, for continuous-integration pages.
+"""A grade as JUnit XML: one test case per criterion, for continuous-integration pages.
 
-A criterion passes with full marks; one that could not be marked fairly is an error, not a failure.
+A criterion passes with full marks. One that could not be marked fairly is an error, not a failure.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ _NOT_MARKED = frozenset({Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR})
 
 @document("junit", ".xml", staff_view)
 def junit_text(view: View, submission: Submission | None = None) -> str:
-    """The grade as a ``testsuites`` document with one suite; times are simulated seconds."""
+    """Return the grade as a ``testsuites`` document with one suite. Times are simulated seconds."""
     return _document([_suite(view.grade, [("student", view.grade.student)], submission)])
 
 
 @refusal("junit")
 def junit_refusal(row: TableRow[Grade]) -> str:
-    """One suite with an error in it."""
+    """Return a document with one suite that contains an error."""
     return _document([_suite_of(row.shown(staff_view))])
 
 
 @table("junit", ".xml", staff_view)
 def junit_suites(rows: Sequence[TableRow[View]]) -> str:
-    """A suite for each submission; one without a grade has one test case that says why."""
+    """Return one suite per submission. One without a grade has one test case with the reason."""
     return _document([_suite_of(row) for row in rows])
 
 

@@ -1,6 +1,6 @@
-"""What Moodle takes back: its grade import, its offline grading worksheet filled in, and a zip of feedback files.
+"""Imports for Moodle: its grade import, its offline grading worksheet, and a zip of feedback files.
 
-Moodle knows a submission again by the number in its download's names and in the worksheet's column Identifier.
+Moodle identifies a submission by the number in the names of its download and in the worksheet's column Identifier.
 """
 
 from __future__ import annotations
@@ -26,25 +26,26 @@ from sim.readers.unreadable import Unreadable
 from submissions.downloads import moodle_number
 
 _IDENTIFIER, _GRADE, _FEEDBACK, _MAXIMUM = "Identifier", "Grade", "Feedback comments", "Maximum Grade"
-#: By what a row is found whose submission did not come from Moodle, in this order.
+#: Columns that identify a row if its submission did not come from Moodle, in order of priority.
 _NAMES = ("ID number", "Email address", "Full name")
 _LONGEST = 2000
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip archive can hold
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time in a zip archive
 
 
 @table("moodle", ".csv", gradebook_view)
 def moodle_csv(rows: Sequence[TableRow[GradebookView]]) -> str:
-    """What Moodle's grade import takes: ID number, grade, and feedback that tells nothing of hidden criteria."""
-    # One that nobody is known by would end the whole import.
+    """Return Moodle's grade import: ID number, grade, and feedback without anything about hidden criteria."""
+    # A row without a known student would make the whole import fail.
     cells = [[row.student.id, _marks(row), _feedback(row)] for row in rows_for_students(rows) if row.student.id]
     return csv_text([["ID number", "Grade", "Feedback comments"], *cells])
 
 
 @filled_in("moodle-worksheet", ".csv", gradebook_view)
 def moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> FilledIn:
-    """The worksheet with Grade and Feedback comments filled in; every other row and cell stays as it is.
+    """Fill in Grade and Feedback comments of the worksheet. All other rows and cells stay unchanged.
 
-    Raises UsageError for what is no worksheet, or one of an assignment with another maximum.
+    Raises:
+        UsageError: It is not a worksheet, or its assignment has another maximum.
     """
     mark = "\ufeff" if given.startswith("\ufeff") else ""
     text = given.removeprefix("\ufeff")
@@ -74,7 +75,7 @@ def moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> Fil
             _check_maximum(row.grade.entry.worth, line, places)
             line[places[_GRADE]] = _marks(row)
         feedback = places.get(_FEEDBACK)
-        # What waits leaves standing what somebody wrote.
+        # A pending submission does not overwrite existing feedback.
         if feedback is not None and (row.grade is not None or row.refused or not line[feedback]):
             line[feedback] = safe_cell(_feedback(row))
     ending = "\r\n" if first.endswith("\r") else "\n"
@@ -83,7 +84,10 @@ def moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> Fil
 
 @packed("moodle-feedback", ".zip")
 def moodle_feedback(pages: Iterable[ReportPage], sink: BinaryIO) -> tuple[str, ...]:
-    """A report for each submission that came from Moodle, where its import of feedback files looks for it."""
+    """Pack a report for each submission from Moodle, at the path that its feedback import expects.
+
+    Returns the students that were left out.
+    """
     left_over, taken = [], 0
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
         for page in pages:
@@ -122,7 +126,7 @@ def _share(result: CriterionResult) -> str:
 
 
 def _places_of(lines: Sequence[Sequence[str]], places: Mapping[str, int]) -> dict[tuple[str, str], int]:
-    """The line of each that is called something, by what that is; not by a name that several have."""
+    """Return the line of each identifier, by column and value, without values that several lines share."""
     called: list[tuple[tuple[str, str], int]] = []
     for place, line in enumerate(lines[1:], start=1):
         for heading in (_IDENTIFIER, *_NAMES):

@@ -1,6 +1,6 @@
-"""The output formats by name: each registers itself where it is defined, with its suffix and with who reads it.
+"""The registry of output formats. Each format registers itself, with its suffix and its view of a grade.
 
-A format writes a document for one grade, one table for many, or both; nothing here renders.
+A format writes a document for one grade, one table for many, or both. This module renders nothing.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ _T = TypeVar("_T", covariant=True)
 
 
 class OfOne(Protocol[_T]):
-    """What is made of one grade, with lines of the student's where the submission is given."""
+    """Renders one grade, with source lines if the submission is given."""
 
     def __call__(self, grade: Grade, submission: Submission | None = None, /) -> _T:
-        """Without the submission there is no excerpt."""
+        """Render the grade. Without the submission there is no excerpt."""
 
 
 @dataclass(frozen=True, slots=True)
 class FilledIn:
-    """Another system's table with the grades in it, and the rows that it has no place for."""
+    """A table from another system with the grades filled in, and the rows that did not fit."""
 
     text: str
     left_over: tuple[str, ...] = ()
@@ -38,10 +38,10 @@ class FilledIn:
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """How grades are written: ``document`` one in a file of its own, ``table`` all of a batch in one.
+    """An output format: ``document`` writes one grade to a file, ``table`` all grades of a batch to one file.
 
-    ``refusal`` is the document of what was refused, ``on_terminal`` that for a screen, where it has another shape
-    there. ``filled_in`` writes into a table that it is given, ``packed`` reports into a file.
+    ``refusal`` is the document of a rejected submission. ``on_terminal`` is the document for a terminal, if it differs.
+    ``filled_in`` fills in a given table. ``packed`` packs reports into a file.
     """
 
     name: str
@@ -58,7 +58,7 @@ FORMATS: dict[str, Format] = {}
 
 
 def document(name: str, suffix: str, view: Callable[[Grade], Any]) -> Callable[[_Writes], _Writes]:
-    """Registers a function that writes what ``view`` leaves of one grade, with the submission where it is given."""
+    """Register a function that writes one grade, as seen through ``view``, with the submission if it is given."""
 
     def register(render: _Writes) -> _Writes:
         def written(grade: Grade, submission: Submission | None = None, /) -> str:
@@ -71,7 +71,7 @@ def document(name: str, suffix: str, view: Callable[[Grade], Any]) -> Callable[[
 
 
 def refusal(name: str) -> Callable[[Callable[[TableRow[Grade]], str]], Callable[[TableRow[Grade]], str]]:
-    """Registers a function that writes the document of a row that was refused."""
+    """Register a function that writes the document of a rejected row."""
 
     def register(render: Callable[[TableRow[Grade]], str]) -> Callable[[TableRow[Grade]], str]:
         FORMATS[name] = replace(_begun(name), refusal=render)
@@ -83,7 +83,7 @@ def refusal(name: str) -> Callable[[Callable[[TableRow[Grade]], str]], Callable[
 def table(
     name: str, suffix: str, view: Callable[[Grade], _V]
 ) -> Callable[[Callable[[Sequence[TableRow[_V]]], str]], Callable[[Sequence[TableRow[_V]]], str]]:
-    """Registers a function that writes the rows of a batch, with what ``view`` leaves of their grades."""
+    """Register a function that writes the rows of a batch, with their grades as seen through ``view``."""
 
     def register(render: Callable[[Sequence[TableRow[_V]]], str]) -> Callable[[Sequence[TableRow[_V]]], str]:
         FORMATS[name] = replace(
@@ -97,7 +97,7 @@ def table(
 def filled_in(
     name: str, suffix: str, view: Callable[[Grade], _V]
 ) -> Callable[[Callable[[Sequence[TableRow[_V]], str], FilledIn]], Callable[[Sequence[TableRow[_V]], str], FilledIn]]:
-    """Registers a function that writes the rows of a batch into the text of another system's table."""
+    """Register a function that fills the rows of a batch into another system's table."""
 
     def register(
         render: Callable[[Sequence[TableRow[_V]], str], FilledIn],
@@ -118,7 +118,7 @@ def packed(
     [Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]]],
     Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]],
 ]:
-    """Registers a function that packs the reports of a batch into a file, and returns whose it had to leave out."""
+    """Register a function that packs the reports of a batch into a file and returns the students left out."""
 
     def register(
         pack: Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]],
@@ -130,7 +130,7 @@ def packed(
 
 
 def on_terminal(name: str, view: Callable[[Grade], Any]) -> Callable[[_Shows], _Shows]:
-    """Registers a function that shows on a screen what ``view`` leaves of one grade, as ``document`` does."""
+    """Register a function that shows one grade, as seen through ``view``, in a terminal."""
 
     def register(render: _Shows) -> _Shows:
         def shown(grade: Grade, submission: Submission | None = None, /) -> RenderableType:

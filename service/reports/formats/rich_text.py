@@ -1,6 +1,6 @@
 """A grade in a terminal with Rich: marks table, verdict, faults.
 
-Student text goes in as ``rich.text.Text``, so square brackets in it are never markup.
+Student text is passed as ``rich.text.Text``, so square brackets in it are never markup.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _STYLES = {"good": "green", "notice": "yellow", "bad": "red"}
 
 @on_terminal("text", staff_view)
 def rich_report(view: View, submission: Submission | None = None) -> RenderableType:
-    """The grade as one renderable; print it with ``rich.console.Console().print``."""
+    """Return the grade as one renderable. Print it with ``rich.console.Console().print``."""
     grade = view.grade
     words = grade_words(grade)
     heading = Text.assemble((one_line(grade.assignment_title), "bold"), "  ", (one_line(grade.student, 60), "dim"))
@@ -50,7 +50,7 @@ def rich_report(view: View, submission: Submission | None = None) -> RenderableT
 
 
 def marks_table(grade: Grade, told: frozenset[int] = frozenset()) -> Table:
-    """Criteria with marks and messages, those that are told already without, and the total in the footer."""
+    """Return the criteria with marks and messages, and the total as footer; those in ``told`` without a message."""
     table = Table(box=box.SIMPLE_HEAD, show_footer=True, padding=(0, 1), expand=False)
     table.add_column("Marks", justify="right", no_wrap=True, footer=_marks(grade))
     table.add_column("Criterion", footer=Text("in all"))

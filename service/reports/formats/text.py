@@ -1,6 +1,6 @@
 """A grade as plain text, for a terminal, a log or an e-mail: marks, verdict, messages.
 
-Whoever reads it, it shows all of the view it is given.
+It contains everything in the view, whoever reads it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _WIDTH = 96
 
 @document("text", ".txt", staff_view)
 def plain_text(view: View, submission: Submission | None = None) -> str:
-    """The grade in lines of at most 96 characters, without colour or control codes."""
+    """Return the grade in lines of at most 96 characters, without colour or control codes."""
     grade = view.grade
     title = f"{one_line(grade.assignment_title)}: {one_line(grade.student, 60)}"
     words, diagnosis = grade_words(grade), diagnose(grade, submission)

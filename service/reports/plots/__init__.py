@@ -1,1 +1,1 @@
-"""The plots of a grade, a floor and a classifier, a module each; ``drawn.py`` says which of them a grade has."""
+"""The plots of a grade, a floor and a classifier, one module each. ``drawn.py`` lists the plots of a grade."""

@@ -1,6 +1,6 @@
-"""Where the blocks of a block diagram stand: who is further along the arrows stands further along the paper.
+"""Layout of block diagrams: blocks further along the arrows are further along the page.
 
-Positions are counted, in levels and in rows across them; inches are ``blocks.py``'s.
+Positions are counted in levels, and in rows across them. ``blocks.py`` converts them to inches.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ from submissions.diagram import Diagram
 
 @dataclass(frozen=True, slots=True)
 class BlockPosition:
-    """The level of a block, from 0, and its row in it: 0 is the middle, as many before it as after it."""
+    """The level of a block, from 0, and its row: 0 is the middle, with as many before as after it."""
 
     level: int
     row: float
 
 
 def layout_of(diagram: Diagram) -> Mapping[str, BlockPosition]:
-    """A position for each actor. Arrows count in the order of the text, whichever way they point."""
+    """Return a position for each actor. Arrows count in the order of the text, whatever their direction."""
     named = [name for arrow in diagram.arrows for name in (arrow.source, arrow.target)]
     order = {name: number for number, name in enumerate(dict.fromkeys([*named, *(a.name for a in diagram.actors)]))}
     group = {name: number for number, each in enumerate(diagram.groups) for name in each.members}
     levels = dict.fromkeys(order, 0)
     pairs = sorted({tuple(sorted((order[a.source], order[a.target]))) for a in diagram.arrows if a.source != a.target})
     names = list(order)
-    for one, other in pairs:  # the earlier actors' levels are final
+    for one, other in pairs:  # the levels of earlier actors are final
         levels[names[other]] = max(levels[names[other]], levels[names[one]] + 1)
     layout: dict[str, BlockPosition] = {}
     for level in range(max(levels.values(), default=0) + 1):

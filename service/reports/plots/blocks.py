@@ -1,6 +1,6 @@
-"""Draws a block diagram: a box an actor, arrows between them.
+"""Drawing of block diagrams: one box per actor, with arrows between them.
 
-Which level a box stands on is told by ``block_layout.py``; what it is a diagram of does not matter here.
+``block_layout.py`` assigns the levels. This module draws any diagram.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from service.reports.plots.diagram_parts import (
 from service.reports.plots.style import HEAD, WIDTH, axes_at, new_figure
 from submissions.diagram import Diagram, DiagramArrow
 
-_MOST_ACROSS = 4  # levels that stand side by side; more of them go down the paper
-_BOX = 1.02  # inches, as the widest label
-_GAP = 0.44  # between boxes, where no label asks for more
-_ROW = 0.42  # between boxes that stand below each other
+_MOST_ACROSS = 4  # levels side by side; more go down the page
+_BOX = 1.02  # inches, the width of the widest label
+_GAP = 0.44  # between boxes, unless a label needs more
+_ROW = 0.42  # between boxes below each other
 _MARGIN = 0.16
 _FOOT = 0.28
-_TWO_WAYS = 0.07  # from the middle, where two arrows run between the same boxes
-#: How far a line may bend, to the left or to the right of its way, to get round a box.
+_TWO_WAYS = 0.07  # distance from the middle, if two arrows connect the same boxes
+#: The bends of a line to the left or right, to avoid a box.
 _BENDS = (0.0, 0.25, -0.25, 0.45, -0.45, 0.7, -0.7, 1.0, -1.0)
 
 Point = tuple[float, float]
@@ -40,7 +40,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class _Sheet:
-    """Inches: how large boxes are, where their centres are, and the paper."""
+    """Box sizes, box centres and page size, in inches."""
 
     box: Point
     centres: Mapping[str, Point]
@@ -49,7 +49,7 @@ class _Sheet:
 
 
 def draw_blocks(diagram: Diagram, title: str, subtitle: str, highlights: Highlights) -> Figure:
-    """The block diagram, along the paper or, with many levels or long words at its arrows, down it."""
+    """Draw the diagram across the page or, with many levels or long labels, down the page."""
     diagram = replace(diagram, steps=_merged(diagram))
     sheet = _sheet(diagram)
     figure = new_figure(HEAD + sheet.height + _FOOT, title, subtitle, sheet.width)
@@ -85,7 +85,7 @@ def draw_blocks(diagram: Diagram, title: str, subtitle: str, highlights: Highlig
 
 
 def _merged(diagram: Diagram) -> tuple[DiagramArrow, ...]:
-    """Arrows that would lie on each other as one, with the words of all."""
+    """Return the arrows, with coinciding ones merged and their labels joined."""
     found: dict[tuple[str, str, str], DiagramArrow] = {}
     for arrow in diagram.arrows:
         key = (arrow.source, arrow.target, arrow.heads)
@@ -119,12 +119,12 @@ def _sheet(diagram: Diagram) -> _Sheet:
 
 
 def _room(boxes: int, gap: float) -> float:
-    """Inches that boxes beside each other take."""
+    """Return the width of boxes beside each other, in inches."""
     return boxes * _BOX + (boxes - 1) * gap + 2 * _MARGIN
 
 
 def _line(arrow: DiagramArrow, sheet: _Sheet, shift: float, side: int) -> tuple[Point, Point, float]:
-    """From where to where, moved aside where an arrow comes back, and how far it bends round what is in its way."""
+    """Return the line's ends and bend: shifted if there is a return arrow, and bent round boxes in its way."""
     (x, y), (to_x, to_y) = sheet.centres[arrow.source], sheet.centres[arrow.target]
     length = max(1e-6, ((to_x - x) ** 2 + (to_y - y) ** 2) ** 0.5)
     aside = (-(to_y - y) / length * shift, (to_x - x) / length * shift)
@@ -137,7 +137,7 @@ def _line(arrow: DiagramArrow, sheet: _Sheet, shift: float, side: int) -> tuple[
 
 
 def _on(start: Point, end: Point, bend: float, part: float) -> Point:
-    """A point on the curve that Matplotlib draws as ``arc3``, ``part`` of the way along it."""
+    """Return a point on the curve that Matplotlib draws as ``arc3``, at the fraction ``part`` of its length."""
     control = (
         (start[0] + end[0]) / 2 + bend * (end[1] - start[1]),
         (start[1] + end[1]) / 2 - bend * (end[0] - start[0]),
@@ -161,7 +161,7 @@ def _meets(
 
 
 def _label_at(start: Point, end: Point, bend: float, beside: tuple[str, ...]) -> Point:
-    """The middle of the curve, or of the lines of a label ``beside`` it, on its left."""
+    """Return the middle of the curve, or the centre of a label ``beside`` it, on its left."""
     x, y = _on(start, end, bend, 0.5)
     if not beside:
         return x, y

@@ -1,6 +1,6 @@
-"""Draws who was taken for whom: truths down, answers across, counts in the cells, totals at the right.
+"""Drawing of confusion matrices: truths down, answers across, counts in the cells, totals at the right.
 
-It counts nothing anew; all numbers are those of the criterion's ``Accuracy``.
+All numbers come from the criterion's ``Accuracy``.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from service.reports.plots.style import FAINT, HEAD, INK, RULE, WIDTH, axes_at, 
 from service.reports.readable import one_line
 
 NO_ANSWER = "no answer"
-_LABELS, _SHORT_LABELS = 1.22, 0.62  # inches for the truths at the left
-_SHORT = 6  # characters of a name that needs little room
+_LABELS, _SHORT_LABELS = 1.22, 0.62  # inches for the true labels at the left
+_SHORT = 6  # largest number of characters in a short name
 _FOOT = 0.56  # inches
-_TOTALS, _ALL, _RECALL = 3.2, 0.85, 2.4  # cells for what stands right of the counts, and where in them
+_TOTALS, _ALL, _RECALL = 3.2, 0.85, 2.4  # widths in cells: the columns right of the counts, and positions in them
 _HEADS, _SHORT_HEADS = 1.06, 0.24  # for the answers at the top
 
 
 @dataclass(frozen=True, slots=True)
 class ConfusionTable:
-    """Counts, one row a truth, one column an answer; ``totals`` are the rows' sums."""
+    """Counts, with one row per truth and one column per answer; ``totals`` are the sums of the rows."""
 
     truths: tuple[str, ...]
     answers: tuple[str, ...]
@@ -35,7 +35,7 @@ class ConfusionTable:
 
 
 def confusion_table(accuracy: Accuracy) -> ConfusionTable:
-    """All labels in their order, then answers that are no label, then ``no answer`` if there was one."""
+    """Return all labels in order, then answers that are not labels, then ``no answer`` if there was one."""
     seen = dict.fromkeys(truth for truth, _, _ in accuracy.confusion)
     truths = tuple(dict.fromkeys((*accuracy.labels, *seen)))
     given = dict.fromkeys(answer for _, answer, _ in accuracy.confusion if answer is not None)
@@ -50,7 +50,7 @@ def confusion_table(accuracy: Accuracy) -> ConfusionTable:
 
 
 def draw_confusion(result: CriterionResult, accuracy: Accuracy, title: str) -> Figure:
-    """The confusion matrix of ``accuracy`` with its value, interval and n."""
+    """Draw the confusion matrix of ``accuracy`` with its value, interval and n."""
     subtitle = (
         f"accuracy {accuracy.value:.2f}, 95 % interval {accuracy.low:.2f} to {accuracy.high:.2f}, "
         f"n = {accuracy.n} {counted(accuracy)}"
@@ -59,12 +59,12 @@ def draw_confusion(result: CriterionResult, accuracy: Accuracy, title: str) -> F
 
 
 def counted(accuracy: Accuracy) -> str:
-    """What ``n`` counts: ``images`` or ``patterns``."""
+    """Return the unit of ``n``: ``images`` or ``patterns``."""
     return accuracy.counts.of if accuracy.counts is not None else "images"
 
 
 def draw_table(table: ConfusionTable, title: str, subtitle: str) -> Figure:
-    """The confusion matrix of ``table``, whoever counted it."""
+    """Draw the confusion matrix of ``table``."""
     across = len(table.answers) + _TOTALS
     labels = _LABELS if any(len(truth) > _SHORT for truth in table.truths) else _SHORT_LABELS
     cell = min(0.56, (WIDTH - labels - 0.14) / across)
@@ -90,7 +90,7 @@ def draw_table(table: ConfusionTable, title: str, subtitle: str) -> Figure:
 
 
 def _draw_names(axes: Axes, table: ConfusionTable, size: float, *, upright: bool) -> None:
-    """All headings one way round: lying where every name is short, else upright."""
+    """Draw all headings in one direction: horizontal if every name is short, otherwise upright."""
     for row, truth in enumerate((*table.truths, "precision")):
         _name(axes, -0.12, row + 0.5, truth, size, ha="right", va="center")
     count = len(table.answers)
@@ -138,7 +138,7 @@ def _draw_cells(axes: Axes, table: ConfusionTable, size: float) -> None:
 
 
 def _smaller(size: float) -> float:
-    """For what stands beside the counts: as small as a phone can show it."""
+    """Return the size for text beside the counts, as small as a phone can show it."""
     return max(0.82 * size, min(size, 8.0))
 
 
@@ -147,14 +147,14 @@ def _figure_text(axes: Axes, x: float, row: int, text: str, size: float) -> None
 
 
 def _share(part: int, whole: int) -> str:
-    """``.83``: narrow, so that ten columns of it can be read; a dash where there is nothing to divide by."""
+    """Return a ratio as ``.83``, short enough for ten columns; a dash if the divisor is 0."""
     if not whole:
         return "\N{EN DASH}"
     return str(part // whole) if part in (0, whole) else f"{part / whole:.2f}".lstrip("0")
 
 
 def _draw_cell(axes: Axes, corner: tuple[int, int], share: float, *, right: bool) -> None:
-    # One hue each, from white to dark, so that the order survives a greyscale print.
+    # One hue each, from white to dark, so that the order is visible in a greyscale print.
     darkest = (0.07, 0.27, 0.47) if right else (0.64, 0.09, 0.16)
     shade = tuple(1 - share * (1 - channel) for channel in darkest)
     axes.add_patch(Rectangle(corner, 1, 1, facecolor=shade, edgecolor=RULE, linewidth=0.7))

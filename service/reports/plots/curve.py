@@ -1,6 +1,6 @@
-"""Draws how a share falls as conditions get harder: one panel a condition, a line with its 95 % band a curve.
+"""Drawing of accuracy curves: one panel per condition, one line with its 95 % band per curve.
 
-It measures nothing; shares, intervals and counts come from whoever did.
+The caller supplies the fractions, intervals and counts.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from service.reports.plots.style import (
 )
 from service.reports.readable import one_line
 
-#: Colour, line and marker of the first curve, the second and so on: each differs without colour too.
+#: Colour, line and marker of the curves, in order. They differ without colour too.
 _STYLES = ((LEFT, "-", "o"), (RIGHT, "--", "s"), (SAID, ":", "^"), (FAINT, "-.", "D"))
 _LEFT, _RIGHT_MARGIN = 0.62, 0.16
 _PANEL, _BELOW, _ABOVE = 1.22, 0.46, 0.36  # inches: the axes, its labels, its title
@@ -41,9 +41,9 @@ _FOOT = 0.26
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A share at each of ``x``, ascending, with the interval round it and how many were counted."""
+    """A fraction at each of ``x``, ascending, with its interval and sample count."""
 
-    label: str  # for the legend; not shown where a panel has one curve
+    label: str  # for the legend; not shown if a panel has one curve
     x: tuple[float, ...]
     share: tuple[float, ...]
     low: tuple[float, ...]
@@ -53,7 +53,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class AccuracyPanel:
-    """What is varied and in which unit, the curves, and the share that is asked for, if one is."""
+    """The varied condition and its unit, the curves, and the required accuracy, if there is one."""
 
     varied: str
     unit: str
@@ -62,7 +62,7 @@ class AccuracyPanel:
 
 
 def draw_curves(panels: Sequence[AccuracyPanel], title: str, subtitle: str = "", counted: str = "images") -> Figure:
-    """The panels under each other, all with the same upright axis from 0 to 1; ``counted`` is what ``n`` counts."""
+    """Draw the panels below each other, all with an axis from 0 to 1. ``counted`` is the unit of ``n``."""
     row = _ABOVE + _PANEL + _BELOW
     height = HEAD + row * len(panels) + _FOOT
     figure = new_figure(height, title, subtitle)
@@ -78,7 +78,7 @@ def draw_curves(panels: Sequence[AccuracyPanel], title: str, subtitle: str = "",
 
 
 def draw_panel(axes: Axes, panel: AccuracyPanel) -> None:
-    """All curves of one panel into ``axes``, with labelled axes and, where there are several curves, a legend."""
+    """Draw all curves of one panel, with labelled axes and, for several curves, a legend."""
     axes.set_ylim(-0.04, 1.04)
     axes.yaxis.set_major_locator(FixedLocator([0, 0.25, 0.5, 0.75, 1]))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.2f}".rstrip("0").rstrip(".")))
@@ -107,7 +107,7 @@ def draw_panel(axes: Axes, panel: AccuracyPanel) -> None:
 
 
 def draw_curve(axes: Axes, curve: Curve, colour: str = LEFT, line: str = "-", marker: str = "o") -> None:
-    """One curve into ``axes``: its band, then its line, with a marker at each value that was measured."""
+    """Draw one curve: its band, then its line, with a marker at each measured value."""
     if len(curve.x) > 1:
         axes.fill_between(curve.x, curve.low, curve.high, color=colour, alpha=0.18, linewidth=0, zorder=3)
         for edge in (curve.low, curve.high):
@@ -129,7 +129,7 @@ def _counts(curves: Sequence[Curve], counted: str) -> str:
 
 
 def _readable_ticks(xs: Sequence[float]) -> list[float]:
-    """Those of ``xs`` whose labels do not run into each other: none nearer than an eighteenth of the width."""
+    """Return the ``xs`` whose labels don't overlap: at least an eighteenth of the width apart."""
     kept: list[float] = []
     for x in xs:
         if not kept or x - kept[-1] >= (xs[-1] - xs[0]) / 18:

@@ -1,6 +1,6 @@
-"""What block and sequence diagrams are drawn of: actors, arrows, labels, and what highlights a difference.
+"""Parts of block and sequence diagrams: actors, arrows, labels, and highlights of differences.
 
-Where they stand is the diagram's own business, ``blocks.py`` and ``lanes.py``.
+``blocks.py`` and ``lanes.py`` decide the positions.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from service.reports.plots.style import FAINT, FAULT, INK, LEFT, RIGHT, RULE, dr
 from service.reports.readable import one_line
 from submissions.diagram import DiagramActor, DiagramArrow
 
-#: Of 8 point type that fit into an inch.
+#: Characters of 8 point type in an inch.
 CHARACTERS = 14.9
-#: Inches that a line of a label takes.
+#: The height of a label's line, in inches.
 LINE_HEIGHT = 0.131
 _FILL = "#eef1f4"
 _DASHES: dict[str, Any] = {"solid": "solid", "dashed": (0, (3.2, 1.8)), "dotted": (0, (1.2, 1.6))}
@@ -36,7 +36,7 @@ _BARE = ("none", "dots", "textbox")
 
 @dataclass(frozen=True, slots=True)
 class Highlights:
-    """Which actors and arrows (source, target) are highlighted as different, and how; by default none."""
+    """The actors and arrows (source, target) to highlight as different, and the style; none by default."""
 
     actors: frozenset[str] = frozenset()
     arrows: frozenset[tuple[str, str]] = frozenset()
@@ -45,23 +45,23 @@ class Highlights:
     words: str = ""
 
     def on(self, arrow: DiagramArrow) -> bool:
-        """Whether an arrow is highlighted, for itself or for one of its ends."""
+        """Return whether an arrow is highlighted, itself or through one of its ends."""
         pair = (arrow.source, arrow.target)
         turned = arrow.heads != "target" and pair[::-1] in self.arrows
         return pair in self.arrows or turned or not self.actors.isdisjoint(pair)
 
     def signed(self, arrow: DiagramArrow, lines: tuple[str, ...]) -> tuple[str, ...]:
-        """The label of an arrow, with the sign before it, for who does not tell the colours apart."""
+        """Return the label of an arrow with the sign before it, for readers who don't distinguish the colours."""
         return (f"{self.sign} {lines[0] if lines else ''}".rstrip(), *lines[1:]) if self.on(arrow) else lines
 
     def explain(self, figure: Figure) -> None:
-        """Tell what the sign means, at the foot of the figure, if it is in it."""
+        """Write the meaning of the sign at the foot of the figure, if the sign is used."""
         if self.actors or self.arrows:
             write(figure, 0.08, 0.07, f"{self.sign} {self.words}", size=7.8, colour=self.colour, bold=True)
 
 
 def broken(text: str, inches: float, most_lines: int) -> tuple[str, ...]:
-    """A label broken into lines that are so wide; its own line breaks stay."""
+    """Break a label into lines of at most this width. Its own line breaks stay."""
     width = max(4, int(inches * CHARACTERS))
     kept = [one_line(line, 200) for line in text.split("\n")[: most_lines + 1]]
     lines = [piece for line in kept for piece in textwrap.wrap(line, width) or [""]]
@@ -73,7 +73,7 @@ def broken(text: str, inches: float, most_lines: int) -> tuple[str, ...]:
 
 
 def label(axes: Axes, x: float, y: float, lines: tuple[str, ...], colour: str, va: str = "bottom") -> None:
-    """The lines of a label, centred over ``x``, on white."""
+    """Draw the lines of a label, centred over ``x``, on white."""
     if any(lines):
         axes.text(
             x, y, drawable("\n".join(lines)), font=font(8), color=colour, ha="center", va=va, parse_math=False,
@@ -91,7 +91,7 @@ def draw_actor(
     lines: tuple[str, ...],
     highlights: Highlights,
 ) -> Patch:
-    """An actor with its centre at ``x``, ``y``; what arrows end at."""
+    """Draw an actor centred at ``x``, ``y``, and return the patch where arrows end."""
     different = actor.name in highlights.actors
     fill = _usable(actor.colour, _FILL)
     patch = _shape(actor.shape, x, y, width, height)
@@ -118,7 +118,7 @@ def draw_actor(
 
 
 def arrow_colour(arrow: DiagramArrow, highlights: Highlights) -> str:
-    """The colour of an arrow, as it is highlighted, or as its text says, or as who sends it."""
+    """Return the colour of an arrow: by highlight, by its text, or by its sender."""
     if highlights.on(arrow):
         return highlights.colour
     if arrow.failed:
@@ -136,13 +136,13 @@ def connect(
     ends: tuple[Patch | None, Patch | None] = (None, None),
     bend: float = 0.0,
 ) -> None:
-    """The line of an arrow with its heads, cut off at the patches it runs between."""
+    """Draw the line of an arrow with its heads, clipped at the patches that it connects."""
     styles = {"target": "->", "both": "<->", "none": "-"} if arrow.open_head else _HEADS
     style = "-" if arrow.failed else styles[arrow.heads]
     line = "dotted" if arrow.failed else arrow.line
     if line == "solid" or arrow.open_head or style == "-":
         drawn = [(style, _DASHES[line], 1.9 if highlights.on(arrow) else 1.2)]
-    else:  # whose heads would be dashed too
+    else:  # otherwise the heads would be dashed too
         drawn = [("-", _DASHES[line], 1.2), (style, "solid", 0.0)]
     for arrow_style, dashes, thick in drawn:
         size = "head_length=4.6,head_width=2.6" if thick else "head_length=6.2,head_width=3.4"
@@ -157,7 +157,7 @@ def connect(
 
 
 def frame(axes: Axes, x: float, y: float, width: float, height: float, colour: str, text: str) -> None:
-    """A group's frame, its lower left corner at ``x``, ``y``, with its label inside at the top."""
+    """Draw a group's frame, with its lower left corner at ``x``, ``y`` and its label inside at the top."""
     fill = _usable(colour, "#dbe6f0")
     axes.add_patch(
         FancyBboxPatch((x, y), width, height, boxstyle="round,pad=0,rounding_size=0.08", facecolor=fill, alpha=0.45,
@@ -192,11 +192,11 @@ def _shape(shape: str, x: float, y: float, width: float, height: float) -> Patch
 
 
 def _cylinder(left: float, low: float, width: float, height: float) -> Patch:
-    """Body and lid; the lid is a line of its own, that closes nothing."""
+    """Return a cylinder: its body, and its lid as a separate open line."""
     x, y = left + width / 2 * (1 + np.cos(_HALF_TURN)), height / 11 * np.sin(_HALF_TURN)
     bottom, top = low + height / 11, low + height * 10 / 11
     body = [*zip(x, top + y, strict=True), *zip(x[::-1], bottom - y, strict=True), (x[0], top)]
-    lid = list(zip(x[::-1], top - y, strict=True))  # turned as the body is, or it would be a hole
+    lid = list(zip(x[::-1], top - y, strict=True))  # in the direction of the body, otherwise it would be a hole
     codes = [Path.MOVETO, *[Path.LINETO] * (len(body) - 1), Path.MOVETO, *[Path.LINETO] * (len(lid) - 1)]
     return PathPatch(Path([*body, *lid], codes))
 

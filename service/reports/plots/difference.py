@@ -1,6 +1,6 @@
-"""A notebook's own diagram against what happened: who and what is in one of them only. Shown, never marked.
+"""Comparison of a notebook's own diagram with the recorded events. It is shown and never marked.
 
-Actors are known by the words in their names and labels; drawing the differences is left to others.
+Actors are identified by words in their names and labels. Other modules draw the differences.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from submissions.diagram import Diagram, DiagramActor
 
 Pair = tuple[str, str]
 
-#: Words that tell which party an actor is; of two the upper one counts: a Python agent is the agent.
+#: Words that identify a party. The first match counts: a Python agent is the agent.
 _TOLD_BY: Mapping[str, frozenset[str]] = MappingProxyType(
     {
         "logger": frozenset({"logger", "log", "logfile"}),
@@ -35,10 +35,10 @@ _MOST_NAMED = 6
 
 @dataclass(frozen=True, slots=True)
 class Differences:
-    """Names as the diagram has them, for what it alone has, and as ``talks`` has them, for what happened besides.
+    """The differences: names as in the diagram if only it has them, as in ``talks`` if only the recording has them.
 
-    An arrow at an actor that is itself in one of the two only is not told again. ``alike`` is the part of all arrows,
-    0 to 1, that is in both.
+    An arrow at an actor that is itself a difference is not listed. ``alike`` is the fraction of all arrows, 0 to 1,
+    that both have.
     """
 
     drawn_actors: tuple[str, ...] = ()
@@ -52,10 +52,10 @@ class Differences:
 
 
 def differences(diagram: Diagram, told: Sequence[Talk]) -> Differences | None:
-    """None for a diagram of something else: one in which fewer than two took part.
+    """Return the differences; None if fewer than two drawn parties took part, so the diagram shows something else.
 
-    An arrow may stand for a way through actors that are not drawn, so that a diagram can leave out what goes on
-    inside, and one without a direction for either. What a call gave back need not be drawn.
+    An arrow may represent a path through parties that are not drawn, and one without a direction represents both.
+    Return values of calls need not be drawn.
     """
     party = {actor.name: party_of_actor(actor) for actor in diagram.actors}
     drawn = {each for each in party.values() if each is not None}
@@ -90,7 +90,7 @@ def differences(diagram: Diagram, told: Sequence[Talk]) -> Differences | None:
 
 
 def in_words(found: Differences, language: Language = ENGLISH) -> str:
-    """The differences as sentences."""
+    """Return the differences as sentences."""
     if not found:
         return language.say("It shows what happened.")
     told = []
@@ -121,7 +121,7 @@ def in_words(found: Differences, language: Language = ENGLISH) -> str:
 
 
 def party_of_actor(actor: DiagramActor) -> str | None:
-    """Which party an actor is, by its name, or else by its label; None for one that is none of them."""
+    """Return the party of an actor, by its name or else its label; None if it is none of them."""
     for text in (actor.name, actor.label):
         words = set(_WORD.findall(text.lower()))
         for party, told_by in _TOLD_BY.items():
@@ -131,7 +131,7 @@ def party_of_actor(actor: DiagramActor) -> str | None:
 
 
 def _ways(told: Sequence[Talk], drawn: set[str]) -> set[tuple[str | None, str | None]]:
-    """From whom a text came to whom, at once or through parties that are not drawn."""
+    """Return sender and receiver of each text, directly or through parties that are not drawn."""
     steps = {(party_of(talk.source), party_of(talk.target)) for talk in told}
     ways: set[tuple[str | None, str | None]] = set()
     for start in drawn:
@@ -151,7 +151,7 @@ def _arrow(pair: Pair) -> str:
 
 
 def _listed(names: Iterable[str], language: Language) -> str:
-    """Names as a sentence has them, few enough to be read."""
+    """Join names for a sentence, shortened if there are many."""
     found = [one_line(name, 70) for name in names]
     if len(found) > _MOST_NAMED:
         more = language.say("%(count)s more", count=len(found) - _MOST_NAMED + 1)

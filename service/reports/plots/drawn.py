@@ -1,6 +1,6 @@
-"""Which plots a grade has, what each is called and says, and all of them drawn.
+"""The plots of a grade with their titles and descriptions, and the drawing of all of them.
 
-Each is handed to the module that draws its kind; nothing here is random, timed or kept between calls.
+The modules of each kind draw them. Nothing here is random, depends on time, or is kept between calls.
 """
 
 from __future__ import annotations
@@ -35,9 +35,10 @@ _NO_IMAGES: Mapping[str, Pixels] = MappingProxyType({})
 
 
 def plots_of(grade: Grade, language: Language = ENGLISH) -> tuple[Plot, ...]:
-    """Path and sensors of every scenario's worst trial, and classifications, once for criteria that share them.
+    """Return path and sensor plots of every scenario's worst trial, and classification plots.
 
-    Of a robot that stood still there is neither path nor sensors. What is written in a plot itself is English.
+    Criteria that share a classification share its plots. Robots that did not move have no path or sensor plots. Text
+    inside plots is in English.
     """
     return (*_classifications(grade, language), *_trials(grade, language))
 
@@ -45,10 +46,10 @@ def plots_of(grade: Grade, language: Language = ENGLISH) -> tuple[Plot, ...]:
 def draw_all(
     grade: Grade, images: Mapping[str, Pixels] = _NO_IMAGES, cells: Sequence[DiagramCell] = ()
 ) -> dict[str, bytes]:
-    """Every plot of ``grade``, and the diagrams of the notebook's ``cells``, for staff and student, name -> PNG.
+    """Draw every plot of ``grade`` and of the notebook's ``cells``, for staff and student, as name -> PNG.
 
-    ``images`` are floors that are not built in, by background name, (1143, 2362, 3) uint8 with row 0 at
-    y = 1143 mm; a floor that is in neither is drawn white.
+    ``images`` are floors that are not built in, by background name, (1143, 2362, 3) uint8 with row 0 at y = 1143 mm. A
+    floor that is in neither is drawn white.
     """
     drawn: dict[str, bytes] = {}
     for view in (staff_view(grade), student_view(grade)):
@@ -63,7 +64,7 @@ def draw_all(
 
 
 def _picture(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> bytes:
-    # Who has nothing to draw need not load the drawing library, nor who only says what is drawn.
+    # The drawing library is loaded only if there is something to draw.
     from service.reports.plots.drawn import figure_of
     from service.reports.plots.style import png
 
@@ -78,7 +79,7 @@ def _own_picture(own: OwnDiagram, grade: Grade, plot: Plot) -> bytes:
 
 
 def same_answers(grade: Grade) -> tuple[tuple[int, ...], ...]:
-    """The criteria that tell of recognition, those together that judge the same answers to the same images."""
+    """Return groups of recognition criteria that judge the same answers to the same images."""
     alike: dict[Hashable, list[int]] = {}
     for index, result in enumerate(grade.criteria):
         confusion = result.accuracy.confusion if result.accuracy is not None else ()
@@ -145,7 +146,7 @@ def _told_of_predictions(result: CriterionResult, wrong: Sequence[Prediction], l
 
 
 def _along(grade: Grade, index: int, result: CriterionResult, suffix: str, language: Language) -> Iterator[Plot]:
-    """How accuracy changes along what is swept and along the way, and what was misread."""
+    """Yield the plots of accuracy along the swept conditions and along the path, and of misread images."""
     say = language.say
     title = one_line(result.title, 80)
     if result.curves:
@@ -249,7 +250,7 @@ def _at(pose: Pose) -> str:
 
 
 def figure_of(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Figure:
-    """The plot, drawn."""
+    """Draw the plot."""
     if plot.kind == "path":
         trial = grade.trials[plot.subject]
         return draw_path(trial, plot.title, _floor(trial.recording, images))
@@ -284,7 +285,7 @@ def _panel(curve: AccuracyCurve) -> AccuracyPanel:
 
 
 def _floor(recording: Recording, images: Mapping[str, Pixels]) -> Pixels | None:
-    """The floor as it was in the trial, with the same digits and label patches."""
+    """Return the floor of the trial, with the same digits and label patches."""
     if recording.background in images:
         return images[recording.background]
     floor = floor_of(recording)

@@ -1,6 +1,6 @@
-"""Draws the diagrams that a notebook draws itself, and what happened beside them.
+"""Drawing of the diagrams in a notebook, beside diagrams of the recorded events.
 
-Which there are and how they differ is ``own_diagrams.py``'s.
+``own_diagrams.py`` finds the diagrams and their differences.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from service.reports.readable import one_line
 from submissions.diagram import Diagram, DiagramActor
 
 _HAPPENED = "#8a5a00"
-#: Of a conversation, beside a diagram of it.
+#: Limits of a conversation beside a diagram of it.
 _MOST_EXCHANGES, _MOST_STEPS = 2, 24
 
 
 def draw_own(own: OwnDiagram, grade: Grade, plot: Plot) -> Figure:
-    """One of the two plots of ``own``."""
+    """Draw one of the two plots of ``own``."""
     found = own.differences or Differences()
     if plot.kind == "own":
         highlights = Highlights(
@@ -51,12 +51,12 @@ def draw_own(own: OwnDiagram, grade: Grade, plot: Plot) -> Figure:
 
 
 def draw_diagram(diagram: Diagram, title: str, subtitle: str, highlights: Highlights) -> Figure:
-    """A diagram of either kind."""
+    """Draw a diagram of either kind."""
     draw = draw_blocks if diagram.kind == "blockdiag" else draw_lanes
     return draw(diagram, title, subtitle, highlights)
 
 
 def _in_order(parties: Sequence[DiagramActor], drawn: Sequence[DiagramActor]) -> tuple[DiagramActor, ...]:
-    """Parties in the order in which they are drawn; those that are not come after them."""
+    """Return the parties in the order in which they are drawn, followed by those that are not."""
     order = [party_of_actor(actor) for actor in drawn]
     return tuple(sorted(parties, key=lambda party: order.index(party.name) if party.name in order else len(order)))

@@ -1,6 +1,6 @@
-"""Draws a floor by itself: the image with a scale in mm, where the robot starts, obstacles and what has a label.
+"""Drawing of a floor: the image with a scale in mm, the start pose, obstacles and labelled places.
 
-The floors' images are ``sim/floors``'; a robot's path over one is drawn in ``path.py``.
+The images come from ``sim/floors``. ``path.py`` draws a robot's path over a floor.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _LEFT_EDGE, _RIGHT_EDGE, _FOOT = 0.56, 0.12, 0.42  # inches
 
 
 def draw_floor(floor: Floor) -> Figure:
-    """The whole floor with x to the right and y upwards, mm."""
+    """Draw the whole floor with x to the right and y upwards, mm."""
     width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
     height = width * _FLOOR_HEIGHT / _FLOOR_WIDTH
     pose = floor.default_pose

@@ -1,6 +1,6 @@
-"""Draws a sequence diagram that a text describes: one lane an actor, time going down.
+"""Drawing of sequence diagrams: one lane per actor, time going down.
 
-What is told in it, and in which order, is decided by whoever made the diagram.
+The caller decides the content and its order.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from service.reports.plots.diagram_parts import (
 from service.reports.plots.style import FAINT, FAULT, HEAD, RULE, WIDTH, axes_at, drawable, font, new_figure
 from submissions.diagram import Diagram, DiagramArrow, Divider
 
-_EDGE = 0.62  # from the paper's edge to the first and the last lane, inches
+_EDGE = 0.62  # from the edge of the page to the first and last lane, inches
 _NARROWEST = 0.79  # between two lanes
-_ARROW = 0.19  # that an arrow takes below its label
-_SELF = 0.30  # that an arrow to its own lane takes to the side
+_ARROW = 0.19  # height of an arrow below its label
+_SELF = 0.30  # width of an arrow to its own lane
 _DIVIDER = 0.34
 _FOOT = 0.28
 
@@ -44,7 +44,7 @@ class _StepRow:
 
 
 def draw_lanes(diagram: Diagram, title: str, subtitle: str, highlights: Highlights) -> Figure:
-    """The sequence diagram, as wide as its lanes need."""
+    """Draw the sequence diagram, as wide as its lanes need."""
     count = len(diagram.actors)
     width = max(WIDTH, 2 * _EDGE + (count - 1) * _NARROWEST)
     gap = (width - 2 * _EDGE) / max(1, count - 1)
@@ -133,6 +133,6 @@ def _draw_note(axes: Axes, row: _StepRow, x: float, baseline: float, width: floa
 
 
 def _inside(x: float, lines: Sequence[str], width: float) -> float:
-    """The middle of a label that has to stay on the paper."""
+    """Return the centre of a label, moved so that it stays on the page."""
     half = max((len(line) for line in lines), default=0) / CHARACTERS / 2 + 0.06
     return min(max(x, half), width - half)

@@ -1,6 +1,6 @@
-"""Draws the images that were misread, each beside the nearest ones that were read rightly.
+"""Drawing of misread images, each beside the nearest correctly read ones.
 
-Which these are is ``sensor_images.py``'s.
+``sensor_images.py`` selects them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _TEXT = 3 * (_SIDE + _GAP) + 0.08
 
 
 def draw_misread(found: Sequence[Misread], images: int, title: str) -> Figure:
-    """At most ``MOST_MISREAD`` rows: the image, the nearest right one of its truth, and of what it was taken for."""
+    """Draw at most ``MOST_MISREAD`` rows: the image, and the nearest correct ones of its truth and of its answer."""
     shown = found[:MOST_MISREAD]
     height = _ROW * len(shown)
     count = f"{len(shown)} of {len(found)}" if len(shown) < len(found) else str(len(found))

@@ -1,6 +1,6 @@
-"""The images of a classifier's evaluation: confusion, misread images beside right ones, and robustness curves.
+"""The plots of a classifier's evaluation: confusion matrix, misread images, and robustness curves.
 
-Everything in them was measured by ``models/evaluation.py``; the drawing of tables and curves is shared with grades.
+``models/evaluation.py`` measures the values. Tables and curves are drawn by the same code as for grades.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from service.reports.plots.style import (
 MOST_MISREAD = 10
 _SIDE, _GAP, _ROW = 0.74, 0.12, 0.92
 _TEXT = 3 * (_SIDE + _GAP) + 0.04
-_LINE = 16  # characters beside the images
+_LINE = 16  # characters per line beside the images
 
 
 def evaluation_plots(evaluation: Evaluation) -> dict[str, bytes]:
-    """PNG files by name: ``NAME-confusion.png``, ``NAME-misread.png`` and ``NAME-robustness.png``."""
+    """Return PNG files by name: ``NAME-confusion.png``, ``NAME-misread.png`` and ``NAME-robustness.png``."""
     name = evaluation.card.name
     return {
         f"{name}-confusion.png": png(draw_evaluation_confusion(evaluation)),
@@ -51,20 +51,20 @@ def evaluation_plots(evaluation: Evaluation) -> dict[str, bytes]:
 
 
 def draw_evaluation_confusion(evaluation: Evaluation) -> Figure:
-    """Who was taken for whom."""
+    """Draw the confusion matrix."""
     measured, classes = evaluation.measured, evaluation.card.classes
     table = ConfusionTable(classes, classes, measured.confusion, tuple(sum(row) for row in measured.confusion))
     return draw_table(table, f"{evaluation.card.name}: who was taken for whom", in_words(measured.accuracy))
 
 
 def in_words(tally: Tally) -> str:
-    """``accuracy 0.966, 95 % interval 0.955 to 0.975, n = 1320 images``."""
+    """Return a tally as ``accuracy 0.966, 95 % interval 0.955 to 0.975, n = 1320 images``."""
     low, high = tally.interval
     return f"accuracy {tally.share:.3f}, 95 % interval {low:.3f} to {high:.3f}, n = {tally.n} images"
 
 
 def draw_robustness(evaluation: Evaluation) -> Figure:
-    """One panel for each condition that was varied."""
+    """Draw one panel for each varied condition."""
     panels: dict[str, list[CardCurve]] = {}
     for curve in evaluation.measured.curves:
         panels.setdefault(curve.varied, []).append(curve)
@@ -79,7 +79,7 @@ def draw_robustness(evaluation: Evaluation) -> Figure:
 
 
 def comparison_plot(names: Sequence[str], found: Sequence[Sequence[CardCurve]]) -> bytes:
-    """A PNG file with a panel for each condition, in it a curve for each of the classifiers called ``names``."""
+    """Return a PNG with one panel per condition, and in it one curve for each classifier in ``names``."""
     figure = draw_curves(
         [
             AccuracyPanel(
@@ -110,10 +110,10 @@ def _curve(counted: CardCurve, label: str | None = None) -> Curve:
 
 
 def draw_misread(evaluation: Evaluation) -> Figure:
-    """At most ``MOST_MISREAD`` images that were misread, each beside its nearest neighbours that were read rightly.
+    """Draw at most ``MOST_MISREAD`` misread images, each beside its nearest correctly read neighbours.
 
-    One neighbour is of the class that it shows, one of the class that it was taken for; near is by the mean square
-    of the difference of greys.
+    One neighbour is of the true class, one of the answered class. Distance is the mean square of the differences of
+    greys.
     """
     misread = [each for each in evaluation.answered if not each.right]
     chosen = _one_each(misread)[:MOST_MISREAD]
@@ -140,7 +140,7 @@ def draw_misread(evaluation: Evaluation) -> Figure:
 
 
 def _one_each(misread: Sequence[Answered]) -> list[Answered]:
-    """Each kind of mistake once before any comes twice, and no image twice."""
+    """Return the images so that each kind of mistake comes once before any repeats, without duplicates."""
     seen: set[bytes] = set()
     kinds: dict[tuple[int, int], int] = {}
     ranked = []

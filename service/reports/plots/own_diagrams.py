@@ -1,6 +1,6 @@
-"""The diagrams that a notebook draws itself, and of each kind one beside what happened, with what differs highlighted.
+"""The diagrams in a notebook, and for each kind a comparison with the recorded events.
 
-Of several diagrams of a kind the one that is closest to what happened is compared. Shown, never marked.
+Of several diagrams of a kind, the one closest to the events is compared. It is shown and never marked.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _TITLES: Mapping[DiagramKind, str] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class OwnDiagram:
-    """A diagram of the notebook's, its plots, and how it differs from what happened, if it is compared with that."""
+    """A diagram of the notebook with its plots, and its differences from the events if it is compared."""
 
     cell: DiagramCell
     differences: Differences | None
@@ -40,9 +40,9 @@ class OwnDiagram:
 
 
 def own_diagrams(grade: Grade, cells: Sequence[DiagramCell], language: Language = ENGLISH) -> tuple[OwnDiagram, ...]:
-    """The diagrams of the notebook's ``cells``, from the top.
+    """Return the diagrams of the notebook's ``cells``, from top to bottom.
 
-    What happened is that of the first trial in which anything was sent, a visible one where there is one.
+    The events are those of the first trial with messages, preferably a visible one.
     """
     talking = [index for index, trial in enumerate(grade.trials) if trial.recording.messages]
     talking.sort(key=lambda index: is_for_staff(grade.trials[index].visibility))
@@ -58,12 +58,12 @@ def own_diagrams(grade: Grade, cells: Sequence[DiagramCell], language: Language 
 
 
 def title_of_cell(cell: DiagramCell, language: Language = ENGLISH) -> str:
-    """What a cell's diagram is called."""
+    """Return the title of a cell's diagram."""
     return language.say(_TITLES[cell.diagram.kind], cell=cell.cell)
 
 
 def _closest(grade: Grade, cells: Sequence[DiagramCell], trial: int) -> dict[int, Differences]:
-    """Of each kind the diagram that is most like it, the last of equals, by its cell."""
+    """Return by cell the diagram of each kind that is closest to the recorded events, the last among equals."""
     told = talks(grade.trials[trial].recording)
     best: dict[DiagramKind, tuple[int, Differences]] = {}
     for cell in cells:

@@ -1,6 +1,6 @@
-"""Draws where the robot went: the path over the floor, with start, end, headings, pen, touches and images taken.
+"""Drawing of the robot's path over the floor, with start, end, headings, pen, touches and image positions.
 
-The floor is an image that the caller gives; nothing here knows how floors are made.
+The caller supplies the floor image.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ Pixels = NDArray[np.uint8]
 
 FLOOR_WIDTH, FLOOR_HEIGHT = 2362.0, 1143.0
 _MARGIN = 90.0  # mm around the path
-_SMALLEST_VIEW = 520.0  # mm, so that a robot that stands still is seen among its surroundings
+_SMALLEST_VIEW = 520.0  # mm, so that a robot that stands still is shown with its surroundings
 _BEYOND = 700.0  # mm outside the floor that are still shown
 _WHOLE_FLOOR_SHARE = 0.55  # a path that needs more of the floor than this is shown on all of it
 _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.10  # inches
@@ -72,17 +72,17 @@ class Viewport:
 
     @property
     def width(self) -> float:
-        """From the left edge to the right, mm."""
+        """The width, mm."""
         return self.right - self.left
 
     @property
     def height(self) -> float:
-        """From the bottom edge to the top, mm."""
+        """The height, mm."""
         return self.top - self.bottom
 
 
 def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Figure:
-    """The path of ``trial``'s robot. ``floor`` is (1143, 2362, 3), row 0 at y = 1143 mm; None draws it white."""
+    """Draw the path of ``trial``'s robot. ``floor`` is (1143, 2362, 3), row 0 at y = 1143 mm; None draws it white."""
     recording = trial.recording
     points = _points(recording)
     partner = recording.partner
@@ -131,7 +131,7 @@ def _subtitle(trial: TrialResult) -> str:
 
 
 def _points(recording: Recording) -> NDArray[np.float64]:
-    """x, y, heading of the start and of every tick, shape (n + 1, 3); rows that are not finite are left out."""
+    """Return x, y and heading of the start and every tick, shape (n + 1, 3), without rows that are not finite."""
     ticks, start = recording.ticks, recording.start
     rows = np.column_stack((ticks.x, ticks.y, ticks.heading)) if len(ticks) else np.empty((0, 3))
     rows = np.vstack(([[start.x, start.y, start.heading]], rows))
@@ -156,7 +156,7 @@ def _view(recording: Recording, points: NDArray[np.float64]) -> Viewport:
 
 
 def _shaped(view: Viewport) -> Viewport:
-    """``view`` widened to a shape between square and the floor's own."""
+    """Return ``view`` widened to a shape between a square and the floor's."""
     width, height = max(view.width, _SMALLEST_VIEW), max(view.height, _SMALLEST_VIEW / 1.6)
     width = max(width, height * 1.1)
     height = max(height, width * FLOOR_HEIGHT / FLOOR_WIDTH)
@@ -165,7 +165,7 @@ def _shaped(view: Viewport) -> Viewport:
 
 
 def draw_floor(axes: Axes, floor: Pixels | None, view: Viewport) -> None:
-    """The part of the floor that is in ``view``, lifted towards white; without a floor a white one."""
+    """Draw the part of the floor in ``view``, lightened; white if there is no floor."""
     if floor is None:
         axes.add_patch(Rectangle((0, 0), FLOOR_WIDTH, FLOOR_HEIGHT, facecolor="white", edgecolor=RULE))
         return
@@ -178,7 +178,7 @@ def draw_floor(axes: Axes, floor: Pixels | None, view: Viewport) -> None:
     part = floor[top:bottom, left:right].astype(np.float32)
     part = part[: part.shape[0] // step * step, : part.shape[1] // step * step]
     part = part.reshape(part.shape[0] // step, step, part.shape[1] // step, step, 3).mean(axis=(1, 3))
-    # Lifted towards white, so that a path over black stays visible and print saves ink.
+    # Lightened, so that a path over black stays visible and printing saves ink.
     faded = np.rint(72 + part * (183 / 255)).astype(np.uint8)
     axes.imshow(
         faded,
@@ -202,7 +202,7 @@ def _draw_beacon(axes: Axes, recording: Recording) -> None:
 
 
 def _draw_way(axes: Axes, recording: Recording, points: NDArray[np.float64], per_inch: float, colour: str) -> None:
-    """All that is told of one robot."""
+    """Draw everything about one robot."""
     _draw_trace(axes, recording, points, colour)
     _draw_robot(axes, recording.start, recording, dashed=True)
     _draw_robot(axes, recording.end, recording, dashed=False)
@@ -224,7 +224,7 @@ def _draw_trace(axes: Axes, recording: Recording, points: NDArray[np.float64], c
 
 
 def _pen_strokes(recording: Recording, count: int) -> list[tuple[int, int]]:
-    """Row ranges of the path that were driven with the pen down."""
+    """Return the row ranges of the path with the pen down."""
     strokes: list[tuple[int, int]] = []
     since: int | None = None
     for tick, down in (*recording.pen, (count, False)):
@@ -237,7 +237,7 @@ def _pen_strokes(recording: Recording, count: int) -> list[tuple[int, int]]:
 
 
 def _evenly(points: NDArray[np.float64], wanted: int) -> list[int]:
-    """Rows that are evenly far apart in distance and turning, without the first and last."""
+    """Return rows at even intervals of distance and turning, without the first and last."""
     steps = np.hypot(np.diff(points[:, 0]), np.diff(points[:, 1])) + 0.8 * np.abs(np.diff(points[:, 2]))
     travelled = np.concatenate(([0.0], np.cumsum(steps)))
     count = min(wanted, int(travelled[-1] // 60))
@@ -280,7 +280,7 @@ def _goes_on(points: NDArray[np.float64], view: Viewport) -> bool:
 
 
 def _legend(recording: Recording, view: Viewport) -> list[Artist]:
-    """A handle for every kind of thing that is in the image."""
+    """Return a legend handle for every kind of element in the image."""
     handles: list[Artist] = [
         Line2D([], [], marker="o", linestyle="none", markersize=7, color="white", markeredgecolor=INK,
                markeredgewidth=1.6, label="start"),

@@ -1,6 +1,6 @@
-"""What is written along a path: times, and where the robot began, ended, touched something and took images.
+"""Labels along a path: times, start, end, touches, and image positions.
 
-The path itself, the floor and the robot are ``path.py``'s.
+``path.py`` draws the path itself, the floor and the robot.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from sim.recorded import robot_of, ticks_until
 from sim.recording import Pose, Recording
 
 _TIME_SIZE, _NUMBER_SIZE = 7.6, 7.8  # points
-_FROM_PATH = 0.17, 0.15  # inches to the middle of a time
-_LINE = 0.16  # inches from a word to one above it
+_FROM_PATH = 0.17, 0.15  # inches to the centre of a time
+_LINE = 0.16  # inches between two words above each other
 
 
 def placed(pose: Pose, x: float, y: float) -> tuple[float, float]:
-    """World coordinates of a point of the robot (x right, y forward, mm)."""
+    """Return the world coordinates of a point of the robot (x right, y forward, mm)."""
     angle = math.radians(pose.heading - 90)
     cos, sin = math.cos(angle), math.sin(angle)
     return pose.x + cos * x - sin * y, pose.y + sin * x + cos * y
 
 
 def draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], per_inch: float, colour: str) -> None:
-    """Small times along the path, where the robot had moved on far enough to read them apart.
+    """Write small times along the path, at distances that keep them readable.
 
-    ``points`` are x, y in mm and the heading in degrees, row by row; an inch of the plot shows ``per_inch`` mm.
+    ``points`` are x, y in mm and the heading in degrees, row by row. An inch of the plot shows ``per_inch`` mm.
     """
     ends = ((recording.start.x, recording.start.y), (recording.end.x, recording.end.y))
     taken = [end for end in ends if math.isfinite(sum(end))]
@@ -46,7 +46,7 @@ def draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], pe
         taken.append((x, y))
         axes.plot([x], [y], "o", markersize=3, color="white", markeredgecolor=colour, markeredgewidth=0.9, zorder=5)
         text = f"{second} s"
-        # To the robot's right, and the second one's to its left: two may drive the same way.
+        # On the robot's right, and for the second robot on its left, because both may drive the same way.
         angle = math.radians(float(points[row, 2]) + (90 if colour == SECOND_ROBOT else -90))
         sides = [
             (x + way * _FROM_PATH[0] * per_inch * math.cos(angle), y + way * _FROM_PATH[1] * per_inch * math.sin(angle))
@@ -60,7 +60,7 @@ def draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], pe
 
 
 def draw_marks(axes: Axes, recording: Recording, per_inch: float, colour: str) -> None:
-    """The start and the end, what was touched, and the places of images with their numbers."""
+    """Draw the start, the end, touches, and the places of images with their numbers."""
     for touch in recording.touches[:40]:
         axes.plot([touch.pose.x], [touch.pose.y], "x", markersize=9, color="white", markeredgewidth=4, zorder=6)
         axes.plot([touch.pose.x], [touch.pose.y], "x", markersize=8, color=FAULT, markeredgewidth=2, zorder=6)
@@ -86,7 +86,7 @@ def _draw_images(axes: Axes, recording: Recording, per_inch: float) -> None:
                 Rectangle(corner, image.side, image.side, facecolor="none", edgecolor=edge, linewidth=width, zorder=6)
             )
     numbered: list[tuple[float, float]] = []
-    # The last first: of places too close to be numbered apart it is the one that is kept.
+    # The last one first, so that its number is kept if places are too close together.
     for (column, row), counts in reversed(places.items()):
         text = str(counts[0]) if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
         x, y = column * 8.0, row * 8 + 10 + 0.10 * per_inch
@@ -97,12 +97,12 @@ def _draw_images(axes: Axes, recording: Recording, per_inch: float) -> None:
 
 
 def _half_width(text: str) -> float:
-    """About half of what a time or a number takes, inches."""
+    """Return about half the width of a time or a number, inches."""
     return 0.032 * len(text) + 0.03
 
 
 def _clear(place: tuple[float, float], recording: Recording, per_inch: float) -> bool:
-    """Whether a time there would be written over no touch."""
+    """Return whether a time at this place would not overlap a touch."""
     return all(math.dist(place, (touch.pose.x, touch.pose.y)) > 0.26 * per_inch for touch in recording.touches[:40])
 
 

@@ -1,6 +1,6 @@
-"""Draws the images that a light sensor sent: all of it, the focus that a network is shown, and what was answered.
+"""Drawing of images from a light sensor: the whole image, the focus that a network gets, and the answer.
 
-Whether an answer is right was decided when the work was marked; here it is only shown, by sign and word.
+Answers were judged during grading. Here they are only shown, with a sign and a word.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from service.reports.plots.style import FAULT, HEAD, INK, RULE, SAID, WIDTH, axe
 from service.reports.readable import one_line
 
 _CARD_WIDTH, _CARD_HEIGHT = 1.93, 1.70
-_LINE = 28  # characters that fit under a card
-_SIDE = 0.83  # inches of an image
+_LINE = 28  # characters in a line under a card
+_SIDE = 0.83  # inches, the side of an image
 _COLUMNS = 2
 
 
 def draw_predictions(predictions: Sequence[Prediction], title: str) -> Figure:
-    """Cards of at most ``MOST_PREDICTIONS`` images, wrong answers first where not all fit."""
+    """Draw cards of at most ``MOST_PREDICTIONS`` images, wrong answers first if not all fit."""
     shown = chosen_predictions(predictions)
     rows = -(-len(shown) // _COLUMNS)
     height = rows * _CARD_HEIGHT

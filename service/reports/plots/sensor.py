@@ -1,6 +1,6 @@
-"""Draws what the robot's sensors read over time, with what it said and sent above.
+"""Drawing of sensor readings over time, with what the robot said and sent above.
 
-It shows the recorded readings of every tick, whether or not the program asked for them.
+It shows the recorded readings of every tick, even if the program did not read them.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ from sim.recorded import seconds_at
 from sim.recording import COLUMNS, TICK, Recording
 
 _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.12  # inches
-_GAP = 0.20  # between panels, room for the panel's own title
-_ROW = 0.15  # of a strip of events
-_MOST_MARKS = 400  # of one kind; more would be a solid bar
+_GAP = 0.20  # between panels, room for the panel's title
+_ROW = 0.15  # height of a strip of events
+_MOST_MARKS = 400  # of one kind; more would form a solid bar
 
 
 @dataclass(frozen=True, slots=True)
 class ReadingCurve:
-    """One reading over time; the second of a panel is drawn dashed."""
+    """One reading over time. The second of a panel is dashed."""
 
     label: str
     values: NDArray[np.float64]
@@ -52,7 +52,7 @@ class ReadingCurve:
 
 @dataclass(frozen=True, slots=True)
 class ReadingPanel:
-    """Curves that share a unit."""
+    """Curves with the same unit."""
 
     panel: Panel
     curves: tuple[ReadingCurve, ...]
@@ -60,7 +60,7 @@ class ReadingPanel:
 
 @dataclass(frozen=True, slots=True)
 class Strip:
-    """Moments of one kind, drawn as marks on a line of their own."""
+    """Moments of one kind, drawn as marks on a separate line."""
 
     label: str
     times: tuple[float, ...]
@@ -69,7 +69,7 @@ class Strip:
 
 
 def draw_sensors(trial: TrialResult, title: str) -> Figure:
-    """Reflected light (mean red, 0..255), distance (cm), gyro and wheel encoders (degrees) of ``trial``."""
+    """Draw reflected light (mean red, 0..255), distance (cm), gyro and wheel encoders (degrees) of ``trial``."""
     recording = trial.recording
     panels, strips = panels_of(recording), strips_of(recording)
     strip_height = _ROW * len(strips) + 0.10 if strips else 0.0
@@ -97,7 +97,7 @@ def draw_sensors(trial: TrialResult, title: str) -> Figure:
 
 
 def panels_of(recording: Recording) -> tuple[ReadingPanel, ...]:
-    """The panels that ``draw_sensors`` shows, top to bottom."""
+    """Return the panels for ``draw_sensors``, top to bottom."""
     told = recording.ticks.told()
     curves: dict[Panel, list[ReadingCurve]] = {}
     for column in COLUMNS:
@@ -110,7 +110,7 @@ def panels_of(recording: Recording) -> tuple[ReadingPanel, ...]:
 
 
 def strips_of(recording: Recording) -> tuple[Strip, ...]:
-    """The kinds of events that happened at all, with their times in seconds."""
+    """Return the kinds of events that occurred, with their times in seconds."""
     answers = [m for m in recording.messages if m.sender == "responder"]
     heard = [m for m in recording.messages if m.sender == "partner"]
     strips = (

@@ -1,6 +1,6 @@
-"""The images that a light sensor sent: which are shown, which were misread, and what is like them. Draws nothing.
+"""Selection of light sensor images: those to show, the misread ones, and their nearest neighbours. Draws nothing.
 
-Nearest is by the grey values of the focus that a network is shown; what is right was decided when the work was marked.
+Distance is by the grey values of the focus that a network gets. Answers were judged during grading.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from sim.recording import Image
 
 MOST_PREDICTIONS = 12
 MOST_MISREAD = 6
-#: The part of the 20 x 20 image that lies wholly inside the round sensor: left, upper, right, lower.
+#: The part of the 20 x 20 image inside the round sensor: left, upper, right, lower.
 FOCUS = (3, 3, 17, 17)
 
 
 @dataclass(frozen=True, slots=True)
 class Misread:
-    """An image that was misread, and the nearest rightly read one of its truth and of its answer, if there is one."""
+    """A misread image, and the nearest correctly read ones of its truth and of its answer, if they exist."""
 
     number: int  # of the image, from 1
     prediction: Prediction
@@ -32,31 +32,31 @@ class Misread:
 
 
 def chosen_predictions(predictions: Sequence[Prediction]) -> tuple[int, ...]:
-    """Indices of the images to show, ascending; if there are too many, all wrong ones come first."""
+    """Return the indices of the images to show, ascending. If there are too many, wrong ones have priority."""
     order = sorted(range(len(predictions)), key=lambda index: (is_right(predictions[index]), index))
     return tuple(sorted(order[:MOST_PREDICTIONS]))
 
 
 def is_right(prediction: Prediction) -> bool:
-    """Whether the answer was the truth."""
+    """Return whether the answer equals the truth."""
     return prediction.answer is not None and prediction.answer == prediction.truth
 
 
 def sensor_image(image: Image) -> Pixels.Image:
-    """What the left sensor sent, as an RGB image of ``image.side`` squared."""
+    """Return the left sensor's image as RGB, ``image.side`` squared."""
     return Pixels.frombytes("RGBA", (image.side, image.side), image.left).convert("RGB")
 
 
 def focus_image(image: Image) -> Pixels.Image:
-    """The greyscale crop that a network is shown; sensors of another size than 20 are shown whole."""
+    """Return the greyscale crop that a network gets. Sensors of a size other than 20 are shown whole."""
     whole = sensor_image(image).convert("L")
     return whole.crop(FOCUS) if image.side == 20 else whole
 
 
 def misread(predictions: Sequence[Prediction]) -> tuple[Misread, ...]:
-    """Every image that was answered, and wrongly, in the order in which they were sent.
+    """Return every wrongly answered image, in the order sent.
 
-    The nearest ones are looked for only for the images that are drawn.
+    Neighbours are searched only for the images that are drawn.
     """
     wrong = [
         (number, prediction)

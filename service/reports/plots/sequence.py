@@ -1,6 +1,6 @@
-"""The conversation of a trial as steps between parties, the way a sequence diagram tells it.
+"""The conversation of a trial as steps between parties, for a sequence diagram.
 
-It decides what is told and what is left out; pages list it, and ``lanes.py`` draws it beside a notebook's diagram.
+The module selects the steps. Pages list them, and ``lanes.py`` draws them beside a notebook's diagram.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from service.reports.readable import message_words, one_line
 from service.reports.robots import PARTNER_OF, SECOND, robots_of
 from sim.recording import Call, Message, Recording
 
-#: In the order of their lanes. A name bound to a network, such as MLP, is the party ``network``.
+#: In the order of their lanes. A name bound to a network, such as MLP, belongs to the party ``network``.
 PARTIES = ("robot", "responder", SECOND, "parser", "agent", "logger", "network")
 MOST_EXCHANGES = 6
 MOST_STEPS = 40
-#: Of one message, however often it makes the responder call.
+#: Per message, however many calls it causes in the responder.
 MOST_CALL_STEPS = 60
 _KNOWN: Mapping[str, str] = MappingProxyType({party: party for party in PARTIES})
 
@@ -29,7 +29,7 @@ Kind = Literal["message", "call", "return", "lost", "silence"]
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One arrow: ``t`` (seconds) is when it started, None inside a process, where no time passes."""
+    """One arrow. ``t`` (seconds) is its start; None inside a process, where no time passes."""
 
     kind: Kind
     source: str
@@ -41,7 +41,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """So many exchanges, or steps inside an exchange, are left out here."""
+    """The number of exchanges, or steps inside an exchange, that are left out here."""
 
     count: int
     what: Literal["exchange", "step"] = "exchange"
@@ -49,7 +49,7 @@ class Gap:
 
 @dataclass(frozen=True, slots=True)
 class SequenceDiagram:
-    """``parties`` are those that take part, robot and responder always. ``total`` counts all exchanges."""
+    """A conversation. ``parties`` take part, always with robot and responder. ``total`` counts all exchanges."""
 
     parties: tuple[str, ...]
     steps: tuple[Step | Gap, ...]
@@ -59,7 +59,7 @@ class SequenceDiagram:
 
 @dataclass(frozen=True, slots=True)
 class _Exchange:
-    """A text of the robot's with its answers, or an answer to nothing; places among what was told of that robot."""
+    """A message from the robot with its answers, or an unsolicited answer; indices into that robot's messages."""
 
     sent: int | None
     answers: tuple[int, ...]
@@ -68,22 +68,22 @@ class _Exchange:
 
     @property
     def messages(self) -> Iterator[Message]:
-        """The text, if there is one, then the answers."""
+        """The message, if there is one, then the answers."""
         yield from (self.recording.messages[i] for i in (self.sent, *self.answers) if i is not None)
 
     @property
     def begin(self) -> float:
-        """When the first of them was sent."""
+        """The time at which the first of them was sent."""
         return next(self.messages).t
 
 
 def conversation(
     recording: Recording, most_exchanges: int = MOST_EXCHANGES, most_steps: int = MOST_STEPS
 ) -> SequenceDiagram:
-    """What crossed the bridge in ``recording`` and what the responder called, within the limits given.
+    """Return the messages across the bridge and the responder's calls, within the given limits.
 
-    Kept are the first exchanges and, of the later ones, those in which what was sent again got through, or something
-    was lost or wrong.
+    It keeps the first exchanges. Of the later ones, it keeps those in which a repeated message got through, or
+    something was lost or wrong.
     """
     exchanges = [exchange for robot, own in robots_of(recording) for exchange in _exchanges(own, robot)]
     if recording.partner is not None:
@@ -110,12 +110,12 @@ def conversation(
 
 
 def troubled(message: Message) -> bool:
-    """Whether a message was lost, never arrived, or could not be read."""
+    """Return whether a message was lost, never arrived, or could not be read."""
     return message.delivered is None or bool(befell(message))
 
 
 def _exchanges(recording: Recording, robot: str) -> Iterator[_Exchange]:
-    """What this robot sent and was answered; what the other sent to it is told with the other's."""
+    """Yield this robot's messages with their answers. Messages from the other robot belong to the other's list."""
     messages = recording.messages
     answers: dict[int, list[int]] = {}
     for index, message in enumerate(messages):
@@ -147,7 +147,7 @@ def _chosen(exchanges: Sequence[_Exchange], most_exchanges: int, most_steps: int
 
 
 def _got_through(exchanges: Sequence[_Exchange], wrong: Sequence[int]) -> Iterator[int]:
-    """The exchanges in which a text that was sent before, and went astray, got through."""
+    """Yield the exchanges in which a text got through that was lost before."""
     astray: set[str] = set()
     failed = set(wrong)
     for number, exchange in enumerate(exchanges):
@@ -165,7 +165,7 @@ def _went_wrong(exchange: _Exchange) -> bool:
 
 
 def _told(exchange: _Exchange) -> Iterator[tuple[float, list[Step | Gap]]]:
-    """Groups of steps with the time at which each group is told."""
+    """Yield groups of steps, with the time of each group."""
     recording, robot = exchange.recording, exchange.robot
     if exchange.sent is not None:
         message = recording.messages[exchange.sent]
@@ -196,7 +196,7 @@ def _crossing(message: Message, robot: str) -> Step:
 
 
 def inside(recording: Recording, message: int) -> Iterator[Step]:
-    """What was called, and what agents were asked, until the robot's message was answered; before any, for -1."""
+    """Yield the calls and agent messages until the robot's message was answered; for -1, those before any message."""
     calls = sorted((call for call in recording.calls if call.message == message), key=_before)
     told, shown_at = 0, recording.messages[message].t if message >= 0 else 0.0
     for place, each in enumerate(recording.agent_messages):
@@ -216,7 +216,7 @@ def _before(call: Call) -> int:
 
 
 def _calls(calls: Iterable[Call]) -> Iterator[Step]:
-    """Each call, then what was called inside it, then what it returned; ``calls`` come as they ended."""
+    """Yield each call, the calls inside it, and its return. ``calls`` are in the order in which they ended."""
     ended: list[tuple[int, list[Step]]] = []  # depth and steps of calls whose caller has not ended yet
     for call in calls:
         inner: list[Step] = []

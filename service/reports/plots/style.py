@@ -1,6 +1,6 @@
-"""What every plot shares: paper size, type, colours that differ in lightness too, and how a figure becomes a PNG.
+"""The common style of plots: page size, type, colours that also differ in lightness, and PNG output.
 
-It holds no state and never touches pyplot, so plots can be drawn in any process and come out the same.
+It holds no state and never uses pyplot, so plots are the same in any process.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from PIL import Image
 from service.reports.plots.plot import DPI
 from service.reports.readable import one_line
 
-# A file called matplotlibrc in the folder that a command is started in changes no plot.
+# A file called matplotlibrc in the current folder must not change plots.
 matplotlib.rcParams.update({name: value for name, value in matplotlib.rcParamsDefault.items() if "backend" not in name})
 
-#: Inches. A phone shows it 390 pixels wide, on which the smallest type is 11 pixels high.
+#: Inches. A phone shows it 390 pixels wide, with the smallest type 11 pixels high.
 WIDTH = 3.9
 _SMALLEST = 8.0  # points
-_CHARACTERS = 15.2  # of a subtitle that fit into an inch
+_CHARACTERS = 15.2  # characters of a subtitle in an inch
 _MOST_PIXELS = 6_000_000
 
 INK = "#1c2630"
@@ -48,9 +48,9 @@ _BOLD = FONT_FILE.with_name("DejaVuSans-Bold.ttf")
 
 
 def new_figure(height: float, title: str, subtitle: str = "", width: float = WIDTH) -> Figure:
-    """A white figure ``width`` x ``height`` inches with its title at the top left; ``HEAD`` inches are taken.
+    """Return a white figure of ``width`` x ``height`` inches with its title at the top left, in ``HEAD`` inches.
 
-    One that would take too much memory is coarser.
+    Very large figures get a lower resolution to save memory.
     """
     dpi = min(DPI, math.sqrt(_MOST_PIXELS / (width * height)))
     figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
@@ -76,7 +76,7 @@ def write(
     ha: str = "left",
     va: str = "baseline",
 ) -> Text:
-    """Text at ``x``, ``y`` inches from the lower left corner of the figure."""
+    """Write text at ``x``, ``y`` inches from the lower left corner of the figure."""
     width, height = figure.get_size_inches()
     return figure.text(
         x / width, y / height, drawable(text), color=colour, ha=ha, va=va, font=font(size, bold=bold),
@@ -85,7 +85,7 @@ def write(
 
 
 def axes_at(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
-    """Axes at a rectangle given in inches, with thin rules and small type."""
+    """Return axes at a rectangle in inches, with thin rules and small type."""
     figure_width, figure_height = figure.get_size_inches()
     axes = figure.add_axes((left / figure_width, bottom / figure_height, width / figure_width, height / figure_height))
     for side in axes.spines.values():
@@ -97,24 +97,24 @@ def axes_at(figure: Figure, left: float, bottom: float, width: float, height: fl
 
 
 def set_tick_type(axes: Axes, size: float = 8) -> None:
-    """Sets the tick labels' type, points."""
+    """Set the size of the tick labels, in points."""
     axes.tick_params(labelsize=max(size, _SMALLEST), labelfontfamily="DejaVu Sans")
 
 
 @lru_cache(maxsize=64)
 def font(size: float, *, bold: bool = False) -> FontProperties:
-    """The type that comes with matplotlib, whatever the machine has installed; not too small for a phone."""
+    """Return the type bundled with matplotlib, independent of installed fonts, in a size readable on a phone."""
     return FontProperties(fname=str(_BOLD if bold else FONT_FILE), size=max(size, _SMALLEST))
 
 
 def drawable(text: str) -> str:
-    """``text`` with every character that the type lacks replaced, so that none is drawn as an empty box."""
+    """Replace every character that the type lacks, so that none is drawn as an empty box."""
     known = _known_characters()
     return "".join(character if character == "\n" or ord(character) in known else "\ufffd" for character in text)
 
 
 def png(figure: Figure) -> bytes:
-    """The figure as a PNG of at most 256 colours, without metadata; the same figure gives the same bytes."""
+    """Return the figure as a PNG of at most 256 colours, without metadata; equal figures give equal bytes."""
     canvas = FigureCanvasAgg(figure)
     canvas.draw()  # type: ignore[no-untyped-call]
     stream = io.BytesIO()
@@ -123,10 +123,10 @@ def png(figure: Figure) -> bytes:
 
 
 def _with_palette(rgba: NDArray[np.uint8]) -> Image.Image:
-    """The same image with at most 256 colours, chosen by median cut.
+    """Return the image with at most 256 colours, chosen by median cut.
 
-    Plots are flat: their pixels come in runs, and of their few thousand colours each is looked at once (weighted by the
-    root of how often it is there), which costs a fifth of looking at every pixel.
+    Plots are flat: their pixels come in runs. Each of their few thousand colours is examined once, weighted by the root
+    of its frequency, which costs a fifth of examining every pixel.
     """
     height, width = rgba.shape[:2]
     pixels = np.ascontiguousarray(rgba).view(np.uint32).ravel()
@@ -145,5 +145,5 @@ def _with_palette(rgba: NDArray[np.uint8]) -> Image.Image:
 
 @lru_cache(maxsize=1)
 def _known_characters() -> frozenset[int]:
-    # Both cuts are drawn with, and the bold one has fewer characters.
+    # Both weights are used, and the bold one has fewer characters.
     return frozenset(get_font(str(FONT_FILE)).get_charmap()) & frozenset(get_font(str(_BOLD)).get_charmap())

@@ -1,6 +1,6 @@
-"""Where images were taken along a track, and which trials have one. Draws nothing.
+"""The positions of images along a track, and the trials that have one. Draws nothing.
 
-What is right was decided when the work was marked.
+Answers were judged during grading.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from service.grading.judging.geometry import part_at
 from service.reports.plots.sensor_images import is_right
 from sim.recording import Recording
 
-_LEAST_WAY = 60.0  # mm that images must be apart for a track
+_LEAST_WAY = 60.0  # mm, the least extent of a track
 
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """One image: where the left sensor was (mm), how far the robot had driven (mm), and what came of it."""
+    """One image: the left sensor's position (mm), the distance driven (mm), and the result."""
 
     x: float
     y: float
@@ -31,7 +31,7 @@ class Taken:
 
 
 def tracks(predictions: Sequence[Prediction], trials: Sequence[TrialResult]) -> tuple[int, ...]:
-    """The trials, by index, in which images were taken at places far enough apart to speak of a track."""
+    """Return the indices of the trials whose images were taken far enough apart to form a track."""
     found = []
     for index in dict.fromkeys(prediction.trial for prediction in predictions):
         places = [part_at(trials[index].recording, "left", s.image.pose) for s in predictions if s.trial == index]
@@ -41,7 +41,7 @@ def tracks(predictions: Sequence[Prediction], trials: Sequence[TrialResult]) -> 
 
 
 def taken(predictions: Sequence[Prediction], trials: Sequence[TrialResult], index: int) -> tuple[Taken, ...]:
-    """The images of one trial, in the order in which they were sent."""
+    """Return the images of one trial, in the order sent."""
     recording = trials[index].recording
     way = _way_driven(recording)
     return tuple(
@@ -58,7 +58,7 @@ def taken(predictions: Sequence[Prediction], trials: Sequence[TrialResult], inde
 
 
 def worst_track(predictions: Sequence[Prediction], trials: Sequence[TrialResult]) -> int:
-    """Of the trials with a track the one with the smallest share of right images, the first of equals."""
+    """Return the trial with a track and the smallest fraction of correct images, the first among equals."""
 
     def share_right(index: int) -> float:
         own = [is_right(prediction) for prediction in predictions if prediction.trial == index]
@@ -68,7 +68,7 @@ def worst_track(predictions: Sequence[Prediction], trials: Sequence[TrialResult]
 
 
 def _way_driven(recording: Recording) -> list[float]:
-    """How far the middle of the axle has gone at the start and after each tick, mm."""
+    """Return the distance driven by the centre of the axle at the start and after each tick, mm."""
     points = [(recording.start.x, recording.start.y), *zip(recording.ticks.x, recording.ticks.y, strict=True)]
     way = [0.0]
     for before, after in pairwise(points):

@@ -1,6 +1,6 @@
-"""Who told whom how often in a trial: the robot, the responder, its agents, and what these called.
+"""Message and call counts of a trial by sender and receiver: the robot, the responder, its agents, and callees.
 
-What was said is ``sequence.py``'s; here it is only counted, and of the calls that a text causes the first fifty.
+``sequence.py`` has the texts. This module only counts, and includes only the first fifty calls of a message.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from service.reports.robots import PARTNER_OF, SECOND, called, robots_of
 from sim.recording import Call, Recording
 from submissions.diagram import Diagram, DiagramActor, DiagramArrow, Divider
 
-#: Networks that are counted by the names that they are bound to; those that are called later count as one.
+#: Networks that are counted by name. Networks called later are counted together.
 _MOST_NETWORKS = 4
 _OTHERS = "other networks"
-#: Of what was said, beside a diagram whose labels are words.
+#: The longest label of a message, beside a diagram with words as labels.
 _LONGEST_LABEL = 32
 _NAMED = frozenset(PARTIES) - {"network"}
 
@@ -30,7 +30,7 @@ TalkKind = Literal["message", "call", "return"]
 
 @dataclass(frozen=True, slots=True)
 class Talk:
-    """How often ``source`` told ``target`` something, and how often that got lost on the way."""
+    """The number of messages or calls from ``source`` to ``target``, and how many were lost."""
 
     source: str
     target: str
@@ -40,7 +40,7 @@ class Talk:
 
 
 def talks(recording: Recording) -> tuple[Talk, ...]:
-    """Everything that was told, by who told whom; messages first."""
+    """Return the counts by sender and receiver, messages first."""
     counts: Counter[tuple[str, str, TalkKind]] = Counter()
     lost: Counter[tuple[str, str, TalkKind]] = Counter()
     for talk, arrived in _told(recording):
@@ -50,11 +50,11 @@ def talks(recording: Recording) -> tuple[Talk, ...]:
 
 
 def _told(recording: Recording) -> Iterator[tuple[tuple[str, str, TalkKind], bool]]:
-    """Each text and each call: who told whom, and whether it arrived."""
+    """Yield sender, receiver and kind of each message and call, and whether it arrived."""
     for robot, own in robots_of(recording):
         for message in own.messages:
             other = PARTNER_OF[robot] if message.to_partner else "responder"
-            if message.sender != "partner":  # it is told as the other robot's
+            if message.sender != "partner":  # the other robot's list has it
                 way = (robot, other) if message.sender == "robot" else (other, robot)
                 yield (*way, "message"), message.delivered is not None
     calls = [call for _, own in robots_of(recording) for call in own.calls]
@@ -62,19 +62,19 @@ def _told(recording: Recording) -> Iterator[tuple[tuple[str, str, TalkKind], boo
     for call in calls:
         caller, callee = names.get(call.caller, "responder"), names[call.callee]
         yield (caller, callee, "call"), True
-        if call.result != "None":  # a logger gives nothing back
+        if call.result != "None":  # a logger returns nothing
             yield (callee, caller, "return"), True
     for each in recording.agent_messages:
         yield (each.sender, each.receiver, "call" if each.reply_to is None else "return"), True
 
 
 def party_of(name: str) -> str:
-    """The party that a name in ``talks`` belongs to; what is none of them by name is a network."""
+    """Return the party of a name in ``talks``. Unknown names are networks."""
     return name if name in _NAMED else "network"
 
 
 def talk_words(told: tuple[Talk, ...], language: Language = ENGLISH) -> str:
-    """Who told whom how often, in a sentence; empty where nobody told anything."""
+    """Return the counts as a sentence; empty if there are none."""
     counts = ", ".join(_told_how_often(each, language) for each in told if each.kind != "return")
     return language.say("How often who told whom: %(counts)s.", counts=counts) if counts else ""
 
@@ -89,7 +89,7 @@ def _told_how_often(talk: Talk, language: Language) -> str:
 
 
 def block_diagram(told: tuple[Talk, ...]) -> Diagram:
-    """The same as boxes and arrows with counts; a call that gave something back has an arrow at both ends."""
+    """Return the counts as a block diagram. A call that returned something has an arrow at both ends."""
     returned = {(talk.source, talk.target) for talk in told if talk.kind == "return"}
     arrows = tuple(
         DiagramArrow(
@@ -108,7 +108,7 @@ def block_diagram(told: tuple[Talk, ...]) -> Diagram:
 
 
 def sequence_diagram(told: SequenceDiagram) -> Diagram:
-    """What was told, with its words, as a sequence diagram that stands beside a notebook's own."""
+    """Return the conversation as a sequence diagram, for display beside a notebook's own."""
     return Diagram("seqdiag", tuple(DiagramActor(party, party) for party in told.parties), tuple(_steps(told)))
 
 
@@ -129,7 +129,7 @@ def _steps(told: SequenceDiagram) -> Iterator[DiagramArrow | Divider]:
 
 
 def _callees(calls: Sequence[Call], agents: Iterable[str]) -> Mapping[str, str]:
-    """What each name that was called is shown as."""
+    """Return the display name of each called name."""
     networks = dict.fromkeys(call.callee for call in calls if call.callee not in _NAMED)
     shown = {name: one_line(name, 20) if place < _MOST_NETWORKS else _OTHERS for place, name in enumerate(networks)}
     return MappingProxyType(shown | {name: name for name in (*_NAMED, *agents)})

@@ -1,6 +1,6 @@
-"""Draws recognition along a track: where images were taken, which were named rightly, what share.
+"""Drawing of recognition along a track: image positions, correct answers, and the fraction correct.
 
-What is right was decided when the work was marked; the floor is an image that the caller gives.
+Answers were judged during grading. The caller supplies the floor image.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from service.reports.plots.style import (
 from service.reports.plots.taken import Taken, taken, tracks, worst_track
 
 _LEFT_EDGE, _RIGHT_EDGE, _FOOT = 0.62, 0.14, 0.74
-_ALONG, _GAP = 1.15, 0.62  # inches: the curve, and what is between it and the floor
+_ALONG, _GAP = 1.15, 0.62  # inches: the curve, and the gap to the floor
 _MOST_BINS = 12
 _MARGIN = 60.0
 
@@ -41,7 +41,7 @@ _MARGIN = 60.0
 def draw_track(
     predictions: Sequence[Prediction], trials: Sequence[TrialResult], title: str, floor: Pixels | None
 ) -> Figure:
-    """The worst trial's images over its floor, and the share right along the way in all trials with a track."""
+    """Draw the worst trial's images over its floor, and the fraction correct along the path over all tracks."""
     own = tracks(predictions, trials)
     by_trial = {index: taken(predictions, trials, index) for index in own}
     worst = worst_track(predictions, trials)
@@ -68,7 +68,7 @@ def draw_track(
 
 
 def along_the_way(images: Sequence[Taken]) -> Curve:
-    """The share right in at most twelve stretches of equal length, by the middles of the stretches."""
+    """Return the fraction correct in at most twelve sections of equal length, at the middle of each."""
     first, last = min(item.way for item in images), max(item.way for item in images)
     length = max((last - first) / _MOST_BINS, 1.0)
     bins: dict[int, list[bool]] = {}
@@ -88,7 +88,7 @@ def along_the_way(images: Sequence[Taken]) -> Curve:
 
 
 def _draw_images(axes: Axes, images: Sequence[Taken], beside: float) -> None:
-    """The marks stand ``beside`` mm to the robot's left of where the sensor was, so that the floor can be seen."""
+    """Draw the marks ``beside`` mm to the robot's left of the sensor, so that the floor stays visible."""
     axes.plot(
         [item.x for item in images], [item.y for item in images], color=LEFT, linewidth=0.8, linestyle=":", zorder=3
     )
@@ -105,7 +105,7 @@ def _draw_images(axes: Axes, images: Sequence[Taken], beside: float) -> None:
 
 
 def _mark(item: Taken) -> tuple[str, str]:
-    """Marker and colour: they tell the same, so that either will do."""
+    """Return marker and colour. Each alone identifies the result."""
     if item.right:
         return "o", SAID
     return ("x", FAULT) if item.answered else ("s", INK)

@@ -1,6 +1,6 @@
-"""A whole replay as one JSON-serialisable document: the trials of a grade, or one run, their floors and their source.
+"""A replay as a JSON-serialisable document: the trials of a grade, or one run, with floors and source.
 
-It holds what the reader's view holds, and no more. The page that plays it is ``html.py``'s.
+It contains exactly what the reader's view contains. ``html.py`` makes the page that plays it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from submissions.submission import Submission
 
 Pixels = NDArray[np.uint8]
 FORMAT, VERSION = "robomark replay", 1
-#: Compressed; what the trials of a report may take together. The first one is always there.
+#: The compressed size limit of a report's trials together. The first trial is always included.
 REPORT_BYTES = 300_000
 _FLOOR_BYTES = 120_000
 _OWN: Mapping[str, Pixels] = MappingProxyType({})
@@ -45,10 +45,10 @@ def replay_of_grade(
     most_bytes: float = math.inf,
     others: OtherTrials = NO_OTHERS,
 ) -> dict[str, Any]:
-    """The trials that the view has: first the worst of each scenario, then the others.
+    """Return the trials of the view: first the worst of each scenario, then the others.
 
-    They are as many as fit into ``most_bytes`` when they are compressed, and at least one. ``own_floors`` are those
-    that are not built in, by name. Each of ``others`` lies over the trial that it is of.
+    It includes as many as fit into ``most_bytes`` when compressed, and at least one. ``own_floors`` are floors that are
+    not built in, by name. ``others`` are drawn over the trials of the same index.
     """
     grade = view.grade
     worst = [worst_trial(grade, scenario) for scenario in scenarios(grade)]
@@ -80,14 +80,14 @@ def replay_of_run(
     own_floors: Mapping[str, Pixels],
     others: OtherTrials = NO_OTHERS,
 ) -> dict[str, Any]:
-    """One run, of which nothing was marked, told in English."""
+    """Return the replay of one unmarked run, in English."""
     trial = TrialResult(name, 0, seed, 0, 0, "visible", recording)
     told = {**trial_data(trial, sources), **_over((trial,), 0, others, ENGLISH), "name": one_line(name, 60)}
     return {**_document(name, [(trial, told)], sources, own_floors), "of": 1, "first": 0}
 
 
 def packed(document: Mapping[str, Any]) -> bytes:
-    """The document's JSON, compressed as every browser can read it."""
+    """Return the document's JSON, compressed in a format that every browser can read."""
     return zlib.compress(json.dumps(document, separators=(",", ":"), allow_nan=False).encode("ascii"), 6)
 
 
@@ -123,7 +123,7 @@ def _document(
 
 
 def _floor(recording: Recording, own_floors: Mapping[str, Pixels]) -> dict[str, Any]:
-    """The floor as it was in the trial; without an image where nobody has it any more."""
+    """Return the floor of the trial, without an image if it is not available any more."""
     own = own_floors.get(recording.background)
     if own is not None:
         image = _image(own)
@@ -140,7 +140,7 @@ def _built_in(name: str, labels: bool, sheet: int) -> str:
 
 
 def _image(pixels: Pixels) -> str:
-    """As a data URI: without loss if that is small, as printed floors are, and else as a photograph."""
+    """Return the image as a data URI: lossless if that is small, as for printed floors, otherwise lossy."""
     image = Image.fromarray(np.ascontiguousarray(pixels[:, :, :3]))
     data = _webp(image, lossless=True, method=2)
     if len(data) > _FLOOR_BYTES:

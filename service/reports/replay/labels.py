@@ -1,6 +1,6 @@
-"""All that a replay says by itself, in the reader's language; its script has no words of its own.
+"""The fixed texts of a replay in the reader's language. Its script has no texts of its own.
 
-What its document says of a trial is ``trial.py``'s.
+``trial.py`` makes the texts about a trial.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from service.language import Language, translatable
 from service.reports.robots import CALLED
 from service.reports.words import KINDS
 
-#: By what the script asks for them.
+#: By the script's keys.
 _SENTENCES: Mapping[str, str] = MappingProxyType(
     {
         "allAsTable": translatable("All that happened, as a table"),
@@ -76,7 +76,7 @@ _SENTENCES: Mapping[str, str] = MappingProxyType(
         "whole": translatable("Whole floor"),
     }
 )
-#: What it tells besides what its document has.
+#: Kinds in addition to those of the document.
 _MORE_KINDS: Mapping[str, str] = MappingProxyType(
     {"image": translatable("image"), "lost": translatable("marks lost"), "message": translatable("message")}
 )
@@ -90,14 +90,14 @@ _READINGS: Mapping[str, str] = MappingProxyType(
         "ultrasonic": translatable("Ultrasonic"),
     }
 )
-#: Those that stand close to their number; others follow it as a reading has them.
+#: Units written directly after the number. Other units follow as in a reading.
 _UNITS: Mapping[str, str] = MappingProxyType(
     {"degrees": "°", "degrees, clockwise": translatable("° clockwise"), "encoder degrees": "°"}
 )
 
 
 def replay_words(language: Language) -> dict[str, dict[str, str]]:
-    """Everything, as the script takes it: sentences with ``%(name)s`` for their parts, and words by what they say."""
+    """Return all texts for the script: sentences with ``%(name)s`` placeholders, and words by key."""
     tables = {
         "sentences": _SENTENCES,
         "kinds": {**KINDS, **_MORE_KINDS},

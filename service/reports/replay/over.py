@@ -1,6 +1,6 @@
-"""Another trial as a replay draws it over the one that is watched, and the moment at which the two part.
+"""Data of a trial drawn over the watched one in a replay, and the moment at which the two diverge.
 
-Which trials may lie over each other is the view's to say; of the other's source and images nothing is told.
+The view decides which trials may be combined. The other trial's source and images are not included.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from service.reports.replay.trial import trial_data
 from service.reports.robots import robots_of
 from sim.recording import SECOND, Recording
 
-#: Poses that differ by more are told apart by the eye.
+#: Larger differences of poses are visible.
 _FAR, _TURNED = 10.0, 5.0  # mm, degrees
 _COLUMNS = frozenset({"x", "y", "heading", "left_position", "right_position"})
 _KEPT = ("verdict", "ended", "seconds", "tick", "messages", "events", "left_out")
 
 
 def over_data(trial: TrialResult, other: TrialResult, name: str, language: Language) -> dict[str, Any]:
-    """What is drawn and told of ``other`` beside ``trial``; ``name`` says whose it is."""
+    """Return the data of ``other`` to show beside ``trial``. ``name`` is the name of its student."""
     told = trial_data(other, Sources(), language=language)
     robots = [{**robot, "columns": _drawn(robot["columns"]), "images": []} for robot in told["robots"]]
     return {
@@ -37,7 +37,7 @@ def over_data(trial: TrialResult, other: TrialResult, name: str, language: Langu
 
 
 def parted(one: Recording, other: Recording) -> float | None:
-    """The first moment at which a robot's poses differ by more than 10 mm or 5 degrees; None if they never do.
+    """Return the first time at which a robot's poses differ by more than 10 mm or 5 degrees; None if they never do.
 
     A robot whose trial has ended stays where it is.
     """
@@ -55,12 +55,12 @@ def _parted(one: Recording, other: Recording) -> float | None:
 
 
 def _times(recording: Recording) -> NDArray[np.float64]:
-    """Seconds of each pose, the one at the start included."""
+    """Return the time of each pose in seconds, including the start."""
     return np.round(np.arange(len(recording.ticks) + 1) * recording.ticks.length / SECOND, 9)
 
 
 def _along(recording: Recording, times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The poses at these times, a row each, on the straight way from one tick to the next."""
+    """Return the poses at these times, one row each, interpolated linearly between ticks."""
     ticks, start = recording.ticks, recording.start
     columns = ((ticks.x, start.x), (ticks.y, start.y), (ticks.heading, start.heading))
     known = [np.concatenate(([first], values)) for values, first in columns]

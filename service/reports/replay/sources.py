@@ -1,6 +1,6 @@
-"""The student's source as a replay shows it, and the line that a text came from, where only one can have written it.
+"""The student's source as shown by a replay, and the line that wrote a text, if only one line can have written it.
 
-A line is known by what its ``print`` or ``say`` begins with, letter for letter; the source is never parsed or run.
+A line is identified by the exact beginning of its ``print`` or ``say``. The source is never parsed or run.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _IMAGE = "IMG_DATA"
 
 @dataclass(frozen=True, slots=True)
 class _Writer:
-    """What a line prints or speaks: a text that begins so, or that is so in all."""
+    """The text that a line prints or speaks, or its beginning."""
 
     prints: bool
     begins: str
@@ -31,7 +31,7 @@ class _Writer:
 
 @dataclass(frozen=True, slots=True)
 class ShownSource:
-    """A file or a notebook's cell; ``who`` is whose faults are in its lines, ``cell`` its number in a notebook."""
+    """A file or a notebook cell. ``who`` is the process whose faults refer to it, ``cell`` its number in a notebook."""
 
     name: str
     who: str
@@ -39,7 +39,7 @@ class ShownSource:
     cell: int | None = None
 
     def told(self) -> dict[str, object]:
-        """As the data has it: a line is never longer than a screen is patient."""
+        """Return the source as replay data, with long lines and files shortened."""
         lines = self.text.rstrip("\n").split("\n")
         shown = [readable(line[:_LONGEST_LINE], _LONGEST_LINE) for line in lines[:_MOST_LINES]]
         return {"name": one_line(self.name, 80), "lines": shown, "more": len(lines) - len(shown)}
@@ -58,7 +58,7 @@ class Sources:
 
     def __init__(self, shown: Sequence[ShownSource] = ()) -> None:
         self.shown = tuple(shown)
-        #: A line for each, and two at most: where there are two it is not known which.
+        #: The lines of each text, at most two: with two, the line is ambiguous.
         self._writers: dict[_Writer, list[Place]] = {}
         for index, source in enumerate(self.shown):
             if source.who == "program":
@@ -69,9 +69,9 @@ class Sources:
         self._lengths = sorted({len(writer.begins) for writer in self._writers if not writer.is_all})
 
     def wrote(self, text: str, *, spoken: bool = False) -> Place | None:
-        """The only line of the robot program that can have printed, or spoken, the text; None if it is not known.
+        """Return the only line of the robot program that can have printed, or spoken, the text; None if unknown.
 
-        Its beginnings are looked up one by one, so that neither long sources nor many texts make this slow.
+        The text's beginnings are looked up one by one, so that long sources and many texts don't slow it down.
         """
         text = _IMAGE if text.startswith(f"{_IMAGE}::") else text
         possible = [_Writer(not spoken, text, True)]
@@ -80,7 +80,7 @@ class Sources:
         return found[0] if len(found) == 1 else None
 
     def of_fault(self, fault: Fault) -> Place | None:
-        """The line that a fault names, if it is in what is shown."""
+        """Return the line that a fault names, if it is in the shown sources."""
         if fault.line is None or fault.file or fault.agent:
             return None
         for index, source in enumerate(self.shown):
@@ -90,7 +90,7 @@ class Sources:
 
 
 def sources_of(submission: Submission | None) -> Sources:
-    """What the student wrote: both files, or every code cell."""
+    """Return the student's sources: both files, or every code cell."""
     if submission is None:
         return Sources()
     if submission.notebook is not None:
@@ -99,13 +99,13 @@ def sources_of(submission: Submission | None) -> Sources:
 
 
 def sources_of_files(program: Code | None, responder: Code | None) -> Sources:
-    """A robot program and what answers it, as far as they are there."""
+    """Return the sources of a robot program and its responder, if present."""
     files = (("program", program), ("responder", responder))
     return Sources([ShownSource(code.name, who, code.text) for who, code in files if code is not None])
 
 
 def sources_of_cells(notebook: Notebook) -> Sources:
-    """Every code cell that has something in it."""
+    """Return every code cell that is not empty."""
     return Sources(
         [
             ShownSource(f"cell {cell.number}", "program" if _is_program(cell.source) else "", cell.source, cell.number)

@@ -1,6 +1,6 @@
-"""One trial as a replay's data: the robots tick by tick, and all that happened, with its moment and its line.
+"""One trial as replay data: the robots tick by tick, and all events with their time and source line.
 
-It hides nothing: what comes in is the reader's view already. The keys are told in ``docs/replay.md``.
+It hides nothing: the input is already the reader's view. ``docs/replay.md`` describes the keys.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from sim.recorded import pose_at, printed_alone, robot_of
 from sim.recording import COLUMNS, SECOND, Image, Pose, Recording, Ticks, Verdict
 from sim.robot import LightSensor
 
-#: Of each kind of thing that can happen, in one trial.
+#: Of each kind of event, in one trial.
 _MOST = 2000
 _MOST_IMAGES = 1000
 _LONGEST_TEXT, _MOST_LINES = 600, 12
-#: Steps in one unit of a column; a canvas shows nothing smaller.
+#: Steps in one unit of a column. A canvas shows nothing smaller.
 _FINE = frozenset({"x", "y", "heading"})
 _STEPS_OF_FINE, _STEPS = 100, 10
 
 
 def told_columns(ticks: Ticks) -> dict[str, dict[str, Any]]:
-    """Every column of which anything is known, by the name that readers are told."""
+    """Return every column with known values, by its public name."""
     told = {}
     for each in COLUMNS:
         values = np.asarray(getattr(ticks, each.told_as), np.float64).reshape(len(ticks), each.width)
@@ -46,7 +46,7 @@ def told_columns(ticks: Ticks) -> dict[str, dict[str, Any]]:
 
 
 def _added(values: NDArray[np.float64], per: int) -> list[int | None]:
-    """What each value adds to the one before it, the first to nought; None where there is no value."""
+    """Return the difference of each value from the previous one, the first from 0; None for missing values."""
     known = np.isfinite(values)
     steps = np.rint(np.where(known, values, 0) * per).astype(np.int64)
     added: list[int | None] = [None] * len(values)
@@ -63,7 +63,7 @@ def trial_data(
     index: int = 0,
     language: Language = ENGLISH,
 ) -> dict[str, Any]:
-    """All of a trial but its floor. ``index`` is the one that the evidence of the ``criteria`` knows it by."""
+    """Return all data of a trial except its floor. ``index`` is its index in the evidence of the ``criteria``."""
     recording = trial.recording
     texts, left_out = _events(recording, sources, language)
     messages = sorted(_messages(recording, sources, language), key=lambda message: message["t"])
@@ -87,12 +87,12 @@ def trial_data(
 
 
 def loss_moment(recording: Recording, t: float | None) -> float:
-    """When a criterion was lost; what never happened was lost when the trial ended."""
+    """Return the time at which a criterion was lost; the end of the trial if there is no time."""
     return recording.end_t if t is None or not math.isfinite(t) else max(0.0, min(t, recording.end_t))
 
 
 def moment_hash(trial: int, t: float) -> str:
-    """A link to a moment of a trial, which is counted from 1; not before it, however it is rounded."""
+    """Return a link to a moment of a trial, counted from 1. Rounding never makes it earlier."""
     return f"#trial={trial}&t={math.ceil(t * 1000 - 1e-6) / 1000:.3f}"
 
 
@@ -142,13 +142,13 @@ def _image(image: Image, predictions: Sequence[Prediction]) -> dict[str, Any]:
 
 
 def _pixels(rgba: bytes) -> str:
-    """Without what is the same in every pixel: how opaque it is."""
+    """Return the pixels without their alpha values, which are all equal."""
     whole = rgba[: len(rgba) // 4 * 4]
     return base64.b64encode(np.frombuffer(whole, np.uint8).reshape(-1, 4)[:, :3].tobytes()).decode("ascii")
 
 
 def _events(recording: Recording, sources: Sources, language: Language) -> tuple[list[dict[str, Any]], int]:
-    """What was printed, said, touched and went wrong, by time; and how much of it is left out."""
+    """Return prints, speech, touches and faults by time, and how many are left out."""
     events: list[dict[str, Any]] = []
     left_out = 0
     for robot, own in robots_of(recording):
@@ -193,13 +193,13 @@ def _placed(place: Place | None) -> dict[str, Any]:
 
 
 def _messages(recording: Recording, sources: Sources, language: Language) -> Iterator[dict[str, Any]]:
-    """Every text that set out, with what the other end got of it and when."""
+    """Yield every message, with what the receiver got and when."""
     for robot, own in robots_of(recording):
         responder = answering(own)
         other = PARTNER_OF[robot] if recording.partner is not None else responder
         for message in own.messages:
             if message.sender == "partner":
-                continue  # it is told as the other robot's
+                continue  # the other robot's list has it
             from_robot = message.sender == "robot"
             receiver = other if message.to_partner or recording.partner is None else responder
             told: dict[str, Any] = {
@@ -229,10 +229,10 @@ def _messages(recording: Recording, sources: Sources, language: Language) -> Ite
 
 
 def _losses(recording: Recording, criteria: Sequence[CriterionResult], index: int) -> list[dict[str, Any]]:
-    """Each criterion that the trial failed, with the moment and the place."""
+    """Return each criterion that the trial failed, with time and place."""
     lost = []
     for result in criteria:
-        # One that is excused has no marks to lose.
+        # An excused criterion has no marks to lose.
         for item in result.evidence if result.max_marks else ():
             if item.passed or item.trial != index:
                 continue
