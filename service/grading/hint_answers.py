@@ -62,7 +62,7 @@ def of_missing_key(clues: Clues) -> Iterator[str]:
 
 
 def of_none_answers(clues: Clues) -> Iterator[str]:
-    """Yield a hint on an answer that contains None, with the line if only one line returns None."""
+    """Yield a hint on an answer that contains None, if exactly one line returns None."""
     answer = next((each for each in clues.answers if _NOTHING.search(each)), None)
     if answer is None or not any(isinstance(each, Replies) for each in clues.lost):
         return

@@ -70,7 +70,7 @@ class Clues:
         limit: Simulated time of the shortest visible scenario, in seconds.
         task: The description of the assignment.
         beside: Python files submitted with the parts, including agents.
-        marked_cell: The robot cell that is graded, if there is only one.
+        marked_cell: The notebook cell whose robot program runs alone; None if the whole notebook runs.
         ignored_magic: Why its magic line is ignored.
         idle_responder: The first line of a Raw cell that contains a responder.
         assignment: The id of the assignment.
@@ -156,7 +156,7 @@ class Clues:
 
     @property
     def messages(self) -> Iterator[Message]:
-        """All messages that crossed the bridge."""
+        """All messages of the visible trials."""
         return (message for recording in self.recordings for message in recording.messages)
 
     @property

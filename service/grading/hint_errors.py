@@ -63,7 +63,7 @@ _NEAR_KEY, _NEAR_MODULE = 0.6, 0.8
 
 
 def of_cell_errors(clues: Clues) -> Iterator[str]:
-    """Yield a hint on the first notebook cell that failed, if a later error followed from it."""
+    """Yield a hint on the first notebook cell that failed, if there are also later errors."""
     if any(fault.verdict not in _NO_ERRORS for fault in clues.faults):
         yield from _of_cells(clues)
 

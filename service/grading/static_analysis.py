@@ -48,7 +48,7 @@ class FunctionCaller(Protocol):
 
 
 def analyse(plan: RunPlan, trials: Sequence[TrialResult], caller: FunctionCaller, meter: JobMeter) -> StaticAnalysis:
-    """Return everything that the criteria need besides the recordings.
+    """Return all data for the criteria that is not in the recordings.
 
     Raises:
         HostError: The machine failed.

@@ -85,8 +85,8 @@ class ReportParts:
     """A report without a frame: the HTML for a page's ``main``, and the style and script that it needs.
 
     ``style`` and ``script`` are the same for every report, so a site can serve them as files. The script runs once the
-    body is loaded (``defer``). The body has no style or script of its own: its images are data URIs (``img-src
-    data:``), and its replay is data that no browser runs.
+    body is loaded (``defer``). The body contains no style and no script: its images are data URIs (``img-src data:``),
+    and its replay is data that no browser runs.
     """
 
     title: str
@@ -138,7 +138,7 @@ def report_style() -> str:
 
 @lru_cache(maxsize=1)
 def report_script() -> str:
-    """Return the replay script of all reports: its files in order of name, in a scope of their own."""
+    """Return the replay script of all reports: its files in order of name, wrapped in one function scope."""
     folder = files("service.reports.replay").joinpath("component")
     parts = sorted((each for each in folder.iterdir() if each.name.endswith(".js")), key=lambda each: each.name)
     code = "\n".join(part.read_text(encoding="utf-8") for part in parts)

@@ -51,8 +51,8 @@ PROCESS_LIMITS = "process limits only"
 class CriterionLine:
     """One row of the criteria table. ``share`` is a percentage, ``where`` is the place of the first failure.
 
-    ``told`` is a short form of the findings, empty if they are already shown or nothing was lost. ``message`` is the
-    full form.
+    ``message`` has the full findings. ``told`` has a short form, which is empty if they are already shown or nothing
+    was lost.
     """
 
     title: str
@@ -359,7 +359,7 @@ def _trial_line(trial: TrialResult, language: Language) -> TrialLine:
 
 
 def _channel_words(trial: TrialResult, language: Language) -> str:
-    """Return the swept channel settings in words. Offsets and noise have columns of their own."""
+    """Return the swept channel settings in words. Offsets and noise have separate columns."""
     words = {"loss": language.say("loss"), "delay": language.say("delay")}
     return "".join(f"; {words[condition]} {level:g}" for condition, level in trial.sweep if condition in words)
 

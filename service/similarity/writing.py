@@ -99,9 +99,10 @@ def source_of(student: str, file: str, text: str) -> Source:
 
 
 def compare(sources: Sequence[Source], given: Sequence[str], alike: float = ALIKE) -> Writing:
-    """Return all pairs of different students' sources of which one shares the fraction ``alike`` of its own tokens.
+    """Return all pairs of different students' sources that are similar.
 
-    The students of a pair are in order of name.
+    In a similar pair, the fraction ``alike`` of one source's own tokens is also in the other. The students of a pair
+    are in order of name.
     """
     sources = sorted(sources, key=lambda source: source.student)
     all_grams = [grams(source.tokens) for source in sources]
@@ -128,7 +129,7 @@ def _given(texts: Sequence[str]) -> NDArray[np.uint64]:
 def _same(
     sources: Sequence[Source], all_grams: Sequence[NDArray[np.uint64]], given: NDArray[np.uint64]
 ) -> tuple[tuple[str, ...], ...]:
-    """Return groups that share a whole file that is not mostly given. A file that nearly all have counts as given."""
+    """Return groups that share a whole file with enough code that was not given. Files that nearly all have are left out."""
     students: dict[bytes, set[str]] = {}
     for source, own in zip(sources, all_grams, strict=True):
         size = len(source.tokens)

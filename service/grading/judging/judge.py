@@ -39,7 +39,7 @@ def judge(
     Args:
         assignment: The assignment.
         trials: The trials. A trial that was cut short is judged by what it reached.
-        analysis: Data about the submission besides the recordings.
+        analysis: Data about the submission that is not in the recordings.
 
     Raises:
         HostError: A trial failed on this machine. It must be run again, not marked.

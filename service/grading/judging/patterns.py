@@ -91,7 +91,7 @@ def _one(group: Sequence[Sample], how: How) -> Sample:
 
 
 def _majority(group: Sequence[Sample]) -> Sample:
-    """Return the image with the most frequent answer. A tie, or no answer at all, gives a sample without answer."""
+    """Return the image with the most frequent answer. Without a single most frequent one, the sample has no answer."""
     counts = Counter(sample.answer for sample in group if sample.answer is not None).most_common()
     if not counts:
         return group[0]

@@ -1,6 +1,6 @@
 """The penalty for output that names everything, for criteria that search for items in a lot of output.
 
-The modules of the families find the stray items. Criteria with ``only`` allow none at all and are not handled here.
+The modules of the families find the stray items. Criteria with ``only`` allow no stray items and are handled there.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _OTHERS = 20
 
 @dataclass(frozen=True, slots=True)
 class Strays:
-    """Output besides the required items. ``words`` describes it in a sentence, after "besides"."""
+    """Stray items: output that was not required. ``words`` describes it in a sentence, after "besides"."""
 
     words: str
     misplaced: int = 0  # required items in a wrong place

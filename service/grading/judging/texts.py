@@ -203,7 +203,7 @@ def _stands_for(criterion: TextSequence, text: str, wanted: str) -> bool:
 
 
 def _out_of_order(criterion: TextSequence, chosen: Sequence[Line], found: Sequence[Line], deed: Deed) -> Strays:
-    """Return the other lines that count or match a required text, besides those found."""
+    """Return the strays: other lines that count or match a required text, in addition to those found."""
     if criterion.only:
         # Each additional text has already lowered the score.
         return Strays("")
@@ -245,7 +245,7 @@ def _judge_count(
 
 
 def _beside(criterion: TextSequence, lines: Sequence[Line], chosen: Sequence[Line], deed: Deed) -> Strays:
-    """Return the other lines besides the required ones.
+    """Return the strays: lines in addition to the required ones.
 
     Lines that differ only in numbers count once, unless they differ from a required line only in numbers: then each
     counts.

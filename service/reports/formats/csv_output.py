@@ -26,7 +26,7 @@ _MEASURED = ("accuracy", "accuracy_low", "accuracy_high", "accuracy_n", "submiss
 
 @table("csv", ".csv", staff_view)
 def marks_csv(rows: Sequence[TableRow[View]]) -> str:
-    """Return one row per submission: student, marks, verdict, accuracy, hashes, each criterion, notes and hints."""
+    """Return one row per submission: student, marks, verdict, accuracy, hashes, criteria, notes, hints and reason."""
     grades = [row.grade.grade for row in rows if row.grade is not None]
     criteria = list(dict.fromkeys(result.id for grade in grades for result in grade.criteria))
     header = [*_WHO, "marks", "max_marks", "verdict", *_MEASURED]

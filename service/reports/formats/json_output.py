@@ -1,6 +1,6 @@
 """A grade, or the grades of a batch, as JSON.
 
-It contains everything in the view, whoever reads it.
+It contains everything in the view, for every reader.
 """
 
 from __future__ import annotations

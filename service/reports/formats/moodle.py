@@ -87,6 +87,9 @@ def moodle_feedback(pages: Iterable[ReportPage], sink: BinaryIO) -> tuple[str, .
     """Pack a report for each submission from Moodle, at the path that its feedback import expects.
 
     Returns the students that were left out.
+
+    Raises:
+        UsageError: No submission came from Moodle.
     """
     left_over, taken = [], 0
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -50,7 +50,7 @@ def rich_report(view: View, submission: Submission | None = None) -> RenderableT
 
 
 def marks_table(grade: Grade, told: frozenset[int] = frozenset()) -> Table:
-    """Return the criteria with marks and messages, and the total as footer; those in ``told`` without a message."""
+    """Return the criteria with marks and messages, and the total as footer. Criteria in ``told`` have no message."""
     table = Table(box=box.SIMPLE_HEAD, show_footer=True, padding=(0, 1), expand=False)
     table.add_column("Marks", justify="right", no_wrap=True, footer=_marks(grade))
     table.add_column("Criterion", footer=Text("in all"))

@@ -1,6 +1,6 @@
 """A grade as plain text, for a terminal, a log or an e-mail: marks, verdict, messages.
 
-It contains everything in the view, whoever reads it.
+It contains everything in the view, for every reader.
 """
 
 from __future__ import annotations

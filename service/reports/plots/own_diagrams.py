@@ -1,6 +1,6 @@
 """The diagrams in a notebook, and for each kind a comparison with the recorded events.
 
-Of several diagrams of a kind, the one closest to the events is compared. It is shown and never marked.
+If there are several diagrams of one kind, the one closest to the events is compared. It is shown and never marked.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The fixed texts of a replay in the reader's language. Its script has no texts of its own.
+"""The fixed texts of a replay in the reader's language. Its script contains no texts.
 
 ``trial.py`` makes the texts about a trial.
 """
