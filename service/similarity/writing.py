@@ -129,7 +129,10 @@ def _given(texts: Sequence[str]) -> NDArray[np.uint64]:
 def _same(
     sources: Sequence[Source], all_grams: Sequence[NDArray[np.uint64]], given: NDArray[np.uint64]
 ) -> tuple[tuple[str, ...], ...]:
-    """Return groups that share a whole file with enough code that was not given. Files that nearly all have are left out."""
+    """Return groups that share a whole file with enough code that was not given.
+
+    Files that nearly all students have are left out, because they must have been given in some other way.
+    """
     students: dict[bytes, set[str]] = {}
     for source, own in zip(sources, all_grams, strict=True):
         size = len(source.tokens)
