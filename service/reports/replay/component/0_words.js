@@ -1,4 +1,4 @@
-// What the replay says, in the language of the page, whose data has it: nothing in these files is a word by itself.
+// The texts of the replay, from the data of the page and in its language. These files contain no texts.
 
 const WORDS = wordsOf(document.querySelector("section.replay > script"));
 
@@ -6,12 +6,12 @@ function wordsOf(island) {
   return island ? JSON.parse(island.textContent).words : null;
 }
 
-// A sentence with its parts: "%(seconds)s of %(all)s".
+// Returns a sentence with its placeholders filled in: "%(seconds)s of %(all)s".
 function say(name, parts = {}) {
   return WORDS.sentences[name].replace(/%\((\w+)\)s/g, (_, part) => parts[part]);
 }
 
-// The word for something in one of the tables; what has none there is called as it is.
+// Returns the text of a key in one of the tables, or the key itself if it has no text.
 function worded(table, name) {
   return Object.hasOwn(WORDS[table], name) ? WORDS[table][name] : name;
 }

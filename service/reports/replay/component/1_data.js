@@ -1,4 +1,4 @@
-// The replay's data: unpacked, its columns as numbers, and where a robot is at a moment.
+// The replay's data: unpacking, columns as numbers, and a robot's pose at a time.
 
 const VERSION = 1;
 const ALMOST = 1e-6;
@@ -36,7 +36,7 @@ class RobotTrack {
     this.pen = penDown(told.pen, this.length);
   }
 
-  // The pose after that many ticks, which need not be whole: [x, y, heading].
+  // Returns the pose [x, y, heading] after a number of ticks, which may be a fraction.
   pose(ticks) {
     if (!this.length) return ticks > 0 ? this.end : this.start;
     const whole = Math.max(0, Math.min(Math.floor(ticks + ALMOST), this.length));
@@ -52,7 +52,7 @@ class RobotTrack {
     return [x[0][ticks - 1], y[0][ticks - 1], heading[0][ticks - 1]];
   }
 
-  // What a column has after that many ticks, a list; empty where it is not known.
+  // Returns the values of a column after a number of ticks; empty if they are unknown.
   reading(name, ticks) {
     const parts = this.columns[name];
     if (!parts) return [];
@@ -61,7 +61,7 @@ class RobotTrack {
   }
 }
 
-// From each tick at which the pen goes down to the one at which it goes up.
+// Returns the ticks at which the pen goes down and up, as pairs.
 function penDown(changes, length) {
   const strokes = [];
   let since = null;
@@ -91,7 +91,7 @@ class Trial {
     return Math.abs(ticks - Math.round(ticks)) < 1e-3 ? Math.round(ticks) : ticks;
   }
 
-  // How much of `happened` there is at t.
+  // Returns the number of entries of `happened` up to t.
   count(t) {
     let low = 0;
     let high = this.happened.length;
@@ -104,7 +104,7 @@ class Trial {
   }
 }
 
-// The last image that a robot has sent until t; null before the first.
+// Returns the last image that a robot sent up to t; null before the first.
 function latestImage(robot, t) {
   let latest = null;
   for (const image of robot.images) {

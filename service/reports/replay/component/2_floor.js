@@ -1,4 +1,4 @@
-// The floor with everything on it, drawn for one moment.
+// Drawing of the floor with everything on it, at one time.
 
 const FLOOR_WIDTH = 2362;
 const FLOOR_HEIGHT = 1143;
@@ -9,7 +9,7 @@ const COLOURS = {
   ink: "#1c2630", left: "#0b4a86", right: "#d9791a", pen: "#e79b9b", fault: "#a3162a", second: "#7a3e9d",
   paper: "#ffffff", axle: "#e6007e", beyond: "#a3aab1", obstacle: "#c8cdd2", over: "#00736a",
 };
-// How a robot and its way are drawn: the first one's, the second one's, and those of the trial that lies over this one.
+// Styles of a robot and its path: the first robot, the second robot, and those of the overlaid trial.
 const LOOKS = [
   { path: COLOURS.left, ahead: "rgba(28, 38, 48, 0.55)", pen: COLOURS.pen, dash: [], edged: [], edge: COLOURS.ink,
     body: "rgba(255, 255, 255, 0.66)", axle: COLOURS.axle },
@@ -29,14 +29,14 @@ class FloorCanvas {
     this.mode = "path";
   }
 
-  // With another trial over it, or null.
+  // Shows a trial. `over` is the overlaid trial, or null.
   show(trial, over) {
     Object.assign(this, { trial, over, drawnGround: null, reachedRegion: null });
     this.tracks = trial.robots.map((robot, which) => ({ robot, run: trial, look: LOOKS[which ? 1 : 0] }));
     if (over) this.tracks.unshift(...over.robots.map((robot) => ({ robot, run: over, look: LOOK_OF_OVER })));
   }
 
-  // The part of the world that is seen: x and y of its lower left corner, and mm across and up.
+  // Returns the visible part of the world: its lower left corner, width and height in mm.
   region(ticks) {
     const aspect = this.canvas.clientHeight / this.canvas.clientWidth || 0.5;
     let [left, bottom, right, top] = [0, 0, FLOOR_WIDTH, FLOOR_HEIGHT];
@@ -51,7 +51,7 @@ class FloorCanvas {
     return region;
   }
 
-  // Where robots and what they talk to have been, with some room around.
+  // Returns the region with all positions of the robots, the beacon and lost criteria, with a margin.
   reached() {
     if (this.reachedRegion) return this.reachedRegion;
     const places = this.trial.lost.map((loss) => loss.pose);
@@ -108,7 +108,7 @@ class FloorCanvas {
     }
   }
 
-  // All that does not move, drawn again only when another part of the world is seen.
+  // Draws everything that does not move, again only if the visible region changes.
   drawGround(width, height) {
     const { at, scale, ratio, region } = this.place;
     const drawn = [width, height, region.left, region.bottom, region.width].join(" ");
@@ -143,7 +143,7 @@ class FloorCanvas {
     }
   }
 
-  // The ticks of a path that are at least a pixel apart, where they are, and how many pixels the way to them is.
+  // Returns ticks of a path at least a pixel apart, with their position and distance in pixels.
   thinned(robot) {
     const kept = [];
     let [lastX, lastY, way] = [NaN, NaN, 0];
@@ -182,7 +182,7 @@ class FloorCanvas {
     context.setLineDash([]);
   }
 
-  // What the robots have left behind: drawn on from where it was, and anew when time goes back.
+  // Draws the robots' trails: extends them, or redraws them if time goes back.
   drawTrail(t) {
     const context = this.trail.getContext("2d");
     if (this.drawnTrail === null || t < this.drawnTrail) {
@@ -240,7 +240,7 @@ class FloorCanvas {
     }
   }
 
-  // Where a criterion was lost: a pin with the number that it has below the floor, ringed at its moment.
+  // Draws a numbered pin where each criterion was lost, with a ring at its time.
   drawLosses(t) {
     const taken = [];
     this.trial.lost.forEach((loss, index) => {
@@ -260,7 +260,7 @@ class FloorCanvas {
     });
   }
 
-  // Whose the other robot is, where it is not the same place, and where the two part.
+  // Draws the other robot's name if it is elsewhere, and the place where the two diverge.
   drawOver(t) {
     const [mine, others] = [this.trial, this.over].map((run) => this.place.at(...run.robots[0].pose(run.ticks(t))));
     if (Math.hypot(mine[0] - others[0], mine[1] - others[1]) > 30) {
@@ -311,7 +311,7 @@ class FloorCanvas {
     context.restore();
   }
 
-  // The latest text on its way between both ends, and what was said last.
+  // Draws the latest message between sender and receiver, and the latest speech.
   drawTalk(t, ticks, speed) {
     const lasts = lasting(speed);
     const count = this.trial.count(t);

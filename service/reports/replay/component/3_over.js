@@ -1,6 +1,6 @@
-// Another trial over the one that is watched: whether it is shown, where the two part, and how far apart they are.
+// The choice to overlay another trial, the time at which the two diverge, and their distance.
 
-// How far the other trial's robot is from this one's: mm, and degrees one way or the other.
+// Returns the distance between the robots of both trials, in mm and degrees.
 function apart(trial, t) {
   const [[x, y, heading], [otherX, otherY, otherHeading]] = [trial, trial.over].map((run) =>
     run.robots[0].pose(run.ticks(t)));
@@ -25,7 +25,7 @@ class OverChoice {
       this.parted, this.now);
   }
 
-  // The other trial, where there is one and it is to be seen.
+  // Returns the other trial if there is one and it is selected.
   of(trial) {
     return this.box.checked ? trial.over : null;
   }

@@ -1,23 +1,23 @@
-// The shapes that the floor's drawing is made of; none of them knows the trial.
+// Shapes for the drawing of the floor, independent of the trial.
 
-// The region around this one that has the shape of the canvas.
+// Returns the region around this one in the aspect ratio of the canvas.
 function fitted(left, bottom, width, height, aspect) {
   const across = Math.max(width, height / aspect, CLOSEST);
   const up = across * aspect;
   return { left: left + (width - across) / 2, bottom: bottom + (height - up) / 2, width: across, height: up };
 }
 
-// Where a part so long begins so that it shows little beyond these bounds; between them if it is longer.
+// Returns the start of a part so that it stays within the bounds; centred if it is longer than they are.
 function within(begins, long, low, high) {
   return high - low < long ? (low + high - long) / 2 : Math.max(low, Math.min(begins, high - long));
 }
 
-// Seconds of the trial for which a text is shown.
+// Returns for how many seconds of the trial a text is shown.
 function lasting(speed) {
   return Math.max(0.9, 0.6 * speed);
 }
 
-// Where a point of the robot is that is so far to its right and so far forward.
+// Returns the world position of a point of the robot, given to its right and forward.
 function placed([x, y, heading], [right, forward]) {
   const angle = ((heading - 90) * Math.PI) / 180;
   const [cosine, sine] = [Math.cos(angle), Math.sin(angle)];
@@ -100,7 +100,7 @@ function cross(context, x, y, reach) {
   context.lineTo(x + reach, y - reach);
 }
 
-// A line that is seen on any floor.
+// Draws a line that is visible on any floor.
 function outlined(context, colour, width, path) {
   for (const [stroke, wide] of [[COLOURS.paper, width + 2.5], [colour, width]]) {
     context.beginPath();

@@ -1,10 +1,10 @@
-// What stands beside the floor: what the sensors read, what happens, the source, and everything as a table.
+// The panels beside the floor: sensor readings, events, source, and a table of everything.
 
 const RECENT = 7;
 const MOST_ROWS = 1500;
 const WIDE = matchMedia("(min-width: 48rem)"); // as in replay.css: on a phone the numbers are folded
 
-// An element with these properties and children; texts become text, never markup.
+// Creates an element with properties and children. Strings become text, never markup.
 function element(tag, properties = {}, ...children) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(properties)) {
@@ -19,7 +19,7 @@ function seconds(t) {
   return `${t.toFixed(2)} s`;
 }
 
-// Not before the moment, however it is rounded.
+// Returns a link to a moment. Rounding never makes it earlier.
 function momentHash(trial, t) {
   return `#trial=${trial.trial}&t=${Math.ceil(t * 1000 - ALMOST) / 1000}`;
 }
@@ -75,7 +75,7 @@ class SensorPanel {
     this.drawSent(robot, t);
   }
 
-  // The floor under the sensor, as its window lies: along the axes, whichever way the robot heads.
+  // Draws the floor under the sensor. The window is aligned with the axes at any heading.
   drawEye(side, robot, pose) {
     const { canvas } = this.eyes[side];
     const context = canvas.getContext("2d");
@@ -145,12 +145,12 @@ function drawPixels(canvas, told, side) {
   context.drawImage(small, 0, 0, canvas.width, canvas.height);
 }
 
-// What happened in the other trial, each with whose it is.
+// Returns the events of the other trial with its name.
 function happenedOver(over) {
   return over.happened.map((item) => ({ ...item, whose: over.name }));
 }
 
-// The words for one thing that happened: who, what, and what came of it at the other end.
+// Returns the words for one event: who, what, and the result for the receiver.
 function happenedWords(item) {
   const whose = item.whose ? `${item.whose}: ` : "";
   const [kind, wrong] = [worded("kinds", item.kind), isWrong(item)];
@@ -237,7 +237,7 @@ class SourcePanel {
     if (more) this.lines.append(element("li", { className: "soft" }, say("moreLines", { count: more })));
   }
 
-  // The line of the latest thing that is known to have come from one.
+  // Highlights the line that caused the latest event with a known line.
   draw(t) {
     if (!this.sources.length) return;
     let latest = null;

@@ -1,4 +1,4 @@
-// The controls: one slider over one trial, by mouse, touch, keyboard and links; and how a page starts it.
+// The controls: one slider for one trial, by mouse, touch, keyboard and links; and the start of the replay.
 
 const SPEEDS = [[0.25, "¼×"], [0.5, "½×"], [1, "1×"], [2, "2×"], [5, "5×"], [10, "10×"], [20, "20×"], [50, "50×"]];
 const VIEWS = [["path", "path"], ["floor", "whole"], ["near", "near"]]; // each with the name of its words
@@ -93,7 +93,7 @@ class ReplayControls {
     this.seek(t);
   }
 
-  // As long as the longer of both trials, and the floor with both.
+  // Sets the slider to the longer trial, and shows both on the floor.
   layOver() {
     const over = this.overChoice.of(this.trial);
     this.seconds = Math.max(this.trial.seconds, over ? over.seconds : 0);
@@ -108,7 +108,7 @@ class ReplayControls {
     this.seek(this.t);
   }
 
-  // A link to a moment: #t=12.40, or #trial=2&t=12.40.
+  // Follows a link to a moment: #t=12.40, or #trial=2&t=12.40.
   follow(hash) {
     const asked = new URLSearchParams(hash.slice(1));
     const t = Number.parseFloat(asked.get("t") ?? "");
@@ -132,7 +132,7 @@ class ReplayControls {
     event.preventDefault();
   }
 
-  // From one tenth of a second to the next, wherever between them it stands.
+  // Steps in tenths of a second, rounding the current time.
   step(by) {
     this.seek(Math.round((this.t + by) * 10) / 10);
   }
@@ -179,7 +179,7 @@ class ReplayControls {
     if (!this.playing) this.tell();
   }
 
-  // What a screen reader says of the moment.
+  // Sets the screen reader text of the current time.
   tell() {
     const place = placeWords(this.trial.robots[0].pose(this.trial.ticks(this.t)));
     const count = this.trial.count(this.t);
@@ -190,7 +190,7 @@ class ReplayControls {
     this.slider.setAttribute("aria-valuetext", `${this.clockWords()}; ${place}${far}${said}`);
   }
 
-  // Where it may be copied it is; else it stands in the address.
+  // Copies the link if the browser allows it; otherwise it is in the address bar.
   async copyLink() {
     if (!navigator.clipboard) return;
     await navigator.clipboard.writeText(this.link.href);
