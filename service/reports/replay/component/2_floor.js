@@ -160,7 +160,7 @@ class FloorCanvas {
 
   strokePath(context, robot, from, until, colour, width, dash = []) {
     const begin = this.place.at(...robot.pose(from));
-    let before = 0; // pixels from the start, so that dashes go on where those before them ended
+    let before = 0; // pixels from the start, so that dashes continue the previous ones
     context.beginPath();
     context.moveTo(...begin);
     for (const [tick, x, y, way] of robot.seen) {
@@ -338,7 +338,7 @@ class FloorCanvas {
       const sent = this.trial.messages.find((each) => each.from === this.trial.robots[0].name);
       chip(this.context, worded("called", sent?.to ?? "responder"), width - 58, 20);
     }
-    words ??= message ? null : printed; // what is printed to the other end is told as a message
+    words ??= message ? null : printed; // prints to the other end are shown as messages
     if (words) {
       const [x, y] = ends[words.who] ?? ends[this.trial.robots[0].name];
       const quoted = words.kind === "said" ? `“${words.text}”` : words.text;

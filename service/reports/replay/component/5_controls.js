@@ -1,11 +1,11 @@
 // The controls: one slider for one trial, by mouse, touch, keyboard and links; and the start of the replay.
 
 const SPEEDS = [[0.25, "¼×"], [0.5, "½×"], [1, "1×"], [2, "2×"], [5, "5×"], [10, "10×"], [20, "20×"], [50, "50×"]];
-const VIEWS = [["path", "path"], ["floor", "whole"], ["near", "near"]]; // each with the name of its words
+const VIEWS = [["path", "path"], ["floor", "whole"], ["near", "near"]]; // mode and key of its text
 const STEPS = { ArrowLeft: -0.1, ArrowRight: 0.1, ArrowDown: -1, ArrowUp: 1, PageDown: -10, PageUp: 10 };
 const REDUCED = window.matchMedia("(prefers-reduced-motion: reduce)");
-const REDUCED_STEP = 500; // ms from one still to the next
-const COPIED_FOR = 2000; // ms for which a link says that it was copied
+const REDUCED_STEP = 500; // ms between two still images
+const COPIED_FOR = 2000; // ms during which a link shows that it was copied
 
 class ReplayControls {
   constructor(replay, root) {
@@ -19,7 +19,7 @@ class ReplayControls {
     this.table = new EventTable();
     this.overChoice = new OverChoice(() => this.showOver());
     this.panels = [this.overChoice, sensors, ...beside];
-    this.showingOver = [this.overChoice, beside[0], this.table]; // besides the floor
+    this.showingOver = [this.overChoice, beside[0], this.table]; // in addition to the floor
     this.build(sensors, beside);
     this.open(this.trials[replay.first], 0);
     this.listen();
