@@ -1,1 +1,1 @@
-"""The database: who submitted what, the jobs, and what came of them."""
+"""Database tables, queries and job transitions. Contains no grading or rendering code."""

@@ -1,6 +1,6 @@
-"""Files of a job, kept in the database so that they commit with its marks and reach every machine.
+"""Files of a job, stored in the database so that they commit with its marks and are available on every machine.
 
-Small ones only: what is over the cap is refused. What is in them is their makers' business.
+Only small files: files over ``CAP_BYTES`` are rejected. The content is not interpreted here.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from service.store.models import Artifact, Job
 from sim.errors import HostError
 
 CAP_BYTES = 64_000_000
-#: How many are fetched at once.
+#: Number of files fetched at once.
 _AT_ONCE = 20
 
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """A file to keep, or one that was kept."""
+    """A file to store, or a stored file."""
 
     name: str
     media_type: str
@@ -33,7 +33,7 @@ class File:
 
 
 def put(session: Session, job_id: str, files: list[File], at: datetime) -> None:
-    """Keep the files; one of the same name is replaced. Raises HostError for one over the cap."""
+    """Store the files of a job, replacing files with the same name. Raises HostError for a file over the cap."""
     for file in files:
         compressed = zlib.compress(file.data, 6)
         if len(compressed) > CAP_BYTES:
@@ -53,14 +53,14 @@ def put(session: Session, job_id: str, files: list[File], at: datetime) -> None:
 
 
 def get(session: Session, job_id: str, *, prefix: str = "") -> dict[str, File]:
-    """The files of a job whose names begin with ``prefix``, by name. Raises like ``get_each``."""
+    """Return the files of a job whose names begin with ``prefix``, by name. Raises like ``get_each``."""
     return dict(get_each(session, [job_id], prefix=prefix)).get(job_id, {})
 
 
 def get_each(session: Session, job_ids: Collection[str], *, prefix: str = "") -> Iterator[tuple[str, dict[str, File]]]:
-    """Each of the jobs with its files, read in one statement, in the database's order of ids.
+    """Yield each job id with its files, read in one statement and ordered by id.
 
-    The files of one job at a time are in memory. Raises HostError where the bytes are not those that were kept.
+    Only the files of one job are in memory at a time. Raises HostError if a file does not match its hash.
     """
     mine = and_(Artifact.job_id == Job.id, Artifact.name.startswith(prefix, autoescape=True))
     query = (
@@ -71,7 +71,7 @@ def get_each(session: Session, job_ids: Collection[str], *, prefix: str = "") ->
     )
     rows = session.execute(query, execution_options={"yield_per": _AT_ONCE})
     for job_id, of_job in groupby(rows, key=lambda row: row[0]):
-        # A job without such files has one row without a file.
+        # A job without such files yields one row without a file.
         kept = [(name, media_type, sha256, data) for _, name, media_type, sha256, data in of_job if name is not None]
         yield job_id, {each[0]: _file(job_id, *each) for each in kept}
 

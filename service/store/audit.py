@@ -1,4 +1,4 @@
-"""Who did what to which row, and when: written beside the change it tells of, in the same transaction."""
+"""Activity log: each entry is written in the same transaction as the change that it records."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from service.store.models import Audit
 
 @dataclass(frozen=True, slots=True)
 class AuditEntry:
-    """One thing that somebody did."""
+    """An entry of the activity log."""
 
     at: datetime
     actor: str
@@ -26,7 +26,7 @@ class AuditEntry:
 
 
 def this_user() -> str:
-    """Who runs a command here: the account and the machine."""
+    """Return the account and machine that run this command, as ``account@host``."""
     try:
         account = getpass.getuser()
     except (KeyError, OSError):
@@ -35,13 +35,13 @@ def this_user() -> str:
 
 
 def note(session: Session, actor: str, action: str, subject: str, subject_id: str, **detail: object) -> None:
-    """Write down that ``actor`` did ``action`` to the row ``subject_id`` of the table ``subject``."""
+    """Record that ``actor`` did ``action`` to the row ``subject_id`` of the table ``subject``."""
     session.add(
         Audit(at=now(session), actor=actor, action=action, subject=subject, subject_id=subject_id, detail=detail)
     )
 
 
 def entries(session: Session, subject: str, subject_id: str) -> list[AuditEntry]:
-    """All that was done to a row, in order."""
+    """Return the activity log of a row, oldest entry first."""
     query = select(Audit).where(Audit.subject == subject, Audit.subject_id == subject_id).order_by(Audit.id)
     return [AuditEntry(row.at, row.actor, row.action, dict(row.detail)) for row in session.scalars(query)]

@@ -1,6 +1,6 @@
-"""Copies a whole database: into a SQLite file that can be opened as it is, and from one into an empty database.
+"""Backup of a whole database into a SQLite file, and restore from one into an empty database.
 
-The two may be of different kinds, so a copy also moves an installation; removing what is old is ``purge.py``'s.
+Source and target may be of different kinds, so a backup also moves an installation. ``purge.py`` removes old data.
 """
 
 from __future__ import annotations
@@ -24,15 +24,19 @@ from service.store.revision import current_revision, newest_revision
 from service.store.web_tables import METADATA
 from sim.errors import HostError, UsageError
 
-#: Some of them hold a recording each.
+#: Small, because some rows contain a recording.
 _ROWS_AT_A_TIME = 50
 _EXPECTED = "expected a file that robomark db backup made"
 
 
 def back_up(source: Engine, file: Path) -> None:
-    """Copy a database, in use or not, into ``file``, which is this user's alone and must not exist.
+    """Copy a database, in use or not, into a new ``file`` that only this user can read.
 
-    Raises UsageError where it does, HostError where the copy cannot be made; nothing is left of it then.
+    Removes the partial file on failure.
+
+    Raises:
+        UsageError: ``file`` exists already.
+        HostError: The copy failed.
     """
     if file.exists():
         raise UsageError(f"{file} exists already; name a new file")
@@ -53,10 +57,13 @@ def back_up(source: Engine, file: Path) -> None:
 
 
 def restore(file: Path, target: Engine) -> None:
-    """Bring what a backup holds into an empty database of either kind; all of it or nothing.
+    """Restore a backup into an empty database of either kind, completely or not at all.
 
-    A backup of an older release is brought up to this one on the way, and is not changed itself. Raises UsageError for
-    a file that is no backup, or a database that is not empty; HostError for a backup of a newer release.
+    A backup of an older release is upgraded during the restore; the file itself is not changed.
+
+    Raises:
+        UsageError: The file is not a backup, or the database is not empty.
+        HostError: The backup was made by a newer release.
     """
     if not file.is_file():
         raise UsageError(f"{file}: does not exist, {_EXPECTED}")
@@ -93,7 +100,7 @@ def _copy_file(source: Path, target: Path) -> None:
 
 
 def _copy_rows(source: Engine, target: Engine) -> None:
-    """Every row of every table, as one moment has them. Raises HostError for tables of another release."""
+    """Copy every row of every table from one snapshot. Raises HostError for tables of another release."""
     for engine in (source, target):
         revision = current_revision(engine)
         if revision != newest_revision():
@@ -107,7 +114,8 @@ def _copy_rows(source: Engine, target: Engine) -> None:
         if into.scalar(select(func.count()).select_from(Course)) or into.scalar(select(func.count()).select_from(Job)):
             where = target.url.render_as_string(hide_password=True)
             raise UsageError(f"the database {where} is not empty, expected one in which nothing was submitted yet")
-        # Each was made with its tables; the worlds of what is brought in follow from its own.
+        # The target's rows were created with its tables. Its secret is replaced too, because the restored worlds
+        # depend on it.
         into.execute(delete(Installation))
         into.execute(delete(SchemaCompatibility))
         for table in METADATA.sorted_tables:
@@ -115,7 +123,7 @@ def _copy_rows(source: Engine, target: Engine) -> None:
 
 
 def _copy_table(table: Table, rows: Connection, into: Connection) -> None:
-    """Rows that refer to others of their table may come before those, so they are told of them when all are there."""
+    """Copy a table. References within the table are set last, because a row may refer to a later one."""
     own = [column for column in table.columns if any(key.column.table is table for key in column.foreign_keys)]
     later: list[dict[str, Any]] = []
     (key,) = table.primary_key.columns
@@ -132,7 +140,7 @@ def _copy_table(table: Table, rows: Connection, into: Connection) -> None:
         into.execute(update(table).where(key == bindparam("of")).values(values), later)
     last = into.scalar(select(func.max(key)))
     if into.dialect.name == "postgresql" and isinstance(last, int):
-        # What comes after is numbered on.
+        # New rows get the next free numbers.
         sequence = func.pg_get_serial_sequence(table.name, key.name)
         into.execute(select(func.setval(sequence, last)))
 

@@ -1,6 +1,6 @@
-"""Trees of frozen dataclasses to JSON values and back, by their type hints; nothing is lost, no code is run.
+"""Codec between trees of frozen dataclasses and JSON values, based on type hints. Lossless; executes no code.
 
-The one codec of the store, for recordings, assignments and evidence. It writes no files and knows no table.
+The only codec of the store, used for recordings, assignments and evidence. Uses no files and no tables.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ Json = None | bool | int | float | str | list["Json"] | dict[str, "Json"]
 
 
 def encode(value: object) -> Json:
-    """A JSON value for dataclasses, pydantic models, tuples, mappings, enums, decimals and bytes.
+    """Return a JSON value for dataclasses, pydantic models, tuples, mappings, enums, decimals and bytes.
 
-    Bytes become base64, floats that JSON has no word for their names. Raises TypeError for anything else.
+    Bytes become base64, infinite floats and NaN their names. Raises TypeError for any other type.
     """
     match value:
         case Enum():
@@ -58,7 +58,7 @@ def encode(value: object) -> Json:
         return cast(Json, cast(Any, value).model_dump(mode="json", by_alias=True))
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: encode(getattr(value, field.name)) for field in fields(value)}
-    # Most of what reads the database has no arrays, and need not wait for numpy.
+    # Most readers of the database have no arrays, so numpy is not imported for them.
     import numpy as np
 
     if isinstance(value, np.generic):
@@ -67,15 +67,15 @@ def encode(value: object) -> Json:
 
 
 def decode(kind: type[T], value: Json) -> T:
-    """The inverse of ``encode`` for a value of type ``kind``.
+    """Decode a value of type ``kind``: the inverse of ``encode``.
 
-    Unknown fields are ignored, missing ones defaulted. Raises TypeError or ValueError where it does not fit.
+    Unknown fields are ignored, missing ones get their defaults. Raises TypeError or ValueError for a mismatch.
     """
     return cast(T, _read(kind, value))
 
 
 def decoded_arguments(kind: type, value: Mapping[str, Any]) -> dict[str, Any]:
-    """The arguments for the dataclass ``kind`` among the fields that are there; the caller adds the rest."""
+    """Return decoded arguments for the dataclass ``kind`` from the fields present; the caller adds the others."""
     known = _hints(kind)
     return {name: _read(known[name], item) for name, item in value.items() if name in known}
 
@@ -93,7 +93,10 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 
 
 def _is_model(kind: Any) -> bool:
-    """Whether it is a model of pydantic's, which takes long to import: before it is, there is none."""
+    """Return whether the type is a pydantic model, without importing pydantic, which is slow.
+
+    If pydantic is not imported yet, no model exists.
+    """
     pydantic = sys.modules.get("pydantic.main")
     return pydantic is not None and isinstance(kind, type) and issubclass(kind, pydantic.BaseModel)
 

@@ -1,6 +1,6 @@
-"""Column types that behave alike on SQLite and PostgreSQL: moments, exact decimals, strangers' text and JSON.
+"""Column types that work alike on SQLite and PostgreSQL: timestamps, exact decimals, untrusted text and JSON.
 
-Knows no table.
+Independent of the tables.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from service.store.codec import Json
 
 
 def storable(text: str) -> str:
-    """Text that every database takes: no NUL (shown as its image), no lone surrogates (shown as U+FFFD)."""
+    """Replace NUL by U+2400 and lone surrogates by U+FFFD, so that every database accepts the text."""
     return text.replace("\0", "\u2400").encode("utf-16", "surrogatepass").decode("utf-16", "replace")
 
 
 def storable_json(value: Json) -> Json:
-    """The same for every string inside a JSON value; refuses floats that JSON has no word for."""
+    """Apply ``storable`` to every string in a JSON value. Raises ValueError for infinite floats and NaN."""
     if isinstance(value, str):
         return storable(value)
     if isinstance(value, float) and not math.isfinite(value):
@@ -48,13 +48,13 @@ def storable_json(value: Json) -> Json:
 
 
 class UtcDateTime(TypeDecorator[datetime]):
-    """A moment; only aware values go in, UTC comes out. SQLite forgets the zone, PostgreSQL gives its own."""
+    """Timestamp column. Accepts only aware values and returns UTC. SQLite stores no zone."""
 
     impl = DateTime(timezone=True)
     cache_ok = True
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """The moment in UTC, for SQLite without its zone; raises ValueError where it has none."""
+        """Convert to UTC, without a zone for SQLite. Raises ValueError for a naive value."""
         if value is None:
             return None
         if value.tzinfo is None:
@@ -63,26 +63,26 @@ class UtcDateTime(TypeDecorator[datetime]):
         return moment.replace(tzinfo=None) if dialect.name == "sqlite" else moment
 
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """The moment in UTC, aware on every database."""
+        """Return an aware timestamp in UTC on every database."""
         if value is None:
             return None
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
 
 
 class ExactDecimal(TypeDecorator[Decimal]):
-    """Marks, exactly: NUMERIC on PostgreSQL, text on SQLite (whose own numbers are binary).
+    """Exact marks: NUMERIC on PostgreSQL, text on SQLite (whose numbers are binary floats).
 
-    Queries compare them as numbers: as text "8" is not "8.0", and "10" comes before "9".
+    Queries compare them as numbers, because as text "8" differs from "8.0" and "10" sorts before "9".
     """
 
     impl = String(32)
     cache_ok = True
 
     class Comparator(TypeDecorator.Comparator[Decimal]):
-        """Compares the number, whatever the database stores."""
+        """Comparator that compares numbers, whatever type the database stores."""
 
         def operate(self, op: OperatorType, *other: Any, **kwargs: Any) -> ColumnElement[Any]:
-            """The operation on the numbers of both sides."""
+            """Apply the operator to the numeric values of both sides."""
             numbers = (cast(each, Float) if _is_expression(each) else each for each in other)
             compared: ColumnElement[Any] = op(cast(self.expr, Float), *numbers, **kwargs)
             return compared
@@ -90,17 +90,17 @@ class ExactDecimal(TypeDecorator[Decimal]):
     comparator_factory: Any = Comparator
 
     def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
-        """NUMERIC on PostgreSQL, else text of at most 32 characters."""
+        """Return NUMERIC on PostgreSQL, otherwise text of at most 32 characters."""
         return dialect.type_descriptor(Numeric() if dialect.name == "postgresql" else String(32))
 
     def process_bind_param(self, value: Decimal | None, dialect: Dialect) -> Decimal | str | None:
-        """The number itself for PostgreSQL, else its digits as text."""
+        """Pass the number to PostgreSQL; convert it to text for other databases."""
         if value is None or dialect.name == "postgresql":
             return value
         return str(value)
 
     def process_result_value(self, value: Decimal | str | None, dialect: Dialect) -> Decimal | None:
-        """The number, with every digit that was stored."""
+        """Return the number with all stored digits."""
         return None if value is None else Decimal(value)
 
 
@@ -109,31 +109,31 @@ def _is_expression(value: Any) -> bool:
 
 
 class SafeText(TypeDecorator[str]):
-    """Text that may have come from a student's program."""
+    """Text that may come from a student's program."""
 
     impl = Text
     cache_ok = True
 
     def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
-        """The text without what a database would refuse."""
+        """Replace characters that a database would reject."""
         return None if value is None else storable(value)
 
 
 class SafeJson(TypeDecorator[Any]):
-    """JSON that may hold a student's text; JSONB on PostgreSQL."""
+    """JSON that may contain text of students; JSONB on PostgreSQL."""
 
     impl = JSON(none_as_null=True)
     cache_ok = True
 
     def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
-        """JSONB on PostgreSQL, else JSON; None is NULL on both."""
+        """Return JSONB on PostgreSQL, otherwise JSON. None is stored as NULL on both."""
         if dialect.name != "postgresql":
             return dialect.type_descriptor(JSON(none_as_null=True))
-        # With it come all the drivers that there are for PostgreSQL.
+        # Importing it loads all PostgreSQL drivers.
         from sqlalchemy.dialects.postgresql import JSONB
 
         return dialect.type_descriptor(JSONB(none_as_null=True))
 
     def process_bind_param(self, value: Json, dialect: Dialect) -> Json:
-        """The value with texts that every database takes; raises ValueError for infinity and what is no number."""
+        """Make all strings storable. Raises ValueError for infinite floats and NaN."""
         return storable_json(value)

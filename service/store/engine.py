@@ -1,6 +1,6 @@
-"""Opens the database and gives out transactions: SQLite in a file, or PostgreSQL by URL.
+"""Database connections and transactions: SQLite in a file, or PostgreSQL by URL.
 
-Knows neither tables nor what is done in a transaction.
+Independent of the tables and of the statements in a transaction.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ SQLITE_BUSY_SECONDS = 30
 IMPATIENT_SECONDS = 0.5
 _ONLY_READS = "robomark_only_reads"
 _BUSY_SECONDS = "robomark_busy_seconds"
-#: SQLSTATE of transactions that PostgreSQL ended because of another one: deadlock, serialization failure.
+#: SQLSTATE of transactions that PostgreSQL aborted because of another: deadlock, serialization failure.
 _CONFLICTS = ("40P01", "40001")
-#: A row with the same unique values exists by now, or the row of a foreign key does not: SQLSTATE, and SQLite's names.
+#: A row with the same unique values exists now, or the row of a foreign key is missing: SQLSTATE and SQLite's names.
 _OVERTAKEN = ("23505", "23503", "SQLITE_CONSTRAINT_UNIQUE", "SQLITE_CONSTRAINT_FOREIGNKEY")
 
 P = ParamSpec("P")
@@ -43,24 +43,24 @@ R = TypeVar("R")
 
 
 def is_conflict(error: BaseException) -> bool:
-    """Return whether the database ended a transaction because of another one; run again, it would succeed."""
+    """Return whether the database aborted a transaction because of another one, so that a retry can succeed."""
     return _state_of(error) in _CONFLICTS
 
 
 def is_overtaken(error: BaseException) -> bool:
-    """Return whether another transaction inserted the same row, or removed one, while this one relied on it."""
+    """Return whether another transaction inserted the same row, or removed a row that this one relied on."""
     is_gone = isinstance(error, NoResultFound | StaleDataError | ObjectDeletedError)
     return is_gone or _state_of(error) in _OVERTAKEN
 
 
 def _state_of(error: BaseException) -> str | None:
-    """The SQLSTATE of an error, or SQLite's name of it."""
+    """Return the SQLSTATE of an error, or SQLite's name for it."""
     orig = error.orig if isinstance(error, DBAPIError) else None
     return getattr(orig, "sqlstate", None) or getattr(orig, "sqlite_errorname", None)
 
 
 def retry_conflicts(transact: Callable[P, R]) -> Callable[P, R]:
-    """Decorate a function that is one transaction: run it a second time if the database ended the first by conflict."""
+    """Decorate a function that is one transaction: run it a second time if the first was aborted by a conflict."""
 
     @wraps(transact)
     def transact_again(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -76,33 +76,33 @@ def retry_conflicts(transact: Callable[P, R]) -> Callable[P, R]:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """The open database. Safe to share between threads; not across a fork."""
+    """An open database. Can be shared between threads, but not across a fork."""
 
     engine: Engine
-    secret: Secret | None = None  # of the environment; it wins over the database's own
+    secret: Secret | None = None  # from the environment; overrides the database's own
 
     @contextmanager
     def transaction(self) -> Iterator[Session]:
-        """One transaction: committed at the end, rolled back by any exception.
+        """Open a transaction: committed at the end, rolled back by any exception.
 
-        On SQLite it takes the write lock at once (BEGIN IMMEDIATE), so nothing read in it can go stale.
+        On SQLite it takes the write lock immediately (BEGIN IMMEDIATE), so its reads cannot become stale.
         """
         with Session(self.engine, expire_on_commit=False) as session, session.begin():
             yield session
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
-        """One transaction that only reads; on SQLite it keeps no writer waiting."""
+        """Open a read-only transaction; on SQLite it does not block writers."""
         engine = self.engine.execution_options(**{_ONLY_READS: True})
         with Session(engine, expire_on_commit=False) as session, session.begin():
             yield session
 
     def impatient(self) -> Store:
-        """The same database, for transactions that rather fail than wait long for SQLite's write lock."""
+        """Return the same database for transactions that fail instead of waiting long for SQLite's write lock."""
         return replace(self, engine=self.engine.execution_options(**{_BUSY_SECONDS: IMPATIENT_SECONDS}))
 
     def close(self) -> None:
-        """Close the connections that are kept for later."""
+        """Close the pooled connections."""
         self.engine.dispose()
 
     def __enter__(self) -> Self:
@@ -113,11 +113,10 @@ class Store:
 
 
 def open_engine(url: str) -> Engine:
-    """An engine with the settings that Robomark needs; makes the folder of a SQLite file.
+    """Return an engine with Robomark's settings; creates the folder of a SQLite file.
 
-    No error tells the values of a statement: the installation's secret is one.
-
-    Raises HostError when the folder cannot be made.
+    Errors do not include the values of a statement, because the installation's secret may be one. Raises HostError if
+    the folder cannot be created.
     """
     parsed = make_url(url)
     if parsed.get_backend_name() != "sqlite":
@@ -128,7 +127,7 @@ def open_engine(url: str) -> Engine:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         except OSError as error:
             raise HostError(f"The folder for the database cannot be made: {folder}: {error.strerror}") from None
-    # One connection a transaction: nothing stays open in threads that came and went.
+    # One connection per transaction: finished threads leave none open.
     engine = create_engine(
         parsed, poolclass=NullPool, connect_args={"timeout": SQLITE_BUSY_SECONDS}, hide_parameters=True
     )
@@ -138,7 +137,7 @@ def open_engine(url: str) -> Engine:
 
 
 def _prepare_sqlite(connection: sqlite3.Connection, _record: object) -> None:
-    # Python's own transaction handling emits no BEGIN before a SELECT, which lets two workers claim one job.
+    # Python's transaction handling emits no BEGIN before a SELECT, so two workers could claim one job.
     connection.isolation_level = None
     cursor = connection.cursor()
     for pragma in ("journal_mode = WAL", "synchronous = NORMAL", "foreign_keys = ON"):
@@ -150,15 +149,15 @@ def _begin_immediate(connection: Connection) -> None:
     options = connection.get_execution_options()
     only_reads = options.get(_ONLY_READS, False)
     if _BUSY_SECONDS in options:
-        # The connection is closed after its one transaction.
+        # The connection is closed after its only transaction.
         connection.exec_driver_sql(f"PRAGMA busy_timeout = {int(options[_BUSY_SECONDS] * 1000)}")
     connection.exec_driver_sql("BEGIN" if only_reads else "BEGIN IMMEDIATE")
 
 
 def open_store(settings: Settings) -> Store:
-    """The database of these settings, brought up to the newest tables.
+    """Open the database of these settings and upgrade its tables.
 
-    Raises HostError when it cannot be reached or needs a newer Robomark, UsageError for a home that others share.
+    Raises HostError if it cannot be reached or needs a newer Robomark, UsageError if other users share the home folder.
     """
     parsed = make_url(settings.database)
     file = Path(str(parsed.database)).absolute() if parsed.get_backend_name() == "sqlite" else None
@@ -166,7 +165,7 @@ def open_store(settings: Settings) -> Store:
         open_home(settings.home)
     engine = open_engine(settings.database)
     if file is not None:
-        # Ours alone before anything is in it; SQLite gives what it lays beside it the same mode.
+        # Private before it contains data; SQLite creates its companion files with the same mode.
         with suppress(OSError):
             os.close(os.open(file, os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600))
     try:
@@ -183,7 +182,7 @@ def open_store(settings: Settings) -> Store:
 
 
 def now(session: Session) -> datetime:
-    """The database's clock, so that leases mean the same on every machine; SQLite's machine is ours."""
+    """Return the database's clock, so that leases agree on every machine; for SQLite, this machine's clock."""
     if session.get_bind().dialect.name == "sqlite":
         return datetime.now(UTC)
     moment = session.scalars(select(func.clock_timestamp())).one()

@@ -1,4 +1,4 @@
-"""Names of jobs and batches: hard to guess, easy to read out. Knows no table."""
+"""Random ids of jobs and batches: hard to guess and easy to read aloud. Independent of the tables."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ LENGTH = 12
 
 
 def new_id() -> str:
-    """A name of 60 bits of chance."""
+    """Return a random id of 60 bits."""
     return "".join(secrets.choice(ALPHABET) for _ in range(LENGTH))

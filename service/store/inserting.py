@@ -1,4 +1,4 @@
-"""Inserts a row that another process may be inserting as well, on either database. Knows no table by itself."""
+"""Insert that tolerates the same row from another process, on either database. Independent of the tables."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from service.store import models
 
 
 def insert_if_new(session: Session, table: type[models.Base], **values: object) -> bool:
-    """Insert a row, unless one with the same unique values is there; whether it was inserted."""
-    # The other database's dialect takes longer to import than a command that only asks takes for the rest.
+    """Insert a row unless one with the same unique values exists. Return whether it was inserted."""
+    # Only one dialect is imported: each takes longer than the rest of a simple command.
     if session.get_bind().dialect.name == "postgresql":
         from sqlalchemy.dialects.postgresql import insert
     else:

@@ -1,6 +1,6 @@
-"""The secret of this installation, which its worlds depend on: the environment's where it is set, else the database's.
+"""The secret of this installation, which determines its worlds: from the environment, or else from the database.
 
-It was made with the tables, goes wherever they go, and is shown nowhere; only its hash is.
+It is created with the tables and included in backups. Only its hash is ever shown.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from submissions.seeds import Secret
 
 
 def secret_of(store: Store) -> Secret:
-    """The secret that trials are run with. Raises HostError when the database has lost its own."""
+    """Return the secret that trials are run with. Raises HostError if the database has lost its secret."""
     if store.secret is not None:
         return store.secret
     with store.reading() as session:
@@ -22,7 +22,7 @@ def secret_of(store: Store) -> Secret:
 
 
 def secret_read(text: str | None) -> Secret:
-    """The database's own secret as it was read. Raises HostError where it is gone."""
+    """Return the database's secret from its column. Raises HostError if it is missing."""
     if text is None:
         raise HostError("The database is damaged: the secret that it was made with is gone; restore a backup")
     return Secret(text)

@@ -1,6 +1,6 @@
-"""Row locks, those of several rows in the order of ids, so that two transactions do not deadlock.
+"""Row locks. Several rows are locked in the order of their ids, so that transactions do not deadlock.
 
-They are ``FOR NO KEY UPDATE``, which lets PostgreSQL check foreign keys to the locked rows. SQLite has one writer at a
+They are ``FOR NO KEY UPDATE``, so PostgreSQL can check foreign keys to the locked rows. SQLite allows one writer at a
 time and ignores them.
 """
 
@@ -13,37 +13,37 @@ from service.store.models import Course, Installation, Job, Person, SubmissionRo
 
 
 def lock_installation(session: Session) -> None:
-    """Lock the installation's one row: of what exists once, one transaction at a time makes the first."""
+    """Lock the installation row, so that only one transaction at a time creates an object that must be unique."""
     session.execute(select(Installation.id).with_for_update(key_share=True)).all()
 
 
 def lock_course(session: Session, course_id: int) -> None:
-    """Lock a course to the end of the transaction; submissions to it take the same lock."""
+    """Lock a course until the end of the transaction; submissions to it take the same lock."""
     session.execute(select(Course.id).where(Course.id == course_id).with_for_update(key_share=True)).all()
 
 
 def lock_persons(session: Session, *ids: int) -> None:
-    """Lock persons to the end of the transaction. Raises NoResultFound where one is gone."""
+    """Lock persons until the end of the transaction. Raises NoResultFound if one no longer exists."""
     for each in sorted(ids):
         session.execute(select(Person.id).where(Person.id == each).with_for_update(key_share=True)).one()
 
 
 def lock_jobs(session: Session, *which: ColumnElement[bool]) -> None:
-    """Lock the jobs of these conditions to the end of the transaction."""
+    """Lock the jobs that match these conditions until the end of the transaction."""
     session.execute(_ordered_jobs(*which)).all()
 
 
 def lock_submissions(session: Session, *which: ColumnElement[bool]) -> None:
-    """Lock the submissions of these conditions to the end of the transaction.
+    """Lock the submissions that match these conditions until the end of the transaction.
 
-    Whoever changes which job of a submission stands takes this lock first: a lock on jobs does not stop new ones.
+    Take this lock before changing the standing job of a submission: a lock on jobs does not stop new ones.
     """
     query = select(SubmissionRow.id).where(*which).order_by(SubmissionRow.id)
     session.execute(query.with_for_update(key_share=True)).all()
 
 
 def locked_jobs(*which: ColumnElement[bool]) -> ColumnElement[bool]:
-    """Condition for an UPDATE of several jobs, which locks them in order before it changes the first."""
+    """Return a condition for an UPDATE of several jobs, which locks them in order before the first change."""
     return Job.id.in_(_ordered_jobs(*which))
 
 

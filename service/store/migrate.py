@@ -1,6 +1,6 @@
-"""Brings a database's tables up to this release, once, however many processes start at the same time.
+"""Upgrade of a database's tables to this release, exactly once with any number of concurrent processes.
 
-There is no way down: an older Robomark refuses a newer database.
+Downgrades are not supported: an older Robomark rejects a newer database.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from sim.errors import HostError
 if TYPE_CHECKING:
     from alembic.config import Config
 
-#: An arbitrary number that all Robomarks share: PostgreSQL's advisory lock for migrations.
+#: Arbitrary but fixed key of PostgreSQL's advisory lock for migrations.
 _LOCK = 0x526F626F
 
 
 def configuration(connection: Connection) -> Config:
-    """Alembic's configuration for the scripts inside this package, on an open connection."""
-    # It takes as long to load as all that a command which only asks needs.
+    """Return Alembic's configuration for the scripts in this package, on an open connection."""
+    # Importing it takes as long as everything else in a read-only command.
     from alembic.config import Config
 
     config = Config()
@@ -34,17 +34,17 @@ def configuration(connection: Connection) -> Config:
 
 
 def refuse_downgrade() -> None:
-    """What every revision does when asked to be taken back: raise HostError."""
+    """Raise HostError: the downgrade function of every revision."""
     raise HostError("A database cannot be taken back to an older Robomark; restore the backup made before the upgrade.")
 
 
 def upgrade(engine: Engine) -> None:
-    """Apply what is missing, in one transaction under a lock.
+    """Apply the missing migrations in one transaction, under a lock.
 
     Raises HostError if the database was made by a newer Robomark.
     """
     with engine.begin() as connection:
-        # SQLite holds its write lock since BEGIN IMMEDIATE.
+        # SQLite already has its write lock from BEGIN IMMEDIATE.
         if engine.dialect.name == "postgresql":
             connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _LOCK})
         if revision_of(connection) == newest_revision():
@@ -56,7 +56,7 @@ def upgrade(engine: Engine) -> None:
 
 
 def migrate(connection: Connection) -> None:
-    """Apply one migration after another. Raises HostError if the database was made by a newer Robomark."""
+    """Apply the missing migrations one by one. Raises HostError if the database was made by a newer Robomark."""
     from alembic import command
     from alembic.script import ScriptDirectory
 

@@ -1,8 +1,7 @@
-"""The tables: who, what was submitted, the jobs, and what came of them.
+"""The tables: people, submissions, jobs and results.
 
-Only shapes and constraints; what is done with them stands in the modules beside this one. A class is called as its
-table is, and ``...Row`` only where what it keeps has a class of that name itself (``Submission``, ``Trial``,
-``CriterionResult``).
+Contains only columns and constraints; the modules beside this one contain the operations. A class has the name of its
+table. The suffix ``...Row`` is added if a class with that name exists (``Submission``, ``Trial``, ``CriterionResult``).
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ def _enum(kind: type[StrEnum]) -> Enum:
 
 
 class Base(DeclarativeBase):
-    """What all tables share: the names of their constraints, and the column type of each Python type."""
+    """Base of all tables: the names of constraints, and the column type of each Python type."""
 
     metadata = MetaData(
         naming_convention={
@@ -60,26 +59,26 @@ class Base(DeclarativeBase):
 
 
 class Installation(Base):
-    """One row, made with the tables."""
+    """The installation: one row, created with the tables."""
 
     __tablename__ = "installation"
 
     id: Mapped[int] = mapped_column(primary_key=True)
-    secret: Mapped[str] = mapped_column(String(64))  # what the seeds of trials depend on; shown nowhere
+    secret: Mapped[str] = mapped_column(String(64))  # determines the seeds of trials; never shown
     made_at: Mapped[datetime]
 
 
 class SchemaCompatibility(Base):
-    """One row, which the migrations write."""
+    """Schema compatibility: one row, written by the migrations."""
 
     __tablename__ = "schema_compatibility"
 
     id: Mapped[int] = mapped_column(primary_key=True)
-    oldest_compatible: Mapped[str] = mapped_column(String(32))  # the revision whose code can still use the tables
+    oldest_compatible: Mapped[str] = mapped_column(String(32))  # oldest revision whose code can use the tables
 
 
 class Course(Base):
-    """A course; no two have the same name."""
+    """A course with a unique name."""
 
     __tablename__ = "course"
 
@@ -89,18 +88,18 @@ class Course(Base):
 
 
 class Person(Base):
-    """Somebody who is in a course; their id, name and address are those that each course has of them."""
+    """A person in one or more courses; each enrolment has the id, name and address used in that course."""
 
     __tablename__ = "person"
 
     id: Mapped[int] = mapped_column(primary_key=True)
-    operator: Mapped[bool] = mapped_column(default=False)  # runs the whole installation
+    operator: Mapped[bool] = mapped_column(default=False)  # administers the whole installation
     created_at: Mapped[datetime]
-    signed_in_at: Mapped[datetime | None]  # first, or had a token; since then no platform may take their place
+    signed_in_at: Mapped[datetime | None]  # or got a token, first; from then on no platform may replace them
 
 
 class Enrolment(Base):
-    """A student is a course and an id in it: from the roster, else the name of the folder or file."""
+    """A member of a course, with an id that is unique in it: from the roster, or else from the folder or file name."""
 
     __tablename__ = "enrolment"
     __table_args__ = (Index(None, "course_id", "student", unique=True),)
@@ -116,14 +115,14 @@ class Enrolment(Base):
 
 
 class AssignmentVersion(Base):
-    """An assignment, frozen: ``content`` is all a worker on another machine needs."""
+    """A frozen assignment; ``content`` contains everything that a worker on another machine needs."""
 
     __tablename__ = "assignment_version"
 
     id: Mapped[int] = mapped_column(primary_key=True)
     assignment: Mapped[str] = mapped_column(index=True)
     sha256: Mapped[str] = mapped_column(String(64), unique=True)  # of the content
-    version: Mapped[str]  # what the assignment calls itself: the hash of its folder
+    version: Mapped[str]  # the assignment's own version: the hash of its folder
     title: Mapped[str]
     max_marks: Mapped[Decimal]
     content: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
@@ -131,7 +130,7 @@ class AssignmentVersion(Base):
 
 
 class Batch(Base):
-    """Submissions of one course that were taken in together, or the regrade of such."""
+    """Submissions of one course that were accepted together, or a regrade of them."""
 
     __tablename__ = "batch"
 
@@ -139,13 +138,13 @@ class Batch(Base):
     course_id: Mapped[int] = mapped_column(ForeignKey("course.id"))
     name: Mapped[str]
     state: Mapped[BatchState] = mapped_column(default=BatchState.OPEN)
-    refusals: Mapped[Any] = mapped_column(default=list)  # what was not taken in: a ``Refusal`` each
-    regrade_of: Mapped[str | None] = mapped_column(ForeignKey("batch.id"))  # whose submissions these are
+    refusals: Mapped[Any] = mapped_column(default=list)  # one ``Refusal`` for each rejected file
+    regrade_of: Mapped[str | None] = mapped_column(ForeignKey("batch.id"))  # the batch that was graded again
     created_at: Mapped[datetime]
 
 
 class SubmissionRow(Base):
-    """What a student submitted; ``attempt`` counts within the student and the assignment."""
+    """A submission of a student; ``attempt`` counts per student and assignment."""
 
     __tablename__ = "submission"
     __table_args__ = (
@@ -158,14 +157,14 @@ class SubmissionRow(Base):
     assignment: Mapped[str]
     batch_id: Mapped[str | None] = mapped_column(ForeignKey("batch.id"), index=True)
     attempt: Mapped[int]
-    sha256: Mapped[str] = mapped_column(String(64), index=True)  # of what was submitted
-    source: Mapped[str]  # the name it came under
+    sha256: Mapped[str] = mapped_column(String(64), index=True)  # of the submission
+    source: Mapped[str]  # the name of its file or folder
     size: Mapped[int]
     packed: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
     created_at: Mapped[datetime]
-    submitted_at: Mapped[datetime | None]  # by the student; None where nobody said
+    submitted_at: Mapped[datetime | None]  # by the student; None if unknown
     days_late: Mapped[int] = mapped_column(default=0)
-    staff_only: Mapped[str | None]  # the limit that this submission is over: it is marked, and shown to staff alone
+    staff_only: Mapped[str | None]  # the limit that it exceeds: the submission is marked, but only staff see it
     exceeded: Mapped[Any | None]  # the same limit as data: {"limit": "attempts", "actual": 3, "allowed": 2}
 
 
@@ -173,7 +172,7 @@ _STANDS = text("standing = 'stands'")
 
 
 class Job(Base):
-    """One grading of one submission. The row is the job; the broker only notices."""
+    """One grading of one submission. The row is the job; the broker only notifies."""
 
     __tablename__ = "job"
     __table_args__ = (
@@ -182,7 +181,7 @@ class Job(Base):
         Index(None, "started_at"),
         Index(None, "plots", "plots_due_at"),
         Index(None, "worker", "finished_at"),
-        # All that the counts of a batch are made of, so that they read no job.
+        # All columns counted for a batch, so that counting reads no job row.
         Index(None, "batch_id", "state", "plots", "suspect"),
         Index("uq_job_standing", "submission_id", unique=True, sqlite_where=_STANDS, postgresql_where=_STANDS),
         CheckConstraint("(state = 'running') = (lease IS NOT NULL)", name="lease"),
@@ -191,30 +190,30 @@ class Job(Base):
     id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=new_id)
     submission_id: Mapped[int] = mapped_column(ForeignKey("submission.id"), index=True)
     assignment_version_id: Mapped[int] = mapped_column(ForeignKey("assignment_version.id"), index=True)
-    # The two shares that a claim weighs, beside the job so that a claim reads one table.
+    # The shares that a claim weighs, stored in the job so that a claim reads one table.
     enrolment_id: Mapped[int] = mapped_column(ForeignKey("enrolment.id"), index=True)
     batch_id: Mapped[str | None] = mapped_column(ForeignKey("batch.id"))
     lane: Mapped[Lane]
     state: Mapped[JobState] = mapped_column(default=JobState.QUEUED)
 
-    attempt: Mapped[int] = mapped_column(default=0)  # times begun; not the student's attempts
+    attempt: Mapped[int] = mapped_column(default=0)  # times started; not the student's attempts
     max_attempts: Mapped[int]
-    due_at: Mapped[datetime]  # not before this: later than ``queued_at`` after a fault of ours
+    due_at: Mapped[datetime]  # earliest start: after ``queued_at`` following a host fault
     lease: Mapped[str | None] = mapped_column(String(32))
     lease_until: Mapped[datetime | None]
     heartbeat_at: Mapped[datetime | None]
-    worker: Mapped[str | None]  # who holds it or held it last
-    process: Mapped[int | None]  # which of that worker's
+    worker: Mapped[str | None]  # the present or last owner
+    process: Mapped[int | None]  # the process of that worker
     progress: Mapped[float] = mapped_column(default=0.0)  # 0 to 1
-    error: Mapped[str | None]  # a sentence, of the last fault of ours or the reason of death
+    error: Mapped[str | None]  # a sentence: the last host fault, or the reason of the final failure
     cancelled_for: Mapped[CancelReason | None]
-    superseded_by: Mapped[str | None] = mapped_column(String(ID_LENGTH))  # a newer submission's job, where known
+    superseded_by: Mapped[str | None] = mapped_column(String(ID_LENGTH))  # a newer submission's job, if known
 
     queued_at: Mapped[datetime]
     notified_at: Mapped[datetime | None]
     started_at: Mapped[datetime | None]
     graded_at: Mapped[datetime | None]  # grading ended, results not yet stored
-    finished_at: Mapped[datetime | None]  # results stored, or given up
+    finished_at: Mapped[datetime | None]  # results stored, or job failed
 
     verdict: Mapped[str | None] = mapped_column(String(32))
     marks: Mapped[Decimal | None]
@@ -222,20 +221,20 @@ class Job(Base):
     grader_version: Mapped[str | None]
     sandbox: Mapped[str | None]
     notes: Mapped[Any] = mapped_column(default=list)
-    hints: Mapped[Any] = mapped_column(default=list)  # sentences on what probably cost marks
-    missing: Mapped[str] = mapped_column(default="")  # the part that was asked for and not submitted
+    hints: Mapped[Any] = mapped_column(default=list)  # sentences on the probable causes of lost marks
+    missing: Mapped[str] = mapped_column(default="")  # the required part that was not submitted
     cost: Mapped[Any | None]  # {"limits": {"cpu_seconds": 240.0, ...}, "spent": {"cpu_seconds": 3.2, ...}}
 
-    #: Moments of one grading, ISO 8601 UTC, by the names of ``phases``.
+    #: Times of one grading, ISO 8601 UTC, by the names in ``phases``.
     phases: Mapped[Any] = mapped_column(default=dict)
-    grader_sha256: Mapped[str | None] = mapped_column(String(64))  # of all that decides over marks
-    secret_sha256: Mapped[str | None] = mapped_column(String(64))  # of what its seeds depend on; None: of nothing
-    cache_key: Mapped[str | None] = mapped_column(String(64), index=True)  # alike only where grades must be
-    forced: Mapped[bool] = mapped_column(default=False)  # to be run even where an identical grade is there
-    copied_from: Mapped[str | None] = mapped_column(ForeignKey("job.id"), index=True)  # the grade that was run
-    regrade_of: Mapped[str | None] = mapped_column(ForeignKey("job.id"), index=True)  # the grade that stood before
+    grader_sha256: Mapped[str | None] = mapped_column(String(64))  # of all code that affects marks
+    secret_sha256: Mapped[str | None] = mapped_column(String(64))  # of the secret that its seeds use; None: no secret
+    cache_key: Mapped[str | None] = mapped_column(String(64), index=True)  # equal only if the grades must be equal
+    forced: Mapped[bool] = mapped_column(default=False)  # run it even if an identical grade exists
+    copied_from: Mapped[str | None] = mapped_column(ForeignKey("job.id"), index=True)  # the original grade
+    regrade_of: Mapped[str | None] = mapped_column(ForeignKey("job.id"), index=True)  # the previous standing grade
     standing: Mapped[Standing] = mapped_column(default=Standing.STANDS)
-    suspect: Mapped[str | None]  # why its grade is not to be trusted
+    suspect: Mapped[str | None]  # why its grade is not trusted
     published_at: Mapped[datetime | None]
     published_by: Mapped[str | None]
 
@@ -246,7 +245,7 @@ class Job(Base):
 
 
 class TrialRow(Base):
-    """One run; its recording is the job's artifact ``recording-<position>``."""
+    """One trial; its recording is the job's artifact ``recording-<position>``."""
 
     __tablename__ = "trial"
     __table_args__ = (Index(None, "job_id", "position", unique=True),)
@@ -263,13 +262,13 @@ class TrialRow(Base):
     verdict: Mapped[str] = mapped_column(String(32))
     sha256: Mapped[str] = mapped_column(String(64))
     end_t: Mapped[float]
-    place: Mapped[int] = mapped_column(default=0)  # which of the scenario's poses
-    sweep: Mapped[Any] = mapped_column(default=list)  # [["light_noise", 32.0]]: what is swept, and its level here
-    surprise: Mapped[str | None]  # what our own code stumbled over, if it did
+    place: Mapped[int] = mapped_column(default=0)  # index of the pose in the scenario
+    sweep: Mapped[Any] = mapped_column(default=list)  # [["light_noise", 32.0]]: swept values and their levels here
+    surprise: Mapped[str | None]  # an error in Robomark's own code, if one occurred
 
 
 class CriterionResultRow(Base):
-    """One marked line. Accuracy is data of its own, so that a course can be asked about it."""
+    """The result of one criterion. Accuracy has its own columns for queries over a course."""
 
     __tablename__ = "criterion_result"
     __table_args__ = (Index(None, "job_id", "position", unique=True),)
@@ -293,14 +292,14 @@ class CriterionResultRow(Base):
     counts: Mapped[Any | None]  # {"sent": 6, "answered": 5, "late": 0, "malformed": 0, "unanswered": 1, ...}
     confidence: Mapped[Any | None]  # {"right": 0.93, "n_right": 5, "wrong": null, "n_wrong": 0}
     curves: Mapped[Any] = mapped_column(default=list)  # [{"along": "light_noise", "levels": [...]}, ...]
-    unjudged: Mapped[str | None]  # why it could not be judged; staff have to look
+    unjudged: Mapped[str | None]  # why it could not be judged; needs review by staff
     predictions: Mapped[Any]
-    shown: Mapped[Any | None]  # {"message": ..., "accuracy": ..., "curves": ...} as of the visible trials alone
-    for_staff: Mapped[str] = mapped_column(default="")  # where somebody should look, which no student is told
+    shown: Mapped[Any | None]  # {"message": ..., "accuracy": ..., "curves": ...} of the visible trials only
+    for_staff: Mapped[str] = mapped_column(default="")  # hint for a review by staff; never shown to students
 
 
 class Artifact(Base):
-    """A named file of a job: a recording, a plot. Small ones only; ``artifacts`` caps them."""
+    """A named file of a job, such as a recording or a plot. Small files only; ``artifacts`` limits the size."""
 
     __tablename__ = "artifact"
     __table_args__ = (Index(None, "job_id", "name", unique=True),)
@@ -316,7 +315,7 @@ class Artifact(Base):
 
 
 class Policy(Base):
-    """When and how often a course's students may submit; an empty ``assignment`` is for all that have none."""
+    """Deadline and attempts of a course; an empty ``assignment`` is the default for those without a policy."""
 
     __tablename__ = "policy"
     __table_args__ = (Index(None, "course_id", "assignment", unique=True),)
@@ -328,11 +327,11 @@ class Policy(Base):
     late_days: Mapped[int] = mapped_column(default=0)
     attempts: Mapped[int | None]
     cool_down_seconds: Mapped[float] = mapped_column(default=0.0)
-    zone: Mapped[str] = mapped_column(String(64), default="")  # late days are days of it; empty: of the server's zone
+    zone: Mapped[str] = mapped_column(String(64), default="")  # zone of late days; empty: the server's
 
 
 class Extension(Base):
-    """What one student is allowed beyond the policy."""
+    """An extension of the policy for one student."""
 
     __tablename__ = "extension"
     __table_args__ = (Index(None, "enrolment_id", "assignment", unique=True),)
@@ -345,7 +344,7 @@ class Extension(Base):
 
 
 class Worker(Base):
-    """A worker that has graded a known answer. One that got it wrong is in quarantine and claims nothing."""
+    """A worker that has run a self-test. After a failed one it is in quarantine and claims no jobs."""
 
     __tablename__ = "worker"
 
@@ -353,13 +352,13 @@ class Worker(Base):
     grader_version: Mapped[str]
     grader_sha256: Mapped[str] = mapped_column(String(64))
     first_at: Mapped[datetime]
-    self_tested_at: Mapped[datetime]  # of the last known answer, right or wrong
+    self_tested_at: Mapped[datetime]  # time of the last self-test, passed or failed
     quarantined_at: Mapped[datetime | None]
     reason: Mapped[str | None]
 
 
 class SelfTest(Base):
-    """When a process of a worker last graded the known answer rightly; what it graded since is not vouched for."""
+    """The last passed self-test of a worker process; its later grades are not confirmed yet."""
 
     __tablename__ = "self_test"
     __table_args__ = (Index(None, "worker", "process", unique=True),)
@@ -371,7 +370,10 @@ class SelfTest(Base):
 
 
 class Heartbeat(Base):
-    """A worker that lives, or lived until lately: it says so every few seconds, and takes its row away at its end."""
+    """A live worker, or one that was alive recently.
+
+    It updates its row every few seconds and deletes it when it exits.
+    """
 
     __tablename__ = "heartbeat"
 
@@ -379,14 +381,14 @@ class Heartbeat(Base):
     host: Mapped[str]
     concurrency: Mapped[int]  # gradings at a time
     grader_version: Mapped[str]
-    sandbox: Mapped[str]  # what stands round student code there
+    sandbox: Mapped[str]  # sandbox layers on that machine
     problem: Mapped[str | None]  # why it must be restarted
     started_at: Mapped[datetime]
     seen_at: Mapped[datetime] = mapped_column(index=True)
 
 
 class Audit(Base):
-    """Who did what to which row; never deleted, and changed only where the name of who is erased stands in it."""
+    """Activity log; never deleted, and changed only to erase the name of a person."""
 
     __tablename__ = "audit"
     __table_args__ = (Index(None, "subject", "subject_id"),)
@@ -395,6 +397,6 @@ class Audit(Base):
     at: Mapped[datetime] = mapped_column(index=True)
     actor: Mapped[str]
     action: Mapped[str]
-    subject: Mapped[str] = mapped_column(String(32))  # a table's name
+    subject: Mapped[str] = mapped_column(String(32))  # name of a table
     subject_id: Mapped[str]
     detail: Mapped[Any] = mapped_column(default=dict)

@@ -1,6 +1,6 @@
-"""The tables of a new SQLite database, as the migrations make them one after another, laid at once from a record.
+"""Creation of a new SQLite database from a recorded schema instead of one migration after another.
 
-It is only a shortcut: what the tables are the migrations decide; ``recorded_schema.py`` writes the record.
+Only a shortcut: the migrations define the tables, and ``recorded_schema.py`` writes the record.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from sqlalchemy import insert, inspect
 from sqlalchemy.engine import Connection
 
 RECORD = Path(__file__).with_name("migrations") / "schema.sql"
-#: Between statements; none has an empty line in it.
+#: Separates statements, which contain no empty lines.
 BETWEEN = ";\n\n"
 
 
 def can_be_laid(connection: Connection) -> bool:
-    """Whether this is a SQLite database with nothing in it."""
+    """Return whether this is an empty SQLite database."""
     return connection.dialect.name == "sqlite" and not inspect(connection).get_table_names()
 
 
 def lay(connection: Connection, revision: str) -> None:
-    """Make the tables of ``revision``, the newest, and what the migrations put into them."""
-    # Imported only for a new database: commands that only ask do without the tables.
+    """Create the tables of ``revision``, which is the newest, and the rows that the migrations insert."""
+    # Imported only for a new database: read-only commands do not need the tables.
     from service.store.models import Installation
 
     for statement in RECORD.read_text(encoding="utf-8").split(BETWEEN):

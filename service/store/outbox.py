@@ -1,6 +1,6 @@
-"""What is to be told to webhooks: written in the transaction of what it tells of, then claimed and sent.
+"""Webhook events: written in the transaction of the change that they report, then claimed and sent.
 
-Sending is the web server's, which addresses there are ``webhooks.py``'s. Where a course has none, nothing is written.
+The web server sends them; ``webhooks.py`` stores the addresses. Courses without webhooks write nothing.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from service.store.models import Batch, Enrolment, Job, SubmissionRow
 from service.store.states import UNFINISHED, JobState
 from service.store.web_tables import Delivery, OpenAssignment, Webhook
 
-#: For so long a delivery is tried; then it is given up.
+#: Time after which a delivery is given up.
 TRIED_FOR = timedelta(days=1)
 _FIRST_WAIT = timedelta(seconds=15)
 _LONGEST_WAIT = timedelta(hours=2)
-#: Whoever claimed a delivery has so long to send it, before another may.
+#: Time to send a claimed delivery, before it can be claimed again.
 _LEASE = timedelta(minutes=2)
 _FORGOTTEN = timedelta(days=30)
 
 
 class WebhookEvent(StrEnum):
-    """What webhooks can be told of."""
+    """Events that webhooks can subscribe to."""
 
     GRADE_FINISHED = "grade.finished"
     BATCH_FINISHED = "batch.finished"
@@ -40,7 +40,7 @@ class WebhookEvent(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ClaimedDelivery:
-    """One thing to be sent now, by whoever claimed it."""
+    """A claimed delivery that is to be sent now."""
 
     id: str
     url: str
@@ -52,45 +52,45 @@ class ClaimedDelivery:
 
 
 def grade_finished(session: Session, job_id: str) -> None:
-    """A job has a grade now; its batch may have come to its end with it."""
+    """Report that a job is graded, and that its batch is finished if this was the last one."""
     if hooks := _of_job(session, job_id):
         _grade_finished(session, hooks, job_id)
         _batch_ended(session, hooks, session.scalar(select(Job.batch_id).where(Job.id == job_id)))
 
 
 def grade_copied(session: Session, job_id: str) -> None:
-    """A job has the grade of an identical one, while its batch is still being taken in."""
+    """Report that a job got the grade of an identical one, during the intake of its batch."""
     if hooks := _of_job(session, job_id):
         _grade_finished(session, hooks, job_id)
 
 
 def job_ended(session: Session, job_id: str) -> None:
-    """A job ended without a grade; its batch may have come to its end with it."""
+    """Handle a job that ended without a grade: report its batch as finished if this was the last one."""
     if hooks := _of_job(session, job_id):
         _batch_ended(session, hooks, session.scalar(select(Job.batch_id).where(Job.id == job_id)))
 
 
 def batch_ended(session: Session, batch_id: str) -> None:
-    """Jobs of a batch ended; where none is left, tell that it is finished."""
+    """Report a batch as finished if all its jobs have ended."""
     course_id = select(Batch.course_id).where(Batch.id == batch_id).scalar_subquery()
     if hooks := _hooks(session, select(Webhook).where(Webhook.course_id == course_id)):
         _batch_ended(session, hooks, batch_id)
 
 
 def superseded(session: Session, submissions: Select[int], at: datetime) -> None:
-    """Jobs of these submissions were cancelled at this moment for newer ones."""
+    """Report the batches of jobs that were cancelled at this time for newer submissions."""
     which = (Job.submission_id.in_(submissions), Job.state == JobState.CANCELLED, Job.finished_at == at)
     for batch_id in session.scalars(select(Job.batch_id).where(*which, Job.batch_id.is_not(None)).distinct()).all():
         batch_ended(session, str(batch_id))
 
 
 def grades_published(session: Session, course_id: int, **told: object) -> None:
-    """Grades were released to their students."""
+    """Report that grades were released to their students."""
     _tell(session, _of_course(session, course_id), WebhookEvent.GRADES_PUBLISHED, told)
 
 
 def appeal_opened(session: Session, submission_id: int, appeal_id: int) -> None:
-    """A student asks for a second look."""
+    """Report that a student opened an appeal."""
     of_submission = select(Enrolment.course_id).join(SubmissionRow, SubmissionRow.enrolment_id == Enrolment.id)
     course_id = session.scalars(of_submission.where(SubmissionRow.id == submission_id)).one()
     told = {"appeal": appeal_id, "submission": submission_id}
@@ -99,7 +99,7 @@ def appeal_opened(session: Session, submission_id: int, appeal_id: int) -> None:
 
 @retry_conflicts
 def claim(store: Store, most: int) -> list[ClaimedDelivery]:
-    """Take what is due; nobody else has it for a while."""
+    """Claim the deliveries that are due; no other process gets them until the claim expires."""
     with store.reading() as session:
         at = now(session)
         due = (Delivery.delivered_at.is_(None), Delivery.due_at <= at)
@@ -138,7 +138,7 @@ def claim(store: Store, most: int) -> list[ClaimedDelivery]:
 
 @retry_conflicts
 def delivered(store: Store, claimed: ClaimedDelivery) -> None:
-    """It has arrived."""
+    """Record that a delivery succeeded."""
     with store.transaction() as session:
         values = {"delivered_at": now(session), "error": None}
         session.execute(update(Delivery).where(Delivery.id == claimed.id).values(**values))
@@ -146,7 +146,7 @@ def delivered(store: Store, claimed: ClaimedDelivery) -> None:
 
 @retry_conflicts
 def failed(store: Store, claimed: ClaimedDelivery, error: str) -> None:
-    """It has not arrived: it is tried again later, or given up when a day has gone."""
+    """Record that a delivery failed: it is retried later, or given up after a day."""
     wait = min(_FIRST_WAIT * 2 ** min(claimed.attempt - 1, 20), _LONGEST_WAIT)
     with store.transaction() as session:
         again = now(session) + wait
@@ -181,7 +181,7 @@ def _batch_ended(session: Session, hooks: Sequence[Webhook], batch_id: str | Non
     if batch_id is None:
         return
     if session.get_bind().dialect.name == "postgresql":
-        # Of two workers that end the last two jobs at once, the second has to see what the first did.
+        # If two workers end the last two jobs at once, the second must see the change of the first.
         number = int.from_bytes(hashlib.sha256(batch_id.encode()).digest()[:8], signed=True)
         session.execute(select(func.pg_advisory_xact_lock(number)))
     takes_in = (OpenAssignment.batch_id == batch_id, OpenAssignment.closed_at.is_(None))

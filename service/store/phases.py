@@ -1,6 +1,6 @@
-"""When each phase of a job came to its end: kept with the grade, so that it can be told where the time went.
+"""Times at which each phase of a job ended, stored with the grade to show where time was spent.
 
-All moments are by the database's clock; a worker adds what it measured itself to the moment of its claim.
+All times are by the database's clock; a worker adds its own measurements to the time of its claim.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import Any
 
 QUEUED = "queued"
 CLAIMED = "claimed"
-TRIALS = "trials"  # the last trial had been run
-JUDGED = "judged"  # every criterion had been marked
-COMMITTED = "committed"  # the marks were in the database
+TRIALS = "trials"  # the last trial ended
+JUDGED = "judged"  # all criteria were marked
+COMMITTED = "committed"  # the marks were stored
 PLOTTED = "plotted"
-#: In their order. A grade that was copied, or is not plotted yet, lacks some.
+#: In order. A copied grade, or one that is not plotted yet, does not have all of them.
 NAMES = (QUEUED, CLAIMED, TRIALS, JUDGED, COMMITTED, PLOTTED)
-#: What is done from the phase before, where that is there, to the end of each.
+#: Spans between two phases, by name.
 SPANS: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
         "waiting": (QUEUED, CLAIMED),
@@ -31,13 +31,13 @@ SPANS: Mapping[str, tuple[str, str]] = MappingProxyType(
 
 
 def written(moments: Mapping[str, datetime | None]) -> dict[str, str]:
-    """Moments as they are stored: ISO 8601 by name, in order; those that are None are left out."""
+    """Return the times as stored: ISO 8601 by name, in order, without those that are None."""
     present = {name: moments.get(name) for name in NAMES}
     return {name: moment.isoformat() for name, moment in present.items() if moment is not None}
 
 
 def durations(stored: Any) -> dict[str, timedelta]:
-    """How long each span took, by the names of ``SPANS``; only those of which both ends are stored."""
+    """Return the duration of each span in ``SPANS`` with both ends stored."""
     moments = {name: datetime.fromisoformat(text) for name, text in dict(stored or {}).items() if name in NAMES}
     return {
         span: moments[end] - moments[start]

@@ -1,7 +1,7 @@
-"""Removes what was submitted before a day and has long been marked, or all there is of one student.
+"""Purge of old, graded submissions, and erasure of single students.
 
-With submissions go grades, recordings and what was said of them. What is done to a batch before that is
-``batch_control.py``'s; the audit trail stays, without the names of those who are erased.
+Grades, recordings and comments are removed with their submissions. ``batch_control.py`` controls batches before that.
+The activity log is kept, without the names of erased students.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from sim.errors import UsageError
 from submissions.names import shown_name
 
 _TEMPORARY = MetaData()
-#: Submissions and enrolments that go; there may be more of them than a statement takes as values.
+#: Ids of submissions and enrolments to remove; there may be more than a statement accepts as parameters.
 _GOING = Table("going", _TEMPORARY, Column("id", Integer, primary_key=True), prefixes=["TEMPORARY"])
 _LEAVING = Table("leaving", _TEMPORARY, Column("id", Integer, primary_key=True), prefixes=["TEMPORARY"])
 _AT_ONCE = 500
@@ -43,7 +43,7 @@ _leaving = select(_LEAVING.c.id)
 
 @dataclass(frozen=True, slots=True)
 class Purged:
-    """How much went, or would go."""
+    """Numbers of removed rows, or of rows that would be removed."""
 
     submissions: int
     grades: int
@@ -54,9 +54,9 @@ class Purged:
 def purge(
     store: Store, before: datetime, actor: str, *, course_id: int | None = None, only_count: bool = False
 ) -> Purged:
-    """Remove the submissions taken in before a moment, with all that came of them, and students who have none left.
+    """Remove the submissions accepted before a moment, with their results, and students without remaining submissions.
 
-    Of all courses, or of one. What still waits or runs stays, and so does what a later grade is a copy of. With
+    Applies to all courses or to one. Unfinished submissions and the sources of later copies are kept. With
     ``only_count`` nothing is changed.
     """
     with store.transaction() as session:
@@ -72,7 +72,10 @@ def purge(
 
 
 def remove_student(session: Session, enrolment_id: int, actor: str) -> None:
-    """Remove a student who has submitted nothing from a course. Raises UsageError for one who has, or instructs it."""
+    """Remove a student without submissions from a course.
+
+    Raises UsageError for an instructor or existing submissions.
+    """
     if has_submitted(session, enrolment_id):
         student = session.get_one(Enrolment, enrolment_id).student
         raise UsageError(f"{student} has submitted something; robomark course delete-student removes that, too")
@@ -80,7 +83,7 @@ def remove_student(session: Session, enrolment_id: int, actor: str) -> None:
 
 
 def has_submitted(session: Session, enrolment_id: int, without: Set[str] = frozenset()) -> bool:
-    """Return whether a student has submitted anything, leaving out some assignments."""
+    """Return whether a student has submitted anything, except to the assignments in ``without``."""
     own = select(SubmissionRow.id).where(
         SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment.not_in(without)
     )
@@ -88,10 +91,10 @@ def has_submitted(session: Session, enrolment_id: int, without: Set[str] = froze
 
 
 def erase_student(session: Session, enrolment_id: int, actor: str) -> Purged:
-    """Remove all there is of one student of a course: what was submitted and what came of it, and who they are.
+    """Remove all data of one student of a course: submissions, results and personal data.
 
-    Somebody who is in other courses, too, is only removed from this one. A grade that is a copy of one of theirs stays.
-    The caller has locked the course. Raises UsageError for an instructor, and while a submission of theirs is being
+    A person with other courses is removed only from this one. Grades copied from the student's are kept. The caller
+    must have locked the course. Raises UsageError for an instructor, and while a submission of the student is being
     graded.
     """
     enrolment = session.get_one(Enrolment, enrolment_id)
@@ -119,7 +122,7 @@ def _found(session: Session) -> Purged:
 
 
 def _forget_names(session: Session, enrolment: Enrolment) -> None:
-    """Where a student is named beside their own rows: among what was refused, and in the audit."""
+    """Remove a student's name from other rows: rejections of batches, and the activity log."""
     for batch in session.scalars(select(Batch).where(Batch.course_id == enrolment.course_id)):
         kept = [each for each in batch.refusals if shown_name(each["student"]["id"]) != enrolment.student]
         if len(kept) < len(batch.refusals):
@@ -145,7 +148,7 @@ def _choose(session: Session, before: datetime, course_id: int | None) -> None:
         .join(Job, or_(Job.copied_from == source.id, Job.regrade_of == source.id))
         .where(Job.submission_id.not_in(_going))
     )
-    # What is kept for a later grade may need an earlier one itself.
+    # The source of a kept copy may be a copy itself.
     while session.execute(delete(_GOING).where(_GOING.c.id.in_(needed))).rowcount:  # type: ignore[attr-defined]
         pass
     losing = select(SubmissionRow.enrolment_id).where(SubmissionRow.id.in_(_going))
@@ -161,7 +164,7 @@ def _remove(session: Session) -> None:
     lock_jobs(session, copies)
     session.execute(update(Job).where(copies).values(copied_from=None))
     session.execute(update(Job).where(of_them).values(regrade_of=None))
-    # Its trials, results and artifacts go with a job.
+    # Deleting a job also deletes its trials, results and artifacts.
     session.execute(delete(Job).where(of_them))
     for column in (Override.submission_id, Comment.submission_id, Appeal.submission_id):
         session.execute(delete(column.class_).where(column.in_(_going)))
@@ -171,7 +174,7 @@ def _remove(session: Session) -> None:
         Batch.id.in_(select(SubmissionRow.batch_id).where(SubmissionRow.batch_id.is_not(None))),
         Batch.id.in_(select(OpenAssignment.batch_id).where(OpenAssignment.batch_id.is_not(None))),
     )
-    # A batch of regrades goes before the one that it is of.
+    # A batch of regrades is deleted before its original.
     session.execute(delete(Batch).where(~or_(*used), Batch.regrade_of.is_not(None)))
     regraded = select(Batch.regrade_of).where(Batch.regrade_of.is_not(None))
     session.execute(delete(Batch).where(~or_(*used), Batch.id.not_in(regraded)))
@@ -194,7 +197,7 @@ def _remove(session: Session) -> None:
 
 
 def _sign_out_leaving(session: Session) -> None:
-    """End what those who leave a course sign in with, as far as it reaches that course."""
+    """Revoke the credentials of students who leave a course, if they reach that course."""
     reaches = or_(Credential.course_id.is_(None), Credential.course_id == Enrolment.course_id)
     left = select(Enrolment.id).where(Enrolment.id.in_(_leaving), Enrolment.person_id == Credential.person_id, reaches)
     ended = update(Credential).where(Credential.revoked_at.is_(None), left.exists()).values(revoked_at=now(session))

@@ -1,6 +1,6 @@
-"""Writes down the tables that the migrations make, for new databases: ``python -m service.store.recorded_schema``.
+"""Recorder of the schema that the migrations create: ``python -m service.store.recorded_schema``.
 
-Run it after adding a migration; ``new_database.py`` lays the tables from the record.
+Run it after adding a migration; ``new_database.py`` creates tables from the record.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from service.store.new_database import BETWEEN, RECORD
 
 
 def statements_of(connection: Connection) -> list[str]:
-    """The statements that make the tables of a SQLite database, in their order."""
+    """Return the statements that create the tables of a SQLite database, in order."""
     asked = "SELECT sql FROM sqlite_master WHERE sql IS NOT NULL ORDER BY rowid"
     return list(connection.exec_driver_sql(asked).scalars())
 
 
 def write_schema() -> None:
-    """Write down what the migrations of this checkout make."""
+    """Record the tables that the migrations of this checkout create."""
     with tempfile.TemporaryDirectory() as folder:
         engine = open_engine(f"sqlite:///{folder}/new.db")
         with engine.begin() as connection:

@@ -1,1 +1,1 @@
-"""What is submitted together: taking in, looking at, publishing and grading again."""
+"""Batches: intake, tables and views, publishing and regrading."""

@@ -1,6 +1,6 @@
-"""The table of a batch: a short row for each submission and each refusal, filtered, sorted and cut into pages.
+"""Table of a batch: a short row for each submission and rejection, filtered, sorted and split into pages.
 
-Only reads, and of each job only what a row shows; all that is known of one job is in ``batches.py``.
+Read-only. Reads only the columns that a row shows; ``batches.py`` reads everything about one job.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from submissions.student_identity import Refusal
 
 REFUSED = "refused"
 ROWS_A_PAGE = 100
-#: What rows can be asked for by.
+#: Values of the state filter.
 STATES = (*(state.value for state in JobState), REFUSED)
 
 
 @dataclass(frozen=True, slots=True)
 class TableLine:
-    """One row. Of what was refused there is no job, so that ``id`` is empty and ``error`` says why."""
+    """A row of the table. A rejected file has no job: its ``id`` is empty and ``error`` contains the reason."""
 
     id: str
     submission_id: int
@@ -52,26 +52,26 @@ class TableLine:
     max_marks: Decimal
     error: str
     cancelled_for: CancelReason | None
-    superseded_by: str | None  # the newer submission's job, where it is known
+    superseded_by: str | None  # the newer submission's job, if known
     suspect: str | None
     staff_only: str | None
     days_late: int
     attempt: int
     sha256: str
-    seconds: float | None  # from its begin to its marks, where it was run
+    seconds: float | None  # from start to marks, if it was run
     published_at: datetime | None
-    elsewhere: bool  # submitted in another batch than the table's
-    newer_attempt: int | None  # the newest attempt after it that is not graded or over a limit
+    elsewhere: bool  # submitted in a batch other than the table's
+    newer_attempt: int | None  # the newest later attempt that is not graded or over a limit
 
     @property
     def share(self) -> Decimal:
-        """What it got of its marks; less than nothing where it has none, so that it comes last."""
+        """Marks as a fraction of the maximum; -1 without marks, so that the row sorts last."""
         return Decimal(-1) if self.marks is None or not self.max_marks else self.marks / self.max_marks
 
 
 @dataclass(frozen=True, slots=True)
 class TableAsked:
-    """What of a table is wanted: rows in a state (all, if empty), with a text in them, sorted, and which page."""
+    """Filter, sort order and page of a table. An empty ``state`` selects all states."""
 
     state: str = ""
     text: str = ""
@@ -82,7 +82,7 @@ class TableAsked:
 
 @dataclass(frozen=True, slots=True)
 class TablePage:
-    """Some rows of all that were found, and which page that is of how many."""
+    """A page of the matching rows, with the number of rows and pages."""
 
     lines: tuple[TableLine, ...]
     found: int
@@ -92,7 +92,7 @@ class TablePage:
 
 @dataclass(frozen=True, slots=True)
 class Remarked:
-    """What else there is to be looked at: criteria that could not be judged, trials that our own code stumbled in."""
+    """Additional review counts of a job: unjudged criteria, and trials in which Robomark's own code failed."""
 
     unjudged: int = 0
     surprises: int = 0
@@ -102,7 +102,7 @@ def _by_student(line: TableLine) -> tuple[Any, ...]:
     return (line.student.casefold(), line.assignment, line.id)
 
 
-#: How rows are sorted, by the word that asks for it.
+#: Sort keys, by the name of the order.
 SORTS: Mapping[str, Callable[[TableLine], Any]] = MappingProxyType(
     {
         "student": _by_student,
@@ -116,7 +116,7 @@ SORTS: Mapping[str, Callable[[TableLine], Any]] = MappingProxyType(
 
 
 def table_lines(session: Session, batch_id: str, refusals: Sequence[Refusal], hidden: HiddenNames) -> list[TableLine]:
-    """All rows of a batch, by student."""
+    """Return all rows of a batch, ordered by student."""
     row = session.get(Batch, batch_id)  # kept, so that it is read once
     query = (
         select(
@@ -156,7 +156,7 @@ def table_lines(session: Session, batch_id: str, refusals: Sequence[Refusal], hi
 
 
 def table_page(lines: Sequence[TableLine], asked: TableAsked) -> TablePage:
-    """The page of the rows that is asked for, the last where there are not so many."""
+    """Return the requested page of the matching rows, or the last page if there are fewer."""
     text = asked.text.strip().casefold()
     found = [line for line in lines if (not asked.state or line.state == asked.state) and text in _searched(line)]
     found.sort(key=SORTS.get(asked.sort, _by_student), reverse=asked.descending)
@@ -166,7 +166,7 @@ def table_page(lines: Sequence[TableLine], asked: TableAsked) -> TablePage:
 
 
 def remarked(session: Session, lines: Sequence[TableLine]) -> dict[str, Remarked]:
-    """What there is to be looked at in some jobs, by id."""
+    """Return the review counts of some jobs, by job id."""
     ids = [line.id for line in lines if line.id]
     unjudged = dict(
         session.execute(

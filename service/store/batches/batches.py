@@ -1,7 +1,7 @@
-"""What an instructor asks about batches and jobs: how far, what marks, what went wrong. Only reads.
+"""Queries about batches and jobs for instructors: progress, marks and failures. Read-only.
 
-A batch has a row for each student who submitted in it. The row shows the attempt that counts, which may be in another
-batch (``service.store.grades.current``).
+A batch has a row for each student who submitted in it. The row shows the student's current attempt, which may be in
+another batch (``service.store.grades.current``).
 """
 
 from __future__ import annotations
@@ -33,19 +33,19 @@ from sim.errors import UsageError
 from submissions.nearest import did_you_mean
 from submissions.student_identity import Refusal
 
-#: What is read of each job.
+#: Columns read for each job.
 _Asked = tuple[
     Job, str, str, str, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None,
     int | None, str | None, int | None,
 ]  # fmt: skip
 _MOST_LISTED = 50
-#: The newest of which one may have been meant by an id that there is not.
+#: Number of newest ids considered for a "did you mean" hint.
 _MOST_COMPARED = 1000
 
 
 @dataclass(frozen=True, slots=True)
 class JobLine:
-    """One job, as a table shows it."""
+    """A job, as shown in a table."""
 
     id: str
     submission_id: int
@@ -62,32 +62,32 @@ class JobLine:
     attempt: int  # the student's
     error: str | None
     cancelled_for: CancelReason | None
-    superseded_by: str | None  # the newer submission's job, where it is known
+    superseded_by: str | None  # the newer submission's job, if known
     plots: PlotState
-    sandbox: str | None  # what stood around the student's code
+    sandbox: str | None  # the active sandbox layers
     worker: str | None
     queued_at: datetime
     finished_at: datetime | None
     standing: Standing
-    missing: str  # the part that was asked for and not submitted
-    copied_from: str | None  # the identical grade that was run
-    suspect: str | None  # why the grade is not to be trusted
-    staff_only: str | None  # the limit that the submission was over
-    unjudged: int  # criteria that could not be judged, nor were set by hand
-    set_by_hand: int  # criteria that were
-    surprises: int  # trials in which our own code stumbled over what a child sent
+    missing: str  # the required part that was not submitted
+    copied_from: str | None  # the identical grade that was copied
+    suspect: str | None  # why the grade is not trusted
+    staff_only: str | None  # the limit that the submission exceeds
+    unjudged: int  # criteria that could not be judged and were not set by staff
+    set_by_hand: int  # criteria set by staff
+    surprises: int  # trials in which Robomark's own code failed on data from a child
     days_late: int
     published_at: datetime | None
-    batch_id: str | None  # in which it was submitted
-    newer_attempt: int | None  # the newest attempt after it that is not graded or over a limit
+    batch_id: str | None  # the batch that it was submitted in
+    newer_attempt: int | None  # the newest later attempt that is not graded or over a limit
 
     @property
     def ended(self) -> bool:
-        """Whether nothing will come of the job any more but what has come."""
+        """Return whether the job has reached a final state."""
         return self.state not in UNFINISHED
 
     def hidden_by(self, names: HiddenNames) -> JobLine:
-        """The same with nothing in it that tells whose it is, where names are hidden."""
+        """Return the line without identifying data if names are hidden for its assignment."""
         if self.assignment not in names.assignments:
             return self
         return replace(self, student=names.called(self.assignment, self.student), name="", email="", source="")
@@ -95,7 +95,7 @@ class JobLine:
 
 @dataclass(frozen=True, slots=True)
 class BatchLine:
-    """A batch, and how many of its jobs are in each state."""
+    """A batch, with the number of jobs in each state."""
 
     id: str
     name: str
@@ -104,19 +104,19 @@ class BatchLine:
     refusals: tuple[Refusal, ...]
     jobs: int
     states: dict[JobState, int]
-    regrade_of: str | None  # the batch whose submissions these are
-    web_assignment: str | None  # the assignment that these were submitted to on the web
-    takes_in: bool  # more may come, for the assignment is open
+    regrade_of: str | None  # the batch that was graded again
+    web_assignment: str | None  # the assignment of a batch of web submissions
+    takes_in: bool  # the assignment is open, so more submissions may arrive
 
     @property
     def unfinished(self) -> int:
-        """How many of its jobs have not ended."""
+        """Number of its jobs that have not ended."""
         return sum(self.states.get(state, 0) for state in UNFINISHED)
 
 
 @dataclass(frozen=True, slots=True)
 class BatchProgress:
-    """How far jobs have come; ``partial`` is what the running ones have done, in jobs."""
+    """Progress of some jobs; ``partial`` is the work done by the running ones, in jobs."""
 
     jobs: int
     ended: int
@@ -125,19 +125,19 @@ class BatchProgress:
 
 
 def find_batch(session: Session, start: str) -> str:
-    """The id of the batch that begins so. Raises UsageError where none or several do."""
+    """Return the id of the batch that begins with ``start``. Raises UsageError for no match or several."""
     return _find(session, Batch.id, Batch.created_at, start, "batch")
 
 
 def find_job(session: Session, start: str) -> str:
-    """The id of the job that begins so. Raises UsageError where none or several do."""
+    """Return the id of the job that begins with ``start``. Raises UsageError for no match or several."""
     return _find(session, Job.id, Job.queued_at, start, "grade")
 
 
 def job_before(session: Session, job_id: str) -> str:
-    """The id of the grade that stands for the same student's last attempt before this job's.
+    """Return the id of the standing grade of the same student's previous attempt.
 
-    Raises UsageError where there is none; what is for staff alone, or not to be trusted, is passed over.
+    Skips staff-only and untrusted grades. Raises UsageError if there is none.
     """
     mine = session.execute(
         select(SubmissionRow).join(Job, Job.submission_id == SubmissionRow.id).where(Job.id == job_id)
@@ -160,7 +160,7 @@ def job_before(session: Session, job_id: str) -> str:
 
 
 def list_batches(session: Session, course_id: int | None = None) -> list[BatchLine]:
-    """The newest batches first, of all courses or of one."""
+    """Return the newest batches, newest first, of all courses or of one."""
     query = select(Batch).order_by(Batch.created_at.desc(), Batch.id).limit(_MOST_LISTED)
     if course_id is not None:
         query = query.where(Batch.course_id == course_id)
@@ -168,7 +168,7 @@ def list_batches(session: Session, course_id: int | None = None) -> list[BatchLi
 
 
 def batches_of(session: Session, course_id: int, limit: int, after: tuple[datetime, str] | None) -> list[BatchLine]:
-    """The newest batches of a course first, from the one on that was made ``after`` at, and has that id."""
+    """Return the next ``limit`` batches of a course, newest first, after the batch with this creation time and id."""
     query = select(Batch).where(Batch.course_id == course_id)
     if after is not None:
         earlier = and_(Batch.created_at == after[0], Batch.id > after[1])
@@ -178,7 +178,7 @@ def batches_of(session: Session, course_id: int, limit: int, after: tuple[dateti
 
 
 def batch(session: Session, batch_id: str) -> BatchLine:
-    """One batch. Raises UsageError if there is none of this id."""
+    """Return one batch. Raises UsageError if the id is unknown."""
     row = session.get(Batch, batch_id)
     if row is None:
         raise UsageError(f"there is no batch {batch_id}")
@@ -186,39 +186,42 @@ def batch(session: Session, batch_id: str) -> BatchLine:
 
 
 def is_regrade(session: Session, batch_id: str) -> bool:
-    """Whether a batch is one of regrades; asks nothing where the caller keeps its row."""
+    """Return whether a batch consists of regrades. Needs no query if the caller keeps the batch row."""
     row = session.get(Batch, batch_id)
     return row is not None and row.regrade_of is not None
 
 
 def standing_in(session: Session, batch_id: str) -> tuple[ColumnElement[bool], ...]:
-    """What holds of the job that stands for a submission of the batch; of a batch of regrades, of its own jobs."""
+    """Return the conditions that select the standing jobs of a batch; for a batch of regrades, its own jobs."""
     if is_regrade(session, batch_id):
         return (Job.batch_id == batch_id, Job.suspect.is_(None))
     return (Job.submission_id.in_(counting([batch_id])), Job.standing == Standing.STANDS)
 
 
 def submissions_in(session: Session, batch_id: str) -> Select[int]:
-    """The submissions that a batch is about: those that count of it, or all that a batch of regrades has."""
+    """Return a query for the submissions of a batch: the current ones, or all in a batch of regrades."""
     if is_regrade(session, batch_id):
         return select(Job.submission_id).where(Job.batch_id == batch_id)
     return counting([batch_id])
 
 
 def counting(batch_ids: Sequence[str]) -> Select[int]:
-    """The submissions that rows of some batches show: of each student and assignment in them the current attempt."""
+    """Return a query for the submissions that the rows of some batches show: the current attempt of each student."""
     return current.shown(current.attempted_in(select(Batch.id).where(Batch.id.in_(batch_ids))))
 
 
 def job_lines(session: Session, batch_id: str, hidden: HiddenNames = NAMED) -> list[JobLine]:
-    """The job that stands for each submission of a batch, by student as shown; of a batch of regrades its own jobs."""
+    """Return the standing job of each submission of a batch, ordered by displayed student name.
+
+    For a batch of regrades, returns its own jobs.
+    """
     query = _job_lines().where(*standing_in(session, batch_id)).order_by(Enrolment.student, Job.id)
     lines = _under_their_names_in(session, batch_id, [_line(row) for row in session.execute(query)])
     return _by_shown_names(lines, hidden)
 
 
 def attempt_lines(session: Session, batch_id: str) -> list[JobLine]:
-    """The job that stands for each submission that came with a batch, whether it counts or not."""
+    """Return the standing job of each submission made in a batch, current or not."""
     query = _job_lines().where(SubmissionRow.batch_id == batch_id, Job.standing == Standing.STANDS)
     return [_line(row) for row in session.execute(query.order_by(Enrolment.student, Job.id))]
 
@@ -226,7 +229,10 @@ def attempt_lines(session: Session, batch_id: str) -> list[JobLine]:
 def some_job_lines(
     session: Session, batch_id: str, hidden: HiddenNames, limit: int, after: str | None = None
 ) -> list[JobLine]:
-    """Some of them, which follow on the job of this id, without the hidden names and in no order that tells them."""
+    """Return at most ``limit`` job lines of a batch, after the job with this id.
+
+    Hidden names are left out and do not affect the order.
+    """
     student = case((SubmissionRow.assignment.in_(hidden.assignments), ""), else_=Enrolment.student)
     query = _job_lines().where(*standing_in(session, batch_id)).order_by(student, Job.id).limit(limit)
     if after is not None:
@@ -245,7 +251,7 @@ def some_job_lines(
 def course_lines(
     session: Session, course_id: int, assignments: Sequence[str], hidden: HiddenNames = NAMED
 ) -> list[JobLine]:
-    """The same of each student of a course for some assignments, in whichever batch it is or in none."""
+    """Return the current job of each student of a course for some assignments, in any batch or in none."""
     students = select(Enrolment.id).where(Enrolment.course_id == course_id, Enrolment.role == Role.STUDENT)
     ids = current.shown(SubmissionRow.assignment.in_(assignments), SubmissionRow.enrolment_id.in_(students))
     query = _job_lines().where(Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
@@ -253,7 +259,7 @@ def course_lines(
 
 
 def job_line(session: Session, job_id: str) -> JobLine:
-    """One job. Raises UsageError if there is none of this id."""
+    """Return one job. Raises UsageError if the id is unknown."""
     row = session.execute(_job_lines().where(Job.id == job_id)).one_or_none()
     if row is None:
         raise UsageError(f"there is no grade {job_id}")
@@ -261,7 +267,7 @@ def job_line(session: Session, job_id: str) -> JobLine:
 
 
 def progress(session: Session, batch_id: str) -> BatchProgress:
-    """How far a batch has come."""
+    """Return the progress of a batch."""
     of_batch = Job.batch_id == batch_id
     states = dict(session.execute(select(Job.state, func.count()).where(of_batch).group_by(Job.state)).all())
     running = select(func.sum(Job.progress)).where(of_batch, Job.state == JobState.RUNNING)
@@ -278,7 +284,7 @@ def _batch_lines(session: Session, rows: Sequence[Batch]) -> list[BatchLine]:
     ids = [row.id for row in rows]
     opened = session.scalars(select(OpenAssignment).where(OpenAssignment.batch_id.in_(ids)))
     of_the_web = {row.batch_id: row for row in opened if row.batch_id is not None}
-    # What a worker in quarantine graded is in the batch a second time.
+    # Submissions graded by a quarantined worker have a second job in the batch.
     counted = select(Job.batch_id, Job.state, func.count()).where(
         Job.batch_id.in_([own for own in ids if own not in of_the_web]), Job.suspect.is_(None)
     )
@@ -413,16 +419,16 @@ def _line(row: Row[*_Asked]) -> JobLine:
 
 
 def _by_shown_names(lines: list[JobLine], names: HiddenNames) -> list[JobLine]:
-    """The lines as instructors see them: their order, and what is counted in it, tells nothing of hidden names."""
+    """Return the lines as instructors see them, sorted so that neither order nor count reveals hidden names."""
     if not names.assignments:
         return lines
     return sorted((line.hidden_by(names) for line in lines), key=lambda line: (line.student, line.id))
 
 
 def _under_their_names_in(session: Session, batch_id: str, lines: list[JobLine]) -> list[JobLine]:
-    """The lines with the names that the students' submissions came under in this batch.
+    """Return the lines with the source names that the submissions have in this batch.
 
-    By these the system that a batch was downloaded from knows its rows again, whatever else was submitted since.
+    The system that a batch was downloaded from identifies its rows by these names, even after later submissions.
     """
     if all(line.batch_id == batch_id for line in lines):
         return lines

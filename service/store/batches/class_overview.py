@@ -1,6 +1,6 @@
-"""What came of a batch at a glance: marks, criteria, causes, whom to look at, and who has not submitted. Only reads.
+"""Overview of a batch: marks, criteria, causes, outliers and missing submissions. Read-only.
 
-What is made of marks is ``service.grading``'s; near copies are ``similarities.py``'s, which takes long.
+``service.grading`` computes the statistics. ``similarities.py`` finds similar submissions, which takes longer.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ from submissions.student_identity import Student
 
 @dataclass(frozen=True, slots=True)
 class ClassOverview:
-    """Of one assignment; ``identical`` are those whose submissions are the very same, each group of them."""
+    """Overview of one assignment; ``identical`` contains groups of submissions with the same content."""
 
     statistics: AssignmentStatistics
     distribution: tuple[MarksBin, ...]
     passed: int
     outliers: tuple[Outlier, ...]
     identical: tuple[tuple[TableLine, ...], ...]
-    missing: tuple[Student, ...]  # in the course, without any submission for it; named as rows are
+    missing: tuple[Student, ...]  # in the course, without a submission for it; named as in rows
 
 
 def overview(
     session: Session, course_id: int, lines: Sequence[TableLine], pass_share: Decimal, hidden: HiddenNames
 ) -> tuple[ClassOverview, ...]:
-    """Of the rows of a batch, by assignment."""
+    """Return the overview of each assignment in the rows of a batch."""
     graded = [line for line in lines if current.is_for_students(line)]
     found = []
     counted = marked(session, graded)
     for statistics in statistics_of(counted):
-        # Who is excused from everything has no marks, so neither passes nor fails.
+        # A student excused from everything has no marks, so neither passes nor fails.
         own = [line for line in graded if line.assignment == statistics.assignment and line.share >= 0]
         marks = (each.marks for each in counted if each.assignment == statistics.assignment)
         taken = [MarksAndTime(line.id, line.share, line.seconds) for line in own]
@@ -69,9 +69,9 @@ def _identical(lines: Sequence[TableLine]) -> tuple[tuple[TableLine, ...], ...]:
 
 
 def missing(session: Session, course_id: int, assignment: str, hidden: HiddenNames) -> tuple[Student, ...]:
-    """Return the students of a course who have submitted nothing for an assignment.
+    """Return the students of a course without a submission for an assignment.
 
-    Where names are hidden they have labels: by a name that leaves this list a new row could be recognised.
+    If names are hidden, labels are returned: a real name that leaves this list would identify the new row.
     """
     of_student = (SubmissionRow.enrolment_id == Enrolment.id, SubmissionRow.assignment == assignment)
     query = (

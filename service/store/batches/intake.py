@@ -1,6 +1,6 @@
-"""Takes submissions in: the student, the frozen assignment, the submission and its job, in one transaction.
+"""Intake of submissions: stores student, frozen assignment, submission and job in one transaction.
 
-Publishes nothing: the row is the job, and the queue's notice comes after the commit.
+Sends nothing to the broker: the row is the job, and workers are notified after the commit.
 """
 
 from __future__ import annotations
@@ -39,26 +39,26 @@ if TYPE_CHECKING:
     from submissions.assignment.definition import Assignment
 
 Read = TypeVar("Read")
-#: How many submissions are fetched at once.
+#: Number of submissions fetched at once.
 _AT_ONCE = 10
 
 
 @dataclass(frozen=True, slots=True)
 class Accepted:
-    """A submission that is now a job."""
+    """A submission that was accepted as a job."""
 
     job_id: str
     submission_id: int
     student: str
     assignment: str
     attempt: int
-    copied_from: str | None = None  # the identical grade that it has already
-    staff_only: str = ""  # the limit that it is over
+    copied_from: str | None = None  # the identical grade that was copied to it
+    staff_only: str = ""  # the limit that it exceeds
 
 
 @dataclass(frozen=True, slots=True)
 class AcceptedBatch:
-    """``refused`` are students whom the course cannot tell from others."""
+    """An accepted batch; ``refused`` contains students that cannot be identified uniquely in the course."""
 
     id: str
     jobs: tuple[Accepted, ...]
@@ -67,19 +67,19 @@ class AcceptedBatch:
 
 @dataclass(frozen=True, slots=True)
 class AlreadySubmitted:
-    """A submission that changes nothing: the newest of its student is the same, for the same assignment."""
+    """A submission that is identical to the student's newest one for the same assignment, so it changes nothing."""
 
     job_id: str
     batch_id: str | None
     student: str
     assignment: str
     state: JobState
-    other_grader: bool = False  # graded by another version than this
+    other_grader: bool = False  # graded by a different version of the grader
 
 
 @dataclass(frozen=True, slots=True)
 class AcceptedNew:
-    """What was new of a batch, and what was not; no batch was made when nothing was."""
+    """New and already known submissions of a batch. ``batch`` is None if nothing was new."""
 
     batch: AcceptedBatch | None
     known: tuple[AlreadySubmitted, ...]
@@ -98,12 +98,15 @@ def accept(
     most_bytes: int | None = None,
     enrolment_id: int | None = None,
 ) -> Accepted:
-    """Take in one submission that a person waits for; where an identical one has a grade, it has that grade at once.
+    """Accept one interactive submission. If an identical submission is graded, its grade is copied immediately.
 
-    It is submitted now, unless it says when. ``most_bytes`` is given where students submit themselves: what they have
-    for the assignment may be so much in all, and of submissions over a limit the newest is kept, ungraded until staff
-    ask for it. With ``enrolment_id`` the student has to be enrolled, as which they are signed in. Raises UsageError
-    where its student cannot be told from another, has too much here, or is not enrolled any more.
+    Without a submission time in the request, the current time is used. Of the submissions over a limit only the newest
+    is kept, ungraded until staff ask for it.
+
+    ``most_bytes`` limits the total size of the student's submissions to the assignment; set it when students submit
+    themselves. With ``enrolment_id``, the signed-in student must be enrolled under that id.
+
+    Raises UsageError if the student is ambiguous, exceeds the size limit or is no longer enrolled.
     """
     (packed,) = _pack([grading_request])
     secret = secret_of(store).sha256
@@ -132,10 +135,10 @@ def accept_batch(
     max_attempts: int,
     record: Callable[[Session, AcceptedNew], None] | None = None,
 ) -> AcceptedBatch:
-    """Take in a whole batch or nothing of it, each submission to be graded anew whatever was submitted before.
+    """Accept a whole batch or nothing. Each submission is graded again, regardless of earlier submissions.
 
-    ``refusals`` were made when it was read. ``record`` is called in the same transaction with what was taken in.
-    Raises UsageError when the course refuses the rest.
+    ``refusals`` were found when the batch was read. ``record`` is called with the accepted batch in the same
+    transaction. Raises UsageError if all remaining submissions are rejected.
     """
     packed = _pack(grading_requests)
     secret = secret_of(store).sha256
@@ -162,11 +165,11 @@ def accept_new(
     max_attempts: int,
     record: Callable[[Session, AcceptedNew], None] | None = None,
 ) -> AcceptedNew:
-    """Take in what is new of a batch, so that submitting the same batch twice changes nothing.
+    """Accept the new submissions of a batch. Submitting the same batch twice changes nothing.
 
-    Not new is what has the bytes of the student's newest submission and is marked against the same version of the
-    assignment; but for what was cancelled, which comes in again. What is new and identical to a submission with a grade
-    has that grade at once. ``record`` is called in the same transaction where a batch is made.
+    A submission is known if it has the same bytes as the student's newest submission and the same assignment version.
+    Cancelled submissions are accepted again. A new submission that is identical to a graded one gets that grade
+    immediately. ``record`` is called in the same transaction if a batch is created.
     """
     packed = _pack(grading_requests)
     secret = secret_of(store).sha256
@@ -187,9 +190,9 @@ def accept_new(
 
 
 def load_grading_request(session: Session, job_id: str) -> GradingRequest:
-    """What a job is about, rebuilt from the database alone.
+    """Rebuild the grading request of a job from the database.
 
-    Raises UsageError for an unknown job, HostError where what was kept cannot be read.
+    Raises UsageError for an unknown job, HostError if the stored data cannot be read.
     """
     source = select(SubmissionRow.source).join(Job, Job.submission_id == SubmissionRow.id)
     return GradingRequest(
@@ -200,15 +203,15 @@ def load_grading_request(session: Session, job_id: str) -> GradingRequest:
 
 
 def load_submission(session: Session, job_id: str) -> Submission:
-    """What was submitted for a job; raises like ``load_grading_request``."""
+    """Return the submission of a job; raises like ``load_grading_request``."""
     kept = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
     return _read_back(unpack_submission, session.scalar(kept.where(Job.id == job_id)), "submission", job_id)
 
 
 def load_each_submission(session: Session, job_ids: Collection[str]) -> Iterator[tuple[str, Submission]]:
-    """Each of the jobs with what was submitted for it, read in one statement, in the database's order of ids.
+    """Yield each job id with its submission, read in one statement and ordered by id.
 
-    One submission at a time is in memory. Raises HostError where what was kept cannot be read.
+    Only one submission is in memory at a time. Raises HostError if the stored data cannot be read.
     """
     query = select(Job.id, SubmissionRow.packed).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
     query = query.where(Job.id.in_(job_ids)).order_by(Job.id)
@@ -217,7 +220,7 @@ def load_each_submission(session: Session, job_ids: Collection[str]) -> Iterator
 
 
 def load_assignment(session: Session, job_id: str) -> Assignment:
-    """What a job is marked against; raises like ``load_grading_request``."""
+    """Return the assignment version of a job; raises like ``load_grading_request``."""
     kept = select(AssignmentVersion.content).join(Job, Job.assignment_version_id == AssignmentVersion.id)
     return _read_back(assignment_from_bytes, session.scalar(kept.where(Job.id == job_id)), "assignment", job_id)
 
@@ -240,7 +243,7 @@ class _Packed:
 
 @dataclass(frozen=True, slots=True)
 class _Item:
-    """What is taken in, and whose it is."""
+    """A submission to accept, with the enrolment of its student."""
 
     packed: _Packed
     enrolment_id: int
@@ -248,7 +251,7 @@ class _Item:
 
 @dataclass(frozen=True, slots=True)
 class _Terms:
-    """How submissions are taken in; with ``anew`` staff ask for it, so no policy and no identical grade counts."""
+    """Conditions of an intake. With ``anew``, staff request a regrade: policies and identical grades are ignored."""
 
     course_id: int
     lane: Lane
@@ -257,11 +260,11 @@ class _Terms:
     secret_sha256: str
     batch_id: str | None = None
     anew: bool = False
-    most_bytes: int | None = None  # that one student may have for an assignment; None where staff submit
+    most_bytes: int | None = None  # size limit per student and assignment; None when staff submit
 
 
 def _pack(grading_requests: Sequence[GradingRequest]) -> list[_Packed]:
-    """What is stored of each submission; done before the transaction, and once for each assignment."""
+    """Prepare the stored form of each submission, before the transaction and once per assignment."""
     frozen: dict[int, Frozen] = {}
     packed = []
     for grading_request in grading_requests:
@@ -273,7 +276,7 @@ def _pack(grading_requests: Sequence[GradingRequest]) -> list[_Packed]:
 
 
 def _enrolled(session: Session, packed: Sequence[_Packed], terms: _Terms) -> tuple[list[_Item], tuple[Refusal, ...]]:
-    """Whose each is, and what is refused because its student cannot be told from another."""
+    """Return the submissions with their enrolments, and the rejections of students who are ambiguous."""
     students = Students(session, terms.course_id)
     items, refused = [], []
     for each in packed:
@@ -288,7 +291,7 @@ def _enrolled(session: Session, packed: Sequence[_Packed], terms: _Terms) -> tup
 def already_submitted(
     session: Session, grading_request: GradingRequest, enrolment_id: int, assignment_sha256: str
 ) -> AlreadySubmitted | None:
-    """The job of the student's newest submission, where that is the very same; None where this one is new."""
+    """Return the job of the student's newest submission if it is identical; None for a new submission."""
     newest = session.scalar(
         select(SubmissionRow)
         .where(
@@ -308,10 +311,10 @@ def already_submitted(
             Job.submission_id == newest.id,
             AssignmentVersion.sha256 == assignment_sha256,
             Job.state != JobState.CANCELLED,
-            # A dead job of a cancelled batch cannot be retried, so it too comes in again.
+            # A dead job of a cancelled batch cannot be retried, so its submission is accepted again.
             or_(Job.state != JobState.DEAD, Job.batch_id.is_(None), Batch.state != BatchState.CANCELLED),
         )
-        # A regrade that waits to be published comes after the grade that stands.
+        # An unpublished regrade sorts after the standing grade.
         .order_by(Job.standing == Standing.KEPT, Job.standing == Standing.PROPOSED, Job.queued_at.desc(), Job.id)
         .limit(1)
     )
@@ -330,7 +333,7 @@ def _accept_batch(
     session.add(batch)
     session.flush()
     terms = replace(terms, batch_id=batch.id)
-    # Students are numbered as the batch names them; numbers of submissions in another order do not tell whose each is.
+    # Students keep the order of the batch. Submission numbers follow another order, so they don't identify students.
     first = {item.enrolment_id: item.packed.grading_request.submission.sha256 for item in reversed(items)}
     order = sorted(range(len(items)), key=lambda number: first[items[number].enrolment_id])
     taken = {number: _accept(session, items[number], terms) for number in order}
@@ -346,7 +349,8 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
     version_id = keep(session, packed.frozen, at)
     of_student = (SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment == assignment.id)
     earlier = session.scalar(select(func.max(SubmissionRow.attempt)).where(*of_student)) or 0
-    # A claim skips locked jobs: none begins between the ruling, which counts only begun ones, and being superseded.
+    # A claim skips locked jobs: no job starts between the ruling, which counts only started jobs, and being
+    # superseded.
     waiting = (Job.state == JobState.QUEUED, Job.submission_id.in_(select(SubmissionRow.id).where(*of_student)))
     lock_jobs(session, *waiting)
     ruling = Ruling()
@@ -383,7 +387,7 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
         assignment_version_id=version_id,
         enrolment_id=enrolment_id,
         batch_id=terms.batch_id,
-        # Nobody waits for what only staff will see.
+        # No student waits for a staff-only grade.
         lane=Lane.BATCH if ruling.over else terms.lane,
         max_attempts=terms.max_attempts,
         forced=terms.anew,
@@ -402,9 +406,9 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
 
 
 def _forget_put_aside(session: Session, of_student: tuple[ColumnElement[bool], ...]) -> None:
-    """Remove the earlier submissions over a limit that nobody has asked for: only the newest is kept.
+    """Remove earlier submissions over a limit that staff never asked to grade; only the newest is kept.
 
-    Those that have a comment are kept, too.
+    Submissions with a comment are kept, too.
     """
     own = select(SubmissionRow.id).where(*of_student, SubmissionRow.staff_only.is_not(None))
     waiting = (
@@ -413,7 +417,7 @@ def _forget_put_aside(session: Session, of_student: tuple[ColumnElement[bool], .
         Job.cancelled_for == CancelReason.OVER_LIMIT,
     )
     gone = session.scalars(select(Job.submission_id).where(*waiting)).all()
-    # What was graded before, and was asked for again, has other jobs.
+    # A submission that was graded before and requested again has other jobs.
     other_reason = Job.cancelled_for.is_distinct_from(CancelReason.OVER_LIMIT)
     others = select(Job.submission_id).where(Job.submission_id.in_(gone), other_reason)
     kept = set(session.scalars(others))

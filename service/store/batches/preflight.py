@@ -1,6 +1,6 @@
-"""What would come of a batch if it were taken in now: who is new to the course, and what is known already. Only reads.
+"""Preview of an intake: new students and known submissions of a batch. Read-only.
 
-What is refused was found when it was read, or is by ``intake.py`` when it is taken in.
+Rejections are found when the batch is read, or by ``intake.py`` when it is accepted.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from submissions.grading_request import GradingRequest
 
 @dataclass(frozen=True, slots=True)
 class Foreseen:
-    """Of one submission: whether its student is in the course, and what is known of it."""
+    """Preview of one submission: whether its student is enrolled and whether the submission is known."""
 
     enrolled: bool
-    known: bool  # it is the newest of its student, and stays as it is
-    copied: bool  # an identical one is graded, and it gets that grade at once
+    known: bool  # it is the student's newest and stays unchanged
+    copied: bool  # an identical one is graded, and its grade is copied
 
 
 def foresee(
     session: Session, course_id: int, grading_requests: Sequence[GradingRequest], secret_sha256: str
 ) -> list[Foreseen]:
-    """One of each, in their order."""
+    """Return a preview of each grading request, in their order."""
     students = Students(session, course_id)
     versions = {id(each.assignment): each.assignment for each in grading_requests}
     frozen = {key: freeze(assignment).sha256 for key, assignment in versions.items()}

@@ -1,7 +1,7 @@
-"""Grades that are let stand and released to students: of a batch, or of one submission.
+"""Publishing: makes the newest regrades standing and releases grades to students, for a batch or one submission.
 
-The newest regrade takes the place of what stood; what may not be seen, or was not judged, is held back and counted.
-What would be done can be asked first. ``service.operations.regrades`` owns the transactions.
+Staff-only and unjudged grades are held back and counted. A preview is available. ``service.operations.regrades`` owns
+the transactions.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from service.store.states import UNFINISHED, JobState, Standing
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """How many grades are published now that were not, how many took another's place, and what was left out."""
+    """Number of newly published grades, of replaced grades, and of those left out by reason."""
 
     published: int
     replaced: int
@@ -33,35 +33,35 @@ class Published:
 
 @dataclass(frozen=True, slots=True)
 class Publication:
-    """What would be published, and of how many students."""
+    """Preview of a publication, with the number of students affected."""
 
     counts: Published
     students: int
 
 
 def publish(session: Session, batch_id: str, *, actor: str, anyway: bool = False) -> Published:
-    """Let the newest regrade of each submission of the batch stand, and publish every grade that then stands.
+    """Make the newest regrade of each submission of the batch standing, and publish all standing grades.
 
-    One that is suspect, of a submission over a limit, or with a criterion that could not be judged is not published,
-    the last unless ``anyway``.
+    Grades that are suspect, over a limit or have an unjudged criterion are not published. ``anyway`` includes those
+    with an unjudged criterion.
     """
     return _publish(session, _of_batch(batch_id), actor=actor, anyway=anyway)
 
 
 def publish_one(session: Session, job_id: str, *, actor: str, anyway: bool = False) -> Published:
-    """The same for the submission of one job alone."""
+    """Publish like ``publish``, for the submission of one job only."""
     return _publish(session, select(Job.submission_id).where(Job.id == job_id), actor=actor, anyway=anyway)
 
 
 def would_publish(session: Session, batch_id: str) -> Publication:
-    """What ``publish`` would do to a batch now, without ``anyway``. Only reads."""
+    """Return the effect of ``publish`` on a batch, without ``anyway``. Read-only."""
     ids = _of_batch(batch_id)
     plan = _plan(session, session.scalars(_gradings(ids)).all(), ids, anyway=False)
     return Publication(plan.counts, len({job.enrolment_id for job in plan.released}))
 
 
 def unpublished_regrades(session: Session, batch_id: str) -> int:
-    """How many submissions of a batch have a regrade that is done and does not stand yet."""
+    """Return the number of submissions of a batch with a finished regrade that is not published yet."""
     proposed = (Job.standing == Standing.PROPOSED, *current.IS_TRUSTED)
     query = select(Job.submission_id).where(Job.submission_id.in_(_of_batch(batch_id)), *proposed).distinct()
     return len(session.scalars(query).all())
@@ -69,7 +69,7 @@ def unpublished_regrades(session: Session, batch_id: str) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _Plan:
-    """The jobs that are released, those that stand from then on, and those that give way to them."""
+    """Jobs to release, jobs that become standing, and jobs that they replace."""
 
     released: list[Job]
     standing: list[Job]
@@ -85,12 +85,12 @@ def _publish(session: Session, ids: Select[int], *, actor: str, anyway: bool) ->
     at = now(session)
     lock_submissions(session, SubmissionRow.id.in_(ids))
     lock_jobs(session, Job.submission_id.in_(ids))
-    # Jobs that were read before they were locked may have changed since.
+    # Jobs that were read before the lock may have changed.
     gradings = session.scalars(_gradings(ids).execution_options(populate_existing=True)).all()
     plan = _plan(session, gradings, ids, anyway=anyway)
     for job in plan.outdated:
         job.standing = Standing.KEPT
-    # The database refuses a second job that stands, also within a transaction.
+    # The database rejects a second standing job of a submission, even within a transaction.
     session.flush()
     for job in plan.standing:
         job.standing = Standing.STANDS
@@ -132,10 +132,10 @@ def _plan(session: Session, gradings: Sequence[Job], ids: Select[int], *, anyway
 
 
 def _stands(jobs: Sequence[Job], unjudged: Set[str]) -> tuple[Job | None, list[Job]]:
-    """The grade of one submission that stands from now on, and those that give way to it.
+    """Return the job that becomes the standing one of a submission, and the jobs that it replaces.
 
-    The newest regrade replaces the job that stands, whatever the age of that, and every older proposal. One not graded
-    yet, or ``unjudged``, stays a proposal.
+    The newest trusted regrade replaces the standing job, regardless of its age, and every older proposal. Ungraded and
+    ``unjudged`` jobs remain proposals.
     """
     done = [job for job in jobs if current.is_trusted(job) and job.id not in unjudged]
     proposed = [job for job in done if job.standing is Standing.PROPOSED]
@@ -150,7 +150,7 @@ def _stands(jobs: Sequence[Job], unjudged: Set[str]) -> tuple[Job | None, list[J
 
 
 def _unjudged(session: Session, ids: Select[int]) -> set[str]:
-    """The jobs for these submissions that have a criterion that could not be judged, nor was set by hand."""
+    """Return the jobs of these submissions with a criterion that was neither judged nor set by staff."""
     query = (
         select(CriterionResultRow.job_id)
         .join(Job, CriterionResultRow.job_id == Job.id)

@@ -1,6 +1,6 @@
-"""The measures that the assignments of a batch rank, read from its grades: a table for each criterion. Only reads.
+"""Measures that the assignments of a batch rank, read from its grades: one table per criterion. Read-only.
 
-Places, ties and intervals are worked out in ``service.grading.ranks``.
+``service.grading.ranks`` computes places, ties and intervals.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from service.store.models import AssignmentVersion, CriterionResultRow, Job
 if TYPE_CHECKING:
     from submissions.criteria.timing import Ranking
 
-#: How many jobs are asked for at once: databases take so many values, and not every number of them.
+#: Number of jobs per query: databases limit the number of parameters.
 _AT_ONCE = 1000
 
 
 def rank_tables(session: Session, lines: Sequence[JobLine]) -> list[RankTable]:
-    """What is ranked among these jobs, over all that are graded, not excused, and not for staff alone."""
+    """Return the rank tables of the graded jobs that are not excused and not staff-only."""
     graded = [line for line in lines if current.is_for_students(line)]
     asked: dict[tuple[str, str], Ranking] = {}
     for content in _contents(session, graded):
-        # Most assignments rank nothing, and reading one whole takes longer than everything else here.
+        # Most assignments rank nothing, and decoding one takes longer than everything else here.
         if b'"ranking"' in zlib.decompress(content):
             from submissions.criteria.timing import Ranking
 
@@ -50,7 +50,7 @@ def _portions(lines: Sequence[JobLine]) -> Iterator[dict[str, JobLine]]:
 
 
 def _contents(session: Session, lines: Sequence[JobLine]) -> Iterator[bytes]:
-    """Each assignment version that these jobs are graded against, once."""
+    """Yield the content of each assignment version of these jobs once."""
     versions: set[int] = set()
     for jobs in _portions(lines):
         versions.update(session.scalars(select(Job.assignment_version_id).where(Job.id.in_(jobs)).distinct()))

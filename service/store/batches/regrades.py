@@ -1,6 +1,6 @@
-"""Batches graded again after an assignment or the grader changed: what changes, and why.
+"""Regrades after a change of an assignment or the grader: queues them, and reports changes and reasons.
 
-The old grades stay and stand until somebody publishes the new ones (``publishing.py``). Nothing is graded here.
+The old grades stand until the new ones are published (``publishing.py``). Nothing is graded here.
 ``service.operations.regrades`` owns the transactions.
 """
 
@@ -31,7 +31,7 @@ _UNEXPLAINED = "unexplained: other recordings from the same assignment and grade
 
 @dataclass(frozen=True, slots=True)
 class Regraded:
-    """A batch of regrades, and how many submissions were left out: for another assignment, or not graded yet."""
+    """A batch of regrades, with the number of submissions left out: other assignment, or not graded yet."""
 
     batch_id: str
     jobs: int
@@ -41,9 +41,9 @@ class Regraded:
 
 @dataclass(frozen=True, slots=True)
 class CriterionChange:
-    """One criterion whose marks differ, as (marks, the most there are); None where the assignment did not have it.
+    """A criterion whose marks differ, as (marks, maximum); None if that version of the assignment does not have it.
 
-    ``by_hand`` where what somebody set counts in place of the new grade's: it may have been out of other marks.
+    ``by_hand`` is true if marks set by staff replace those of the new grade; their maximum may differ.
     """
 
     title: str
@@ -54,7 +54,7 @@ class CriterionChange:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A regrade beside the grade that it may replace. Marks are None where there is no grade (yet)."""
+    """A regrade and the grade that it may replace. Marks are None without a grade."""
 
     student: str
     job_id: str
@@ -67,17 +67,17 @@ class Change:
     after_max: Decimal | None
     criteria: tuple[CriterionChange, ...]
     reason: str
-    is_unexplained: bool  # other recordings, although nothing that they depend on differs
+    is_unexplained: bool  # different recordings, although their inputs are equal
 
     @property
     def differs(self) -> bool:
-        """Whether there is a new grade and its marks, or what they are out of, are others than before."""
+        """Return whether the regrade is done and its marks or maximum differ."""
         return self.state is JobState.DONE and (self.before, self.before_max) != (self.after, self.after_max)
 
 
 @dataclass(frozen=True, slots=True)
 class Grading:
-    """One of the times that a submission was graded."""
+    """One grading of a submission."""
 
     id: str
     state: JobState
@@ -90,7 +90,7 @@ class Grading:
 
 @dataclass(frozen=True, slots=True)
 class ChangesPage:
-    """Some of the changes of a batch, of how many, and how many differ in marks or have none yet."""
+    """A page of the changes of a batch, with the total and the number that differ or are not graded yet."""
 
     changes: tuple[Change, ...]
     found: int
@@ -100,10 +100,10 @@ class ChangesPage:
 
 
 def regrade(session: Session, original: Batch, frozen: Frozen | None, *, max_attempts: int) -> Regraded:
-    """Queue every submission of the batch that has a grade, or could not be given one, to be graded again.
+    """Queue a regrade of every submission of the batch that was graded or failed.
 
-    Against ``frozen``, or without it the version that each was graded against. The grades that stand are not
-    touched. Raises UsageError when there is nothing to grade again.
+    Uses the assignment version ``frozen``, or else the version that each was graded against. Standing grades are not
+    changed. Raises UsageError if there is nothing to grade again.
     """
     at = now(session)
     standing = _standing(session, original.id)
@@ -128,9 +128,9 @@ def regrade(session: Session, original: Batch, frozen: Frozen | None, *, max_att
 
 
 def regrade_one(session: Session, asked: Job, frozen: Frozen | None, *, max_attempts: int) -> Job:
-    """Queue the submission of one grade to be graded again, at once; the job that may take its place.
+    """Queue an interactive regrade of one submission and return the new job.
 
-    ``frozen`` as ``regrade`` has it. Raises UsageError where there is no grade yet, or for another assignment.
+    ``frozen`` as in ``regrade``. Raises UsageError if there is no grade yet, or for another assignment.
     """
     at = now(session)
     of_submission = (Job.submission_id == asked.submission_id, Job.standing == Standing.STANDS)
@@ -149,7 +149,7 @@ def regrade_one(session: Session, asked: Job, frozen: Frozen | None, *, max_atte
 
 
 def change(session: Session, job_id: str) -> Change | None:
-    """What one regrade changes; None for a grade that is none."""
+    """Return the change that a regrade makes; None if the job is not a regrade."""
     after = session.get(Job, job_id)
     if after is None or after.regrade_of is None:
         return None
@@ -158,7 +158,7 @@ def change(session: Session, job_id: str) -> Change | None:
 
 
 def gradings(session: Session, submission_id: int) -> list[Grading]:
-    """All that a submission was graded, in order; what a worker in quarantine did is left out."""
+    """Return all gradings of a submission, oldest first, without those of quarantined workers."""
     of_submission = (Job.submission_id == submission_id, Job.suspect.is_(None))
     rows = session.scalars(select(Job).where(*of_submission).order_by(Job.queued_at, Job.id))
     return [
@@ -168,7 +168,7 @@ def gradings(session: Session, submission_id: int) -> list[Grading]:
 
 
 def changes(session: Session, batch_id: str, hidden: HiddenNames) -> list[Change]:
-    """What a batch of regrades changes, by the students' names as they are shown."""
+    """Return the changes of a batch of regrades, ordered by displayed student name."""
     before = aliased(Job)
     query = (
         select(Job, before, Enrolment.student, SubmissionRow.assignment)
@@ -185,9 +185,9 @@ def changes(session: Session, batch_id: str, hidden: HiddenNames) -> list[Change
 
 
 def changes_page(session: Session, batch_id: str, page: int, hidden: HiddenNames) -> ChangesPage:
-    """Some of what a batch of regrades changes: other marks first, then by student.
+    """Return a page of the changes of a batch of regrades: different marks first, then by student.
 
-    Where names are hidden the order is that of the jobs' random ids.
+    If names are hidden, the order is that of the random job ids.
     """
     before = aliased(Job)
     differ = or_(Job.marks != before.marks, Job.max_marks != before.max_marks, Job.marks.is_(None))
@@ -216,7 +216,7 @@ def changes_page(session: Session, batch_id: str, page: int, hidden: HiddenNames
 
 
 def _standing(session: Session, batch_id: str) -> Sequence[tuple[Job, str]]:
-    """The jobs that stand for the submissions of a batch, with their assignment."""
+    """Return the standing jobs of the submissions of a batch, with their assignments."""
     query = (
         select(Job, AssignmentVersion.assignment)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
@@ -284,7 +284,7 @@ def _worth(line: CriterionMarks | None) -> tuple[Decimal, Decimal] | None:
 
 
 def _reason(session: Session, before: Job, after: Job) -> str | None:
-    """Why the grades may differ: everything that differs between the two gradings; None where nothing explains it."""
+    """Return every difference between two gradings that may explain different marks; None without one."""
     if after.state is not JobState.DONE:
         return after.error or after.state.value
     reasons = []
@@ -302,7 +302,7 @@ def _reason(session: Session, before: Job, after: Job) -> str | None:
     if before.suspect is not None:
         reasons.append("the earlier worker was found to grade wrongly")
     if not reasons and _chains(session, before.id) != _chains(session, after.id):
-        # The same grader and assignment owe the same recordings: somebody has to look.
+        # The same grader and assignment must give the same recordings, so this needs review.
         return None
     return ", ".join(reasons) or "nothing changed"
 

@@ -1,6 +1,6 @@
-"""What is alike among submissions, read from what was submitted and from its recordings. Only reads.
+"""Similar submissions, compared by source code and recordings. Read-only.
 
-What is alike is decided in ``service.similarity``, who may see it in ``service.reports.view``.
+``service.similarity`` defines similarity; ``service.reports.view`` decides who may see it.
 """
 
 from __future__ import annotations
@@ -17,21 +17,22 @@ from service.store.batches.batches import JobLine
 from service.store.engine import Store
 from service.store.grades import current, results
 
-#: Submissions that are compared while somebody waits for the answer; it takes some seconds.
+#: Maximum number of submissions compared in a request; this takes some seconds.
 MOST_AT_ONCE = 300
 
 
 def similarities(store: Store, lines: Sequence[JobLine], given: Path | None = None) -> list[Similarity]:
-    """For each assignment of a batch what is alike; its code that was given, and that in ``given``, is left out.
+    """Return the similar submissions of each assignment of a batch.
 
-    The recordings of one submission at a time are in memory. Raises UsageError where ``given`` cannot be read.
+    Ignores code given with the assignment and the code in ``given``. Only the recordings of one submission are in
+    memory at a time. Raises UsageError if ``given`` cannot be read.
     """
     assignments = sorted({line.assignment for line in lines})
     return [_of_one(store, [line for line in lines if line.assignment == each], given) for each in assignments]
 
 
 class SourceTexts:
-    """The sources that a page quotes, read when the first is asked for."""
+    """Source files that a page quotes, read on first use."""
 
     def __init__(self, store: Store, lines: Sequence[JobLine]) -> None:
         self._store = store
@@ -39,7 +40,7 @@ class SourceTexts:
         self._texts: dict[str, Mapping[str, str]] = {}
 
     def of(self, assignment: str, student: str, file: str) -> str:
-        """The text of one file of a student's."""
+        """Return the text of one file of a student."""
         if not self._texts:
             with self._store.reading() as session:
                 each = intake.load_each_submission(session, self._jobs.values())

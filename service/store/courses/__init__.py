@@ -1,1 +1,1 @@
-"""What a course has set: its assignments as they were frozen, who may submit when, whose names are hidden."""
+"""Settings of a course: frozen assignments, deadlines and attempts, and hidden names."""

@@ -1,7 +1,7 @@
-"""Labels in place of students' names, for assignments that are marked with names hidden.
+"""Labels that replace students' names in assignments with anonymous marking.
 
-A student has one label for each assignment, so that an assignment whose names are shown again tells nothing of others.
-Which assignments are marked so is ``open_assignments.py``'s to say.
+A student has a different label in each assignment, so showing the names of one reveals nothing about others.
+``open_assignments.py`` stores which assignments are marked anonymously.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ _LONG = 6
 
 @dataclass(frozen=True, slots=True)
 class HiddenNames:
-    """The assignments of a course whose students have labels in place of names."""
+    """Assignments of a course that show labels in place of names."""
 
     assignments: frozenset[str]
     key: bytes
 
     def called(self, assignment: str, student: str) -> str:
-        """Return the label of the student with this id; the id itself where names are not hidden."""
+        """Return the label of the student with this id; the id itself if names are not hidden."""
         if assignment not in self.assignments:
             return student
         whose = f"{assignment}\n{student}".encode("utf-8", "surrogatepass")
@@ -43,7 +43,10 @@ NAMED = HiddenNames(frozenset(), b"")
 
 
 def hidden_names_of(store: Store, course_id: int) -> HiddenNames:
-    """Those of a course; numbers follow from the installation's own secret, so that nobody can count them out."""
+    """Return the hidden names of a course.
+
+    Labels are keyed by the installation's secret, so nobody can compute them.
+    """
     own_secret = select(Installation.secret).scalar_subquery()
     with store.reading() as session:
         rows = session.execute(select(OpenAssignment.assignment, own_secret).where(*are_hidden(course_id))).all()

@@ -1,6 +1,6 @@
-"""Days as people count them: by the wall clock of a time zone, in which a day may have 23 or 25 hours.
+"""Calendar days by the wall clock of a time zone, in which a day may have 23 or 25 hours.
 
-Knows no policy and no table.
+Independent of policies and tables.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _LOCALTIME = Path("/etc/localtime")
 
 
 def local_zone() -> str:
-    """The name of this server's time zone, such as Europe/Berlin; empty where the server does not say."""
+    """Return this server's time zone, such as Europe/Berlin; empty if unknown."""
     named = os.environ.get("TZ", "").removeprefix(":")
     if not named:
         _, found, named = os.fspath(_LOCALTIME.resolve()).rpartition("zoneinfo/")
@@ -26,7 +26,7 @@ def local_zone() -> str:
 
 
 def add_days(moment: datetime, days: int, zone: str) -> datetime:
-    """The moment at which the wall clock of a zone shows the same time ``days`` later; the later one of two such."""
+    """Return the moment ``days`` later at the same local time; the later one if that time occurs twice."""
     if not days:
         return moment
     here = _wall(moment, zone)
@@ -36,7 +36,7 @@ def add_days(moment: datetime, days: int, zone: str) -> datetime:
 
 
 def days_after(moment: datetime, later: datetime, zone: str) -> int:
-    """How many days of a zone, the last one begun included, ``later`` is after ``moment``; 0 where it is not."""
+    """Return the number of local days, rounded up, that ``later`` is after ``moment``; 0 if it is not after."""
     if later <= moment:
         return 0
     days = max(1, math.ceil((_wall(later, zone) - _wall(moment, zone)) / _ONE_DAY))
@@ -48,13 +48,13 @@ def days_after(moment: datetime, later: datetime, zone: str) -> int:
 
 
 def _wall(moment: datetime, zone: str) -> datetime:
-    """What the wall clock of the zone shows, without the zone."""
+    """Return the local time in the zone, as a naive datetime."""
     return moment.astimezone(_zone(zone)).replace(tzinfo=None)
 
 
 @cache
 def _zone(name: str) -> tzinfo | None:
-    """The zone of this name; None, which is this server's zone, for none that is known here."""
+    """Return the zone of this name; None, which means the server's zone, if it is unknown."""
     try:
         return ZoneInfo(name) if name else None
     except (ZoneInfoNotFoundError, ValueError, OSError):

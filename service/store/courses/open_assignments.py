@@ -1,7 +1,7 @@
-"""What a course has open: assignments that its instructors prepared, and that its students may submit to.
+"""Assignments of a course, prepared by instructors and opened to students.
 
-A prepared one is frozen as all that are marked; limits of time and attempts are ``policies.py``'s. What is submitted to
-one on the web is in one batch, which is at its end when nobody may submit any more.
+A prepared assignment is frozen like all others; ``policies.py`` contains deadlines and attempts. Web submissions to an
+assignment share one batch, which ends when the assignment is closed.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class CourseAssignment:
-    """An assignment of a course; students see it from ``opened_at`` on, and may submit until ``closed_at``."""
+    """An assignment of a course. Students see it from ``opened_at`` and may submit until ``closed_at``."""
 
     assignment: str
     title: str
@@ -38,16 +38,16 @@ class CourseAssignment:
     opened_at: datetime | None
     closed_at: datetime | None
     names_hidden: bool
-    batch_id: str | None  # of what students submit on the web
+    batch_id: str | None  # of web submissions
 
     @property
     def open(self) -> bool:
-        """Whether students may submit to it."""
+        """Return whether students may submit to it."""
         return self.opened_at is not None and self.closed_at is None
 
 
 def prepare(session: Session, course_id: int, frozen: Frozen) -> CourseAssignment:
-    """Put an assignment into a course, not yet open; one of the same id is marked by this version from now on."""
+    """Add an assignment to a course without opening it, or replace the version of one with the same id."""
     at = now(session)
     version_id = keep(session, frozen, at)
     row = _row(session, course_id, frozen.assignment.id)
@@ -62,7 +62,7 @@ def prepare(session: Session, course_id: int, frozen: Frozen) -> CourseAssignmen
 
 
 def open_for_students(session: Session, course_id: int, assignment: str) -> None:
-    """From now on students see it and may submit. Raises UsageError where the course has none of this id."""
+    """Show the assignment to students and accept submissions. Raises UsageError if the course does not have it."""
     row, at = _there(session, course_id, assignment), now(session)
     row.opened_at, row.closed_at = row.opened_at or at, None
     if row.batch_id is None:
@@ -74,7 +74,7 @@ def open_for_students(session: Session, course_id: int, assignment: str) -> None
 
 
 def close(session: Session, course_id: int, assignment: str) -> None:
-    """Nobody may submit any more; what was submitted stays. Raises UsageError where the course has none of this id."""
+    """Stop accepting submissions; existing ones are kept. Raises UsageError if the course does not have it."""
     row = _there(session, course_id, assignment)
     row.closed_at = now(session)
     session.flush()
@@ -83,9 +83,9 @@ def close(session: Session, course_id: int, assignment: str) -> None:
 
 
 def remove(session: Session, course_id: int, assignment: str) -> None:
-    """Let the course have it no more, and no limits of its own; graded batches stay as they are.
+    """Remove an assignment and its policy from a course; graded batches are kept.
 
-    Raises UsageError where the course has none of this id, students have been shown it, or names are hidden by it.
+    Raises UsageError if the course does not have it, students have seen it, or it hides names.
     """
     row = _there(session, course_id, assignment)
     if row.opened_at is not None:
@@ -98,22 +98,22 @@ def remove(session: Session, course_id: int, assignment: str) -> None:
 
 
 def hide_names(session: Session, course_id: int, assignment: str, hidden: bool) -> None:
-    """Whether instructors see whose work it is. Raises UsageError where the course has none of this id."""
+    """Hide or show students' names to instructors. Raises UsageError if the course does not have it."""
     _there(session, course_id, assignment).names_hidden = hidden
 
 
 def with_names_hidden(session: Session, course_id: int) -> frozenset[str]:
-    """The assignments of a course whose instructors do not see whose work it is."""
+    """Return the assignments of a course whose instructors do not see students' names."""
     return frozenset(session.scalars(select(OpenAssignment.assignment).where(*are_hidden(course_id))))
 
 
 def are_hidden(course_id: int) -> tuple[ColumnElement[bool], ...]:
-    """Of an ``OpenAssignment``: it is the course's, and its instructors do not see whose work it is."""
+    """Return the conditions on an ``OpenAssignment`` that select the course's assignments with hidden names."""
     return OpenAssignment.course_id == course_id, OpenAssignment.names_hidden.is_(True)
 
 
 def of_course(session: Session, course_id: int) -> list[CourseAssignment]:
-    """All of a course, by id."""
+    """Return all assignments of a course, ordered by id."""
     query = (
         select(OpenAssignment, AssignmentVersion)
         .join(AssignmentVersion, OpenAssignment.assignment_version_id == AssignmentVersion.id)
@@ -124,13 +124,13 @@ def of_course(session: Session, course_id: int) -> list[CourseAssignment]:
 
 
 def find(session: Session, course_id: int, assignment: str) -> CourseAssignment:
-    """One of a course. Raises UsageError where there is none of this id."""
+    """Return one assignment of a course. Raises UsageError if the course does not have it."""
     row = _there(session, course_id, assignment)
     return _line(row, session.get_one(AssignmentVersion, row.assignment_version_id))
 
 
 def load(session: Session, course_id: int, assignment: str) -> Assignment:
-    """The assignment itself. Raises UsageError where the course has none of this id."""
+    """Load the content of an assignment. Raises UsageError if the course does not have it."""
     row = _there(session, course_id, assignment)
     content = session.scalars(
         select(AssignmentVersion.content).where(AssignmentVersion.id == row.assignment_version_id)

@@ -1,6 +1,6 @@
-"""When and how often students may submit: a course's policy, a student's extensions, and what follows from them.
+"""Deadlines and attempts: the policy of a course, extensions of students, and their effects.
 
-What is over a limit is kept and marked all the same, but shown to staff alone; nothing here refuses a submission.
+A submission over a limit is stored and can be marked, but only staff see it. Nothing here rejects a submission.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ _NOT_THE_STUDENTS = ("assignment_error", "host_error")
 
 @dataclass(frozen=True, slots=True)
 class PolicyLimits:
-    """What one student may do. ``attempts`` counts different submissions; None is no limit, and no due date."""
+    """Limits of one student. ``attempts`` counts different submissions. None means no limit, or no due date."""
 
     due_at: datetime | None = None
     late_days: int = 0
     attempts: int | None = None
     cool_down_seconds: float = 0.0
-    zone: str = ""  # of the days that are counted; empty for this server's
+    zone: str = ""  # of the counted days; empty for this server's
 
     @property
     def closed_at(self) -> datetime | None:
-        """After this moment a submission is over the limit."""
+        """Return the moment after which a submission is over the limit; None without a due date."""
         return None if self.due_at is None else add_days(self.due_at, self.late_days, self.zone)
 
     def days_late(self, submitted_at: datetime) -> int:
-        """How many days of the policy's zone a submission is late, the last one begun included."""
+        """Return the number of days late in the policy's zone, rounded up."""
         return 0 if self.due_at is None else days_after(self.due_at, submitted_at, self.zone)
 
 
@@ -52,7 +52,7 @@ OverLimit = Literal["attempts", "date", "cool-down"]
 
 @dataclass(frozen=True, slots=True)
 class Exceeded:
-    """A limit that a submission is over, and by how much: the attempt, the days late, or the minutes waited."""
+    """An exceeded limit and the actual value: the attempt, the days late, or the minutes waited."""
 
     limit: OverLimit
     actual: int
@@ -70,22 +70,22 @@ class Exceeded:
 
 @dataclass(frozen=True, slots=True)
 class Ruling:
-    """How many days late a submission is, and the limit that it is over, if any."""
+    """Days that a submission is late, and the limit that it exceeds, if any."""
 
     days_late: int = 0
     over: Exceeded | None = None
 
 
 def limits(session: Session, enrolment_id: int, assignment: str) -> PolicyLimits:
-    """The policy for the assignment, else the course's, with what this student is allowed beyond it.
+    """Return the limits of a student: the assignment's policy, or the course's, with the student's extensions.
 
-    Extensions for all assignments and for this one hold together: the latest due date, the larger number of attempts.
+    Extensions for all assignments and for this one combine: the later due date and the larger number of attempts apply.
     """
     return limits_of_each(session, enrolment_id, [assignment])[assignment]
 
 
 def limits_of_each(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, PolicyLimits]:
-    """The same for several assignments, in as many statements."""
+    """Return ``limits`` for several assignments, with the same number of statements."""
     course_id = select(Enrolment.course_id).where(Enrolment.id == enrolment_id).scalar_subquery()
     known = _known_policies(session, Policy.course_id == course_id, assignments)
     own = {assignment: policy for (_, assignment), policy in known.items()}
@@ -110,12 +110,12 @@ def _extended(policy: PolicyLimits, extensions: Sequence[Extension]) -> PolicyLi
 
 
 def in_days(count: int) -> str:
-    """A number of days in words."""
+    """Return a number of days in words."""
     return "1 day" if count == 1 else f"{count} days"
 
 
 def rule(session: Session, enrolment_id: int, assignment: str, sha256: str, submitted_at: datetime | None) -> Ruling:
-    """What the policy says of a submission that comes in now; a moment of submitting that nobody knows is in time."""
+    """Apply the policy to a submission that arrives now. An unknown submission time counts as in time."""
     allowed = limits(session, enrolment_id, assignment)
     counted = _counted(session, enrolment_id, [assignment]).get(assignment, {})
     earlier = [when for sha, when in counted.items() if sha != sha256]
@@ -135,16 +135,16 @@ def rule(session: Session, enrolment_id: int, assignment: str, sha256: str, subm
 
 
 def attempts_made(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, int]:
-    """How many of a student's submissions count as attempts until now, by assignment."""
+    """Return the number of a student's submissions that count as attempts so far, by assignment."""
     counted = _counted(session, enrolment_id, assignments)
     return {each: len(counted.get(each, {})) for each in assignments}
 
 
 def released(session: Session, job_id: str) -> frozenset[str]:
-    """Which visibilities a student may see of a grade now.
+    """Return the visibilities of a grade that its student may see now.
 
-    ``after_due_date`` opens when nobody of the course may submit any more, extensions and late days included; all
-    but ``hidden`` opens when the grade is published. Raises NoResultFound where the job is gone.
+    ``after_due_date`` opens when no student of the course may submit any more, including extensions and late days. All
+    but ``hidden`` open when the grade is published. Raises NoResultFound if the job no longer exists.
     """
     found = released_of_each(session, [job_id])
     if job_id not in found:
@@ -153,7 +153,7 @@ def released(session: Session, job_id: str) -> frozenset[str]:
 
 
 def released_of_each(session: Session, job_ids: Collection[str]) -> dict[str, frozenset[str]]:
-    """The same for several grades, in as many statements."""
+    """Return ``released`` for several grades, with the same number of statements."""
     query = (
         select(Job.id, Job.published_at, Enrolment.course_id, SubmissionRow.assignment)
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
@@ -171,9 +171,9 @@ def released_of_each(session: Session, job_ids: Collection[str]) -> dict[str, fr
 
 
 def set_policy(session: Session, course_id: int, assignment: str, allowed: PolicyLimits) -> None:
-    """Make ``allowed`` the policy of a course for an assignment, or with an empty one for all that have none.
+    """Set the policy of a course for an assignment. An empty ``assignment`` sets the default of the course.
 
-    Where it names no zone, its days are those of this server's zone, also should the server move to another.
+    Without a zone, the current zone of this server is stored, so moving the server does not change the days.
     """
     insert_if_new(session, Policy, course_id=course_id, assignment=assignment)
     row = session.scalars(select(Policy).where(Policy.course_id == course_id, Policy.assignment == assignment)).one()
@@ -183,18 +183,18 @@ def set_policy(session: Session, course_id: int, assignment: str, allowed: Polic
 
 
 def drop_policy(session: Session, course_id: int, assignment: str) -> None:
-    """Let an assignment have what holds for all of the course, in place of a policy of its own."""
+    """Remove the policy of an assignment, so that the default of the course applies."""
     session.execute(delete(Policy).where(Policy.course_id == course_id, Policy.assignment == assignment))
 
 
 def policies(session: Session, course_id: int) -> dict[str, PolicyLimits]:
-    """The policies of a course, by assignment."""
+    """Return the policies of a course, by assignment."""
     rows = session.scalars(select(Policy).where(Policy.course_id == course_id).order_by(Policy.assignment))
     return {row.assignment: _limits(row) for row in rows}
 
 
 def extend(session: Session, enrolment_id: int, assignment: str, due_at: datetime | None, more_attempts: int) -> None:
-    """Allow one student so much beyond the policy; what was allowed before for the same assignment is replaced."""
+    """Extend the policy for one student; replaces the student's earlier extension for the same assignment."""
     insert_if_new(session, Extension, enrolment_id=enrolment_id, assignment=assignment)
     same = (Extension.enrolment_id == enrolment_id, Extension.assignment == assignment)
     row = session.scalars(select(Extension).where(*same)).one()
@@ -203,7 +203,7 @@ def extend(session: Session, enrolment_id: int, assignment: str, due_at: datetim
 
 @dataclass(frozen=True, slots=True)
 class ExtensionLine:
-    """What one student is allowed beyond the policy; an empty ``assignment`` is every one."""
+    """The extension of one student; an empty ``assignment`` means all assignments."""
 
     enrolment_id: int
     student: str
@@ -213,7 +213,7 @@ class ExtensionLine:
 
 
 def extensions(session: Session, course_id: int) -> list[ExtensionLine]:
-    """All of a course, by student."""
+    """Return all extensions of a course, ordered by student."""
     query = (
         select(Extension, Enrolment.student)
         .join(Enrolment, Extension.enrolment_id == Enrolment.id)
@@ -229,7 +229,7 @@ def extensions(session: Session, course_id: int) -> list[ExtensionLine]:
 def _known_policies(
     session: Session, of_course: ColumnElement[bool], assignments: Collection[str]
 ) -> dict[tuple[int, str], PolicyLimits]:
-    """The policies for some assignments and those for all others, by course and assignment."""
+    """Return the policies of some assignments and the defaults, by course and assignment."""
     rows = session.scalars(select(Policy).where(of_course, Policy.assignment.in_(("", *assignments))))
     return {(row.course_id, row.assignment): _limits(row) for row in rows}
 
@@ -239,7 +239,7 @@ def _limits(row: Policy) -> PolicyLimits:
 
 
 def _closed_for_all(session: Session, which: Collection[tuple[int, str]]) -> set[tuple[int, str]]:
-    """Those of some assignments of courses to which nobody may submit any more."""
+    """Return the given (course, assignment) pairs to which no student may submit any more."""
     course_ids, assignments = {course_id for course_id, _ in which}, {assignment for _, assignment in which}
     known = _known_policies(session, Policy.course_id.in_(course_ids), assignments)
     extended = (
@@ -263,9 +263,9 @@ def _closed_for_all(session: Session, which: Collection[tuple[int, str]]) -> set
 
 
 def _counted(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, dict[str, datetime]]:
-    """When the different submissions came that count as attempts, by assignment and hash.
+    """Return the submission times of different submissions that count as attempts, by assignment and hash.
 
-    They were begun, and not ended by a fault of ours.
+    A submission counts if its grading started and did not end with a fault of the assignment or the host.
     """
     submission = SubmissionRow
     counts = or_(Job.state == JobState.RUNNING, (Job.state == JobState.DONE) & Job.verdict.not_in(_NOT_THE_STUDENTS))

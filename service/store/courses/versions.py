@@ -1,6 +1,6 @@
-"""Assignments as they are kept: frozen by their content, once each, with all that a worker elsewhere needs.
+"""Assignment versions: stored once per content, with everything that a worker on another machine needs.
 
-Reading one from its folder is ``submissions.assignment.reader``'s.
+``submissions.assignment.reader`` reads assignments from folders.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from submissions.nearest import did_you_mean
 if TYPE_CHECKING:
     from submissions.assignment.definition import Assignment
 
-#: What keys are called in assignments that earlier releases kept.
+#: New names of keys in assignments that earlier releases stored.
 _FORMERLY = {"picture": "image", "pictures": "images"}
 
 
 @dataclass(frozen=True, slots=True)
 class Frozen:
-    """An assignment and what is kept of it; made before a transaction, so that compressing keeps no lock waiting."""
+    """An assignment and its stored form. Created before a transaction, so that compressing it delays no lock."""
 
     assignment: Assignment
     content: bytes
@@ -39,13 +39,13 @@ class Frozen:
 
 
 def freeze(assignment: Assignment) -> Frozen:
-    """What is kept of the assignment."""
+    """Return the stored form of the assignment."""
     content = assignment_to_bytes(assignment)
     return Frozen(assignment, content, hashlib.sha256(zlib.decompress(content)).hexdigest())
 
 
 def keep(session: Session, frozen: Frozen, at: datetime) -> int:
-    """The id of the row with exactly this content; made if there is none."""
+    """Return the id of the row with exactly this content, inserting it if necessary."""
     of_version = select(AssignmentVersion.id).where(AssignmentVersion.sha256 == frozen.sha256)
     found = session.scalar(of_version)
     if found is not None:
@@ -66,9 +66,9 @@ def keep(session: Session, frozen: Frozen, at: datetime) -> int:
 
 
 def check_assignment(session: Session, name: str) -> None:
-    """Raises UsageError, with one like it, for an assignment that is neither in the catalogue nor was ever marked.
+    """Raise UsageError, with a similar name, if an assignment is neither in the catalogue nor stored.
 
-    An empty one stands for all.
+    An empty name means all assignments and is accepted.
     """
     known = {"", *catalogue(), *session.scalars(select(AssignmentVersion.assignment).distinct())}
     if name not in known:
@@ -77,14 +77,14 @@ def check_assignment(session: Session, name: str) -> None:
 
 
 def assignment_to_bytes(assignment: Assignment) -> bytes:
-    """All of an assignment, images and given files and secret included."""
+    """Encode an assignment, including images, given files and its secret."""
     text = json.dumps(encode(assignment), sort_keys=True, separators=(",", ":"))
     return zlib.compress(text.encode("ascii"), 6)
 
 
 def assignment_from_bytes(content: bytes) -> Assignment:
-    """The assignment again. Raises ValueError or TypeError if the bytes are not one."""
-    # With all kinds of criteria; what only keeps or names an assignment need not wait for them.
+    """Decode an assignment. Raises ValueError or TypeError if the bytes are not one."""
+    # Imports all criteria, which callers that only store or name an assignment do not need.
     from submissions.assignment.definition import Assignment
 
     try:
@@ -94,7 +94,7 @@ def assignment_from_bytes(content: bytes) -> Assignment:
 
 
 def _in_todays_words(content: dict[str, Any]) -> dict[str, Any]:
-    """The tables of an assignment as they were kept, with the keys that they have now."""
+    """Return the stored tables of an assignment with keys renamed to their present names."""
     kept = {name: _renamed(content[name]) for name in ("world", "training") if content.get(name) is not None}
     return content | kept | {"criteria": [_renamed(table) for table in content["criteria"]]}
 

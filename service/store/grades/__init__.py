@@ -1,1 +1,1 @@
-"""What came of gradings: results, recordings and plots, and what instructors set by hand beside them."""
+"""Results of gradings: criteria, recordings and plots, and overrides by staff."""

@@ -1,7 +1,4 @@
-"""Students who ask for a second look at a grade, and what instructors answer. It changes no marks.
-
-What comes of the second look is set by ``overrides.py``.
-"""
+"""Appeals by students and answers by instructors. Changes no marks; ``overrides.py`` does."""
 
 from __future__ import annotations
 
@@ -26,15 +23,15 @@ LONGEST_TEXT = 4000
 
 @dataclass(frozen=True, slots=True)
 class AppealLine:
-    """One appeal, answered or open."""
+    """An appeal, answered or open."""
 
     id: int
     submission_id: int
-    who: str  # the student, by another name where those of the assignment are hidden
+    who: str  # the student, or a label if the assignment hides names
     assignment: str
     title: str  # of the assignment
     attempt: int  # the student's
-    job_id: str  # the grade that stands
+    job_id: str  # the standing grade
     text: str
     asked_at: datetime
     answer: str | None
@@ -43,24 +40,23 @@ class AppealLine:
 
 
 def may_appeal(session: Session, submission_id: int) -> bool:
-    """Whether there is a grade that its student may see."""
+    """Return whether the submission has a grade that its student may see."""
     seen = select(Job.id).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
     seen = seen.where(SubmissionRow.id == submission_id, *current.CAN_COUNT)
     return session.scalar(seen) is not None
 
 
 def ask(session: Session, submission_id: int, text: str) -> int:
-    """Ask for a second look at a submission's grade. Returns the appeal's id.
+    """Open an appeal against the grade of a submission and return the appeal's id.
 
-    Raises UsageError where there is no grade that the student may see, an appeal is open, or the text is empty or too
-    long.
+    Raises UsageError if the student may not see a grade, an appeal is open already, or the text is empty or too long.
     """
     text = text.replace("\r\n", "\n").strip()
     if not 0 < len(text) <= LONGEST_TEXT:
         raise UsageError(
             "the text has %(count)s characters, expected 1 to %(most)s", count=len(text), most=LONGEST_TEXT
         )
-    # One writer at a time, so that of two at once one finds the other open.
+    # Serialises concurrent appeals, so that the second one finds the first open.
     lock_submissions(session, SubmissionRow.id == submission_id)
     if not may_appeal(session, submission_id):
         raise UsageError("there is no grade yet that could be looked at again")
@@ -75,9 +71,9 @@ def ask(session: Session, submission_id: int, text: str) -> int:
 
 
 def answer(session: Session, course_id: int, appeal_id: int, text: str, actor: str) -> None:
-    """Answer an open appeal of the course, which closes it.
+    """Answer and close an open appeal of the course.
 
-    Raises UsageError where there is none of this id, it is answered, or the text is empty or too long.
+    Raises UsageError if the appeal does not exist or is answered, or the text is empty or too long.
     """
     text = text.replace("\r\n", "\n").strip()
     if not 0 < len(text) <= LONGEST_TEXT:
@@ -94,7 +90,7 @@ def answer(session: Session, course_id: int, appeal_id: int, text: str, actor: s
 
 
 def waiting(session: Session, course_id: int) -> int:
-    """How many of a course wait for an answer."""
+    """Return the number of open appeals of a course."""
     query = select(func.count()).select_from(Appeal).join(SubmissionRow, Appeal.submission_id == SubmissionRow.id)
     mine = (Enrolment.course_id == course_id, Appeal.answered_at.is_(None))
     return session.scalar(query.join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id).where(*mine)) or 0
@@ -103,9 +99,9 @@ def waiting(session: Session, course_id: int) -> int:
 def open_in_course(
     session: Session, course_id: int, hidden: HiddenNames, *, limit: int | None = None, after: int | None = None
 ) -> list[AppealLine]:
-    """The appeals of a course that wait for an answer, the longest waiting first.
+    """Return the open appeals of a course, oldest first.
 
-    ``after`` is the id of the last appeal of the page before.
+    ``after`` is the id of the last appeal on the previous page.
     """
     query = _lines().where(Enrolment.course_id == course_id, Appeal.answered_at.is_(None))
     if after is not None:
@@ -121,9 +117,9 @@ def answered_in_course(
     limit: int | None = None,
     after: tuple[datetime, int] | None = None,
 ) -> list[AppealLine]:
-    """The answered appeals of a course, the newest answer first.
+    """Return the answered appeals of a course, newest answer first.
 
-    ``after`` is when the last appeal of the page before was answered, and its id.
+    ``after`` is the answer time and id of the last appeal on the previous page.
     """
     query = _lines().where(Enrolment.course_id == course_id, Appeal.answered_at.is_not(None))
     if after is not None:
@@ -137,12 +133,12 @@ def _called(found: list[AppealLine], hidden: HiddenNames) -> list[AppealLine]:
 
 
 def of_submission(session: Session, submission_id: int) -> list[AppealLine]:
-    """The appeals of one submission, the newest first, as its student sees them."""
+    """Return the appeals of a submission, newest first, as its student sees them."""
     return _read(session, _lines().where(Appeal.submission_id == submission_id).order_by(Appeal.id.desc()))
 
 
 def newest_of(session: Session, enrolment_id: int) -> dict[str, AppealLine]:
-    """What one student asked last, by assignment."""
+    """Return a student's newest appeal for each assignment."""
     query = _lines().where(SubmissionRow.enrolment_id == enrolment_id).order_by(Appeal.id)
     return {each.assignment: each for each in _read(session, query)}
 

@@ -1,6 +1,6 @@
-"""What instructors write to the student of a submission, for all of it or one criterion. It changes no marks.
+"""Comments by staff for the student, on a whole submission or on one criterion. Changes no marks.
 
-When a student sees it is ``reports/view.py``'s.
+``reports/view.py`` decides when a student sees them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ LONGEST_COMMENT = 2000
 
 @dataclass(frozen=True, slots=True)
 class CommentLine:
-    """One comment; an empty ``criterion`` is for all of the submission."""
+    """A comment; an empty ``criterion`` refers to the whole submission."""
 
     id: int
     criterion: str
@@ -33,9 +33,9 @@ class CommentLine:
 
 
 def comment(session: Session, job_id: str, criterion: str, text: str, actor: str) -> int:
-    """Write a comment on this grade's submission. Returns its id.
+    """Add a comment to the submission of this grade and return the comment's id.
 
-    Raises UsageError for a criterion that the grade does not have, or a text that is empty or too long.
+    Raises UsageError for an unknown criterion, or a text that is empty or too long.
     """
     text = text.replace("\r\n", "\n").strip()
     if not 0 < len(text) <= LONGEST_COMMENT:
@@ -56,7 +56,10 @@ def comment(session: Session, job_id: str, criterion: str, text: str, actor: str
 
 
 def withdraw(session: Session, job_id: str, comment_id: int, actor: str) -> None:
-    """Show a comment to nobody any more. Raises UsageError where this grade's submission has none of this id."""
+    """Withdraw a comment, so that it is no longer shown.
+
+    Raises UsageError if this grade's submission does not have it.
+    """
     submission_id = session.get_one(Job, job_id).submission_id
     row = session.get(Comment, comment_id)
     if row is None or row.submission_id != submission_id or row.withdrawn_at is not None:
@@ -66,12 +69,12 @@ def withdraw(session: Session, job_id: str, comment_id: int, actor: str) -> None
 
 
 def of_job(session: Session, job_id: str) -> list[CommentLine]:
-    """The comments on the submission of a job, the oldest first."""
+    """Return the comments on the submission of a job, oldest first."""
     return of_jobs(session, [job_id]).get(job_id, [])
 
 
 def of_jobs(session: Session, job_ids: Collection[str]) -> dict[str, list[CommentLine]]:
-    """The same by job, of those that have some."""
+    """Return the comments by job, without jobs that have none."""
     query = (
         select(Job.id, Comment)
         .join(Comment, Comment.submission_id == Job.submission_id)

@@ -1,7 +1,7 @@
-"""Which grades are shown, and the attempt that counts: of each student and assignment one. Defined here alone.
+"""Visibility of grades, and the current attempt of each student and assignment. The only definition of both.
 
-A grade is trusted, seen by its student, or can count: each is a predicate and an SQL expression of the same, which a
-test compares. The attempt that counts is the newest that can, whichever way it was submitted.
+The states "trusted", "for students" and "can count" are each defined as a predicate and as an SQL expression; a test
+compares the two. The current attempt is the newest that can count, regardless of how it was submitted.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from sqlalchemy.orm import aliased
 from service.store.models import Job, SubmissionRow
 from service.store.states import JobState, Standing
 
-#: What holds of a job that has a grade, and whose worker has not been found to grade wrongly.
+#: Condition on a job: it is graded, and its worker is not known to grade incorrectly.
 IS_TRUSTED: tuple[ColumnElement[bool], ...] = (Job.state == JobState.DONE, Job.suspect.is_(None))
-#: What holds of a job beside its submission where students may be shown the grade, once it stands.
+#: Condition on a job joined with its submission: students may see the grade when it is standing.
 IS_FOR_STUDENTS: tuple[ColumnElement[bool], ...] = (*IS_TRUSTED, SubmissionRow.staff_only.is_(None))
-#: What holds of a job beside its submission where its student may see the grade, and it can count.
+#: Condition on a job joined with its submission: its student may see the grade, and it can count.
 CAN_COUNT: tuple[ColumnElement[bool], ...] = (*IS_FOR_STUDENTS, Job.standing == Standing.STANDS)
 
 
 class JobOutcome(Protocol):
-    """What tells whether there is a grade to rely on: a job, or a line that is read of one."""
+    """Fields that decide whether a grade is trusted: a job, or a line read from one."""
 
     @property
     def state(self) -> str: ...  # noqa: D102
@@ -32,58 +32,61 @@ class JobOutcome(Protocol):
 
 
 class AttemptOutcome(JobOutcome, Protocol):
-    """The same with the limit that the submission is over."""
+    """Fields of ``JobOutcome``, with the limit that the submission exceeds."""
 
     @property
     def staff_only(self) -> str | None: ...  # noqa: D102
 
 
 class StandingOutcome(AttemptOutcome, Protocol):
-    """The same with what the job is to its submission."""
+    """Fields of ``AttemptOutcome``, with the standing of the job."""
 
     @property
     def standing(self) -> Standing: ...  # noqa: D102
 
 
 def is_trusted(job: JobOutcome) -> bool:
-    """As ``IS_TRUSTED``."""
+    """Return whether ``IS_TRUSTED`` applies."""
     return job.state == JobState.DONE and job.suspect is None
 
 
 def is_for_students(attempt: AttemptOutcome) -> bool:
-    """As ``IS_FOR_STUDENTS``."""
+    """Return whether ``IS_FOR_STUDENTS`` applies."""
     return is_trusted(attempt) and attempt.staff_only is None
 
 
 def can_count(attempt: StandingOutcome) -> bool:
-    """As ``CAN_COUNT``."""
+    """Return whether ``CAN_COUNT`` applies."""
     return is_for_students(attempt) and attempt.standing is Standing.STANDS
 
 
 def counting(*which: ColumnElement[bool]) -> Select[int]:
-    """The ids of the submissions that count, among all of the students and assignments that ``which`` selects.
+    """Return a query for the ids of the submissions that count, among those selected by ``which``.
 
-    ``which`` are conditions on ``SubmissionRow`` that hold for all attempts of a student at an assignment or for none.
+    Each condition on ``SubmissionRow`` must select all attempts of a student at an assignment, or none.
     """
     ranked = _ranked(*which)
     return select(ranked.c.id).where(ranked.c.place == 1, ranked.c.counts == 1)
 
 
 def shown(*which: ColumnElement[bool]) -> Select[int]:
-    """The same with a submission for every student: the newest over no limit, else the newest, where none counts."""
+    """Return a query like ``counting`` with one submission for every student.
+
+    If none counts, it is the newest within the limits, otherwise the newest.
+    """
     ranked = _ranked(*which)
     return select(ranked.c.id).where(ranked.c.place == 1)
 
 
 def attempted_in(batch_ids: Select[str]) -> ColumnElement[bool]:
-    """Condition on ``SubmissionRow``: its student has submitted to its assignment in one of these batches."""
+    """Return the condition that the student of a ``SubmissionRow`` has submitted to its assignment in these batches."""
     member = aliased(SubmissionRow)
     pairs = select(member.enrolment_id, member.assignment).where(member.batch_id.in_(batch_ids))
     return tuple_(SubmissionRow.enrolment_id, SubmissionRow.assignment).in_(pairs)
 
 
 def newer_attempt() -> ColumnElement[int | None]:
-    """Of a ``SubmissionRow``: its student's newest attempt after it that does not count; None for none."""
+    """Return the newest later attempt of the student of a ``SubmissionRow`` that does not count; None without one."""
     newer, job = aliased(SubmissionRow), aliased(Job)
     return (
         select(func.max(newer.attempt))

@@ -1,4 +1,4 @@
-"""The marks of jobs as they count, as statistics are made of them: criteria's rows, and no recording. Only reads."""
+"""Marks of jobs for statistics, as they count: read from criterion rows, without recordings. Read-only."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from service.grading.statistics import MarkedCriterion, MarkedSubmission, marks_
 from service.store.grades import current, overrides
 from service.store.models import CriterionResultRow
 
-#: How many jobs are asked for at once: databases take so many values, and not every number of them.
+#: Number of jobs per query: databases limit the number of parameters.
 _AT_ONCE = 1000
 
 
 class MarkedLine(Protocol):
-    """What is looked at of a job: whose it is, for what, and whether its marks count."""
+    """Fields of a job that are read for statistics."""
 
     @property
     def id(self) -> str: ...  # noqa: D102
@@ -41,7 +41,7 @@ class MarkedLine(Protocol):
 
 
 def marked(session: Session, lines: Sequence[MarkedLine]) -> list[MarkedSubmission]:
-    """Those of the jobs that are graded, not for staff alone, and not excused altogether."""
+    """Return the graded jobs that are neither staff-only nor excused completely."""
     graded = [line for line in lines if current.is_for_students(line)]
     criteria: dict[str, list[MarkedCriterion]] = {line.id: [] for line in graded}
     worths = dict.fromkeys(criteria, Decimal(0))

@@ -1,6 +1,6 @@
-"""What was done by hand to the marks of a submission, and by whom: the audit trail with its reasons and texts.
+"""Changes by staff to the marks of a submission: activity log entries with their reasons and texts. Read-only.
 
-They go when the submission is purged, and the trail stays without them. Only reads.
+Purging a submission removes the reasons and texts; the log entries remain.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from service.store.web_tables import Appeal, Comment, Override
 
 @dataclass(frozen=True, slots=True)
 class MarkingStep:
-    """One thing that somebody did; empty is what does not apply."""
+    """A change by staff; fields that do not apply are empty."""
 
     at: datetime
     actor: str
@@ -28,11 +28,11 @@ class MarkingStep:
     criterion: str
     before: str
     after: str
-    text: str  # a reason, a comment, an answer
+    text: str  # a reason, comment or answer
 
 
 def history(session: Session, submission_id: int) -> list[MarkingStep]:
-    """All that was done, in order."""
+    """Return all changes to a submission by staff, oldest first."""
     texts = {
         "override": _texts(session, submission_id, Override, Override.reason),
         "comment": _texts(session, submission_id, Comment, Comment.text),

@@ -1,6 +1,6 @@
-"""What instructors set by hand: a criterion's marks in place of the grader's, a criterion excused; with a reason.
+"""Overrides by staff: marks that replace the grader's for one criterion, or an excused criterion, with a reason.
 
-It belongs to the submission, so every grade of that counts so, a later one too. What the grader gave is never changed.
+An override belongs to the submission, so it also applies to later grades. The grader's own result is never changed.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from sim.errors import UsageError
 from submissions.nearest import did_you_mean
 
 LONGEST_REASON = 500
-#: So many digits after the point.
+#: Maximum precision: four digits after the point.
 _FINEST = Decimal("0.0001")
 _NONE = Decimal(0)
 
 
 class MarksChanged(UsageError):
-    """Somebody changed the marks of a criterion after the caller had looked at them."""
+    """The marks of a criterion changed after the caller read them."""
 
 
 @dataclass(frozen=True, slots=True)
 class OverrideLine:
-    """What holds of one criterion in place of the grader's marks; None of marks excuses it."""
+    """An override of one criterion; marks of None excuse it."""
 
     id: int
     marks: Decimal | None
@@ -43,27 +43,27 @@ class OverrideLine:
     made_at: datetime
 
     def counted(self, worth: Decimal) -> tuple[Decimal, Decimal]:
-        """The marks of a criterion and the most there are, where the assignment gives so much for it."""
+        """Return the effective marks and maximum of a criterion, given its maximum ``worth``."""
         return (_NONE, _NONE) if self.marks is None else (min(self.marks, worth), worth)
 
 
 @dataclass(frozen=True, slots=True)
 class CriterionMarks:
-    """One criterion of a grade: as graded, and as it counts."""
+    """A criterion of a grade, as graded and as it counts."""
 
     criterion: str
     title: str
     message: str  # the grader's
     visibility: str
-    graded: Decimal | None  # None where it could not be judged
-    worth: Decimal  # the most that the assignment gives
+    graded: Decimal | None  # None if it could not be judged
+    worth: Decimal  # the maximum that the assignment gives
     marks: Decimal
     max_marks: Decimal
     override: OverrideLine | None
 
 
 def read_marks(text: str) -> Decimal:
-    """Marks as people write them, with a point or a comma. Raises UsageError for what is no number."""
+    """Parse marks with a decimal point or comma. Raises UsageError for anything else."""
     try:
         return Decimal(text.strip().replace(",", "."))
     except InvalidOperation:
@@ -73,11 +73,13 @@ def read_marks(text: str) -> Decimal:
 def set_marks(
     session: Session, job_id: str, criterion: str, marks: Decimal, reason: str, actor: str, *, seen: int | None = None
 ) -> None:
-    """Let a criterion of this grade's submission have these marks from now on.
+    """Override the marks of a criterion of this grade's submission.
 
-    ``seen`` is the id of the override that whoever asks has seen, 0 for none; None where they have looked at nothing.
-    Raises UsageError for a grade or criterion that there is not, marks out of its range, or no reason, and MarksChanged
-    for another override than the one seen.
+    ``seen`` is the id of the override that the caller last read, 0 for none. None skips this check.
+
+    Raises:
+        UsageError: The grade or criterion is unknown, the marks are out of range, or the reason is missing.
+        MarksChanged: The present override is not the one in ``seen``.
     """
     submission_id, line = _criterion(session, job_id, criterion, seen)
     if not marks.is_finite() or not _NONE <= marks <= line.worth or marks != marks.quantize(_FINEST):
@@ -91,15 +93,15 @@ def set_marks(
 
 
 def excuse(session: Session, job_id: str, criterion: str, reason: str, actor: str, *, seen: int | None = None) -> None:
-    """Let neither the marks of a criterion count nor the most there are. Raises UsageError as ``set_marks`` does."""
+    """Exclude the marks and the maximum of a criterion from the total. Raises UsageError like ``set_marks``."""
     submission_id, line = _criterion(session, job_id, criterion, seen)
     _replace(session, submission_id, line, None, reason, actor)
 
 
 def withdraw(session: Session, job_id: str, criterion: str, actor: str, *, seen: int | None = None) -> None:
-    """Let the grader's marks of a criterion count again.
+    """Restore the grader's marks of a criterion.
 
-    Raises UsageError where nothing was set by hand, and MarksChanged for another override than the one seen.
+    Raises UsageError without an override, MarksChanged if the override is not the one in ``seen``.
     """
     submission_id = _submission(session, job_id)
     before = of_jobs(session, [job_id]).get(job_id, {}).get(criterion)
@@ -115,7 +117,7 @@ def withdraw(session: Session, job_id: str, criterion: str, actor: str, *, seen:
 
 
 def of_jobs(session: Session, job_ids: Collection[str]) -> Mapping[str, Mapping[str, OverrideLine]]:
-    """What is set by hand for the submissions of these jobs, by job and criterion; no job where nothing is."""
+    """Return the overrides for the submissions of these jobs, by job and criterion, without jobs that have none."""
     query = (
         select(Job.id, Override)
         .join(Override, Override.submission_id == Job.submission_id)
@@ -129,7 +131,7 @@ def of_jobs(session: Session, job_ids: Collection[str]) -> Mapping[str, Mapping[
 
 
 def criterion_marks(session: Session, job_id: str) -> list[CriterionMarks]:
-    """The criteria of a grade in their order."""
+    """Return the criteria of a grade in their order."""
     row = CriterionResultRow
     columns = (row.criterion, row.title, row.message, row.visibility, row.unjudged, row.marks, row.max_marks)
     by_hand = of_jobs(session, [job_id]).get(job_id, {})
@@ -145,7 +147,7 @@ def criterion_marks(session: Session, job_id: str) -> list[CriterionMarks]:
 
 
 def recount(session: Session, job_id: str) -> None:
-    """Write down what a job's criteria come to as they count; nothing else writes a job's marks."""
+    """Store the effective total of a job's criteria; no other function writes a job's marks."""
     lines = criterion_marks(session, job_id)
     marks, most = (sum(each, _NONE) for each in ([line.marks for line in lines], [line.max_marks for line in lines]))
     statement = update(Job).where(Job.id == job_id).values(marks=marks, max_marks=most)
@@ -153,7 +155,7 @@ def recount(session: Session, job_id: str) -> None:
 
 
 def is_excused() -> ColumnElement[bool]:
-    """Of a criterion's row beside its job's: neither its marks nor the most there are count."""
+    """Return the condition that a criterion row, joined with its job, is excused."""
     said = exists().where(
         Override.submission_id == Job.submission_id,
         Override.criterion == CriterionResultRow.criterion,
@@ -164,7 +166,7 @@ def is_excused() -> ColumnElement[bool]:
 
 
 def waits_for_judgement() -> ColumnElement[bool]:
-    """Of a criterion's row beside its job's: it could not be judged, and nobody has said since what it counts."""
+    """Return the condition that a criterion row, joined with its job, is unjudged and has no override."""
     said = (
         exists()
         .where(
@@ -178,7 +180,7 @@ def waits_for_judgement() -> ColumnElement[bool]:
 
 
 def _submission(session: Session, job_id: str) -> int:
-    """Whose grade it is; all grades of that submission are locked, so that one that comes in meanwhile counts too."""
+    """Return the id of a grade's submission and lock all its jobs, so that concurrent regrades are included."""
     job = session.get(Job, job_id)
     if job is None or job.state is not JobState.DONE:
         raise UsageError("%(job)s has no grade", job=job_id)
@@ -202,7 +204,7 @@ def _criterion(session: Session, job_id: str, criterion: str, seen: int | None) 
 
 
 def _check_seen(override: OverrideLine | None, seen: int | None, title: str) -> None:
-    """Compare under the lock of the grade: of two people who have seen the same, the second is refused."""
+    """Compare ``seen`` under the lock of the grade, so that the second of two concurrent changes is rejected."""
     if seen is not None and seen != (0 if override is None else override.id):
         raise MarksChanged(
             "Somebody else changed the marks of %(title)s. Look at them again, then repeat your change.", title=title
@@ -235,7 +237,7 @@ def _replace(
     session.flush()
     before = line.graded if line.override is None else line.override.marks
     told = "not judged" if line.override is None and line.graded is None else _words(before)
-    # The reason goes with the submission when that is purged, which the trail does not.
+    # Purging removes the reason with the submission, but not the log entry.
     detail = {"criterion": line.criterion, "before": told, "after": _words(marks), "override": row.id}
     action = "excuse" if marks is None else "set marks"
     audit.note(session, actor, action, "submission", str(submission_id), **detail)

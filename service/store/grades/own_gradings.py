@@ -1,4 +1,4 @@
-"""What one person of a course got, newest first; who may know whose it is, is for the caller to say. Only reads."""
+"""Grades of one person in a course, newest first. Read-only; the caller checks permission."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MOST = 50
 
 @dataclass(frozen=True, slots=True)
 class OwnGrading:
-    """The grade that stands of one submission."""
+    """The standing grade of one submission."""
 
     job_id: str
     assignment: str
@@ -30,7 +30,7 @@ class OwnGrading:
 
 
 def newest(session: Session, enrolment_id: int, assignment: str = "") -> list[OwnGrading]:
-    """Of one person, for one assignment or for all."""
+    """Return the newest grades of one person, for one assignment or for all."""
     query = (
         select(Job, SubmissionRow.assignment, SubmissionRow.attempt)
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)

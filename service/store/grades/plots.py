@@ -1,6 +1,6 @@
-"""The plots of stored grades: whose are drawn next, and what was drawn. They come after the marks and change none.
+"""Plots of stored grades: claiming and storing them. Plots follow the marks and do not affect them.
 
-Draws nothing; that is ``service.plotting``'s.
+``service.plotting`` draws them.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ _PREFIX, _SUFFIX = "plot-", ".png"
 
 @retry_conflicts
 def claim(store: Store, lease_seconds: float) -> str | None:
-    """The job whose plots are drawn next, by age; None when none is due.
+    """Claim the job whose plots are due longest; None if no plots are due.
 
-    Drawing twice does no harm, so the claim is only put off, not fenced. After three times it is given up.
+    Drawing twice does no harm, so a claim is only postponed, not fenced. The plots fail after three attempts.
     """
     with store.transaction() as session:
         if needs_newer_code(session):
@@ -46,7 +46,7 @@ def claim(store: Store, lease_seconds: float) -> str | None:
 
 @retry_conflicts
 def finish(store: Store, job_id: str, drawn: Mapping[str, bytes]) -> None:
-    """Keep the plots of a job: name -> PNG."""
+    """Store the plots of a job, a mapping of name to PNG."""
     files = [artifacts.File(f"{_PREFIX}{name}{_SUFFIX}", "image/png", data) for name, data in drawn.items()]
     with store.transaction() as session:
         at = now(session)
@@ -58,12 +58,12 @@ def finish(store: Store, job_id: str, drawn: Mapping[str, bytes]) -> None:
 
 
 def load(session: Session, job_id: str) -> dict[str, bytes]:
-    """The plots that were kept of a job: name -> PNG."""
+    """Return the stored plots of a job, a mapping of name to PNG."""
     return _named(artifacts.get(session, job_id, prefix=_PREFIX))
 
 
 def load_each(session: Session, job_ids: Collection[str]) -> Iterator[tuple[str, dict[str, bytes]]]:
-    """Each of the jobs with its plots, read in one statement, in the database's order of ids."""
+    """Yield each job id with its plots, read in one statement and ordered by id."""
     return ((job_id, _named(kept)) for job_id, kept in artifacts.get_each(session, job_ids, prefix=_PREFIX))
 
 
@@ -72,14 +72,14 @@ def _named(kept: Mapping[str, artifacts.File]) -> dict[str, bytes]:
 
 
 def due(store: Store) -> int:
-    """How many jobs wait for their plots."""
+    """Return the number of jobs whose plots are due."""
     with store.reading() as session:
         waiting = (Job.plots == PlotState.DUE, Job.plots_due_at <= now(session))
         return session.scalar(select(func.count()).select_from(Job).where(*waiting)) or 0
 
 
 def correct_clock(session: Session, at: datetime, ahead: datetime) -> None:
-    """Plots that wait for a moment after ``ahead`` are due ``at``, where a wrong clock wrote it."""
+    """Make plots due ``at`` if a wrong clock scheduled them after ``ahead``."""
     waiting = (Job.plots == PlotState.DUE, Job.plots_due_at > ahead)
     written_later = or_(Job.finished_at > ahead, Job.started_at > ahead)
     which = (*waiting, written_later)

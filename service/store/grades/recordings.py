@@ -1,6 +1,6 @@
-"""Recordings to bytes and back: compact, bit for bit, and readable without running anything.
+"""Lossless, compact format for recordings, which is read without executing code.
 
-A recording's bytes are zlib over an npz of arrays, images as raw bytes, and one JSON text; never a pickle.
+The bytes are a zlib-compressed npz with arrays, images as raw bytes, and one JSON text; never a pickle.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from service.store.grades.recorded_words import RecordingError, with_words
 from sim.columns import Column
 from sim.recording import COLUMNS, Image, Recording, Ticks
 
-#: What one grade's recordings may take together, compressed; a flood of output must not fill the database.
+#: Maximum compressed size of one grade's recordings, so that excessive output does not fill the database.
 GRADE_BYTES = 64_000_000
-#: What a recording may always have, however many there are.
+#: Minimum size limit of one recording, regardless of their number.
 SMALLEST_CAP = 256_000
 _TEXT_KEPT = 2000
 
@@ -30,22 +30,22 @@ _Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class StoredRecording:
-    """A recording as it is stored: whole, or without what was too large."""
+    """A recording as stored: whole, or without the parts that were too large."""
 
     recording: Recording
     data: bytes
 
 
 def cap_for(trials: int) -> int:
-    """Bytes that each of a grade's recordings may take."""
+    """Return the maximum size in bytes of each recording of a grade."""
     return max(SMALLEST_CAP, GRADE_BYTES // max(1, trials))
 
 
 def keep(recording: Recording, cap: int) -> StoredRecording:
-    """The recording within ``cap`` bytes; what does not fit is left out, and a note says so.
+    """Encode a recording within ``cap`` bytes; parts that do not fit are left out, with a note.
 
-    Left out first are images and all but the first texts of each kind, then every text, then the ticks; the
-    verdict, the faults, the poses and the chain's hash always stay.
+    Removed first are images and all but the first texts of each kind, then all texts, then the ticks. The verdict,
+    faults, poses and chain hash are always kept.
     """
     data = to_bytes(recording)
     for trim in (_without_floods, _without_words, _without_ticks):
@@ -59,7 +59,7 @@ def keep(recording: Recording, cap: int) -> StoredRecording:
 
 
 def to_bytes(recording: Recording) -> bytes:
-    """Everything in the recording, compressed."""
+    """Return the whole recording, compressed."""
     ticks = recording.ticks
     words: dict[str, Any] = {
         field.name: encode(getattr(recording, field.name))
@@ -84,14 +84,14 @@ def to_bytes(recording: Recording) -> bytes:
 
 
 def from_bytes(data: bytes) -> Recording:
-    """The recording again. Raises RecordingError if the bytes are not one."""
+    """Decode a recording. Raises RecordingError if the bytes are not one."""
     try:
         with np.load(io.BytesIO(zlib.decompress(data)), allow_pickle=False) as arrays:
             words = json.loads(bytes(arrays["words"]))
             pixels = bytes(arrays["pictures"])
             partner = from_bytes(bytes(arrays["partner"])) if "partner" in arrays else None
             sizes = arrays["picture_sizes"].reshape(-1, 2).tolist()
-            # A recording may be older than a column.
+            # The recording may be older than a column.
             columns = {each.name: _column(arrays[each.name], each) for each in COLUMNS if each.name in arrays}
         ticks = Ticks(**cast(dict[str, Any], columns), **words.pop("ticks"))
         images = _with_pixels(words.pop("images"), sizes, pixels)
@@ -120,9 +120,9 @@ def _bytes_array(data: bytes) -> _Bytes:
 
 
 def _shuffled(columns: NDArray[Any]) -> _Bytes:
-    """(n, c) of 8-byte numbers to (c, 8, n) bytes: differences of their bit patterns, like bytes together.
+    """Convert (n, c) 8-byte numbers to (c, 8, n) bytes: bit pattern differences, grouped by byte position.
 
-    Halves what zlib makes of a path, and loses no bit: the differences wrap.
+    Halves the compressed size of a path. Lossless, because the differences wrap around.
     """
     rows, count = columns.shape
     patterns = np.ascontiguousarray(columns.T).view(np.uint64)

@@ -1,6 +1,6 @@
-"""Grades that need not be run again: the same submission, assignment, seeds and grader give the same marks.
+"""Result cache: the same submission, assignment, seeds and grader give the same marks, without another run.
 
-A copy has rows of its own and names the grade that was run. What may be copied is decided here, when is not.
+A copy has its own rows and names the original grade. This module decides which grades can be copied, not when.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from service.store.grades import current
 from service.store.models import Artifact, AssignmentVersion, CriterionResultRow, Job, SubmissionRow, TrialRow, Worker
 from service.store.states import PlotState
 
-#: How far such a trial came depends on the machine and its load, so another run may differ.
+#: The end of such a trial depends on the machine and its load, so another run may differ.
 _NOT_REPEATABLE = ("cpu_limit", "memory_limit", "stalled", "host_error")
 
 
 def cache_key(session: Session, job_id: str, grader_sha256: str, secret_sha256: str) -> str:
-    """Alike for two jobs only where their grades must be: the seeds follow from the assignment and the secret."""
+    """Return the cache key of a job. Equal keys mean equal grades: assignment and secret determine the seeds."""
     query = (
         select(SubmissionRow.sha256, AssignmentVersion.sha256)
         .join(Job, Job.submission_id == SubmissionRow.id)
@@ -33,15 +33,16 @@ def cache_key(session: Session, job_id: str, grader_sha256: str, secret_sha256: 
 
 
 def key_of(submission_sha256: str, assignment_sha256: str, grader_sha256: str, secret_sha256: str) -> str:
-    """The same of what has no job yet."""
+    """Return the cache key from its parts, for submissions without a job."""
     parts = (submission_sha256, assignment_sha256, grader_sha256, secret_sha256)
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
 def find(session: Session, key: str) -> str | None:
-    """The newest grade that may be copied for this key; None where it has to be run.
+    """Return the newest grade that may be copied for this key; None if it must be run.
 
-    Never one without the sandbox, of a worker in quarantine, cut by a limit of the machine, or not judged in full.
+    Never returns a grade made without the sandbox or by a quarantined worker, cut short by a limit of the machine, or
+    with unjudged criteria.
     """
     distrusted = exists().where(Worker.name == Job.worker, Worker.quarantined_at.is_not(None))
     cut = exists().where(TrialRow.job_id == Job.id, TrialRow.verdict.in_(_NOT_REPEATABLE))
@@ -52,7 +53,7 @@ def find(session: Session, key: str) -> str | None:
             Job.cache_key == key,
             *current.IS_TRUSTED,
             Job.copied_from.is_(None),
-            # The key fixes the sandbox's policy; these say that both layers stood.
+            # The key includes the sandbox policy; these conditions require both layers to be active.
             Job.sandbox.contains("Landlock"),
             Job.sandbox.contains("seccomp"),
             ~distrusted,
@@ -66,7 +67,7 @@ def find(session: Session, key: str) -> str | None:
 
 
 def copy_rows(session: Session, source_id: str, job_id: str) -> None:
-    """Copy the rows of a grade to another job, which has none."""
+    """Copy the rows of a grade to another job that has none."""
     for table in (TrialRow, CriterionResultRow, Artifact):
         columns = table.__table__.columns
         kept = [column for column in columns if column.name not in ("id", "job_id")]
@@ -75,7 +76,7 @@ def copy_rows(session: Session, source_id: str, job_id: str) -> None:
 
 
 def copied(session: Session, source_id: str, job_id: str, at: datetime) -> dict[str, Any]:
-    """What another job itself has of a grade that is copied to it."""
+    """Return the column values that a job takes over from a copied grade."""
     source = session.scalars(select(Job).where(Job.id == source_id)).one()
     queued_at = session.scalar(select(Job.queued_at).where(Job.id == job_id))
     of_grade = ("verdict", "sandbox", "grader_version", "missing", "hints", "cost")
@@ -93,7 +94,10 @@ def copied(session: Session, source_id: str, job_id: str, at: datetime) -> dict[
 
 
 def _notes(session: Session, source: Job, job_id: str) -> list[str]:
-    """What was noted when this submission was read, then by the grading: another's folder may have their name."""
+    """Return the notes of reading this submission, then those of the grading.
+
+    The notes of reading the other submission are left out, because they may name its folder.
+    """
     from submissions.packed import unpack_submission
 
     packed = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)

@@ -1,6 +1,6 @@
-"""Grades to rows and back, whole: marks, evidence, accuracy as data, and every recording as an artifact.
+"""Storage of complete grades as rows: marks, evidence, accuracy, and each recording as an artifact.
 
-Whether a worker may store a grade is ``jobs``'s to say; nothing here judges.
+``jobs`` decides whether a worker may store a grade. Nothing here judges.
 """
 
 from __future__ import annotations
@@ -45,15 +45,15 @@ _RECORDING = "application/x-robomark-recording"
 
 @dataclass(frozen=True, slots=True)
 class PreparedGrade:
-    """A grade made ready for its transaction, so that compressing keeps no lock waiting."""
+    """A grade prepared before its transaction, so that compressing it delays no lock."""
 
     grade: Grade
     files: list[artifacts.File]
-    predictions: list[list[dict[str, Any]]]  # a list a criterion
+    predictions: list[list[dict[str, Any]]]  # one list per criterion
 
 
 def prepare(grade: Grade) -> PreparedGrade:
-    """Compress the recordings and point the predictions at their images."""
+    """Compress the recordings and replace the images in predictions by references."""
     from service.store.grades import recordings
 
     cap = recordings.cap_for(len(grade.trials))
@@ -72,7 +72,7 @@ def prepare(grade: Grade) -> PreparedGrade:
 
 
 def insert(session: Session, job_id: str, prepared: PreparedGrade, at: datetime) -> None:
-    """Write the rows of a grade; those of an earlier grading of the same job go."""
+    """Insert the rows of a grade, replacing those of an earlier grading of the same job."""
     grade = prepared.grade
     session.execute(delete(TrialRow).where(TrialRow.job_id == job_id))
     session.execute(delete(CriterionResultRow).where(CriterionResultRow.job_id == job_id))
@@ -85,14 +85,14 @@ def insert(session: Session, job_id: str, prepared: PreparedGrade, at: datetime)
 
 
 def load(session: Session, job_id: str) -> Grade:
-    """The grade of a job as it counts, with what instructors set and wrote. Raises UsageError when it has none."""
+    """Load the grade of a job as it counts, with overrides and comments. Raises UsageError if it has none."""
     return _only(load_each(session, [job_id]), job_id)
 
 
 def load_each(session: Session, job_ids: Collection[str]) -> Iterator[tuple[str, Grade]]:
-    """As ``load``, the grades of those jobs that have one, in the database's order of ids, in as many statements.
+    """Yield the grades like ``load`` for jobs that have one, ordered by id, with a fixed number of statements.
 
-    The recordings of one job at a time are read.
+    Only the recordings of one job are in memory at a time.
     """
     from service.store.grades.recordings import from_bytes
 
@@ -100,21 +100,21 @@ def load_each(session: Session, job_ids: Collection[str]) -> Iterator[tuple[str,
 
 
 def load_words(session: Session, job_id: str) -> Grade:
-    """As ``load``, for whoever tells what was said and marked: recordings without their ticks and pixels."""
+    """Load a grade like ``load``, but with recordings without ticks and pixels."""
     return _only(_as_all_count(session, [job_id], _graded(session, [job_id], words_from_bytes)), job_id)
 
 
 def load_graded(session: Session, job_id: str) -> Grade:
-    """The grade of a job as the grader gave it. Raises UsageError when it has none."""
+    """Load the grade of a job as the grader gave it. Raises UsageError if it has none."""
     from service.store.grades.recordings import from_bytes
 
     return _only(_graded(session, [job_id], from_bytes), job_id)
 
 
 def load_marks(session: Session, job_ids: Collection[str]) -> dict[str, Grade]:
-    """The grades of jobs as they count, for lists: without trials, predictions and comments.
+    """Load the grades of jobs as they count, for lists: without trials, predictions and comments.
 
-    No recordings are read. Jobs without a grade are left out.
+    Reads no recordings. Jobs without a grade are left out.
     """
     heads = _heads(session, job_ids, defer(CriterionResultRow.predictions))
     by_hand = overrides.of_jobs(session, job_ids)
@@ -125,7 +125,7 @@ def load_marks(session: Session, job_ids: Collection[str]) -> dict[str, Grade]:
 
 
 def load_each_trials(session: Session, job_ids: Collection[str]) -> Iterator[tuple[str, tuple[TrialResult, ...]]]:
-    """Each of the jobs with its trials, those of one at a time in memory; none where it has no grade."""
+    """Yield each job id with its trials, which are empty without a grade. Keeps those of one job in memory."""
     from service.store.grades.recordings import from_bytes
 
     return _trials(session, job_ids, from_bytes)
@@ -164,7 +164,7 @@ def _with_criteria(grade: Grade, rows: Sequence[CriterionResultRow], trials: tup
 def _heads(
     session: Session, job_ids: Collection[str], *options: ORMOption
 ) -> dict[str, tuple[Grade, list[CriterionResultRow]]]:
-    """What is read of grades but their trials, by job: all but the criteria, and the rows of these."""
+    """Return the grades without criteria and trials, and the criterion rows, by job."""
     query = (
         select(Job, SubmissionRow.sha256, Enrolment.student, AssignmentVersion)
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
@@ -280,7 +280,7 @@ def _criterion_row(
 
 
 def _encoded_prediction(prediction: Prediction, numbers: Mapping[Image, int]) -> dict[str, Any] | None:
-    """A prediction that names its image by number in the recording; none if the image was too much to keep."""
+    """Encode a prediction with its image as a number in the recording; None if the images were too large to store."""
     if not numbers:
         return None
     where = numbers.get(prediction.image)
@@ -321,7 +321,7 @@ def _as_it_counts(result: CriterionResult, override: OverrideLine | None) -> Cri
     if not result.unjudged:
         said = SetByHand(result.marks, result.max_marks, override.reason, excused)
         return replace(result, marks=marks, max_marks=max_marks, set_by_hand=said)
-    # That staff will look at it is true no more.
+    # The note that staff will review it no longer applies.
     said = SetByHand(None, result.max_marks, override.reason, excused)
     return replace(result, marks=marks, max_marks=max_marks, set_by_hand=said, message="", unjudged="")
 

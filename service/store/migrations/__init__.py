@@ -1,1 +1,1 @@
-"""Alembic's revisions of the tables; carried in the wheel."""
+"""Alembic revisions of the tables; included in the wheel."""

@@ -1,4 +1,4 @@
-"""Runs revisions on the connection that ``service.store.migrate`` hands over; opens none itself."""
+"""Alembic environment: runs revisions on the connection from ``service.store.migrate`` and opens none."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from service.store.web_tables import METADATA
 def _write_oldest_compatible(
     ctx: MigrationContext, step: MigrationInfo, heads: Collection[Any], run_args: Mapping[str, Any]
 ) -> None:
-    """After a migration that names one, keep the oldest revision whose code can use the tables."""
+    """Store the oldest revision whose code can use the tables, after a migration that names one."""
     script = step.up_revision
     oldest = getattr(script.module, "OLDEST_COMPATIBLE", None) if isinstance(script, Script) else None
     if ctx.connection is not None and oldest is not None:

@@ -1,1 +1,1 @@
-"""Who there is: students, who instructs, how they sign in, and who is told of what happens."""
+"""People: students, staff, credentials, LTI and webhooks."""

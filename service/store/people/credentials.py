@@ -1,6 +1,6 @@
-"""How people sign in: links that count once, sessions of browsers, tokens of programs; and how far each reaches.
+"""Credentials: single-use sign-in links, browser sessions and API tokens, with the reach of each.
 
-Only hashes of secrets are kept. What somebody may do with a role is the web's to say.
+Only hashes of secrets are stored. The web service decides what each role permits.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from service.store.web_tables import Credential, LtiCourse
 
 SESSION_LIFETIME = timedelta(days=7)
 LINK_LIFETIME = timedelta(days=2)
-#: Of one person: the oldest session ends when another begins, further tokens are refused.
+#: Per person: a new session ends the oldest one; further tokens are rejected.
 MOST_SESSIONS, MOST_TOKENS = 20, 20
-#: Ahead of a secret, so that one that was left lying about is known for what it is.
+#: Prefixes of secrets, so that a leaked one can be recognised.
 _PREFIXES = {CredentialKind.LINK: "rml_", CredentialKind.SESSION: "rms_", CredentialKind.TOKEN: "rmt_"}
 _FORGOTTEN = timedelta(days=30)
 _NOTED_EVERY = timedelta(hours=1)
@@ -34,16 +34,16 @@ _NOTED_EVERY = timedelta(hours=1)
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """How far a credential reaches: not beyond the course, role, platform and scopes of whoever issued it."""
+    """Limits of a credential: never beyond the course, role, platform and scopes of its issuer."""
 
     course_id: int | None = None
     role: Role | None = None
     platform_id: int | None = None
-    scopes: frozenset[str] = frozenset()  # empty: all, for a session; none, for a token
+    scopes: frozenset[str] = frozenset()  # empty: all scopes for a session, none for a token
 
     @property
     def is_everywhere(self) -> bool:
-        """Whether it reaches every course of its owner in every role."""
+        """Return whether it reaches every course of its owner in every role."""
         return self.course_id is None and self.role is None and self.platform_id is None
 
 
@@ -52,7 +52,7 @@ EVERYWHERE = Reach()
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """The owner of a valid secret, as far as it reaches. ``scopes`` is None for a browser without such a limit."""
+    """The owner of a valid secret, within its reach. ``scopes`` is None for a browser session without a scope limit."""
 
     credential_id: str
     person_id: int
@@ -66,7 +66,7 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class NewSession:
-    """The secret of a new session of a browser, and how long it lasts."""
+    """The secret of a new browser session, and its lifetime."""
 
     secret: str
     lifetime: timedelta = SESSION_LIFETIME
@@ -74,7 +74,7 @@ class NewSession:
 
 @dataclass(frozen=True, slots=True)
 class LinkOwner:
-    """Whom a link that counts would sign in, and how long yet."""
+    """The person that a valid link signs in, and its expiry time."""
 
     person_id: int
     name: str
@@ -127,7 +127,7 @@ def issue(
 def make_token(
     session: Session, person_id: int, lifetime: timedelta, word: str, *, name: str, reach: Reach = EVERYWHERE
 ) -> None:
-    """Make a token of this person from a word that nobody can guess: one, however often the same is asked for."""
+    """Create a token of this person from an unguessable word. Repeating the call creates no second token."""
     at = now(session)
     _forget_expired(session, at)
     _note_sign_in(session, person_id, at)
@@ -146,14 +146,14 @@ def make_token(
 
 
 def unused_token(session: Session, person_id: int, word: str) -> str:
-    """The secret of a person's token that was made of this word, until it is used first; else empty."""
+    """Return the secret of the token created from this word if it is not used yet, otherwise an empty string."""
     secret = _PREFIXES[CredentialKind.TOKEN] + word
     row = _valid(session, secret, CredentialKind.TOKEN)
     return "" if row is None or row.person_id != person_id or row.used_at is not None else secret
 
 
 def count_tokens(session: Session, person_id: int) -> int:
-    """Number of a person's valid tokens, which the transaction then keeps others from changing."""
+    """Return the number of a person's valid tokens and lock the person until the end of the transaction."""
     session.get_one(Person, person_id, with_for_update={"key_share": True})
     query = select(func.count()).where(Credential.person_id == person_id, Credential.kind == CredentialKind.TOKEN)
     return session.scalar(query.where(*_counts(now(session)))) or 0
@@ -162,9 +162,9 @@ def count_tokens(session: Session, person_id: int) -> int:
 def replace_links(
     session: Session, person_ids: Sequence[int], lifetime: timedelta, word: str = "", reach: Reach = EVERYWHERE
 ) -> dict[int, str]:
-    """The secret of a new link of each of these persons; those that they had count no more.
+    """Create a new link for each of these persons and return the secrets; their earlier links are revoked.
 
-    A ``word`` that nobody can guess makes that of one, so that it can be told again by whoever has the word.
+    An unguessable ``word`` determines the secret for a single person, so that the caller can reproduce it.
     """
     at = now(session)
     _forget_expired(session, at)
@@ -178,12 +178,12 @@ def replace_links(
 
 
 def link_of(word: str) -> str:
-    """The secret of a link that was made of this word."""
+    """Return the secret of a link created from this word."""
     return _PREFIXES[CredentialKind.LINK] + word
 
 
 def owner(session: Session, link: str) -> LinkOwner | None:
-    """Who would be signed in by the link; None where it does not count, or not any more."""
+    """Return the person that the link signs in; None if it is invalid or expired."""
     row = _valid(session, link, CredentialKind.LINK)
     if row is None:
         return None
@@ -191,7 +191,7 @@ def owner(session: Session, link: str) -> LinkOwner | None:
 
 
 def redeem(session: Session, link: str) -> NewSession | None:
-    """Exchange a link for a new session that reaches as far. None if the link is not valid."""
+    """Exchange a link for a new session with the same reach. None if the link is not valid."""
     row = _valid(session, link, CredentialKind.LINK)
     if row is None:
         return None
@@ -203,7 +203,10 @@ def redeem(session: Session, link: str) -> NewSession | None:
 
 
 def start_session(session: Session, token: str) -> NewSession | None:
-    """A session that reaches as far as a token, and ends with it. None if the token may not sign a browser in."""
+    """Start a session with the reach of a token, which ends with the token.
+
+    Returns None if the token does not permit browser sign-in.
+    """
     row = _valid(session, token, CredentialKind.TOKEN)
     if row is None or "sign-in" not in row.scopes:
         return None
@@ -212,7 +215,7 @@ def start_session(session: Session, token: str) -> NewSession | None:
 
 
 def identify(session: Session, secret: str, kind: CredentialKind) -> Identity | None:
-    """The owner of a session or a token, with the roles that it reaches. None if it is not valid."""
+    """Return the owner of a session or token, with the roles within its reach. None if it is not valid."""
     row = _valid(session, secret, kind)
     if row is None:
         return None
@@ -236,7 +239,7 @@ def identify(session: Session, secret: str, kind: CredentialKind) -> Identity | 
 
 
 def note_use(session: Session, credential_id: str) -> None:
-    """Write down that a token was used; once an hour is enough."""
+    """Record the use of a token, at most once an hour."""
     at = now(session)
     row = session.get(Credential, credential_id)
     if row is not None and (row.used_at is None or row.used_at < at - _NOTED_EVERY):
@@ -244,19 +247,19 @@ def note_use(session: Session, credential_id: str) -> None:
 
 
 def revoke(session: Session, credential_id: str, person_id: int, reach: Reach = EVERYWHERE) -> bool:
-    """End a credential. Returns False if this person has none of this id within ``reach``."""
+    """Revoke a credential. Returns False if this person does not have it within ``reach``."""
     one = (Credential.id == credential_id, Credential.person_id == person_id, Credential.revoked_at.is_(None))
     return _revoke(session, *one, *_within(reach)) == 1
 
 
 def revoke_all(session: Session, person_id: int, *, but: str = "", reach: Reach = EVERYWHERE) -> int:
-    """End all links, sessions and tokens of a person within ``reach``, but one; returns how many ended."""
+    """Revoke all links, sessions and tokens of a person within ``reach`` except one. Returns the number revoked."""
     theirs = (Credential.person_id == person_id, Credential.id != but, *_counts(now(session)))
     return _revoke(session, *theirs, *_within(reach))
 
 
 def revoke_reaching(session: Session, person_id: int, course_id: int) -> int:
-    """End what a person signs in with that reaches a course; returns how many ended."""
+    """Revoke all credentials of a person that reach a course. Returns the number revoked."""
     reaches = or_(Credential.course_id.is_(None), Credential.course_id == course_id)
     return _revoke(session, Credential.person_id == person_id, reaches, *_counts(now(session)))
 
@@ -267,7 +270,7 @@ def _revoke(session: Session, *which: ColumnElement[bool]) -> int:
 
 
 def of_person(session: Session, person_id: int, reach: Reach = EVERYWHERE) -> list[CredentialLine]:
-    """A person's valid sessions and tokens within ``reach``, newest first."""
+    """Return a person's valid sessions and tokens within ``reach``, newest first."""
     of_kind = Credential.kind.in_([CredentialKind.SESSION, CredentialKind.TOKEN])
     theirs = (Credential.person_id == person_id, of_kind, *_counts(now(session)), *_within(reach))
     return [
@@ -281,7 +284,10 @@ def of_person(session: Session, person_id: int, reach: Reach = EVERYWHERE) -> li
 
 
 def person_name(session: Session, person_id: int, course_id: int | None = None) -> str:
-    """A person's name in the course, or without one in any of theirs, first where they instruct; else their id."""
+    """Return a person's name in the course; without a course, the name in any course, preferring those they teach.
+
+    Falls back to the person's id.
+    """
     query = select(Enrolment.name, Enrolment.written).where(Enrolment.person_id == person_id)
     if course_id is not None:
         query = query.where(Enrolment.course_id == course_id)
@@ -290,7 +296,7 @@ def person_name(session: Session, person_id: int, course_id: int | None = None) 
 
 
 def _name(person_id: int, known: Sequence[tuple[str, str]]) -> str:
-    """The first name among a person's enrolments, else the first id."""
+    """Return the first name among a person's enrolments, otherwise the first id."""
     names = [name for name, _ in known if name] or [written for _, written in known if written]
     return names[0] if names else f"person {person_id}"
 
@@ -309,7 +315,7 @@ def _columns(reach: Reach) -> dict[str, Any]:
 
 
 def _reached(reach: Reach) -> list[ColumnElement[bool]]:
-    """Conditions for the enrolments that a credential reaches."""
+    """Return the conditions for the enrolments within a credential's reach."""
     found: list[ColumnElement[bool]] = []
     if reach.course_id is not None:
         found.append(Enrolment.course_id == reach.course_id)
@@ -322,7 +328,7 @@ def _reached(reach: Reach) -> list[ColumnElement[bool]]:
 
 
 def _within(reach: Reach) -> list[ColumnElement[bool]]:
-    """Conditions for the credentials that reach no further than this: only these may be seen and ended with it."""
+    """Return the conditions for credentials that stay within this reach: only these may be viewed and revoked with it."""
     limits = (
         (Credential.course_id, reach.course_id),
         (Credential.role, reach.role),
@@ -365,7 +371,10 @@ def _row(
 
 
 def _forget_expired(session: Session, at: datetime) -> None:
-    """What a reply was kept for goes with it, and an audit names people, not secrets."""
+    """Delete credentials that expired long ago.
+
+    Stored replies are deleted with them; audit entries name no credentials.
+    """
     expired = (Credential.expires_at < at - _FORGOTTEN, Credential.kind != CredentialKind.TOKEN)
     session.execute(delete(Credential).where(*expired))
 

@@ -1,4 +1,4 @@
-"""What is kept of learning platforms: how each is registered, which launches were begun, whom and what they mean.
+"""Learning platforms: registrations, pending launches, and the persons and courses that they map to.
 
 Signs and fetches nothing; ``service.lti`` does.
 """
@@ -28,20 +28,20 @@ from submissions.student_identity import Student
 _LAUNCH_TAKES = timedelta(minutes=10)
 
 
-#: Longest id of a subject, a context or a deployment. A longer one is refused: two cut ones could be equal.
+#: Longest id of a subject, context or deployment. Longer ones are rejected, because cut ones could collide.
 LONGEST_ID = 250
 _LONGEST_STUDENT = 500
-#: Longest issuer and client: an index of PostgreSQL has to hold both.
+#: Longest issuer and client id: a PostgreSQL index contains both.
 LONGEST_REGISTERED = 255
-#: Launches that wait for their answer; anybody can begin one, so the oldest of a platform make room.
+#: Maximum number of pending launches of a platform. Anybody can start one, so the oldest are dropped.
 MOST_PENDING = 10_000
 
 
 @dataclass(frozen=True, slots=True)
 class Registration:
-    """What is registered of a learning platform. Its issuer and client id together identify it.
+    """Registration of a learning platform, identified by its issuer and client id together.
 
-    ``service_origins`` are the origins, beside those of the three addresses, that may be asked for members and marks.
+    ``service_origins`` are additional origins that may be queried for members and sent marks.
     """
 
     name: str
@@ -61,7 +61,7 @@ class Platform(Registration):
     id: int = field(kw_only=True)
 
     def may_be_asked(self, url: str) -> bool:
-        """Whether an operator registered the origin of this address, with the platform's own or beside them."""
+        """Return whether the origin of this address is registered, in a platform address or as a service origin."""
         origin = origin_of(url)
         own = (origin_of(each) for each in (self.authorization_url, self.token_url, self.keys_url))
         return origin is not None and origin in {*own, *self.service_origins}
@@ -69,7 +69,7 @@ class Platform(Registration):
 
 @dataclass(frozen=True, slots=True)
 class PendingLaunch:
-    """A launch whose answer has come: what it was begun with."""
+    """A launch that was answered, with the values it started with."""
 
     platform: Platform
     nonce: str
@@ -78,7 +78,7 @@ class PendingLaunch:
 
 @dataclass(frozen=True, slots=True)
 class Launched:
-    """Whom and where a launch means."""
+    """The person and course of a launch."""
 
     person_id: int
     course_id: int
@@ -87,7 +87,7 @@ class Launched:
 
 @dataclass(frozen=True, slots=True)
 class CourseLink:
-    """A course that a platform launches, and where the platform's services for it are."""
+    """A course that a platform launches, with the addresses of the platform's services for it."""
 
     platform: Platform
     members_url: str | None
@@ -95,7 +95,7 @@ class CourseLink:
 
 
 def origin_of(url: str) -> str | None:
-    """Scheme, host and port of an address of the web; None if it is none."""
+    """Return the scheme, host and port of a web address; None if it is not one."""
     try:
         parts = urlsplit(url)
         port = parts.port or {"https": 443, "http": 80}.get(parts.scheme)
@@ -108,10 +108,10 @@ def origin_of(url: str) -> str | None:
 
 
 def register(session: Session, asked: Registration) -> int:
-    """Register a platform, or change the one of the same issuer and client; returns its id.
+    """Register a platform, or update the one with the same issuer and client. Returns its id.
 
-    Raises UsageError for an address without a host or that does not begin with https:// or http://, and for an id that
-    is too long.
+    Raises UsageError for an id that is too long, and for an address without a host or that does not begin with https://
+    or http://.
     """
     for kind, value in (("issuer", asked.issuer), ("client", asked.client_id)):
         if len(value) > LONGEST_REGISTERED:
@@ -144,12 +144,12 @@ def register(session: Session, asked: Registration) -> int:
 
 
 def platforms(session: Session) -> list[Platform]:
-    """All that are registered, by name."""
+    """Return all registered platforms, ordered by name."""
     return [_platform(row) for row in session.scalars(select(LtiPlatform).order_by(LtiPlatform.name, LtiPlatform.id))]
 
 
 def find_platform(session: Session, issuer: str, client_id: str | None) -> Platform | None:
-    """The platform of this issuer; of several clients of one issuer the client has to be said."""
+    """Return the platform of this issuer. If an issuer has several clients, the client id is required."""
     query = select(LtiPlatform).where(LtiPlatform.issuer == issuer)
     if client_id is not None:
         query = query.where(LtiPlatform.client_id == client_id)
@@ -158,7 +158,7 @@ def find_platform(session: Session, issuer: str, client_id: str | None) -> Platf
 
 
 def begin_launch(session: Session, platform: Platform, target: str) -> tuple[str, str]:
-    """A state and a nonce, each of which counts once and for a few minutes.
+    """Return a new state and nonce, each valid once and for a few minutes.
 
     At most ``MOST_PENDING`` launches of a platform are kept.
     """
@@ -181,7 +181,7 @@ def begin_launch(session: Session, platform: Platform, target: str) -> tuple[str
 
 
 def take_launch(session: Session, state: str) -> PendingLaunch | None:
-    """What was begun with this state, which counts no more; None where nothing was, or too long ago."""
+    """Return and delete the launch with this state; None if it does not exist or has expired."""
     row = session.get(LtiLaunch, _sha256(state), with_for_update={"key_share": True})
     if row is None:
         return None
@@ -203,12 +203,12 @@ def meet(
     members_url: str | None,
     lineitems_url: str | None,
 ) -> Launched | None:
-    """The person and course of a launch: enrolled if new; the first launch by an instructor creates the course.
+    """Return the person and course of a launch; enrols new members. An instructor's first launch creates the course.
 
-    None where a student comes to a course that no instructor has launched. A platform reaches no course but those that
-    were created from it. Only an instructor's launch sets the addresses of the platform's services.
+    Returns None for a student in a context that no instructor has launched. A platform reaches only courses that were
+    created from it. Only an instructor's launch sets the addresses of the platform's services.
 
-    Raises UsageError for ids that are too long, and where the student's id is that of somebody else.
+    Raises UsageError for ids that are too long, and if the student's id belongs to another person.
     """
     _check_id("deployment", deployment)
     _check_id("context", context)
@@ -233,12 +233,12 @@ def meet(
 
 
 def enrol(session: Session, platform: Platform, course_id: int, subject: str, student: Student, role: Role) -> int:
-    """The person of a platform's subject, enrolled in the course with this role.
+    """Enrol a platform's subject in the course with this role and return the person's id.
 
-    Their own enrolment changes its role. An enrolment that was there before is given to them only if nobody else has
-    it; otherwise whoever chooses an id on the platform would choose whom they are here.
+    Updates the role of the subject's existing enrolment. An older enrolment with the same id is reused only if it
+    belongs to no other person. Otherwise a user could choose any identity by choosing an id on the platform.
 
-    Raises UsageError where their id is that of somebody else, or too long.
+    Raises UsageError if the id belongs to another person or is too long.
     """
     _check_id("subject", subject)
     if len(student.id) > _LONGEST_STUDENT:
@@ -259,13 +259,13 @@ def enrol(session: Session, platform: Platform, course_id: int, subject: str, st
 
 
 def _new_enrolment(session: Session, course_id: int, student: Student, person_id: int | None) -> Enrolment:
-    """An enrolment that nobody else has, of a given person or of its own."""
+    """Return an enrolment that belongs to no other person, for the given person or a new one."""
     row = session.get_one(Enrolment, Students(session, course_id).enrol(student, now(session)))
     if not _is_nobodys(session, row):
         raise UsageError(
             "somebody else is called '%(id)s' in this course; ask whoever runs Robomark", id=student.id[:LONGEST_ID]
         )
-    # Links that were made for it would sign in somebody else as this person.
+    # Existing links to it would sign in another user as this person.
     credentials.revoke_all(session, row.person_id)
     if person_id is not None:
         nobody, row.person_id = row.person_id, person_id
@@ -276,7 +276,7 @@ def _new_enrolment(session: Session, course_id: int, student: Student, person_id
 
 
 def _is_nobodys(session: Session, row: Enrolment) -> bool:
-    """Whether an enrolment is new, or a student's id that nobody has signed in as, in this course alone."""
+    """Return whether an enrolment is unclaimed: a student in this course only, who never signed in."""
     person = session.get_one(Person, row.person_id)
     has_signed_in = person.signed_in_at is not None or is_from_platform(session, person.id)
     return not (has_signed_in or row.role is not Role.STUDENT or is_more_than(session, row))
@@ -290,9 +290,10 @@ def _enrolment_of(session: Session, person_id: int, course_id: int) -> Enrolment
 def _course_of_context(
     session: Session, platform: Platform, deployment: str, context: str, subject: str
 ) -> LtiCourse | None:
-    """The course of a deployment's context.
+    """Return the course of a deployment's context.
 
-    One whose deployment was not recorded is of the deployment from which one of its instructors launches it first.
+    A course without a recorded deployment is assigned to the first deployment from which one of its instructors
+    launches it.
     """
     of_context = (LtiCourse.platform_id == platform.id, LtiCourse.context == context)
     found = session.scalar(select(LtiCourse).where(*of_context, LtiCourse.deployment == deployment))
@@ -314,7 +315,7 @@ def _course_of_context(
 
 
 def _lock(session: Session, platform: Platform) -> None:
-    """One launch of a platform at a time: two of the same subject or context would both be the first."""
+    """Lock the platform, so that concurrent launches of one subject or context do not both create it."""
     session.get_one(LtiPlatform, platform.id, with_for_update={"key_share": True})
 
 
@@ -324,7 +325,7 @@ def _check_id(kind: str, value: str) -> None:
 
 
 def course_link(session: Session, course_id: int) -> CourseLink | None:
-    """The platform that launches the course, if one does."""
+    """Return the platform that launches the course; None if none does."""
     row = session.scalar(select(LtiCourse).where(LtiCourse.course_id == course_id).limit(1))
     if row is None:
         return None
@@ -332,7 +333,7 @@ def course_link(session: Session, course_id: int) -> CourseLink | None:
 
 
 def subjects(session: Session, platform: Platform, course_id: int) -> dict[str, str]:
-    """What the platform calls the students of a course, by the ids that the course knows them by."""
+    """Return the platform's subjects for the students of a course, by student id."""
     query = (
         select(Enrolment.student, LtiPerson.subject)
         .join(LtiPerson, LtiPerson.person_id == Enrolment.person_id)
@@ -342,21 +343,21 @@ def subjects(session: Session, platform: Platform, course_id: int) -> dict[str, 
 
 
 def private_keys(session: Session) -> list[tuple[str, str]]:
-    """Our keys, the newest first: id and private half, as PEM."""
+    """Return the tool's own keys, newest first, as (id, private key in PEM)."""
     rows = session.scalars(select(LtiKey).order_by(LtiKey.created_at.desc(), LtiKey.id))
     return [(row.id, row.private_pem) for row in rows]
 
 
 def add_private_key(session: Session, pem: str) -> None:
-    """Keep a key; it is signed with from now on."""
+    """Store a key, which is used for signing from now on."""
     session.add(LtiKey(private_pem=pem, created_at=now(session)))
     session.flush()
 
 
 def _new_course(session: Session, title: str) -> int:
-    """A course of this name, or of one like it where another course has it.
+    """Create a course with this name, or with a number appended if the name is taken.
 
-    The installation's own course is no platform's, even before it is made: its instructors may become operators.
+    Never uses the name of the default course, even before it exists, because its instructors may become operators.
     """
     name, number = title, 1
     while name == DEFAULT_COURSE or session.scalar(select(Course.id).where(Course.name == name)) is not None:

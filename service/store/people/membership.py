@@ -1,6 +1,6 @@
-"""Members of a course and their roles; persons who are in several courses.
+"""Members of a course and their roles; persons with several courses.
 
-Students are enrolled by ``students.py``; how people sign in is ``credentials.py``'s.
+``students.py`` enrols students; ``credentials.py`` handles sign-in.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from submissions.student_identity import Student
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """Somebody in a course."""
+    """A member of a course."""
 
     person_id: int
     enrolment_id: int
     course_id: int
-    id: str  # what the course knows them by
+    id: str  # the id in this course
     name: str
     email: str
     role: Role
@@ -37,7 +37,7 @@ class Member:
 
 @dataclass(frozen=True, slots=True)
 class CourseLine:
-    """A course, and how many are in it."""
+    """A course, with its number of instructors and students."""
 
     id: int
     name: str
@@ -46,11 +46,11 @@ class CourseLine:
 
 
 def make_instructor(session: Session, course: str, who: Student) -> Member:
-    """Make somebody an instructor of the course, which is made where there is none of that name.
+    """Make a person an instructor of the course, creating the course if necessary.
 
-    An id belongs to its course: the same id in another course is another person, until an operator joins the two.
-    Raises UsageError where a student of the course has this id: whoever can sign in as that student would be an
-    instructor.
+    An id is local to its course: the same id in another course is another person, until an operator joins the two.
+    Raises UsageError if a student of the course has this id, because anyone who can sign in as that student would
+    become an instructor.
     """
     course_id, own = course_of(session, course, now(session)), shown_name(who.id)
     taken = select(Enrolment.role).where(Enrolment.course_id == course_id, Enrolment.student == own)
@@ -60,14 +60,14 @@ def make_instructor(session: Session, course: str, who: Student) -> Member:
 
 
 def set_role(session: Session, row: Enrolment, role: Role) -> None:
-    """Give a member of a course a role. Losing the instructor's role ends what they sign in with there."""
+    """Set the role of a member. Losing the instructor role revokes the credentials that reach the course."""
     if row.role is Role.INSTRUCTOR and role is not Role.INSTRUCTOR:
         credentials.revoke_reaching(session, row.person_id, row.course_id)
     row.role = role
 
 
 def elsewhere(session: Session, enrolment_id: int) -> list[tuple[str, Member]]:
-    """Instructors with the id of this one in other courses who are other persons, each with the course's name."""
+    """Return instructors with the same id in other courses who are different persons, with the course names."""
     own = session.get_one(Enrolment, enrolment_id)
     query = (
         select(Course.name, Enrolment, Person)
@@ -81,7 +81,7 @@ def elsewhere(session: Session, enrolment_id: int) -> list[tuple[str, Member]]:
 
 
 def enrolments(session: Session, person_id: int) -> list[tuple[str, Member]]:
-    """What a person is in each of their courses, with the course's name."""
+    """Return the enrolments of a person, with the course names."""
     query = (
         select(Course.name, Enrolment, Person)
         .join(Course, Enrolment.course_id == Course.id)
@@ -93,14 +93,14 @@ def enrolments(session: Session, person_id: int) -> list[tuple[str, Member]]:
 
 
 def is_from_platform(session: Session, person_id: int) -> bool:
-    """Whether a learning platform vouches for this person."""
+    """Return whether a learning platform identifies this person."""
     return session.scalar(select(LtiPerson.id).where(LtiPerson.person_id == person_id).limit(1)) is not None
 
 
 def join(session: Session, person_id: int, other_id: int) -> None:
-    """Make two persons one, who keeps all enrolments. What either signs in with ends, for it would reach further.
+    """Merge two persons into one with all enrolments. Revokes all credentials of both, because their reach would grow.
 
-    The caller has locked both.
+    The caller must have locked both.
     """
     for each in (person_id, other_id):
         credentials.revoke_all(session, each)
@@ -114,33 +114,33 @@ def join(session: Session, person_id: int, other_id: int) -> None:
 
 
 def make_student(session: Session, course: str, who: Student) -> Member:
-    """Enrol somebody as a student, whatever they were in the course before."""
+    """Enrol a person as a student, replacing any earlier role in the course."""
     return _make(session, course, who, Role.STUDENT)
 
 
 def make_operator(session: Session, person_id: int) -> None:
-    """Let a person run the installation."""
+    """Make a person an operator of the installation."""
     session.get_one(Person, person_id).operator = True
 
 
 def member(session: Session, course: str, written: str) -> Member:
-    """Somebody in the course, by id. Raises UsageError for a course or a person that there is not."""
+    """Return a member of the course by id. Raises UsageError for an unknown course or person."""
     return _member(session, Students(session, find_course(session, course)).find(written))
 
 
 def known(session: Session, course_id: int, who: Student) -> Member | None:
-    """Whoever in the course has this id; None where nobody has."""
+    """Return the member of the course with this id; None if there is none."""
     enrolment_id = Students(session, course_id).known(who)
     return None if enrolment_id is None else _member(session, enrolment_id)
 
 
 def member_of(session: Session, row: Enrolment) -> Member:
-    """Whom an enrolment is of."""
+    """Return the member of an enrolment."""
     return _line(row, session.get_one(Person, row.person_id))
 
 
 def find_course(session: Session, name: str) -> int:
-    """The course of this name. Raises UsageError where there is none."""
+    """Return the id of the course with this name. Raises UsageError if it does not exist."""
     course_id = session.scalar(select(Course.id).where(Course.name == name))
     if course_id is None:
         raise UsageError(f"there is no course {name!r}")
@@ -148,7 +148,7 @@ def find_course(session: Session, name: str) -> int:
 
 
 def members(session: Session, course_id: int) -> list[Member]:
-    """Everybody in the course, by id."""
+    """Return all members of the course, ordered by id."""
     query = (
         select(Enrolment, Person)
         .join(Person, Enrolment.person_id == Person.id)
@@ -159,7 +159,7 @@ def members(session: Session, course_id: int) -> list[Member]:
 
 
 def members_after(session: Session, course_id: int, enrolment_id: int, limit: int) -> list[Member]:
-    """Some of the course, in the order in which they came in: those who came after this one."""
+    """Return at most ``limit`` members of the course who were enrolled after this enrolment."""
     query = (
         select(Enrolment, Person)
         .join(Person, Enrolment.person_id == Person.id)
@@ -171,7 +171,7 @@ def members_after(session: Session, course_id: int, enrolment_id: int, limit: in
 
 
 def students(session: Session, course_id: int) -> list[tuple[Member, bool]]:
-    """The students of the course, by id, each with whether they are more than that."""
+    """Return the students of the course, ordered by id, each with the result of ``is_more_than``."""
     query = (
         select(Enrolment, Person, _more_than())
         .join(Person, Enrolment.person_id == Person.id)
@@ -182,7 +182,7 @@ def students(session: Session, course_id: int) -> list[tuple[Member, bool]]:
 
 
 def is_more_than(session: Session, row: Enrolment) -> bool:
-    """Whether a person is more than this enrolment says: in other courses, or runs the installation."""
+    """Return whether the person of an enrolment is in other courses or is an operator."""
     query = (
         select(_more_than())
         .select_from(Enrolment)
@@ -193,7 +193,7 @@ def is_more_than(session: Session, row: Enrolment) -> bool:
 
 
 def courses(session: Session) -> list[CourseLine]:
-    """All courses, by name."""
+    """Return all courses, ordered by name."""
     instructors, students = (func.count().filter(Enrolment.role == role) for role in (Role.INSTRUCTOR, Role.STUDENT))
     query = select(Course.id, Course.name, instructors, students)
     query = query.outerjoin(Enrolment, Enrolment.course_id == Course.id).group_by(Course.id, Course.name)

@@ -1,6 +1,6 @@
-"""The students of a course: found by id, enrolled when new, and refused where one cannot be told from another.
+"""Students of a course: lookup by id, enrolment of new students, rejection of ambiguous ids.
 
-What a name comes to is ``submissions.names``'; what a student submits is ``intake.py``'s.
+``submissions.names`` defines the normal form of names; ``intake.py`` stores submissions.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from submissions.nearest import did_you_mean
 from submissions.raw_files import shown
 from submissions.student_identity import Student
 
-#: The course of an installation that has only one.
+#: The course of an installation with a single course.
 DEFAULT_COURSE = "default"
 
 
 def course_of(session: Session, name: str, at: datetime) -> int:
-    """The course, locked to the end of the transaction: numbering attempts needs one writer at a time."""
+    """Return the id of a course, creating it if necessary, and lock it: numbering attempts needs a single writer."""
     insert_if_new(session, Course, name=name, created_at=at)
     return session.scalars(select(Course.id).where(Course.name == name).with_for_update(key_share=True)).one()
 
 
 class Students:
-    """The students of one course, in one transaction that has locked it."""
+    """The students of one course, within a transaction that has locked it."""
 
     def __init__(self, session: Session, course_id: int) -> None:
         self._session = session
@@ -39,10 +39,10 @@ class Students:
         self._by_form: dict[str, dict[str, int]] | None = None
 
     def enrol(self, student: Student, at: datetime) -> int:
-        """The enrolment of the student whose id is written so, new if there is none.
+        """Return the enrolment of the student with this id, creating it if necessary.
 
-        One who is written otherwise than in the normal form is only who was first written so. Name and address are
-        those that were told last. Raises UsageError for an id that is nobody's, or cannot be told from another's.
+        An id that is not in normal form matches only the spelling that was enrolled first. Name and e-mail address are
+        updated. Raises UsageError for an empty id, or one that is ambiguous.
         """
         own, written = shown_name(student.id), unicodedata.normalize("NFC", student.id)
         if not own:
@@ -50,7 +50,7 @@ class Students:
         found = self._enrolled(own)
         if found is None:
             others = self._near(own)
-            # What was enrolled before there was one normal form may have blanks round it.
+            # Enrolments from before normal forms may have surrounding blanks.
             same = [enrolment_id for other, enrolment_id in others.items() if shown_name(other) == own]
             if len(same) == 1:
                 self._tell(same[0], student)
@@ -70,21 +70,21 @@ class Students:
         )
 
     def is_enrolled(self, enrolment_id: int, student: Student) -> bool:
-        """Return whether an enrolment is still this student's; SQLite gives the ids of removed rows to new ones."""
+        """Return whether an enrolment still belongs to this student: SQLite reuses the ids of deleted rows."""
         row = self._session.get(Enrolment, enrolment_id)
         if row is None or row.course_id != self._course_id:
             return False
         return shown_name(row.written) == shown_name(student.id)
 
     def known(self, student: Student) -> int | None:
-        """The enrolment of who is written so in the normal form; None where nobody is, or it would have to be asked."""
+        """Return the enrolment of the student with this normal form; None if there is none, or it is ambiguous."""
         found = self._enrolled(shown_name(student.id))
         return None if found is None else found.id
 
     def find(self, written: str) -> int:
-        """The enrolment of the student who is written so.
+        """Return the enrolment of the student with this id.
 
-        Raises UsageError, with one like it if there is one, for somebody who is not in the course.
+        Raises UsageError, with a similar id if there is one, for a student who is not in the course.
         """
         found = self._enrolled(shown_name(written))
         if found is not None:
@@ -99,7 +99,7 @@ class Students:
 
     def _tell(self, enrolment_id: int, student: Student) -> None:
         row = self._session.get_one(Enrolment, enrolment_id)
-        # A table that one instructor uploads does not rename another instructor.
+        # A table uploaded by one instructor does not rename another instructor.
         if row.role is Role.STUDENT:
             row.name, row.email = student.name or row.name, student.email or row.email
 
@@ -122,7 +122,7 @@ class Students:
         return row.id
 
     def _near(self, name: str) -> dict[str, int]:
-        """The students, by name, that one of this name could be taken for."""
+        """Return the students that could be confused with this name, as a mapping of names to enrolments."""
         if self._by_form is None:
             self._by_form = {}
             query = select(Enrolment.student, Enrolment.id).where(Enrolment.course_id == self._course_id)

@@ -1,6 +1,6 @@
-"""Where a course wants to be told of what happens in it, and what became of what it was told.
+"""Webhooks of a course and the state of their deliveries.
 
-What is told, and when, is ``outbox.py``'s; sending is the web server's.
+``outbox.py`` defines the events; the web server sends them.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class WebhookLine:
 
 @dataclass(frozen=True, slots=True)
 class DeliveryLine:
-    """One thing that was told, or is to be."""
+    """A delivery, sent or pending."""
 
     id: str
     webhook_id: str
@@ -48,9 +48,9 @@ class DeliveryLine:
 
 
 def create(session: Session, course_id: int, url: str, events: Collection[str]) -> tuple[WebhookLine, str]:
-    """A new webhook, and the secret that its deliveries are signed with, which is told this once.
+    """Create a webhook and the secret that signs its deliveries, which is returned only once.
 
-    Raises UsageError for an address or an event that there is not, or where the course has many already.
+    Raises UsageError for an invalid address or event, or if the course has too many webhooks.
     """
     _check_url(url)
     known = [event.value for event in WebhookEvent]
@@ -68,13 +68,13 @@ def create(session: Session, course_id: int, url: str, events: Collection[str]) 
 
 
 def of_course(session: Session, course_id: int) -> list[WebhookLine]:
-    """The webhooks of a course that are not revoked, the oldest first."""
+    """Return the active webhooks of a course, oldest first."""
     mine = (Webhook.course_id == course_id, Webhook.revoked_at.is_(None))
     return [_line(row) for row in session.scalars(select(Webhook).where(*mine).order_by(Webhook.created_at))]
 
 
 def revoke(session: Session, course_id: int, webhook_id: str) -> bool:
-    """Tell it nothing any more, not even what waits; false where the course has none of this id."""
+    """Revoke a webhook and its pending deliveries. Returns False if the course does not have it."""
     row = session.get(Webhook, webhook_id)
     if row is None or row.course_id != course_id or row.revoked_at is not None:
         return False
@@ -85,7 +85,7 @@ def revoke(session: Session, course_id: int, webhook_id: str) -> bool:
 
 
 def deliveries(session: Session, course_id: int, limit: int, after: tuple[datetime, str] | None) -> list[DeliveryLine]:
-    """What a course was told or is to be, the newest first; what follows on the one of this moment and id."""
+    """Return deliveries of a course, newest first, after the one with this time and id."""
     query = select(Delivery).join(Webhook, Delivery.webhook_id == Webhook.id).where(Webhook.course_id == course_id)
     if after is not None:
         same = (Delivery.made_at == after[0]) & (Delivery.id > after[1])

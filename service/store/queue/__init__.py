@@ -1,1 +1,1 @@
-"""What waits and what is done with it: every change of a job, whose turn it is, and the workers."""
+"""The job queue: transitions of jobs, scheduling and workers."""

@@ -1,7 +1,7 @@
-"""What may be done to a whole batch: paused, resumed, cancelled, its dead jobs retried.
+"""Control of a whole batch: pause, resume, cancel, and retry of its dead jobs.
 
-A claim looks at the batch's state, and a worker at its job's, so nothing here talks to a worker. Submissions on the web
-are not paused, because students wait for them. ``service.operations.batches`` owns the transactions.
+Claims check the batch's state and workers their job's, so nothing here contacts a worker. Web submissions cannot be
+paused, because students are waiting for them. ``service.operations.batches`` owns the transactions.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sim.errors import UsageError
 
 @dataclass(frozen=True, slots=True)
 class Controlled:
-    """Whether the batch's state changed, and how many of its jobs waited and ran then."""
+    """Result of a batch operation: whether the state changed, and the number of jobs waiting and running."""
 
     changed: bool
     waiting: int
@@ -31,26 +31,26 @@ class Controlled:
 
 @dataclass(frozen=True, slots=True)
 class Retried:
-    """How many dead jobs wait again, and how many stay dead because their student submitted anew."""
+    """Numbers of dead jobs that were queued again, and of those left dead because of a newer submission."""
 
     queued: int
     outdated: int
 
 
 def pause(session: Session, batch_id: str) -> Controlled:
-    """Begin no more of the batch; what runs goes on. Raises UsageError for one cancelled, or of the web."""
+    """Start no further jobs of the batch; running ones continue. Raises UsageError for a cancelled or a web batch."""
     return _set(session, batch_id, BatchState.PAUSED)
 
 
 def resume(session: Session, batch_id: str) -> Controlled:
-    """Let a paused batch go on. Raises UsageError for a batch that was cancelled."""
+    """Resume a paused batch. Raises UsageError for a cancelled batch."""
     return _set(session, batch_id, BatchState.OPEN)
 
 
 def cancel(session: Session, batch_id: str) -> Controlled:
-    """End all jobs of the batch that have not ended; a worker that runs one is told at its next heartbeat.
+    """Cancel all unfinished jobs of the batch; a running job stops at its next heartbeat.
 
-    A batch with nothing left to end stays as it is. Raises UsageError for what is submitted on the web.
+    A batch without unfinished jobs is not changed. Raises UsageError for a batch of web submissions.
     """
     _state(session, batch_id)
     _refuse_of_the_web(session, batch_id)
@@ -63,9 +63,9 @@ def cancel(session: Session, batch_id: str) -> Controlled:
 
 
 def retry(session: Session, batch_id: str | None) -> Retried:
-    """Queue the dead jobs of a batch again, with all their attempts; None for every dead job there is.
+    """Queue the dead jobs of a batch again, with all their attempts. None means all dead jobs.
 
-    Raises UsageError for a batch that was cancelled; with None their jobs are passed over.
+    Raises UsageError for a cancelled batch; with None, jobs of cancelled batches are skipped.
     """
     if batch_id is None:
         cancelled = select(Batch.id).where(Batch.state == BatchState.CANCELLED)
@@ -91,7 +91,7 @@ def _set(session: Session, batch_id: str, state: BatchState) -> Controlled:
     _refuse_cancelled(before, batch_id)
     _refuse_of_the_web(session, batch_id)
     session.execute(update(Batch).where(Batch.id == batch_id).values(state=state))
-    # So that what goes on is notified for at once.
+    # So that workers are notified immediately of resumed jobs.
     waiting = (Job.batch_id == batch_id, Job.state == JobState.QUEUED)
     unannounced = update(Job).where(locked_jobs(*waiting), *waiting).values(notified_at=None)
     session.execute(unannounced, execution_options={"synchronize_session": False})
@@ -99,7 +99,7 @@ def _set(session: Session, batch_id: str, state: BatchState) -> Controlled:
 
 
 def _state(session: Session, batch_id: str) -> BatchState:
-    """The batch's state, locked to the end of the transaction."""
+    """Return the batch's state and lock the batch until the end of the transaction."""
     state = session.scalar(select(Batch.state).where(Batch.id == batch_id).with_for_update(key_share=True))
     if state is None:
         raise UsageError(f"there is no batch {batch_id}")

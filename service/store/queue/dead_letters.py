@@ -1,4 +1,4 @@
-"""The jobs that could not be graded, for whoever runs the installation. Only reads; retrying is ``batch_control``'s."""
+"""Failed jobs of the installation, for operators. Read-only; ``batch_control`` retries them."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from sqlalchemy.orm import Session
 from service.store.models import Batch, Course, Enrolment, Job
 from service.store.states import JobState, Lane
 
-#: The newest that are listed.
+#: Maximum number listed, newest first.
 MOST = 100
 
 
 @dataclass(frozen=True, slots=True)
 class DeadLetter:
-    """One job that was given up."""
+    """A job that was given up."""
 
     job_id: str
     course: str
@@ -31,7 +31,7 @@ class DeadLetter:
 
 
 def dead_letters(session: Session) -> list[DeadLetter]:
-    """The newest of them first."""
+    """Return the failed jobs, newest first."""
     query = (
         select(Job, Course.name, Batch.name)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)

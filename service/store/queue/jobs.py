@@ -1,7 +1,7 @@
-"""The states of a job, and every transition between them: nothing else writes a job's state, lease or due moment.
+"""Job states and all their transitions. No other module writes a job's state, lease or due time.
 
-A worker holds a job by its lease's token, and every change it makes is refused once the token is no longer the job's.
-Which job is due first stands in ``scheduling.py``; finding lost ones in ``lease_reaper.py``; plots in ``plots.py``.
+A worker owns a job through the token of its lease; a change with an outdated token is rejected. ``scheduling.py``
+chooses the next job, ``lease_reaper.py`` finds lost ones, and ``plots.py`` handles plots.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ if TYPE_CHECKING:
     from service.store.grades import results
 
 _LONGEST_BACKOFF = timedelta(hours=1)
-#: Clocks are corrected all the time by less than this.
+#: Smaller clock corrections are normal and ignored.
 _TOLERANCE = timedelta(seconds=2)
 
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """What may happen to a job: from which states, to which, and by whom. From none: there was no job."""
+    """A transition of a job: the states before, the state after, and the actor. No state before means a new job."""
 
     name: str
     before: tuple[JobState, ...]
@@ -68,12 +68,12 @@ TRANSITIONS = (
 
 
 class Fenced(Cancelled):
-    """The job is no longer this worker's: cancelled, or another has it."""
+    """The worker no longer owns the job: it was cancelled or claimed by another worker."""
 
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A job in the hands of one worker."""
+    """A job owned by one worker."""
 
     job_id: str
     lease: str
@@ -84,17 +84,17 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Retry:
-    """How often a job is tried again after a fault of ours, and how long it waits: doubling from ``backoff``."""
+    """Retry policy after host faults. The delay starts at ``backoff_seconds`` and doubles."""
 
     backoff_seconds: float
 
     def wait(self, attempt: int) -> timedelta:
-        """Before the attempt after number ``attempt`` (1 is the first)."""
+        """Return the delay after attempt number ``attempt`` (1 is the first)."""
         return min(timedelta(seconds=self.backoff_seconds * 2.0 ** min(attempt - 1, 20)), _LONGEST_BACKOFF)
 
 
 def enqueue(session: Session, job: Job, at: datetime) -> str:
-    """Let a new job wait from now on. Returns its id."""
+    """Queue a new job and return its id."""
     job.state = ENQUEUE.after
     job.queued_at = job.due_at = at
     session.add(job)
@@ -103,7 +103,7 @@ def enqueue(session: Session, job: Job, at: datetime) -> str:
 
 
 def copy(session: Session, job_id: str, source_id: str, at: datetime) -> None:
-    """Give a job that waits the grade of an identical one at once. Raises HostError when it does not wait."""
+    """Give a queued job the grade of an identical one. Raises HostError if it is not queued."""
     values = result_cache.copied(session, source_id, job_id, at)
     if not _make(session, COPY, (Job.id == job_id,), at, values):
         raise HostError(f"The job {job_id} cannot be given a grade: it does not wait")
@@ -113,7 +113,7 @@ def copy(session: Session, job_id: str, source_id: str, at: datetime) -> None:
 
 
 def supersede(session: Session, submissions: Select[int], by: str, at: datetime) -> None:
-    """Cancel what waits of these submissions for the job ``by``; but a regrade of what was graded once goes on."""
+    """Cancel queued jobs of these submissions in favour of the job ``by``; regrades are not cancelled."""
     which = (Job.regrade_of.is_(None), Job.submission_id.in_(submissions))
     reason = {"error": f"superseded by {by}", "cancelled_for": CancelReason.SUPERSEDED, "superseded_by": by}
     if _make(session, SUPERSEDE, which, at, reason):
@@ -121,20 +121,20 @@ def supersede(session: Session, submissions: Select[int], by: str, at: datetime)
 
 
 def put_aside(session: Session, job_id: str, at: datetime) -> None:
-    """Grade a job that waits only once staff ask for it."""
+    """Cancel a queued job that is over a limit; it is graded only if staff ask for it."""
     sentence = "over a limit: it is graded when staff ask for it"
     _make(session, PUT_ASIDE, (Job.id == job_id,), at, {"error": sentence, "cancelled_for": CancelReason.OVER_LIMIT})
 
 
 def ask_for(session: Session, job_id: str, at: datetime) -> bool:
-    """Let a job wait that was put aside. Returns whether it was."""
+    """Queue a job that was over a limit. Return whether it was."""
     which = (Job.id == job_id, Job.cancelled_for == CancelReason.OVER_LIMIT)
     return _make(session, ASK_FOR, which, at, {"error": None, "cancelled_for": None}) > 0
 
 
 @retry_conflicts
 def claim(store: Store, worker: str, lease_seconds: float) -> Claim | None:
-    """Take the job whose turn it is; None when none is due, or the worker may take none."""
+    """Claim the next job; None if no job is due or the worker may not claim."""
     with store.transaction() as session:
         at = now(session)
         may_claim = not needs_newer_code(session) and not workers.is_in_quarantine(session, worker)
@@ -158,7 +158,7 @@ def claim(store: Store, worker: str, lease_seconds: float) -> Claim | None:
 
 @retry_conflicts
 def heartbeat(store: Store, claim: Claim, lease_seconds: float, progress: float) -> None:
-    """Keep the lease and tell the progress (0 to 1). Raises Fenced when the job is no longer this worker's."""
+    """Renew the lease and store the progress (0 to 1). Raises Fenced if the worker no longer owns the job."""
     with store.transaction() as session:
         at = now(session)
         values = {
@@ -177,12 +177,12 @@ def finish(
     graded_at: datetime,
     trials_at: datetime | None = None,
 ) -> None:
-    """Store the grade with all its rows and end the job, in one transaction.
+    """Store the grade with all its rows and finish the job, in one transaction.
 
-    ``trials_at`` and ``graded_at`` are when the last trial had been run and when all was marked. Raises Fenced, and
-    stores nothing, when the job is no longer this worker's.
+    ``trials_at`` and ``graded_at`` are the times when the last trial and all marking ended. Raises Fenced, and stores
+    nothing, if the worker no longer owns the job.
     """
-    # Whoever only enqueues, holds or cancels jobs need not wait for what reads recordings.
+    # Imported here, because other operations on jobs do not read recordings.
     from service.store.grades import results
 
     grade = prepared.grade
@@ -221,9 +221,9 @@ def finish(
 
 @retry_conflicts
 def finish_from_cache(store: Store, claim: Claim) -> bool:
-    """End the job with the grade of an identical one, where there is one and nobody asked for it to be run anew.
+    """Finish the job with the grade of an identical one if there is one and a new run was not requested.
 
-    Raises Fenced when the job is no longer this worker's.
+    Raises Fenced if the worker no longer owns the job.
     """
     secret = secret_of(store)
     with store.transaction() as session:
@@ -244,16 +244,16 @@ def finish_from_cache(store: Store, claim: Claim) -> bool:
 
 @retry_conflicts
 def fail(store: Store, claim: Claim, reason: str, retry: Retry) -> JobState:
-    """A fault of ours: the job waits for another attempt, or is dead when there were enough.
+    """Handle a host fault: the job is queued for another attempt, or dead after the last one.
 
-    Raises Fenced when the job is no longer this worker's.
+    Raises Fenced if the worker no longer owns the job.
     """
     with store.transaction() as session:
         return fault(session, claim, reason, retry, now(session))
 
 
 def fault(session: Session, claim: Claim, reason: str, retry: Retry, at: datetime) -> JobState:
-    """The same in a transaction that is open, for a worker that cannot say so itself any more."""
+    """Handle a host fault within an open transaction, on behalf of a worker that is lost."""
     if claim.attempt >= claim.max_attempts:
         times = "once" if claim.attempt == 1 else f"{claim.attempt} times"
         _make_held(session, GIVE_UP, claim, at, {"error": f"Tried {times}, the last time: {reason}"})
@@ -265,7 +265,7 @@ def fault(session: Session, claim: Claim, reason: str, retry: Retry, at: datetim
 
 @retry_conflicts
 def give_up(store: Store, claim: Claim, reason: str) -> None:
-    """The job cannot be graded, however often it is tried. Raises Fenced when it is no longer this worker's."""
+    """Mark a job as dead without further attempts. Raises Fenced if the worker no longer owns it."""
     with store.transaction() as session:
         _make_held(session, GIVE_UP, claim, now(session), {"error": reason})
         outbox.job_ended(session, claim.job_id)
@@ -273,18 +273,18 @@ def give_up(store: Store, claim: Claim, reason: str) -> None:
 
 @retry_conflicts
 def release_worker(store: Store, worker: str) -> int:
-    """Give back all that a worker held, one that is known to have ended. Returns how many jobs that were."""
+    """Requeue all jobs of a worker that has ended. Return their number."""
     with store.transaction() as session:
         return give_back(session, worker, now(session))
 
 
 def give_back(session: Session, worker: str, at: datetime) -> int:
-    """Let all that a worker holds wait as if it had not been begun. Returns how many jobs that were."""
+    """Requeue all jobs of a worker without counting the attempt. Return their number."""
     return _make(session, GIVE_BACK, (Job.worker == worker,), at, {"attempt": Job.attempt - 1})
 
 
 def cancel(session: Session, batch_id: str, reason: str, at: datetime) -> int:
-    """End the jobs of a batch that have not ended; a worker that runs one is told at its next heartbeat."""
+    """Cancel all unfinished jobs of a batch; a running job stops at its next heartbeat."""
     ended = _make(session, CANCEL, (Job.batch_id == batch_id,), at, {"error": reason})
     if ended:
         outbox.batch_ended(session, batch_id)
@@ -292,16 +292,16 @@ def cancel(session: Session, batch_id: str, reason: str, at: datetime) -> int:
 
 
 def retry(session: Session, which: tuple[ColumnElement[bool], ...], at: datetime) -> int:
-    """Let those of these jobs that are dead wait again, with all their attempts. Returns how many."""
+    """Requeue the dead ones among these jobs, with all their attempts. Return their number."""
     return _make(session, RETRY, which, at, {"attempt": 0, "error": None})
 
 
 def correct_clock(session: Session, at: datetime, longest_wait: Callable[[int], timedelta]) -> None:
-    """Bring moments that lie too far ahead of ``at`` back to where they would be; doing it twice changes nothing.
+    """Correct times that are too far ahead of ``at``. Repeating the correction changes nothing.
 
-    Nothing but a clock that was set back can have written them; one that was set forward needs no correction, as
-    leases then run out early and the workers are fenced. ``longest_wait`` is how long a job waits after an attempt that
-    failed. A lease keeps its length, a job that never failed is due now, and one that did waits once more.
+    Such times were written before the clock was set back. A clock set forward needs no correction: leases expire early
+    and their workers are fenced. ``longest_wait`` returns the delay after a failed attempt. A lease keeps its length, a
+    job that never failed is due now, and one that failed waits again.
     """
     ahead = at + _TOLERANCE
     held = select(Job.id, Job.lease, Job.lease_until, Job.heartbeat_at)
@@ -325,7 +325,7 @@ def correct_clock(session: Session, at: datetime, longest_wait: Callable[[int], 
 
 
 def _arriving(state: JobState, at: datetime) -> dict[str, Any]:
-    """What every transition into a state writes beside it."""
+    """Return the columns that every transition into a state sets."""
     match state:
         case JobState.QUEUED:
             waiting = {"progress": 0.0, "due_at": at, "notified_at": None, "finished_at": None}
@@ -345,7 +345,7 @@ def _make(
     at: datetime,
     values: dict[str, Any],
 ) -> int:
-    """Make the transition for those of these jobs that are where it begins; the others stay. Returns how many."""
+    """Apply the transition to those of these jobs that are in a valid state before it. Return their number."""
     columns = {"state": transition.after} | _arriving(transition.after, at) | values
     which = (*which, Job.state.in_(transition.before))
     statement = update(Job).where(locked_jobs(*which), *which).values(**columns)
@@ -354,7 +354,7 @@ def _make(
 
 
 def _make_held(session: Session, transition: Transition, claim: Claim, at: datetime, values: dict[str, Any]) -> None:
-    """Make the transition for a job that is held. Raises Fenced when it is held no more."""
+    """Apply the transition to an owned job. Raises Fenced if the worker no longer owns it."""
     if not _make(session, transition, (Job.id == claim.job_id, Job.lease == claim.lease), at, values):
         state = session.scalar(select(Job.state).where(Job.id == claim.job_id))
         if state is None:

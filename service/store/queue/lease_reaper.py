@@ -1,6 +1,6 @@
-"""Finds jobs that were lost: leases that ran out, notices that never came. Any number may sweep at any time.
+"""Search for lost jobs: expired leases and missing notifications. Concurrent sweeps are safe.
 
-Publishes nothing; it says how many notices are wanting.
+Sends nothing; returns the number of missing notifications.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from service.store.queue.jobs import Claim, Retry
 from service.store.queue.scheduling import claimable
 from service.store.states import JobState, Lane
 
-#: Databases bound how many values one statement may carry.
+#: Databases limit the number of parameters of a statement.
 _AT_ONCE = 500
 
 
 @dataclass(frozen=True, slots=True)
 class Wanting:
-    """How many notices should be on their way, and how many of those may have been lost."""
+    """Number of notifications that should be pending, and of those that may be lost."""
 
     due: int
     stale: int
@@ -34,7 +34,7 @@ class Wanting:
 
 @retry_conflicts
 def requeue_lost(store: Store, retry: Retry) -> int:
-    """Jobs whose worker fell silent wait again, or are dead when that happened too often. Returns how many."""
+    """Requeue jobs with expired leases, or mark them dead after the last attempt. Return their number."""
     with store.transaction() as session:
         at = now(session)
         jobs.correct_clock(session, at, retry.wait)
@@ -48,7 +48,7 @@ def requeue_lost(store: Store, retry: Retry) -> int:
 
 
 def wanting_notices(store: Store, older_seconds: float) -> Mapping[Lane, Wanting]:
-    """By lane, the jobs that could be claimed, and those whose notice is missing or older than ``older_seconds``."""
+    """Return the claimable jobs by queue, and those with a notification missing or older than ``older_seconds``."""
     with store.reading() as session:
         at = now(session)
         query = select(Job.lane, func.count()).where(*claimable(at)).group_by(Job.lane)
@@ -60,7 +60,7 @@ def wanting_notices(store: Store, older_seconds: float) -> Mapping[Lane, Wanting
 
 @retry_conflicts
 def note_notices(store: Store, lane: Lane, count: int) -> Sequence[str]:
-    """Remember that the ``count`` longest unannounced jobs of a lane were notified now. Returns their ids."""
+    """Mark the ``count`` jobs of a queue with the oldest notification as notified now. Return their ids."""
     with store.transaction() as session:
         at = now(session)
         oldest = (
@@ -76,7 +76,7 @@ def note_notices(store: Store, lane: Lane, count: int) -> Sequence[str]:
 
 @retry_conflicts
 def forget_notices(store: Store, ids: Sequence[str]) -> None:
-    """These were not notified after all."""
+    """Mark these jobs as not notified."""
     with store.transaction() as session:
         _set_notified(session, ids, None)
 

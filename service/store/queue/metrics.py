@@ -1,6 +1,6 @@
-"""What the database tells of the whole service: how much waits and since when, what ended how, and how long it took.
+"""Metrics of the whole service from the database: queue lengths and ages, outcomes, and durations.
 
-Only reads, so that every replica that is asked tells the same.
+Read-only, so every replica reports the same values.
 """
 
 from __future__ import annotations
@@ -21,39 +21,39 @@ from service.store.queue import workers
 from service.store.queue.scheduling import claimable
 from service.store.states import UNFINISHED, BatchState, JobState, Lane, PlotState
 
-#: Times are told of the jobs that ended in this time, the newest of them.
+#: Durations cover the newest jobs that ended within this time.
 TIMES_OVER = timedelta(hours=1)
 TIMES_MOST = 2000
 PACE_OVER = timedelta(minutes=5)
-#: A job that was begun longer ago says nothing of whether the queue stands still.
+#: Older starts are ignored when deciding whether the queue is stuck.
 _LATELY = timedelta(hours=1)
 
 
 @dataclass(frozen=True, slots=True)
 class QueueMetrics:
-    """What waits, and whether anybody grades it."""
+    """Queued jobs and the activity of the workers."""
 
     jobs: Mapping[tuple[Lane, JobState], int]
     claimable: Mapping[Lane, int]
-    oldest_seconds: Mapping[Lane, float]  # how long the oldest job that could be claimed has waited
-    idle_seconds: float  # since a job was begun or ended; infinite where none was in the last hour
+    oldest_seconds: Mapping[Lane, float]  # waiting time of the oldest claimable job
+    idle_seconds: float  # since a job last started or ended; infinite if none did in the last hour
     workers: Sequence[workers.WorkerLine]
-    silent_seconds: Mapping[str, float]  # by worker, since it was last heard of
+    silent_seconds: Mapping[str, float]  # by worker, since last seen
 
     def count(self, state: JobState) -> int:
-        """The number of jobs in a state, of all lanes."""
+        """Return the number of jobs in a state, over all queues."""
         return sum(count for (_, each), count in self.jobs.items() if each is state)
 
 
 @dataclass(frozen=True, slots=True)
 class ServiceMetrics:
-    """One look at the whole service."""
+    """Metrics of the whole service at one moment."""
 
     queue: QueueMetrics
     verdicts: Mapping[str, int]
-    host_faults: int  # attempts that ended through no fault of the student's
+    host_faults: int  # attempts that ended with a host fault
     unjudged: int  # criteria that could not be judged
-    surprises: int  # trials in which our own code stumbled over what a child sent
+    surprises: int  # trials in which Robomark's own code failed on data from a child
     plots: Mapping[PlotState, int]
     paused_batches: int
     quarantined: int
@@ -61,9 +61,9 @@ class ServiceMetrics:
 
 
 def collect(session: Session) -> ServiceMetrics:
-    """All metrics at one moment."""
+    """Collect all metrics."""
     verdicts = select(Job.verdict, func.count()).where(Job.verdict.is_not(None)).group_by(Job.verdict)
-    # Of the attempts of a job that is graded, or is being graded, the last is no fault.
+    # The last attempt of a graded or running job is not a fault.
     good = case((Job.state.in_((JobState.DONE, JobState.RUNNING)), 1), else_=0)
     plots = select(Job.plots, func.count()).where(Job.plots != PlotState.NONE).group_by(Job.plots)
     counts = (
@@ -90,7 +90,7 @@ def collect(session: Session) -> ServiceMetrics:
 
 
 def collect_queue(session: Session) -> QueueMetrics:
-    """The part of them that tells whether the queue stands still."""
+    """Collect only the metrics that show whether the queue is stuck."""
     at = now(session)
     by_state = select(Job.lane, Job.state, func.count()).group_by(Job.lane, Job.state)
     waiting = select(Job.lane, func.count(), func.min(Job.queued_at)).where(*claimable(at)).group_by(Job.lane)
@@ -115,14 +115,14 @@ def _idle_seconds(session: Session, at: datetime) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How fast a batch is being graded, and how long the rest of it takes beside what else waits."""
+    """Grading speed of a batch, and the estimated remaining time next to other queued jobs."""
 
     per_minute: float
     left: timedelta
 
 
 def pace(session: Session, batch_id: str) -> Pace | None:
-    """By what ended in the last minutes, of the batch and of all; None where nothing did, or nothing is left."""
+    """Estimate the pace from the last minutes; None if nothing ended then, or nothing remains."""
     at = now(session)
     unfinished = (
         select(Enrolment.course_id, Job.batch_id, func.count())
@@ -138,7 +138,7 @@ def pace(session: Session, batch_id: str) -> Pace | None:
     for course, batch, count in session.execute(unfinished).all():
         waiting[course][batch] = count
     of_batch = func.sum(case((Job.batch_id == batch_id, 1), else_=0))
-    # The moment of the start has an index.
+    # The start time is indexed.
     ended = (Job.state == JobState.DONE, Job.finished_at > at - PACE_OVER, Job.started_at > at - _LATELY)
     own, everybody, first = session.execute(
         select(of_batch, func.count(), func.min(Job.started_at)).where(*ended)
@@ -151,7 +151,10 @@ def pace(session: Session, batch_id: str) -> Pace | None:
 
 
 def _graded_before_its_end(waiting: Mapping[int, Mapping[str | None, int]], batch_id: str) -> int:
-    """How many jobs of all end until the batch has, as each course has the same share, and each batch in a course."""
+    """Return the number of jobs, in all courses, that end before the batch does.
+
+    Courses share the workers equally, and so do the batches of a course.
+    """
     course = next((course for course, batches in waiting.items() if batch_id in batches), None)
     if course is None:
         return 0
@@ -160,7 +163,7 @@ def _graded_before_its_end(waiting: Mapping[int, Mapping[str | None, int]], batc
 
 
 def quantile(values: Sequence[float], share: float) -> float:
-    """The value that ``share`` of the sorted values do not exceed (nearest rank)."""
+    """Return the nearest-rank quantile of sorted values for a ``share`` of 0 to 1."""
     return values[max(0, min(len(values) - 1, round(share * len(values) + 0.5) - 1))]
 
 
@@ -174,6 +177,6 @@ def _times(session: Session) -> dict[str, list[float]]:
     times: dict[str, list[float]] = {span: [] for span in phases.SPANS}
     for stored in session.scalars(recent):
         for span, duration in phases.durations(stored).items():
-            # A clock that was set back in between makes nonsense; nothing takes less than no time.
+            # A clock that was set back can give negative durations, which count as 0.
             times[span].append(max(0.0, duration.total_seconds()))
     return {span: sorted(found) for span, found in times.items()}

@@ -1,6 +1,6 @@
-"""Where a job stands in the queue, and about how long it takes: what whoever waits for it asks. Only reads.
+"""Position of a job in the queue and its estimated time, for the person waiting for it. Read-only.
 
-An estimate: whose turn it really is, is decided by ``scheduling.py`` when a worker asks.
+This is an estimate: ``scheduling.py`` decides when a worker claims a job.
 """
 
 from __future__ import annotations
@@ -18,33 +18,33 @@ from service.store.queue import workers
 from service.store.queue.scheduling import claimable, recently_begun, shares
 from service.store.states import JobState, Lane
 
-#: A grading takes as long as the mean of so many before it.
+#: Estimates use the mean of this number of recent gradings.
 _MEASURED = 20
-#: What is shown of a grading that takes longer than usual.
+#: Maximum progress shown for a grading that takes longer than usual.
 _MOST_PROGRESS = 0.95
 
 
 @dataclass(frozen=True, slots=True)
 class QueuePlace:
-    """How many jobs come before one, and how long it is to its marks; None where nothing tells how long.
+    """Number of jobs ahead of a job, and the estimated seconds to its marks; None if unknown.
 
-    ``progress`` (0 to 1) follows from the time that gradings usually take: the share of trials that have run would tell
-    students how many there are.
+    ``progress`` (0 to 1) is computed from the usual duration. The share of finished trials would reveal their number to
+    students.
     """
 
     before: int
     seconds: float | None
-    workers: int  # that live
+    workers: int  # active workers
     progress: float = 0.0
 
 
 def queue_place(session: Session, job_id: str) -> QueuePlace:
-    """Of a job that waits or runs."""
+    """Return the place of one queued or running job."""
     return queue_places(session, [job_id])[job_id]
 
 
 def queue_places(session: Session, job_ids: Collection[str]) -> dict[str, QueuePlace]:
-    """Of several such jobs, in as many statements."""
+    """Return the places of several jobs, with the same number of statements."""
     at = now(session)
     jobs = session.scalars(select(Job).where(Job.id.in_(job_ids))).all()
     lively = [seen.worker for seen in workers.known_workers(session) if seen.lately]
@@ -63,7 +63,7 @@ def queue_places(session: Session, job_ids: Collection[str]) -> dict[str, QueueP
 
 
 def _before(session: Session, job_ids: Collection[str], at: datetime) -> dict[str, int]:
-    """How many jobs that can be claimed come before each of these, by id."""
+    """Return the number of claimable jobs ahead of each of these jobs, by id."""
     recent = recently_begun(at).cte("recent")
     of_course = shares(recent.c.course_id)
     of_batch, of_student = shares(recent.c.batch_id), shares(recent.c.enrolment_id)

@@ -1,6 +1,6 @@
-"""Whose turn it is: the queued job that is due first by lane, by share of course, batch and student, and by age.
+"""Scheduling: the next job by queue, by fair share of course, batch and student, and by age.
 
-Only reads (and, on PostgreSQL, locks) the row; taking the job is ``jobs.claim``.
+Only reads (and, on PostgreSQL, locks) the row; ``jobs.claim`` takes the job.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from service.store.models import Batch, Enrolment, Job
 from service.store.queue.workers import another_lives
 from service.store.states import BatchState, JobState, Lane
 
-#: Shares are counted over the jobs begun in this time, so that nobody who was served long ago waits for it.
+#: Shares count only jobs started within this time, so earlier use is no disadvantage.
 SHARE_WINDOW = timedelta(seconds=60)
-#: Of so many jobs begun, one is a batch's even while people wait.
+#: One in this number of started jobs is from a batch, even if interactive jobs wait.
 BATCH_EVERY = 5
-#: For so long a job that failed on one worker is left to the others, where there are any.
+#: Time for which a job that failed on one worker is reserved for the other workers.
 ELSEWHERE = timedelta(seconds=20)
 
 
 def claimable(at: datetime) -> tuple[ColumnElement[bool], ...]:
-    """What holds of a job that may be claimed at ``at``: it waits, it is due, and its batch is not held back."""
+    """Return the conditions for a claimable job: it is queued and due, and its batch is open."""
     held_back = select(Batch.id).where(Batch.state != BatchState.OPEN)
     return (
         Job.state == JobState.QUEUED,
@@ -33,7 +33,7 @@ def claimable(at: datetime) -> tuple[ColumnElement[bool], ...]:
 
 
 def recently_begun(at: datetime) -> Select[Lane, int, str | None, int]:
-    """The lane, the course, the batch and the student of every job that counts for a share."""
+    """Return a query for the queue, course, batch and student of every job that counts towards a share."""
     return (
         select(Job.lane, Enrolment.course_id, Job.batch_id, Job.enrolment_id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
@@ -42,12 +42,12 @@ def recently_begun(at: datetime) -> Select[Lane, int, str | None, int]:
 
 
 def next_job(session: Session, at: datetime, worker: str) -> str | None:
-    """The id of the job that ``worker`` should take next; None when none is due.
+    """Return the id of the job that ``worker`` should claim next; None if no job is due.
 
-    The lane first: people before batches, but for one job in five. In a lane, the course, then the batch, then the
-    student of whom fewest jobs were begun in the last minute; then the oldest job.
+    Interactive jobs come first, except for one job in five. Within a queue, the course with the fewest jobs started in
+    the last minute comes first, then the batch, then the student, then the oldest job.
     """
-    # A common table, or SQLite would walk all jobs there ever were to count each share.
+    # A common table expression; without it SQLite would scan all jobs to count each share.
     recent = recently_begun(at).cte("recent")
     counted = session.execute(select(recent.c.lane, func.count()).group_by(recent.c.lane))
     by_lane: dict[Lane, int] = dict(counted.all())
@@ -79,12 +79,12 @@ def next_job(session: Session, at: datetime, worker: str) -> str | None:
 
 
 def _better_elsewhere(worker: str, at: datetime) -> ColumnElement[bool]:
-    """Whether a job failed on this very worker, through a fault of ours, and another worker could try it."""
-    # A worker that ended gives back what it held without a fault; then no error is written.
+    """Return the condition that a job failed with a host fault on this worker and another worker could try it."""
+    # A stopped worker returns its jobs without a fault, and then no error is stored.
     failed_here = and_(Job.attempt > 0, Job.worker == worker, Job.error.is_not(None))
     return and_(failed_here, Job.due_at > at - ELSEWHERE, another_lives(worker, at))
 
 
 def shares(share: ColumnElement[str | None] | ColumnElement[int]) -> Subquery:
-    """How many of the jobs recently begun each course, each batch, or each student, has."""
+    """Return a subquery that counts the recently started jobs of each course, batch or student."""
     return select(share.label("share"), func.count().label("begun")).group_by(share).subquery()

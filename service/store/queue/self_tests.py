@@ -1,7 +1,7 @@
-"""What a known answer says of a worker: when each process last graded it rightly, and what follows when one did not.
+"""Self-test results of workers: the last pass of each process, and the quarantine after a failure.
 
-A worker that got it wrong claims nothing any more, and what it graded since its last right answer is run again by
-others. Grading the known answer is ``service.queue.self_test``'s.
+A quarantined worker claims no jobs. Its grades since the last pass are run again by other workers.
+``service.queue.self_test`` runs the test.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _FORGOTTEN = timedelta(days=30)
 
 @dataclass(frozen=True, slots=True)
 class Quarantined:
-    """What a quarantine brought about: jobs taken back, grades that are suspect, and jobs that run them again."""
+    """Effects of a quarantine: requeued jobs, suspect grades, and the jobs that repeat them."""
 
     taken_back: int
     suspect: tuple[str, ...]
@@ -36,7 +36,7 @@ class Quarantined:
 
 @retry_conflicts
 def answered_rightly(store: Store, worker: str, process: int) -> None:
-    """Write down that this process of the worker graded the known answer rightly now."""
+    """Record that this process of the worker passed the self-test now."""
     with store.transaction() as session:
         at = now(session)
         _worker(session, worker, at).self_tested_at = at
@@ -50,10 +50,10 @@ def answered_rightly(store: Store, worker: str, process: int) -> None:
 
 @retry_conflicts
 def quarantine(store: Store, worker: str, reason: str) -> Quarantined:
-    """Let the worker claim and finish nothing more, take back what it holds, and run again what it may have spoilt.
+    """Quarantine a worker: it can neither claim nor finish jobs, and its doubtful grades are run again.
 
-    Its grades since the last right answer of the process that gave them stay, marked suspect, and are published no
-    more. Does nothing for a worker that is in quarantine already.
+    The jobs that it owns are requeued. Grades since the last passed self-test of their process are kept, but marked as
+    suspect and no longer published. Does nothing for a worker that is already in quarantine.
     """
     with store.transaction() as session:
         at = now(session)
@@ -62,7 +62,7 @@ def quarantine(store: Store, worker: str, reason: str) -> Quarantined:
             return Quarantined(0, (), ())
         row.self_tested_at = row.quarantined_at = at
         row.reason = reason
-        # A finish waits for this row, or was committed before it was locked and is seen below.
+        # A concurrent finish waits for this row, or is already committed and visible below.
         session.flush()
         taken_back = jobs.give_back(session, worker, at)
         sentence = f"the worker {worker} was found to grade wrongly: {reason}"
@@ -79,7 +79,7 @@ def quarantine(store: Store, worker: str, reason: str) -> Quarantined:
 
 
 def _worker(session: Session, name: str, at: datetime) -> Worker:
-    """The worker's row, locked; made if there is none."""
+    """Return the worker's row, locked, creating it if necessary."""
     row = session.scalar(select(Worker).where(Worker.name == name).with_for_update(key_share=True))
     if row is None:
         _forget_old(session, at)
@@ -101,7 +101,7 @@ def _forget_old(session: Session, at: datetime) -> None:
 
 
 def _suspects(session: Session, worker: str) -> Sequence[Job]:
-    """What the worker graded since it was last known to grade rightly, and all copies of that."""
+    """Return the grades of the worker since its last passed self-test, with all their copies."""
     last = (
         select(SelfTest.right_at)
         .where(SelfTest.worker == worker, SelfTest.process == Job.process)
@@ -119,13 +119,13 @@ def _suspects(session: Session, worker: str) -> Sequence[Job]:
 
 
 def _rerun(session: Session, job: Job) -> Job:
-    """A new job in the place of one that is suspect; not queued yet."""
+    """Create, without queueing, a new job that replaces a suspect one."""
     cancelled = job.batch_id is not None and session.get_one(Batch, job.batch_id).state is BatchState.CANCELLED
     return Job(
         submission_id=job.submission_id,
         assignment_version_id=job.assignment_version_id,
         enrolment_id=job.enrolment_id,
-        # Nothing of a cancelled batch is begun, but this one had its grade before.
+        # Jobs of a cancelled batch never start, but this one was graded before.
         batch_id=None if cancelled else job.batch_id,
         lane=Lane(job.lane),
         max_attempts=job.max_attempts,

@@ -1,6 +1,6 @@
-"""Programs that students try without submitting them: who may, whose is run next, and what came of it.
+"""Test runs: student programs that run without being submitted. Limits, claims and results.
 
-They have a lane of their own beside the jobs', leave no marks, and go a day after. Running one is ``service.trying``'s.
+They have a separate queue, leave no marks and are deleted after a day. ``service.trying`` runs them.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from service.store.states import TryoutState
 from service.store.web_tables import Tryout
 from sim.errors import UsageError
 
-#: What one student may try within an hour.
+#: Test runs of one student within an hour.
 MOST_AN_HOUR = 30
-#: A worker that dies with one loses nothing; the second death is taken to be the program's doing.
+#: The first death of a worker is retried; a second one is attributed to the program.
 MOST_ATTEMPTS = 2
 _KEPT = timedelta(days=1)
 _SILENT = "Whatever ran it fell silent twice; whoever runs the installation finds more in its log."
@@ -30,7 +30,7 @@ _UNFINISHED = (TryoutState.QUEUED.value, TryoutState.RUNNING.value)
 
 @dataclass(frozen=True, slots=True)
 class TryoutClaim:
-    """A tryout in the hands of one worker; the number of the attempt tells it from a later one."""
+    """A test run claimed by one worker; ``attempt`` distinguishes it from later claims."""
 
     id: str
     attempt: int
@@ -38,7 +38,7 @@ class TryoutClaim:
 
 @dataclass(frozen=True, slots=True)
 class TryoutLane:
-    """How many are waiting and running, and how long the oldest has waited."""
+    """Number of queued and running test runs, and the waiting time of the oldest."""
 
     queued: int
     running: int
@@ -47,29 +47,29 @@ class TryoutLane:
 
 @dataclass(frozen=True, slots=True)
 class TryoutLine:
-    """A tryout as its student sees it."""
+    """A test run, as its student sees it."""
 
     id: str
     assignment: str
     title: str
     state: TryoutState
     queued_at: datetime
-    before: int  # how many wait longer
+    before: int  # number of older queued ones
     words: dict[str, Any]
     error: str
 
     @property
     def waits(self) -> bool:
-        """Whether something is still to come."""
+        """Return whether the result is still pending."""
         return self.state.value in _UNFINISHED
 
 
 def ask(session: Session, enrolment_id: int, version_id: int, packed: bytes) -> str:
-    """Let a program wait to be run. Returns its id.
+    """Queue a program for a test run and return its id.
 
-    Raises UsageError where the student has one waiting, or has tried too many within an hour.
+    Raises UsageError if the student has an unfinished one, or too many within an hour.
     """
-    # One at a time: of two that ask at once, the second finds the first.
+    # Serialises concurrent requests, so that the second one finds the first.
     session.execute(select(Enrolment.id).where(Enrolment.id == enrolment_id).with_for_update(key_share=True)).all()
     at = now(session)
     of_student = Tryout.enrolment_id == enrolment_id
@@ -94,7 +94,7 @@ def ask(session: Session, enrolment_id: int, version_id: int, packed: bytes) -> 
 
 
 def _forget_programs(session: Session, enrolment_id: int, version_id: int) -> None:
-    """Remove what a student tried before for the same assignment; what came of it is kept for a day."""
+    """Remove the programs of a student's earlier test runs of the assignment; their results are kept for a day."""
     assignment = select(AssignmentVersion.assignment).where(AssignmentVersion.id == version_id).scalar_subquery()
     versions = select(AssignmentVersion.id).where(AssignmentVersion.assignment == assignment)
     tried = (Tryout.enrolment_id == enrolment_id, Tryout.assignment_version_id.in_(versions))
@@ -103,7 +103,7 @@ def _forget_programs(session: Session, enrolment_id: int, version_id: int) -> No
 
 @retry_conflicts
 def claim(store: Store, lease_seconds: float) -> TryoutClaim | None:
-    """Take the one that has waited longest; None when none is due. What has killed two workers is given up."""
+    """Claim the oldest test run; None if none is due. Gives up those that ended two workers."""
     with store.transaction() as session:
         if needs_newer_code(session):
             return None
@@ -123,14 +123,14 @@ def claim(store: Store, lease_seconds: float) -> TryoutClaim | None:
 
 @retry_conflicts
 def keep(store: Store, claimed: TryoutClaim, lease_seconds: float) -> bool:
-    """Keep the lease; false when it is another's by now."""
+    """Renew the lease. Return False if another worker owns the test run."""
     with store.transaction() as session:
         return _held(session, claimed, lease_until=now(session) + timedelta(seconds=lease_seconds))
 
 
 @retry_conflicts
 def finish(store: Store, claimed: TryoutClaim, words: dict[str, Any], replay: bytes | None) -> bool:
-    """Keep what came of it; false when it is another's by now."""
+    """Store the result. Return False if another worker owns the test run."""
     with store.transaction() as session:
         done = {"state": TryoutState.DONE.value, "finished_at": now(session), "lease_until": None}
         return _held(session, claimed, words=words, replay=replay, error=None, **done)
@@ -138,7 +138,7 @@ def finish(store: Store, claimed: TryoutClaim, words: dict[str, Any], replay: by
 
 @retry_conflicts
 def fail(store: Store, claimed: TryoutClaim, sentence: str) -> bool:
-    """A fault of ours: it waits for its other attempt, or has failed."""
+    """Handle a host fault: the test run is queued for its second attempt, or has failed."""
     with store.transaction() as session:
         if claimed.attempt < MOST_ATTEMPTS:
             return _held(session, claimed, state=TryoutState.QUEUED.value, lease_until=None, error=sentence)
@@ -147,13 +147,13 @@ def fail(store: Store, claimed: TryoutClaim, sentence: str) -> bool:
 
 
 def due(store: Store) -> int:
-    """How many could be run now."""
+    """Return the number of test runs that are due."""
     with store.reading() as session:
         return session.scalar(select(func.count()).where(_due(now(session)))) or 0
 
 
 def lane(session: Session) -> TryoutLane:
-    """How full the lane is."""
+    """Return the load of the test run queue."""
     waits, runs = (Tryout.state == each.value for each in (TryoutState.QUEUED, TryoutState.RUNNING))
     counts = (func.count().filter(waits), func.count().filter(runs), func.min(Tryout.queued_at).filter(waits))
     queued, running, since = session.execute(select(*counts).select_from(Tryout)).one()
@@ -161,7 +161,7 @@ def lane(session: Session) -> TryoutLane:
 
 
 def kept(session: Session, tryout_id: str) -> tuple[bytes, bytes]:
-    """What is to be run, packed, and the assignment that it is run for, as ``versions`` keeps it."""
+    """Return the packed program and the encoded assignment of a test run."""
     query = select(Tryout.packed, AssignmentVersion.content).join(
         AssignmentVersion, Tryout.assignment_version_id == AssignmentVersion.id
     )
@@ -170,7 +170,7 @@ def kept(session: Session, tryout_id: str) -> tuple[bytes, bytes]:
 
 
 def newest(session: Session, enrolment_id: int, assignment: str) -> str | None:
-    """The id of what a student tried last for an assignment; None where there is nothing any more."""
+    """Return the id of a student's newest test run of an assignment; None if there is none."""
     query = (
         select(Tryout.id)
         .join(AssignmentVersion, Tryout.assignment_version_id == AssignmentVersion.id)
@@ -180,7 +180,7 @@ def newest(session: Session, enrolment_id: int, assignment: str) -> str | None:
 
 
 def line(session: Session, enrolment_id: int, tryout_id: str) -> TryoutLine | None:
-    """One of a student's; None where they have none of this id."""
+    """Return one test run of a student; None if the student does not have it."""
     query = (
         select(Tryout, AssignmentVersion.assignment, AssignmentVersion.title)
         .join(AssignmentVersion, Tryout.assignment_version_id == AssignmentVersion.id)
@@ -204,7 +204,7 @@ def line(session: Session, enrolment_id: int, tryout_id: str) -> TryoutLine | No
 
 
 def replay_of(session: Session, tryout_id: str) -> bytes | None:
-    """What the replay plays, compressed; None where there is nothing to play."""
+    """Return the compressed replay; None without one."""
     return session.scalar(select(Tryout.replay).where(Tryout.id == tryout_id))
 
 

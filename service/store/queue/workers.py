@@ -1,6 +1,6 @@
-"""Which workers live and which are in quarantine: each writes down every few seconds that it lives, until its end.
+"""Live and quarantined workers. Each worker updates its heartbeat every few seconds until it exits.
 
-Says nothing of what they hold; that is in the jobs. What puts one into quarantine is in ``self_tests.py``.
+Jobs store their owners; ``self_tests.py`` decides on quarantine.
 """
 
 from __future__ import annotations
@@ -14,26 +14,26 @@ from sqlalchemy.orm import Session
 from service.store.engine import Store, now, retry_conflicts
 from service.store.models import Heartbeat, Worker
 
-#: A worker that wrote within this time is taken to live.
+#: A worker with a heartbeat within this time is considered alive.
 LATELY = timedelta(seconds=30)
 _FORGOTTEN = timedelta(days=1)
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerDescription:
-    """One worker, as it describes itself."""
+    """A worker's description of itself."""
 
     name: str
     host: str
     concurrency: int  # gradings at a time
     grader_version: str
-    sandbox: str  # what stands round student code there
+    sandbox: str  # sandbox layers on that machine
     problem: str = ""  # why it must be restarted
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerLine:
-    """A worker, and when it was last heard of."""
+    """A worker and the time it was last seen."""
 
     worker: WorkerDescription
     started_at: datetime
@@ -43,7 +43,7 @@ class WorkerLine:
 
 @dataclass(frozen=True, slots=True)
 class InQuarantine:
-    """A worker that got a known answer wrong, and how."""
+    """A worker that failed a self-test, and the reason."""
 
     worker: str
     since: datetime
@@ -52,7 +52,7 @@ class InQuarantine:
 
 @retry_conflicts
 def beat(store: Store, worker: WorkerDescription) -> None:
-    """Write down that the worker lives now. Those that fell silent a day ago are forgotten."""
+    """Store the worker's heartbeat. Deletes workers that were last seen more than a day ago."""
     with store.transaction() as session:
         at = now(session)
         row = session.get(Heartbeat, worker.name)
@@ -68,13 +68,13 @@ def beat(store: Store, worker: WorkerDescription) -> None:
 
 @retry_conflicts
 def forget(store: Store, name: str) -> None:
-    """Take away the row of a worker that has ended."""
+    """Delete the heartbeat of a worker that has exited."""
     with store.transaction() as session:
         session.execute(delete(Heartbeat).where(Heartbeat.worker == name))
 
 
 def known_workers(session: Session) -> list[WorkerLine]:
-    """All workers that are written down, by name."""
+    """Return all workers with a heartbeat, ordered by name."""
     at = now(session)
     rows = session.scalars(select(Heartbeat).order_by(Heartbeat.worker))
     return [
@@ -91,18 +91,21 @@ def known_workers(session: Session) -> list[WorkerLine]:
 
 
 def another_lives(worker: str, at: datetime) -> ColumnElement[bool]:
-    """Whether a worker other than this one was heard of lately, as a condition."""
+    """Return the condition that another worker was seen recently."""
     return select(Heartbeat.worker).where(Heartbeat.worker != worker, Heartbeat.seen_at > at - LATELY).exists()
 
 
 def is_in_quarantine(session: Session, worker: str, *, lock: bool = False) -> bool:
-    """Whether the worker may neither claim nor finish; with ``lock`` that stays so to the transaction's end."""
+    """Return whether the worker is barred from claiming and finishing.
+
+    ``lock`` keeps this until the transaction ends.
+    """
     query = select(Worker.quarantined_at).where(Worker.name == worker)
     return session.scalar(query.with_for_update(read=True) if lock else query) is not None
 
 
 def in_quarantine(session: Session) -> list[InQuarantine]:
-    """All workers in quarantine, the latest first."""
+    """Return all quarantined workers, newest first."""
     query = select(Worker).where(Worker.quarantined_at.is_not(None)).order_by(Worker.quarantined_at.desc())
     return [
         InQuarantine(row.name, row.quarantined_at, row.reason or "")

@@ -1,4 +1,4 @@
-"""What a newer hand-in superseded is cancelled, with that as its reason."""
+"""Turn jobs in state "superseded" into cancelled jobs, with that as the reason."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Regrades and what stands, copies of identical grades, hand-in policy, known answers and quarantine."""
+"""Add regrades and standing, copies of identical grades, submission policies, known answers and quarantine."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def upgrade() -> None:
     )
     op.create_index(op.f("ix_presence_seen_at"), "presence", ["seen_at"])
 
-    # Never a rebuilt table: SQLite would empty, by cascade, the tables that refer to the one it drops.
+    # Never rebuilds a table: SQLite would empty the tables that refer to a dropped one, by cascade.
     _add_reference("batch", "regrade_of", "batch")
     op.add_column("submission", sa.Column("handed_in_at", UtcDateTime(), nullable=True))
     op.add_column("submission", sa.Column("days_late", sa.Integer(), nullable=False, server_default="0"))
@@ -102,7 +102,7 @@ def upgrade() -> None:
 
 
 def _add_reference(table: str, column: str, to: str) -> None:
-    """A column with its foreign key in one statement, which SQLite can do without rebuilding the table."""
+    """Add a column and its foreign key in one statement, which SQLite can do without rebuilding the table."""
     op.execute(
         f"ALTER TABLE {table} ADD COLUMN {column} VARCHAR(12) CONSTRAINT fk_{table}_{column}_{to} REFERENCES {to} (id)"
     )

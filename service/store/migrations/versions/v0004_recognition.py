@@ -1,4 +1,4 @@
-"""What became of the pictures that were sent, confidence, and curves of accuracy along what is swept."""
+"""Add outcomes of sent images, confidence, and accuracy curves of swept values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The installation's secret, made here once; which secret a grade rests on, and what of it students may read."""
+"""Add the installation's secret, the secret's hash of each grade, and the part of a grade visible to students."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def upgrade() -> None:
         sa.Column("made_at", UtcDateTime(), nullable=False),
         sa.PrimaryKeyConstraint("id", name=op.f("pk_installation")),
     )
-    # Whoever starts first makes it, under the lock of the migration; all others read it.
+    # The first process creates it under the lock of the migration; all others read it.
     made = {"id": 1, "secret": secrets.token_hex(32), "made_at": datetime.now(UTC)}
     op.bulk_insert(installation, [made])
 

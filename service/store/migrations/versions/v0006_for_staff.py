@@ -1,4 +1,4 @@
-"""For staff: what to look at in a criterion, why it could not be judged, what our own code stumbled over in a trial."""
+"""Add fields for staff: places to review in a criterion, the reason it is unjudged, and internal errors of a trial."""
 
 from __future__ import annotations
 

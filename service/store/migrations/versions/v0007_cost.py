@@ -1,4 +1,4 @@
-"""What all trials of a job cost together, beside what they may cost; unknown of earlier grades."""
+"""Add the total cost of a job's trials, with its limits; unknown for earlier grades."""
 
 from __future__ import annotations
 

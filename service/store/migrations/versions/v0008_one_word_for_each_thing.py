@@ -1,4 +1,4 @@
-"""Tables, columns and files take the words that the rest of Robomark has for them; nothing of their content changes."""
+"""Rename tables, columns and files to the terms used elsewhere in Robomark, without changing their content."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def upgrade() -> None:
     op.drop_index("ix_presence_seen_at", "presence")
     for before, after in _TABLES.items():
         op.rename_table(before, after)
-    # One statement each, and never a rebuilt table: SQLite would empty, by cascade, those that refer to it.
+    # One statement each, without rebuilding a table: SQLite would empty the tables that refer to it, by cascade.
     for table, before, after in _COLUMNS:
         op.execute(f"ALTER TABLE {table} RENAME COLUMN {before} TO {after}")
     op.create_index("ix_self_test_worker_process", "self_test", ["worker", "process"], unique=True)

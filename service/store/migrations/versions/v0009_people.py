@@ -1,7 +1,7 @@
-"""People have a name and an address beside their id; whoever was refused is kept as a person; a part may be missing.
+"""Add names and e-mail addresses of people, store rejected students as persons, and allow a missing part.
 
-Of earlier people only the id is known, as it was first written, which stood where the name is; of those refused, what
-their row was called.
+Existing people have only an id, as first written, which was stored in the name column. Existing rejections keep the
+name of their row.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A grade keeps hints: sentences on what probably cost marks. Earlier ones have none."""
+"""Add hints to a grade: sentences on the probable causes of lost marks. Earlier grades have none."""
 
 from __future__ import annotations
 

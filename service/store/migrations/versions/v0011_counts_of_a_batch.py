@@ -1,4 +1,4 @@
-"""The index that finds a batch's jobs has all that its counts are made of, so that counting reads no job."""
+"""Include all counted columns in the index of a batch's jobs, so that counting reads no job row."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""What the web needs: who signs in, what is open, what instructors set and write, appeals, tryouts, webhooks, LTI."""
+"""Add the tables of the web service.
+
+They are: sign-in, open assignments, overrides, comments, appeals, test runs, webhooks and LTI.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What students submit on the web to an open assignment is in one batch of it.
+"""Collect the web submissions to an open assignment in one batch.
 
-What they submitted before to one that was opened is put into its batch, which is made here.
+Creates the batch for assignments that were opened before, and adds their earlier submissions to it.
 """
 
 from __future__ import annotations

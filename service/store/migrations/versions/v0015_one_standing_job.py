@@ -1,7 +1,7 @@
-"""Of each submission one job stands, which an index ensures; a policy keeps the time zone that its days are counted in.
+"""Allow one standing job per submission, enforced by an index, and store the time zone of a policy.
 
-Where two jobs stand, the one that students were shown stays: graded, published, the newest of such. One that is still
-to be graded comes before one that failed or was cancelled.
+If several jobs stand, the one that students saw is kept: graded, published and newest. A job that is still to be graded
+takes precedence over a failed or cancelled one.
 """
 
 from __future__ import annotations

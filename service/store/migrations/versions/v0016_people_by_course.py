@@ -1,8 +1,8 @@
-"""Names belong to enrolments, credentials have a reach, and a platform's context belongs to its deployment.
+"""Move names to enrolments, limit credentials to courses, and assign LTI contexts to deployments.
 
-Each enrolment gets the name and address that its person had. What a student of one course signs in with reaches that
-course and that role. A context of a platform with one deployment is of that deployment; otherwise the deployment stays
-empty until an instructor of the course launches it.
+Each enrolment gets the name and address of its person. Credentials of students in one course are limited to that course
+and role. The contexts of a platform with one deployment are assigned to it; otherwise the deployment remains empty
+until an instructor of the course launches it.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def upgrade() -> None:
         op.add_column("enrolment", sa.Column(column, SafeText(), nullable=False, server_default=""))
     op.add_column("person", sa.Column("signed_in_at", UtcDateTime(), nullable=True))
     op.add_column("credential", sa.Column("role", sa.String(length=16), nullable=True))
-    # In one statement, which SQLite can do without rebuilding the table.
+    # One statement, which SQLite can run without rebuilding the table.
     op.execute(
         "ALTER TABLE credential ADD COLUMN platform_id INTEGER "
         "CONSTRAINT fk_credential_platform_id_lti_platform REFERENCES lti_platform (id)"

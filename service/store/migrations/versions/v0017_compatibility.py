@@ -1,6 +1,6 @@
-"""The database keeps the oldest revision whose code can use it, and each worker's reason for claiming nothing.
+"""Store the oldest revision whose code can use the database, and each worker's reason for not claiming jobs.
 
-The environment of the migrations writes that revision after each one, from its ``OLDEST_COMPATIBLE``.
+The migration environment writes that revision after each migration, from its ``OLDEST_COMPATIBLE``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""A session that was started with a token keeps which one, and ends with it.
+"""Store the token that started a session, so that the session ends with it.
 
-Sessions of before keep no token: they end a week after they began.
+Existing sessions have no token: they end a week after they began.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ OLDEST_COMPATIBLE = "0017"
 
 
 def upgrade() -> None:
-    # In one statement, which SQLite can do without rebuilding the table.
+    # One statement, which SQLite can run without rebuilding the table.
     op.execute(
         "ALTER TABLE credential ADD COLUMN token_id VARCHAR(12) "
         "CONSTRAINT fk_credential_token_id_credential REFERENCES credential (id)"

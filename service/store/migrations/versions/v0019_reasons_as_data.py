@@ -1,6 +1,6 @@
-"""The limit that a submission is over, and why a job was cancelled, are data beside their sentences.
+"""Store the exceeded limit of a submission and the reason of a cancellation as data beside their sentences.
 
-The sentences stay for people. This is the one place that reads them: rows of before have nothing else.
+The sentences remain for display. Only this migration parses them, because existing rows contain nothing else.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ revision = "0019"
 down_revision = "0018"
 branch_labels = None
 depends_on = None
-# Code of before writes the sentence alone.
+# Older code writes only the sentence.
 OLDEST_COMPATIBLE = "0019"
 
 _SUBMISSION = sa.table(
@@ -62,7 +62,7 @@ def _exceeded(sentence: str) -> dict[str, str | int]:
     for limit, pattern in _LIMITS:
         if found := pattern.fullmatch(sentence):
             return {"limit": limit, "actual": int(found[1]), "allowed": int(found[2])}
-    # No release has written another one; one that somebody wrote by hand was taken for a matter of the date.
+    # No release writes other sentences; manually entered ones were treated as date limits.
     return {"limit": "date", "actual": 0, "allowed": 0}
 
 
