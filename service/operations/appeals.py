@@ -1,4 +1,4 @@
-"""Appeals: a student asks for a second look at a grade, and an instructor answers."""
+"""Appeals: students appeal grades, and instructors answer."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["LONGEST_TEXT"]
 
 @dataclass(frozen=True, slots=True)
 class OwnAppeals:
-    """The appeals of one submission as its student sees them, the newest first."""
+    """The appeals of one submission, newest first, as its student sees them."""
 
     submission_id: int
     assignment: str
@@ -34,9 +34,9 @@ class OwnAppeals:
 def list_open(
     service: Service, actor: Actor, course_id: int, *, limit: int | None = None, after: int | None = None
 ) -> list[AppealLine]:
-    """The appeals of a course that wait for an answer, the longest waiting first. Raises NotFound.
+    """Return the open appeals of a course, oldest first. Raises NotFound.
 
-    ``after`` is the id of the last appeal of the page before.
+    ``after`` is the id of the last appeal on the previous page.
     """
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
@@ -52,9 +52,9 @@ def list_answered(
     limit: int | None = None,
     after: tuple[datetime, int] | None = None,
 ) -> list[AppealLine]:
-    """The answered appeals of a course, the newest answer first. Raises NotFound.
+    """Return the answered appeals of a course, newest answer first. Raises NotFound.
 
-    ``after`` is when the last appeal of the page before was answered, and its id.
+    ``after`` is the answer time and id of the last appeal on the previous page.
     """
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
@@ -64,10 +64,10 @@ def list_answered(
 
 @retry_conflicts
 def answer(service: Service, actor: Actor, course_id: int, appeal_id: int, text: str) -> None:
-    """Answer an open appeal, which closes it.
+    """Answer and close an open appeal.
 
-    Raises NotFound for a course that is not the actor's, and UsageError where there is no such appeal, it is answered,
-    or the text is empty or too long.
+    Raises NotFound if the actor does not instruct the course. Raises UsageError if the appeal does not exist or is
+    answered, or the text is empty or too long.
     """
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -75,7 +75,7 @@ def answer(service: Service, actor: Actor, course_id: int, appeal_id: int, text:
 
 
 def show_own(service: Service, actor: Actor, course_id: int, submission_id: int) -> OwnAppeals:
-    """The appeals of a submission of the actor's own, and whether they may appeal now. Raises NotFound."""
+    """Return the appeals of a submission of the actor, with their permission to appeal now. Raises NotFound."""
     with service.store.reading() as session:
         row = _own(session, actor, course_id, submission_id)
         earlier = appeals.of_submission(session, submission_id)
@@ -86,10 +86,10 @@ def show_own(service: Service, actor: Actor, course_id: int, submission_id: int)
 
 @retry_conflicts
 def ask(service: Service, actor: Actor, course_id: int, submission_id: int, text: str) -> None:
-    """Ask for a second look at the grade of a submission of the actor's own.
+    """Appeal against the grade of a submission of the actor.
 
-    Raises NotFound, and UsageError where there is no grade that they may see, an appeal is open, or the text is empty
-    or too long.
+    Raises NotFound. Raises UsageError if the actor may not see a grade, an appeal is open, or the text is empty or too
+    long.
     """
     with service.store.transaction() as session:
         _own(session, actor, course_id, submission_id)

@@ -1,6 +1,6 @@
-"""Assignments that instructors upload, and reference solutions that are graded as a preview.
+"""Upload of assignments by instructors, and previews that grade reference solutions.
 
-What an assignment's folder may contain is ``submissions.assignment``'s to decide.
+``submissions.assignment`` defines the content of an assignment's folder.
 """
 
 from __future__ import annotations
@@ -30,32 +30,35 @@ _MOST_ENTRIES, _MOST_BYTES = 2000, 200_000_000
 
 
 class StudentsKnowAnother(Conflict):
-    """Students have been shown another assignment with this id, and the request does not say to replace it."""
+    """Students have seen a different assignment with this id, and the request does not permit replacing it."""
 
 
 @dataclass(frozen=True, slots=True)
 class UploadRequest:
-    """The zip of an assignment's folder; with ``replace`` also in place of another that students have been shown."""
+    """The zip of an assignment's folder.
+
+    ``replace`` permits replacing a different assignment that students have seen.
+    """
 
     path: Path
     replace: bool = False
 
 
 def prepare_from_catalogue(service: Service, actor: Actor, course_id: int, assignment: str) -> CourseAssignment:
-    """Put an assignment of the catalogue into a course, in its newest version and not yet open.
+    """Add the newest version of a catalogue assignment to a course, without opening it.
 
-    Raises NotFound where the actor does not instruct the course, and UsageError where there is no such assignment.
+    Raises NotFound if the actor does not instruct the course, UsageError if the assignment does not exist.
     """
     return prepare(service, actor, course_id, find_in_catalogue(assignment))
 
 
 def upload(service: Service, actor: Actor, course_id: int, request: UploadRequest) -> CourseAssignment:
-    """Put the assignment whose folder is in a zip into a course, and grade its reference solution if it has one.
+    """Add an assignment from a zipped folder to a course, and grade its reference solution if it has one.
 
     Raises:
-        NotFound: the actor does not instruct the course.
-        StudentsKnowAnother: the upload would replace an assignment that students have been shown.
-        UsageError: the zip contains no assignment; each mistake is a line.
+        NotFound: The actor does not instruct the course.
+        StudentsKnowAnother: The upload would replace an assignment that students have seen.
+        UsageError: The zip contains no valid assignment; each mistake is a line.
     """
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -71,10 +74,10 @@ def upload(service: Service, actor: Actor, course_id: int, request: UploadReques
 
 
 def preview(service: Service, actor: Actor, course_id: int, assignment: str) -> str:
-    """Grade the catalogue's reference solution as the actor's own submission; returns the id of its grade.
+    """Grade the catalogue's reference solution as the actor's own submission. Returns the id of its grade.
 
-    Raises NotFound where the actor does not instruct the course, and UsageError where there is no reference solution of
-    the version that the course has.
+    Raises NotFound if the actor does not instruct the course, UsageError if there is no reference solution for the
+    course's version.
     """
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -89,7 +92,7 @@ def preview(service: Service, actor: Actor, course_id: int, assignment: str) -> 
 
 
 def reference_of(found: Assignment) -> Path | None:
-    """The catalogue's reference solution; None where the course marks by another version than the catalogue's."""
+    """Return the catalogue's reference solution; None if the course uses a different version."""
     if found.id not in catalogue() or find_in_catalogue(found.id).version != found.version:
         return None
     folder = assignment_folder(found.id) / EXAMPLES / REFERENCE
@@ -125,8 +128,8 @@ def _grade(service: Service, actor: Actor, course_id: int, found: Assignment, re
 
 
 def _unpacked(path: Path) -> Path:
-    """The folder of the assignment: the zip's own, or the only one in it."""
-    # Messages about its content name this folder where the zip has none of its own.
+    """Unzip an assignment and return its folder: the top level, or the only folder in it."""
+    # Error messages name this folder if the zip has no top folder.
     inside = path.parent / "unpacked" / path.stem
     inside.mkdir(parents=True)
     unzip(path, inside, _MOST_ENTRIES, _MOST_BYTES)

@@ -1,4 +1,4 @@
-"""The assignments of a course as its instructors see them, with the policies that apply to them."""
+"""Assignments of a course as its instructors see them, with the policies that apply."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from submissions.assignment.reader import find_in_catalogue
 
 @dataclass(frozen=True, slots=True)
 class CourseAssignments:
-    """The assignments of a course, their own policies, and the policy of all that have none of their own."""
+    """The assignments of a course, their own policies, and the default policy."""
 
     prepared: list[CourseAssignment]
     policies: Mapping[str, PolicyLimits]
@@ -38,18 +38,18 @@ class AssignmentView:
     policy: PolicyLimits  # the one that applies
     previews: list[OwnGrading]
     has_reference: bool
-    changed: bool  # the catalogue has another version
+    changed: bool  # the catalogue has a different version
 
 
 def list_prepared(service: Service, actor: Actor, course_id: int) -> list[CourseAssignment]:
-    """The assignments of a course, by id. Raises NotFound."""
+    """Return the assignments of a course, ordered by id. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         return open_assignments.of_course(session, course_id)
 
 
 def show_all(service: Service, actor: Actor, course_id: int) -> CourseAssignments:
-    """The assignments of a course with its policies. Raises NotFound."""
+    """Return the assignments of a course with its policies. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         allowed = policies.policies(session, course_id)
@@ -58,7 +58,7 @@ def show_all(service: Service, actor: Actor, course_id: int) -> CourseAssignment
 
 
 def load(service: Service, actor: Actor, course_id: int, assignment: str) -> tuple[CourseAssignment, Assignment]:
-    """One assignment of a course. Raises NotFound, and UsageError where the course has none of this id."""
+    """Return one assignment of a course. Raises NotFound, and UsageError if the course does not have it."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         line = open_assignments.find(session, course_id, assignment)
@@ -66,7 +66,7 @@ def load(service: Service, actor: Actor, course_id: int, assignment: str) -> tup
 
 
 def show(service: Service, actor: Actor, course_id: int, assignment: str) -> AssignmentView:
-    """One assignment of a course with all that its page shows. Raises as ``load`` does."""
+    """Return one assignment of a course with the data of its page. Raises like ``load``."""
     line, found = load(service, actor, course_id, assignment)
     with service.store.reading() as session:
         allowed = policies.policies(session, course_id)

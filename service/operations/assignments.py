@@ -1,4 +1,4 @@
-"""Assignments of a course: put into it, opened to students, closed and removed."""
+"""Assignments of a course: add, open, close and remove them."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 
 def prepare(service: Service, actor: Actor, course_id: int, assignment: Assignment) -> CourseAssignment:
-    """Put an assignment into a course, not yet open; one of the same id is marked by this version from now on.
+    """Add an assignment to a course without opening it, or replace the version of one with the same id.
 
-    Raises NotFound where there is no such course, or the actor does not instruct it.
+    Raises NotFound if the course does not exist, or the actor does not instruct it.
     """
     frozen = freeze(assignment)
     with service.store.transaction() as session:
@@ -34,19 +34,19 @@ def prepare(service: Service, actor: Actor, course_id: int, assignment: Assignme
 
 
 def open_for_students(service: Service, actor: Actor, course_id: int, assignment: str) -> CourseAssignment:
-    """Let students see an assignment and submit to it. Raises NotFound, and UsageError where the course has none."""
+    """Open an assignment to students. Raises NotFound, and UsageError if the course does not have it."""
     return _change(service, actor, course_id, assignment, "open", open_assignments.open_for_students)
 
 
 def close(service: Service, actor: Actor, course_id: int, assignment: str) -> CourseAssignment:
-    """Take no more submissions to an assignment; those there are stay. Raises as ``open_for_students`` does."""
+    """Close an assignment to new submissions; existing ones are kept. Raises like ``open_for_students``."""
     return _change(service, actor, course_id, assignment, "close", open_assignments.close)
 
 
 def remove(service: Service, actor: Actor, course_id: int, assignment: str) -> None:
-    """Remove an assignment that no student has been shown; graded batches stay.
+    """Remove an assignment that students have not seen; graded batches are kept.
 
-    Raises NotFound, and UsageError where the course has none of this id, or has to keep it.
+    Raises NotFound, and UsageError if the course does not have it or must keep it.
     """
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -55,7 +55,7 @@ def remove(service: Service, actor: Actor, course_id: int, assignment: str) -> N
 
 
 def hide_names(service: Service, actor: Actor, course_id: int, assignment: str, *, hidden: bool) -> CourseAssignment:
-    """Hide or show whose work it is, for all who instruct the course. Raises as ``open_for_students`` does."""
+    """Hide or show students' names to all instructors of the course. Raises like ``open_for_students``."""
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         open_assignments.hide_names(session, course_id, assignment, hidden)

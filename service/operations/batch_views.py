@@ -51,9 +51,9 @@ _BATCHES_A_PAGE = 30
 
 @dataclass(frozen=True, slots=True)
 class BatchesPage:
-    """Some batches of a course, newest first, and the assignments that it has prepared.
+    """A page of a course's batches, newest first, with its prepared assignments.
 
-    ``older`` is the last of these batches where older ones follow.
+    ``older`` is the id of the last batch if older ones follow.
     """
 
     batches: tuple[BatchLine, ...]
@@ -63,7 +63,7 @@ class BatchesPage:
 
 @dataclass(frozen=True, slots=True)
 class BatchView:
-    """A batch, how far it is, and how fast that changes."""
+    """A batch with its progress and pace."""
 
     batch: BatchLine
     progress: BatchProgress
@@ -72,7 +72,7 @@ class BatchView:
 
 @dataclass(frozen=True, slots=True)
 class TableView:
-    """A batch with all its rows, and what was done to it, newest first."""
+    """A batch with all its rows and its activity log, newest first."""
 
     view: BatchView
     lines: tuple[TableLine, ...]
@@ -93,7 +93,7 @@ class GradedView:
 
 @dataclass(frozen=True, slots=True)
 class StatusView:
-    """All that is known of a batch; ``changes`` are those of a batch of regrades."""
+    """The complete status of a batch; ``changes`` are those of a batch of regrades."""
 
     graded: GradedView
     ranks: tuple[RankTable, ...]
@@ -103,9 +103,9 @@ class StatusView:
 
 @dataclass(frozen=True, slots=True)
 class OverviewView:
-    """What came of a batch by assignment.
+    """Results of a batch, by assignment.
 
-    ``missing`` are the students without a submission where the batch has no graded one at all.
+    If the batch has no graded submissions, ``missing`` contains the students without a submission.
     """
 
     batch: BatchLine
@@ -115,7 +115,7 @@ class OverviewView:
 
 
 def list_batches_page(service: Service, actor: Actor, course_id: int, after: str = "") -> BatchesPage:
-    """The newest batches of a course that are older than ``after``, if that is one of them. Raises NotFound."""
+    """Return the newest batches of a course, or those older than the batch ``after``. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         last = session.get(Batch, after) if after else None
@@ -129,44 +129,41 @@ def list_batches_page(service: Service, actor: Actor, course_id: int, after: str
 def list_batches(
     service: Service, actor: Actor, course_id: int, limit: int, after: tuple[datetime, str] | None = None
 ) -> list[BatchLine]:
-    """The newest batches of a course; ``after`` is the time and id of the last one already seen. Raises NotFound."""
+    """Return the newest batches of a course, after the batch with this time and id. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         return batches.batches_of(session, course_id, limit, after)
 
 
 def list_newest(service: Service, actor: Actor, course: str | None) -> list[BatchLine]:
-    """The newest batches of the course of this name, or of all courses; for operators. Raises NotFound."""
+    """Return the newest batches of the course with this name, or of all courses; for operators. Raises NotFound."""
     with service.store.reading() as session:
         check_operator(actor)
         return batches.list_batches(session, None if course is None else course_named(session, actor, course).id)
 
 
 def look(service: Service, actor: Actor, batch_id: str) -> tuple[BatchProgress, BatchState]:
-    """How far a batch of any course is, and its state, in few queries; for operators who wait for it.
-
-    Raises NotFound.
-    """
+    """Return the progress and state of a batch of any course, in few queries, for operators. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
         return batches.progress(session, batch_id), existing_batch(session, batch_id).state
 
 
 def list_workers(service: Service, actor: Actor) -> list[WorkerDescription]:
-    """The workers that run, for operators. Raises NotFound."""
+    """Return the active workers, for operators. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
         return [seen.worker for seen in workers.known_workers(session) if seen.lately]
 
 
 def show_progress(service: Service, actor: Actor, course_id: int, batch_id: str) -> BatchView:
-    """How far a batch is. Raises NotFound."""
+    """Return the progress of a batch. Raises NotFound."""
     with service.store.reading() as session:
         return _view(session, actor, course_id, batch_id)
 
 
 def show_table(service: Service, actor: Actor, course_id: int, batch_id: str) -> TableView:
-    """A batch with a row for each submission and each refusal. Raises NotFound."""
+    """Return a batch with a row for each submission and rejection. Raises NotFound."""
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
         view = _view(session, actor, course_id, batch_id)
@@ -180,7 +177,7 @@ def show_table(service: Service, actor: Actor, course_id: int, batch_id: str) ->
 def table_page(
     service: Service, actor: Actor, course_id: int, lines: Sequence[TableLine], asked: TableAsked
 ) -> tuple[TablePage, dict[str, Remarked]]:
-    """Some of the rows, and the remarks on them by job. Raises NotFound."""
+    """Return a page of the rows, and their review counts by job. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         table = batch_table.table_page(lines, asked)
@@ -188,14 +185,14 @@ def table_page(
 
 
 def show_graded(service: Service, actor: Actor, course_id: int, batch_id: str) -> GradedView:
-    """A batch with its grades and their statistics. Raises NotFound."""
+    """Return a batch with its grades and their statistics. Raises NotFound."""
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
         return _graded(session, actor, course_id, batch_id, hidden)
 
 
 def show_status(service: Service, actor: Actor, course_id: int, batch_id: str) -> StatusView:
-    """All that is known of a batch. Raises NotFound."""
+    """Return the complete status of a batch. Raises NotFound."""
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
         graded = _graded(session, actor, course_id, batch_id, hidden)
@@ -209,7 +206,7 @@ def show_status(service: Service, actor: Actor, course_id: int, batch_id: str) -
 def list_grades(
     service: Service, actor: Actor, course_id: int, batch_id: str, limit: int, after: str | None = None
 ) -> list[JobLine]:
-    """Some grades of a batch, following the one with the id ``after``. Raises NotFound."""
+    """Return at most ``limit`` grades of a batch, after the one with the id ``after``. Raises NotFound."""
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -218,7 +215,7 @@ def list_grades(
 
 
 def list_submitted(service: Service, actor: Actor, done: SubmittedBatch) -> list[JobLine]:
-    """The grades of submissions that were just made and of those known before, for operators. Raises NotFound."""
+    """Return the grades of new submissions and of those known before, for operators. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
         lines = [batches.job_line(session, known.job_id) for known in done.known]
@@ -228,7 +225,7 @@ def list_submitted(service: Service, actor: Actor, done: SubmittedBatch) -> list
 
 
 def show_statistics(service: Service, actor: Actor, lines: Iterable[JobLine]) -> tuple[AssignmentStatistics, ...]:
-    """The statistics of these grades by assignment, for operators. Raises NotFound."""
+    """Return the statistics of these grades by assignment, for operators. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
         return _statistics(session, tuple(lines))
@@ -237,7 +234,10 @@ def show_statistics(service: Service, actor: Actor, lines: Iterable[JobLine]) ->
 def show_overview(
     service: Service, actor: Actor, course_id: int, batch_id: str, pass_share: Decimal = PASS_SHARE
 ) -> OverviewView:
-    """What came of a batch: marks, criteria, causes, who is missing and which grades need review. Raises NotFound."""
+    """Return the overview of a batch: marks, criteria, causes, missing students and grades to review.
+
+    Raises NotFound.
+    """
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -250,7 +250,7 @@ def show_overview(
 def show_overview_of(
     service: Service, actor: Actor, course_id: int, table: TableView, pass_share: Decimal = PASS_SHARE
 ) -> OverviewView:
-    """The same of a table that the actor has read. Raises NotFound."""
+    """Return the overview of a table that the actor has already loaded. Raises NotFound."""
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -258,7 +258,7 @@ def show_overview_of(
 
 
 def changes_page(service: Service, actor: Actor, course_id: int, batch_id: str, number: int) -> ChangesPage:
-    """Some changes of a batch of regrades: other marks first. Raises NotFound."""
+    """Return a page of the changes of a batch of regrades, different marks first. Raises NotFound."""
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -267,7 +267,7 @@ def changes_page(service: Service, actor: Actor, course_id: int, batch_id: str, 
 
 
 def is_graded(line: TableLine) -> bool:
-    """Whether the row has a grade that counts."""
+    """Return whether the row has a grade that counts."""
     return current.is_for_students(line)
 
 

@@ -47,17 +47,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class FoundInCourse:
-    """The id of a batch or a grade, and the course that it belongs to."""
+    """The id of a batch or grade, and the id of its course."""
 
     course_id: int
     id: str
 
 
 def find(service: Service, actor: Actor, start: str) -> FoundInCourse:
-    """The batch of any course whose id begins with ``start``, for operators.
+    """Return the batch of any course whose id begins with ``start``, for operators.
 
     Raises:
-        UsageError: no id or several ids begin so.
+        UsageError: The prefix matches no batch or several.
     """
     check_operator(actor)
     with service.store.reading() as session:
@@ -66,10 +66,10 @@ def find(service: Service, actor: Actor, start: str) -> FoundInCourse:
 
 
 def find_grade(service: Service, actor: Actor, start: str) -> FoundInCourse:
-    """The grade of any course whose id begins with ``start``, for operators.
+    """Return the grade of any course whose id begins with ``start``, for operators.
 
     Raises:
-        UsageError: no id or several ids begin so.
+        UsageError: The prefix matches no grade or several.
     """
     check_operator(actor)
     with service.store.reading() as session:
@@ -79,7 +79,7 @@ def find_grade(service: Service, actor: Actor, start: str) -> FoundInCourse:
 
 @dataclass(frozen=True, slots=True)
 class ForeseenSubmission:
-    """A submission that would be taken in, its student's name where it is known, and what would come of it."""
+    """Preview of a submission, with its student's name if known."""
 
     asked: GradingRequest
     name: str
@@ -88,7 +88,7 @@ class ForeseenSubmission:
 
 @dataclass(frozen=True, slots=True)
 class SubmitRequest:
-    """Submissions of several students, as they were read; ``again`` grades also those that were submitted before."""
+    """Submissions of several students. ``again`` also grades those that were submitted before."""
 
     name: str
     contents: BatchContents
@@ -97,35 +97,35 @@ class SubmitRequest:
 
 @dataclass(frozen=True, slots=True)
 class SubmittedBatch:
-    """The batch that was made, None where nothing was new; submissions known before, and all refusals."""
+    """The new batch (None if nothing was new), submissions known before, and all rejections."""
 
     batch: AcceptedBatch | None
     known: tuple[AlreadySubmitted, ...]
     refusals: tuple[Refusal, ...]
-    refused_now: tuple[Refusal, ...]  # those of them that the course refused, not the reading
+    refused_now: tuple[Refusal, ...]  # those rejected by the course rather than while reading
 
     @property
     def jobs(self) -> tuple[Accepted, ...]:
-        """The submissions of the batch that was made."""
+        """Return the submissions of the new batch."""
         return () if self.batch is None else self.batch.jobs
 
     @property
     def queued(self) -> int:
-        """How many submissions are to be graded."""
+        """Return the number of submissions to grade."""
         return sum(job.copied_from is None for job in self.jobs)
 
     @property
     def copied(self) -> int:
-        """How many got the grade of an identical submission at once."""
+        """Return the number of submissions that got the grade of an identical one immediately."""
         return sum(job.copied_from is not None for job in self.jobs)
 
 
 def submit(service: Service, actor: Actor, course_id: int, request: SubmitRequest) -> SubmittedBatch:
-    """Make a batch of submissions and notify the workers. Students appear under the names that the actor may see.
+    """Create a batch of submissions and notify the workers. Students appear under the names that the actor may see.
 
     Raises:
-        NotFound: the actor does not instruct the course.
-        UsageError: none of the submissions can be taken in.
+        NotFound: The actor does not instruct the course.
+        UsageError: None of the submissions can be accepted.
     """
     with service.store.reading() as session:
         course = course_for(session, actor, course_id, Role.INSTRUCTOR).name
@@ -149,10 +149,10 @@ def submit(service: Service, actor: Actor, course_id: int, request: SubmitReques
 
 
 def course_of_batches(service: Service, actor: Actor, name: str | None) -> int:
-    """The id of the course of this name, for operators; without a name the default course, created if necessary.
+    """Return the id of a course by name, for operators; without a name, the default course, created if necessary.
 
     Raises:
-        NotFound: no course has this name.
+        NotFound: No course has this name.
     """
     check_operator(actor)
     with service.store.reading() as session:
@@ -166,11 +166,11 @@ def course_of_batches(service: Service, actor: Actor, name: str | None) -> int:
 
 
 def assignment_for(service: Service, actor: Actor, course_id: int, name: str) -> Assignment | None:
-    """The assignment that a batch is submitted to, as the course or the catalogue has it; None for an empty name.
+    """Return the assignment of a batch from the course or the catalogue; None for an empty name.
 
     Raises:
-        NotFound: the actor does not instruct the course.
-        UsageError: neither the course nor the catalogue has it.
+        NotFound: The actor does not instruct the course.
+        UsageError: Neither the course nor the catalogue has it.
     """
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -178,7 +178,7 @@ def assignment_for(service: Service, actor: Actor, course_id: int, name: str) ->
 
 
 def foresee(service: Service, actor: Actor, course_id: int, contents: BatchContents) -> list[ForeseenSubmission]:
-    """Each submission of an upload with what would come of it if it were submitted now. Raises NotFound."""
+    """Return a preview of each submission of an upload. Raises NotFound."""
     secret = secret_of(service.store).sha256
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -191,7 +191,10 @@ def foresee(service: Service, actor: Actor, course_id: int, contents: BatchConte
 
 
 def assignment_named(session: Session, course_id: int, name: str) -> Assignment:
-    """An assignment as the course has it, otherwise the catalogue's; never a folder. Raises UsageError for neither."""
+    """Return an assignment from the course, otherwise from the catalogue; never from a folder.
+
+    Raises UsageError if neither has it.
+    """
     if name in {each.assignment for each in open_assignments.of_course(session, course_id)}:
         return open_assignments.load(session, course_id, name)
     from submissions.assignment.reader import find_in_catalogue
@@ -201,11 +204,11 @@ def assignment_named(session: Session, course_id: int, name: str) -> Assignment:
 
 @retry_conflicts
 def pause(service: Service, actor: Actor, course_id: int, batch_id: str) -> Controlled:
-    """Begin no more jobs of a batch; running jobs continue.
+    """Start no further jobs of a batch; running jobs continue.
 
     Raises:
-        NotFound: the course has no such batch, or the actor does not instruct it.
-        UsageError: the batch was cancelled, or consists of submissions on the web.
+        NotFound: The course does not have the batch, or the actor does not instruct it.
+        UsageError: The batch was cancelled, or consists of web submissions.
     """
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -220,8 +223,8 @@ def resume(service: Service, actor: Actor, course_id: int, batch_id: str) -> Con
     """Resume a paused batch and notify the workers.
 
     Raises:
-        NotFound: the course has no such batch, or the actor does not instruct it.
-        UsageError: the batch was cancelled, or consists of submissions on the web.
+        NotFound: The course does not have the batch, or the actor does not instruct it.
+        UsageError: The batch was cancelled, or consists of web submissions.
     """
     done = _resume(service, actor, course_id, batch_id)
     service.notifier.grade(Lane.BATCH, done.waiting)
@@ -230,11 +233,11 @@ def resume(service: Service, actor: Actor, course_id: int, batch_id: str) -> Con
 
 @retry_conflicts
 def cancel(service: Service, actor: Actor, course_id: int, batch_id: str) -> Controlled:
-    """End all jobs of a batch that have not ended; existing marks stay.
+    """Cancel all unfinished jobs of a batch; existing marks are kept.
 
     Raises:
-        NotFound: the course has no such batch, or the actor does not instruct it.
-        UsageError: the batch consists of submissions on the web.
+        NotFound: The course does not have the batch, or the actor does not instruct it.
+        UsageError: The batch consists of web submissions.
     """
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -249,18 +252,18 @@ def retry(service: Service, actor: Actor, course_id: int, batch_id: str) -> Retr
     """Queue the dead jobs of a batch again and notify the workers.
 
     Raises:
-        NotFound: the course has no such batch, or the actor does not instruct it.
-        UsageError: the batch was cancelled.
+        NotFound: The course does not have the batch, or the actor does not instruct it.
+        UsageError: The batch was cancelled.
     """
     return _notified(service, _retry(service, actor, course_id, batch_id))
 
 
 def retry_dead(service: Service, actor: Actor, batch_id: str | None) -> Retried:
-    """Queue the dead jobs of a batch of any course again, or with None all dead jobs; for operators.
+    """Queue the dead jobs of a batch of any course again, or all dead jobs for None; for operators.
 
     Raises:
-        NotFound: there is no such batch, or the actor is no operator.
-        UsageError: the batch was cancelled.
+        NotFound: The batch does not exist, or the actor is not an operator.
+        UsageError: The batch was cancelled.
     """
     return _notified(service, _retry(service, actor, None, batch_id))
 
@@ -286,7 +289,7 @@ def _under_shown_names(accepted: AcceptedNew, refusals: tuple[Refusal, ...], hid
 
 
 def _known_name(asked: GradingRequest, names: Mapping[str, str]) -> str:
-    """The student's name where it differs from the id: as in the batch, otherwise as in the course."""
+    """Return the student's name if it differs from the id: from the batch, otherwise from the course."""
     name = asked.student.name if asked.student.name != asked.student.id else ""
     return name or names.get(asked.submission.student, "")
 
@@ -304,7 +307,7 @@ def _resume(service: Service, actor: Actor, course_id: int, batch_id: str) -> Co
 
 @retry_conflicts
 def _retry(service: Service, actor: Actor, course_id: int | None, batch_id: str | None) -> Retried:
-    """Without a course for operators, who retry batches of all courses."""
+    """Retry dead jobs. Without a course, the actor must be an operator."""
     with service.store.transaction() as session:
         if course_id is None:
             check_operator(actor)
@@ -320,7 +323,7 @@ def _retry(service: Service, actor: Actor, course_id: int | None, batch_id: str 
 
 
 def _notified(service: Service, done: Retried) -> Retried:
-    # Each job returns to its own queue; extra notices are harmless.
+    # Each job returns to its own queue; extra notifications are harmless.
     for lane in Lane:
         service.notifier.grade(lane, done.queued)
     return done

@@ -1,4 +1,4 @@
-"""What operations work with: the service they act on, and the actor who asks."""
+"""Context of operations: the service that they act on, and the actor."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from service.store.states import Lane, Role
 
 
 class WorkerNotices(Protocol):
-    """Tells workers that there is work, as ``service.queue.notifier`` does."""
+    """Interface for notifying workers, implemented by ``service.queue.notifier``."""
 
     def grade(self, lane: Lane, count: int = 1) -> None:
-        """Notify for ``count`` jobs of a lane."""
+        """Notify for ``count`` jobs of a queue."""
 
     def try_out(self, count: int = 1) -> None:
-        """Notify for ``count`` programs that students run without submitting them."""
+        """Notify for ``count`` test runs."""
 
     def plot(self, count: int = 1) -> None:
         """Notify for the plots of ``count`` jobs."""
@@ -29,7 +29,7 @@ class WorkerNotices(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """One installation: its settings, its database, and the notifier of its workers."""
+    """An installation: its settings, its database, and the notifier of its workers."""
 
     settings: Settings
     store: Store
@@ -38,10 +38,10 @@ class Service:
 
 @dataclass(frozen=True, slots=True)
 class Actor:
-    """The person or program that asks for an operation.
+    """The person or program that requests an operation.
 
-    ``name`` is what the activity log records. Commands on the machine itself are those of an operator without a
-    ``person_id``. ``reach`` is that of the credential that the actor signed in with.
+    ``name`` is written to the activity log. Commands on the machine act as an operator without a ``person_id``.
+    ``reach`` is that of the actor's credential.
     """
 
     name: str
@@ -53,10 +53,10 @@ class Actor:
 
     @property
     def is_machine(self) -> bool:
-        """Whether this is a command on the machine itself, which may do what every role may."""
+        """Return whether the actor is a command on the machine, which has the permissions of every role."""
         return self.operator and self.person_id is None
 
 
 def machine_operator() -> Actor:
-    """The operator that a command on the machine itself acts as: the account that runs it."""
+    """Return the actor of a command on the machine, named after the account that runs it."""
     return Actor(audit.this_user(), operator=True)

@@ -1,4 +1,4 @@
-"""The courses of an installation: found by name, listed, and created with their first instructor."""
+"""Courses of an installation: find, list and create them."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LONGEST_NAME = 100
 
 @dataclass(frozen=True, slots=True)
 class MemberRequest:
-    """A person to add to a course. ``word`` is what their sign-in link follows from; empty for a random one."""
+    """A person to add to a course. ``word`` determines their sign-in link; empty for a random one."""
 
     course: str
     id: str
@@ -42,7 +42,7 @@ class MemberRequest:
 
 @dataclass(frozen=True, slots=True)
 class AddedMember:
-    """A member, the secret of their sign-in link, and the instructors elsewhere who have the same id."""
+    """A new member, the secret of their sign-in link, and instructors with the same id in other courses."""
 
     member: Member
     secret: str
@@ -60,7 +60,7 @@ class OwnCourse:
 
 @dataclass(frozen=True, slots=True)
 class TaughtCourse:
-    """A course as its instructors see it on every page of it."""
+    """A course, as its instructors see it on each of its pages."""
 
     id: int
     name: str
@@ -68,9 +68,9 @@ class TaughtCourse:
 
 
 def find(service: Service, actor: Actor, name: str) -> int:
-    """The id of the course of this name. The default course is created where an installation has none yet.
+    """Return the id of the course with this name. Creates the default course if it does not exist.
 
-    Raises NotFound for every other name that no course has.
+    Raises NotFound if no other course has the name.
     """
     check_operator(actor)
     with service.store.reading() as session:
@@ -81,42 +81,42 @@ def find(service: Service, actor: Actor, name: str) -> int:
 
 
 def show_own(service: Service, actor: Actor, course_id: int, role: Role) -> OwnCourse:
-    """A course in which the actor has this role. Raises NotFound."""
+    """Return a course in which the actor has this role. Raises NotFound."""
     with service.store.reading() as session:
         return OwnCourse(course_id, course_for(session, actor, course_id, role).name, role)
 
 
 def show_taught(service: Service, actor: Actor, course_id: int) -> TaughtCourse:
-    """A course that the actor instructs. Raises NotFound."""
+    """Return a course that the actor instructs. Raises NotFound."""
     with service.store.reading() as session:
         row = course_for(session, actor, course_id, Role.INSTRUCTOR)
         return TaughtCourse(row.id, row.name, appeals.waiting(session, row.id))
 
 
 def list_own(service: Service, actor: Actor) -> list[OwnCourse]:
-    """The courses that the actor has a role in, by id."""
+    """Return the courses in which the actor has a role, ordered by id."""
     with service.store.reading() as session:
         rows = session.scalars(select(Course).where(Course.id.in_(actor.roles)).order_by(Course.id))
         return [OwnCourse(row.id, row.name, actor.roles[row.id]) for row in rows]
 
 
 def list_courses(service: Service, actor: Actor) -> list[CourseLine]:
-    """All courses by name, with their numbers of members, for operators. Raises NotFound."""
+    """Return all courses by name, with their numbers of members, for operators. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
         return membership.courses(session)
 
 
 def add_member(service: Service, actor: Actor, request: MemberRequest) -> AddedMember:
-    """Add an instructor or a student to a course, with a link that signs them in once.
+    """Add an instructor or student to a course and create a single-use sign-in link.
 
-    An instructor's course is created where there is none of the name; a student's has to exist.
+    Adding an instructor creates the course if necessary; adding a student does not.
 
     Raises:
-        NotFound: the actor is no operator, or there is no such course.
-        Forbidden: somebody else than a command makes an operator.
-        Invalid: a name is blank or too long.
-        UsageError: the id is a student's already, or cannot be told from another's.
+        NotFound: The actor is not an operator, or the course does not exist.
+        Forbidden: Only commands on the machine can make operators.
+        Invalid: A name is blank or too long.
+        UsageError: The id belongs to a student already, or is ambiguous.
     """
     check_operator(actor)
     if request.operator and not actor.is_machine:

@@ -1,4 +1,4 @@
-"""A person's own sessions and tokens: make, list and end them, as far as the actor's own credential reaches."""
+"""Sessions and tokens of the actor, within the reach of their credential: create, list and end them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from service.store.states import Role
 
 @dataclass(frozen=True, slots=True)
 class TokenRequest:
-    """A token to make. ``word`` is what its secret follows from, so that the same request twice makes one token."""
+    """A token to create. ``word`` determines its secret, so that repeating the request creates no second token."""
 
     name: str
     scopes: frozenset[str]
@@ -27,9 +27,9 @@ class TokenRequest:
 
 
 def make_token(service: Service, actor: Actor, request: TokenRequest) -> None:
-    """Make a token for the actor, which reaches no further than what they signed in with.
+    """Create a token for the actor, with at most the reach of their credential.
 
-    Raises Invalid for scopes that are of no use to them, Conflict where they have too many tokens.
+    Raises Invalid for scopes that the actor cannot use, Conflict if they have too many tokens.
     """
     person_id = _person(actor)
     check_scopes(request.scopes, list(actor.roles.values()), operator=actor.operator, limit=actor.reach.scopes)
@@ -43,19 +43,19 @@ def make_token(service: Service, actor: Actor, request: TokenRequest) -> None:
 
 
 def show_unused_token(service: Service, actor: Actor, word: str) -> str:
-    """The secret of the actor's token that was made of this word; empty once it has been used."""
+    """Return the secret of the actor's token created from this word; empty after its first use."""
     with service.store.reading() as session:
         return credentials.unused_token(session, _person(actor), word)
 
 
 def list_credentials(service: Service, actor: Actor) -> list[CredentialLine]:
-    """The actor's sessions and tokens, newest first."""
+    """Return the actor's sessions and tokens, newest first."""
     with service.store.reading() as session:
         return credentials.of_person(session, _person(actor), actor.reach)
 
 
 def end_credential(service: Service, actor: Actor, credential_id: str) -> None:
-    """End one of the actor's sessions or tokens. Raises NotFound where they have none of this id."""
+    """End one of the actor's sessions or tokens. Raises NotFound if they do not have it."""
     person_id = _person(actor)
     with service.store.transaction() as session:
         if not credentials.revoke(session, credential_id, person_id, actor.reach):
@@ -64,7 +64,7 @@ def end_credential(service: Service, actor: Actor, credential_id: str) -> None:
 
 
 def end_other_credentials(service: Service, actor: Actor) -> int:
-    """End the actor's links, sessions and tokens, except the one that they use now; returns how many ended."""
+    """End all credentials of the actor except the one in use. Returns the number ended."""
     person_id = _person(actor)
     with service.store.transaction() as session:
         ended = credentials.revoke_all(session, person_id, but=actor.credential_id, reach=actor.reach)
@@ -75,14 +75,14 @@ def end_other_credentials(service: Service, actor: Actor) -> int:
 def check_scopes(
     scopes: frozenset[str], roles: list[Role], *, operator: bool, limit: frozenset[str] = Reach().scopes
 ) -> None:
-    """Raise Invalid unless these are scopes that somebody with these roles can use; an empty ``limit`` is none."""
+    """Raise Invalid unless a person with these roles can use the scopes. An empty ``limit`` means no limit."""
     offered = offered_scopes(roles, operator=operator, limit=limit or None)
     if not scopes or not scopes <= offered.keys():
         raise Invalid("Say what the token may do: %(scopes)s.", scopes=", ".join(offered))
 
 
 def check_number(session: Session, person_id: int) -> None:
-    """Raise Conflict where a person has as many tokens as one may have."""
+    """Raise Conflict if a person has the maximum number of tokens."""
     if credentials.count_tokens(session, person_id) >= MOST_TOKENS:
         raise Conflict("There are %(count)s tokens already. Revoke one first.", count=MOST_TOKENS)
 

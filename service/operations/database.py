@@ -1,4 +1,4 @@
-"""The database of an installation: upgraded, backed up, restored and purged by commands on the machine itself."""
+"""Database maintenance by commands on the machine: upgrade, backup, restore and purge."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from sim.errors import UsageError
 
 
 def upgrade(settings: Settings) -> str:
-    """Bring the tables up to this release; returns their revision. Raises as ``open_store`` does."""
+    """Upgrade the tables to this release and return their revision. Raises like ``open_store``."""
     open_store(settings).close()
     return newest_revision()
 
 
 def back_up(settings: Settings, file: Path) -> int:
-    """Copy the database as it is, in use or not, into a new file; returns its size in bytes.
+    """Copy the database, in use or not, into a new file. Returns its size in bytes.
 
-    Raises UsageError where there is no database yet or the file exists, HostError where the copy fails.
+    Raises UsageError if there is no database yet or the file exists, HostError if the copy fails.
     """
     engine = open_engine(settings.database)
     if engine.dialect.name == "sqlite" and not Path(str(engine.url.database)).exists():
@@ -37,10 +37,12 @@ def back_up(settings: Settings, file: Path) -> int:
 
 
 def restore(service: Service, actor: Actor, file: Path) -> str:
-    """Restore a backup into a database without submissions; returns the database's address without its password.
+    """Restore a backup into a database without submissions. Returns the database's address without its password.
 
-    Raises Forbidden for anybody but commands, UsageError for a file that is no backup and a database that is not empty,
-    HostError for a backup of a newer release.
+    Raises:
+        Forbidden: The actor is not a command on the machine.
+        UsageError: The file is not a backup, or the database is not empty.
+        HostError: The backup was made by a newer release.
     """
     check_machine(actor)
     backup.restore(file, service.store.engine)
@@ -48,15 +50,15 @@ def restore(service: Service, actor: Actor, file: Path) -> str:
 
 
 def count_old(service: Service, actor: Actor, before: datetime) -> Purged:
-    """How much ``remove_old`` would remove. Raises Forbidden for anybody but commands."""
+    """Return the counts that ``remove_old`` would remove. Raises Forbidden unless called by a command."""
     check_machine(actor)
     return purge.purge(service.store, before, actor.name, only_count=True)
 
 
 def remove_old(service: Service, actor: Actor, before: datetime) -> Purged:
-    """Remove the submissions from before a moment, with grades, recordings and students who have nothing left.
+    """Remove submissions from before a moment, with grades, recordings, and students without remaining submissions.
 
-    Raises Forbidden for anybody but commands.
+    Raises Forbidden unless called by a command.
     """
     check_machine(actor)
     return purge.purge(service.store, before, actor.name)

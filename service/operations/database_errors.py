@@ -1,4 +1,4 @@
-"""Errors of the database, for interfaces to catch and to answer."""
+"""Classification of database errors, for interfaces to catch and report."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from service.store.engine import is_conflict, is_overtaken
 
 __all__ = ["DatabaseError", "DatabaseFailure", "classify"]
-#: What is raised where the database cannot be reached, is busy for too long, or stops.
+#: Raised if the database is unreachable, busy for too long, or shutting down.
 _AWAY = (OperationalError, InterfaceError, DisconnectionError, PoolTimeoutError)
-#: Class of SQLSTATE of values that PostgreSQL cannot store; its driver raises the same error for a lost connection.
+#: SQLSTATE class of values that PostgreSQL cannot store; its driver raises the same error for a lost connection.
 _PROGRAM_LIMIT = "54"
 
 
 class DatabaseFailure(Enum):
-    """Why the database did not do what it was asked."""
+    """The reason why a database operation failed."""
 
-    CONFLICT = auto()  # somebody else changed the same at the same moment
-    AWAY = auto()  # it cannot be reached, is busy for too long, or stops
-    UNEXPECTED = auto()  # a mistake of ours
+    CONFLICT = auto()  # a concurrent change of the same data
+    AWAY = auto()  # unreachable, busy for too long, or shutting down
+    UNEXPECTED = auto()  # an error in Robomark
 
 
 def classify(error: Exception) -> DatabaseFailure:
-    """The kind of an error that the database raised."""
+    """Return the kind of a database error."""
     if is_conflict(error) or is_overtaken(error):
         return DatabaseFailure.CONFLICT
     exceeds_limit = str(getattr(getattr(error, "orig", None), "sqlstate", None)).startswith(_PROGRAM_LIMIT)

@@ -1,6 +1,6 @@
-"""Reasons why an operation refuses; each interface renders them in its reader's language.
+"""Errors of operations; each interface renders them in its reader's language.
 
-Each carries a message template and its parameters, as every ``RobomarkError`` does.
+Each has a message template and its parameters, like every ``RobomarkError``.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from sim.errors import UsageError
 
 
 class OperationError(UsageError):
-    """Base of all refusals of operations."""
+    """Base of all errors of operations."""
 
 
 class NotFound(OperationError):
@@ -17,12 +17,12 @@ class NotFound(OperationError):
 
 
 class Forbidden(OperationError):
-    """The actor may see the object but not do this with it (HTTP 403)."""
+    """The actor may see the object, but does not have permission for the action (HTTP 403)."""
 
 
 class Conflict(OperationError):
-    """The object has changed since the actor saw it, or its state does not allow the action (HTTP 409)."""
+    """The object has changed since the actor read it, or its state does not allow the action (HTTP 409)."""
 
 
 class Invalid(OperationError):
-    """The request itself cannot be carried out, for example because a value is out of range (HTTP 422)."""
+    """The request is invalid, for example because a value is out of range (HTTP 422)."""

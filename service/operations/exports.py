@@ -37,9 +37,9 @@ _TYPES: Mapping[str, str] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class ExportRequest:
-    """The format, and whether only published grades are exported.
+    """Options of an export: the format, and a limit to published grades.
 
-    ``worksheet`` is the text that a format fills in. ``one_each`` asks for a file for each submission where the format
+    ``worksheet`` is the text that a format fills in. ``one_each`` requests a file for each submission if the format
     also has a table.
     """
 
@@ -51,10 +51,10 @@ class ExportRequest:
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """The exported texts: one, or by file name one for each submission; none where a package was written.
+    """The result of an export: one text, or one text for each submission by file name; none for a package.
 
-    ``for_staff`` are grades that only staff can see, ``unjudged`` exported ones with criteria that could not be judged,
-    and ``left_over`` the rows that the other program would not recognise.
+    ``for_staff`` contains staff-only grades, ``unjudged`` exported grades with unjudged criteria, and ``left_over`` the
+    rows that the other program would not recognise.
     """
 
     text: str
@@ -67,7 +67,7 @@ class Export:
 
 @dataclass(frozen=True, slots=True)
 class Download:
-    """An export as one file."""
+    """An export as a single file."""
 
     name: str
     media_type: str
@@ -82,11 +82,11 @@ def export(
     request: ExportRequest,
     sink: BinaryIO | None = None,
 ) -> Export:
-    """The grades of a batch that stand, in a format. A package is written to ``sink``.
+    """Export the standing grades of a batch in a format. A package is written to ``sink``.
 
     Raises:
-        NotFound: the course has no such batch, or the actor does not instruct it.
-        Invalid: there is no such format, it does not go with the worksheet, or it needs names that are hidden.
+        NotFound: The course does not have the batch, or the actor does not instruct it.
+        Invalid: The format is unknown, does not match the worksheet, or requires hidden names.
     """
     chosen = _format(request)
     hidden = names_for(service, actor, course_id)
@@ -128,7 +128,7 @@ def export(
 
 
 def download(service: Service, actor: Actor, course_id: int, batch_id: str, request: ExportRequest) -> Download:
-    """The same as one file; several are a zip. Raises as ``export`` does."""
+    """Export as a single file; several files are zipped. Raises like ``export``."""
     chosen, sink = _format(request), io.BytesIO()
     found = export(service, actor, course_id, batch_id, request, sink)
     suffix, data = chosen.suffix, sink.getvalue() if chosen.packed is not None else found.text.encode()
@@ -154,9 +154,9 @@ def _is_for_staff(line: JobLine) -> bool:
 
 
 def _files(chosen: Format, rows: Sequence[TableRow[Grade]]) -> list[tuple[str, str]]:
-    """A file for each grade and, where the format has a text for them, for each refusal.
+    """Return a file for each grade, and for each rejection if the format supports them.
 
-    Files are named after the student, and after the assignment where one student has several.
+    Files are named after the student, and after the assignment if a student has several.
     """
     graded = [(row, row.grade) for row in rows if row.grade is not None]
     stems = file_stems([(row.student.id, row.assignment) for row, _ in graded])

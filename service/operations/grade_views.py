@@ -1,4 +1,4 @@
-"""One grade as staff see it: how far it is, its report and replay, the grades beside it, and what was submitted."""
+"""A grade as staff see it: state, report, replay, neighbouring grades, and submitted files."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from service.store.states import CancelReason, JobState, Role
 
 @dataclass(frozen=True, slots=True)
 class Neighbours:
-    """The ids of the grades before and after one in the table of its batch; empty where there is none."""
+    """The ids of the previous and next grade in the table of a batch; empty if there is none."""
 
     before: str = ""
     after: str = ""
@@ -38,10 +38,10 @@ class Neighbours:
 
 @dataclass(frozen=True, slots=True)
 class GradeView:
-    """A grade with its report, where there is one, the other grades of its submission, and what was done with it."""
+    """A grade with its report, if any, the other grades of its submission, and its activity log."""
 
     line: JobLine
-    batch_id: str | None  # in which it was graded
+    batch_id: str | None  # the batch that it was graded in
     report: ReportParts | None
     change: Change | None  # of a regrade
     gradings: list[Grading]
@@ -53,14 +53,14 @@ class GradeView:
 
 @dataclass(frozen=True, slots=True)
 class SubmittedFiles:
-    """What was submitted, as a zip that can be submitted again."""
+    """Submitted files, as a zip that can be submitted again."""
 
     data: bytes
     name: str
 
 
 def show_state(service: Service, actor: Actor, course_id: int, job_id: str) -> JobLine:
-    """How far one grading is. Raises NotFound."""
+    """Return the state of one grading. Raises NotFound."""
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
         _grade(session, actor, course_id, job_id)
@@ -68,7 +68,7 @@ def show_state(service: Service, actor: Actor, course_id: int, job_id: str) -> J
 
 
 def show_grade(service: Service, actor: Actor, course_id: int, job_id: str, language: Language = ENGLISH) -> GradeView:
-    """One grade with all that its page shows. Raises NotFound."""
+    """Return one grade with the data of its page. Raises NotFound."""
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
         row = _grade(session, actor, course_id, job_id)
@@ -86,32 +86,32 @@ def show_grade(service: Service, actor: Actor, course_id: int, job_id: str, lang
 
 
 def show_neighbours(service: Service, actor: Actor, course_id: int, job_id: str) -> Neighbours:
-    """The grades before and after one in the table of its batch, in the order that the actor sees. Raises NotFound."""
+    """Return the previous and next grade in the order of the table that the actor sees. Raises NotFound."""
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
         return _neighbours(session, _grade(session, actor, course_id, job_id), hidden)
 
 
 def show_result(service: Service, actor: Actor, course_id: int, job_id: str) -> View:
-    """All of a grade, hidden criteria and trials among it. Raises NotFound, also where there is no grade yet."""
+    """Return a grade including hidden criteria and trials. Raises NotFound, also before it is graded."""
     return _result(service, actor, course_id, job_id, ENGLISH)[1]
 
 
 def show_report(service: Service, actor: Actor, course_id: int, job_id: str, language: Language = ENGLISH) -> str:
-    """The report of a grade as a page of its own. Raises NotFound, also where there is no grade yet."""
+    """Return the report of a grade as a standalone page. Raises NotFound, also before it is graded."""
     line, view = _result(service, actor, course_id, job_id, language)
     return report_alone(service.store, line.id, line.plots, view)
 
 
 def show_replay(service: Service, actor: Actor, course_id: int, job_id: str) -> dict[str, Any]:
-    """What a replay of the grade's trials plays. Raises NotFound, also where there is no grade yet."""
+    """Return the replay data of the grade's trials. Raises NotFound, also before it is graded."""
     _, view = _result(service, actor, course_id, job_id, ENGLISH)
     with service.store.reading() as session:
         return replay_document(session, job_id, view)
 
 
 def show_files(service: Service, actor: Actor, course_id: int, submission_id: int) -> SubmittedFiles:
-    """What was submitted, which names its student. Raises NotFound, also where names are hidden."""
+    """Return the submitted files, which can name the student. Raises NotFound, also if names are hidden."""
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -122,7 +122,7 @@ def show_files(service: Service, actor: Actor, course_id: int, submission_id: in
 
 
 def replay_document(session: Session, job_id: str, view: View) -> dict[str, Any]:
-    """What a replay plays of the trials in a view of a job's grade."""
+    """Return the replay data of the trials in a view of a job's grade."""
     submission = intake.load_submission(session, job_id)
     return replay_of_grade(view, submission, own_floors(intake.load_assignment(session, job_id)))
 

@@ -1,4 +1,4 @@
-"""What instructors do with one grade: set marks by hand, excuse criteria, comment, publish it and grade it again."""
+"""Changes to one grade by staff: override marks, excuse criteria and comment."""
 
 from __future__ import annotations
 
@@ -27,10 +27,9 @@ __all__ = ["LONGEST_COMMENT", "LONGEST_REASON"]
 
 @dataclass(frozen=True, slots=True)
 class MarksRequest:
-    """Marks for a criterion in place of the grader's; None excuses the criterion.
+    """Marks that override the grader's for a criterion; None excuses the criterion.
 
-    ``seen`` is the id of the override that the actor has looked at, 0 for none. None means that they looked at nothing,
-    so that the change is made whatever there is.
+    ``seen`` is the id of the override that the actor last read, 0 for none. None skips this check.
     """
 
     criterion: str
@@ -41,7 +40,7 @@ class MarksRequest:
 
 @dataclass(frozen=True, slots=True)
 class CommentRequest:
-    """A comment for the student; an empty ``criterion`` is for all of the submission."""
+    """A comment for the student; an empty ``criterion`` refers to the whole submission."""
 
     text: str
     criterion: str = ""
@@ -49,7 +48,7 @@ class CommentRequest:
 
 @dataclass(frozen=True, slots=True)
 class Marking:
-    """The criteria of a grade as they count, the comments on it, and what was done by hand."""
+    """The effective criteria of a grade, its comments, and the history of changes by staff."""
 
     line: JobLine
     title: str  # of the assignment
@@ -59,7 +58,7 @@ class Marking:
 
 
 def show_marking(service: Service, actor: Actor, course_id: int, job_id: str) -> Marking:
-    """What was set by hand and written for a grade, and what the grader gave. Raises NotFound."""
+    """Return the overrides and comments of a grade, with the grader's own marks. Raises NotFound."""
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
         _grade(session, actor, course_id, job_id)
@@ -67,12 +66,12 @@ def show_marking(service: Service, actor: Actor, course_id: int, job_id: str) ->
 
 
 def set_marks(service: Service, actor: Actor, course_id: int, job_id: str, request: MarksRequest) -> Marking:
-    """Set the marks of a criterion, or excuse it, for this submission and all its grades.
+    """Override the marks of a criterion, or excuse it, for this submission and all its grades.
 
     Raises:
-        NotFound: there is no such grade for the actor.
-        Conflict: the submission has no grade, or the marks were changed after the actor saw them.
-        UsageError: there is no such criterion, the marks are out of its range, or there is no reason.
+        NotFound: The grade does not exist for the actor.
+        Conflict: The submission is not graded, or the marks changed after the actor read them.
+        UsageError: The criterion is unknown, the marks are out of range, or the reason is missing.
     """
     wanted = overrides.read_marks(request.marks) if isinstance(request.marks, str) else request.marks
 
@@ -89,12 +88,12 @@ def set_marks(service: Service, actor: Actor, course_id: int, job_id: str, reque
 def withdraw(
     service: Service, actor: Actor, course_id: int, job_id: str, criterion: str, seen: int | None = None
 ) -> Marking:
-    """Let the grader's marks of a criterion count again; ``seen`` as in ``MarksRequest``.
+    """Restore the grader's marks of a criterion; ``seen`` as in ``MarksRequest``.
 
     Raises:
-        NotFound: there is no such grade for the actor.
-        Conflict: the submission has no grade, or the marks were changed after the actor saw them.
-        UsageError: nothing was set by hand for the criterion.
+        NotFound: The grade does not exist for the actor.
+        Conflict: The submission is not graded, or the marks changed after the actor read them.
+        UsageError: The criterion has no override.
     """
 
     def change(session: Session) -> None:
@@ -104,9 +103,9 @@ def withdraw(
 
 
 def comment(service: Service, actor: Actor, course_id: int, job_id: str, request: CommentRequest) -> Marking:
-    """Write a comment for the student.
+    """Add a comment for the student.
 
-    Raises NotFound, and UsageError for a criterion that the grade does not have, or a text that is empty or too long.
+    Raises NotFound, and UsageError for an unknown criterion, or a text that is empty or too long.
     """
 
     def change(session: Session) -> None:
@@ -116,7 +115,7 @@ def comment(service: Service, actor: Actor, course_id: int, job_id: str, request
 
 
 def withdraw_comment(service: Service, actor: Actor, course_id: int, job_id: str, comment_id: int) -> Marking:
-    """Show a comment to nobody any more. Raises NotFound, and UsageError where the submission has no such comment."""
+    """Withdraw a comment. Raises NotFound, and UsageError if the submission does not have it."""
     return _change(
         service, actor, course_id, job_id, lambda session: comments.withdraw(session, job_id, comment_id, actor.name)
     )

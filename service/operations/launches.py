@@ -1,4 +1,4 @@
-"""Launches from learning platforms by LTI 1.3: begun by the platform, completed with its signed identity token."""
+"""LTI 1.3 launches: started by the platform, and completed with its signed identity token."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from service.store.states import CredentialKind
 
 @dataclass(frozen=True, slots=True)
 class LaunchRequest:
-    """The parameters with which a platform begins a launch."""
+    """The parameters with which a platform starts a launch."""
 
     issuer: str
-    client_id: str  # empty where the platform does not send it
+    client_id: str  # empty if the platform does not send it
     login_hint: str
     message_hint: str
     address: str  # of this installation
@@ -30,7 +30,7 @@ class LaunchRequest:
 
 @dataclass(frozen=True, slots=True)
 class BegunLaunch:
-    """The state of a launch, which its end has to repeat, and the platform's address to send the browser to."""
+    """The state of a started launch, and the platform's address to redirect the browser to."""
 
     state: str
     authorization_address: str
@@ -38,7 +38,7 @@ class BegunLaunch:
 
 @dataclass(frozen=True, slots=True)
 class CompletedLaunch:
-    """A session for the person of a launch, the course and role that it is for, and the path to open."""
+    """A session for the launched person, with the course, role and path to open."""
 
     session: NewSession
     launched: Launched
@@ -46,18 +46,18 @@ class CompletedLaunch:
 
 
 class UnknownPlatform(Invalid):
-    """The issuer and the client are those of no registered platform."""
+    """No registered platform has this issuer and client."""
 
 
 def list_keys(service: Service) -> dict[str, Any]:
-    """The JSON Web Key Set of this installation; a key is created where there is none."""
+    """Return the JSON Web Key Set of this installation, creating a key if there is none."""
     with service.store.transaction() as session:
         signing_key(session)
         return public_keys(session)
 
 
 def begin(service: Service, request: LaunchRequest) -> BegunLaunch:
-    """Begin a launch. Raises UnknownPlatform."""
+    """Start a launch. Raises UnknownPlatform."""
     with service.store.reading() as session:
         platform = lti.find_platform(session, request.issuer, request.client_id or None)
     if platform is None:
@@ -72,12 +72,12 @@ def begin(service: Service, request: LaunchRequest) -> BegunLaunch:
 
 
 def complete(service: Service, state: str, id_token: str) -> CompletedLaunch:
-    """Sign in the person whom a platform vouches for, and enrol them in the course that they come from.
+    """Sign in the person identified by a platform, and enrol them in the launched course.
 
     Raises:
-        Invalid: the launch is too old or was completed already, or a student comes before any instructor.
-        UsageError: the token cannot be trusted, or the person's id is somebody else's.
-        PlatformError: the platform's keys cannot be fetched.
+        Invalid: The launch has expired or was completed already, or no instructor has launched the course yet.
+        UsageError: The token is not trusted, or the person's id belongs to another person.
+        PlatformError: The platform's keys cannot be fetched.
     """
     with service.store.transaction() as session:
         pending = lti.take_launch(session, state)
@@ -99,7 +99,7 @@ def complete(service: Service, state: str, id_token: str) -> CompletedLaunch:
         )
         if launched is None:
             raise Invalid("no instructor has opened Robomark from this course yet; ask yours to do it first")
-        # A platform vouches for people in its own courses only.
+        # A platform identifies people in its own courses only.
         kind, reach = CredentialKind.SESSION, Reach(platform_id=pending.platform.id)
         secret = credentials.issue(session, launched.person_id, kind, SESSION_LIFETIME, reach=reach)
         audit.note(session, f"platform {pending.platform.name}", "launch", "person", str(launched.person_id))

@@ -1,6 +1,6 @@
-"""The objects that operations act on, each found only by an actor who has the role for it in its course.
+"""Lookup of the objects that operations act on, with a check of the actor's role in the course.
 
-Whoever has not learns the same as where there is no such object, so that no answer reveals what exists.
+A missing object and a missing role give the same error, so that no answer reveals which objects exist.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from service.store.states import Role
 
 
 def check_operator(actor: Actor) -> None:
-    """Raise NotFound unless the actor runs the installation."""
+    """Raise NotFound unless the actor is an operator."""
     if not actor.operator:
         raise _nothing()
 
 
 def check_machine(actor: Actor) -> None:
-    """Raise Forbidden unless the actor is a command on the machine itself."""
+    """Raise Forbidden unless the actor is a command on the machine."""
     if not actor.is_machine:
         raise Forbidden("only a command on the machine itself does this")
 
 
 def course_for(session: Session, actor: Actor, course_id: int, *roles: Role) -> Course:
-    """The course, in which the actor has one of these roles; operators of the machine have every role.
+    """Return a course in which the actor has one of these roles; commands on the machine have every role.
 
     Raises:
-        NotFound: there is no such course, or the actor has none of the roles in it.
+        NotFound: The course does not exist, or the actor has none of the roles in it.
     """
     found = session.get(Course, course_id)
     if found is None or not (actor.is_machine or actor.roles.get(course_id) in roles):
@@ -40,10 +40,10 @@ def course_for(session: Session, actor: Actor, course_id: int, *roles: Role) -> 
 
 
 def course_named(session: Session, actor: Actor, name: str) -> Course:
-    """The course of this name, for operators; no course is made of a mistyped name.
+    """Return the course with this name, for operators; never creates one.
 
     Raises:
-        NotFound: there is no course of this name, or the actor is no operator.
+        NotFound: The course does not exist, or the actor is not an operator.
     """
     check_operator(actor)
     found = session.scalars(select(Course).where(Course.name == name)).one_or_none()
@@ -53,7 +53,7 @@ def course_named(session: Session, actor: Actor, name: str) -> Course:
 
 
 def batch_in(session: Session, course_id: int, batch_id: str) -> Batch:
-    """A batch of the course. Raises NotFound."""
+    """Return a batch of the course. Raises NotFound."""
     row = session.get(Batch, batch_id)
     if row is None or row.course_id != course_id:
         raise _nothing()
@@ -61,7 +61,7 @@ def batch_in(session: Session, course_id: int, batch_id: str) -> Batch:
 
 
 def existing_batch(session: Session, batch_id: str) -> Batch:
-    """A batch of any course, for operators. Raises NotFound."""
+    """Return a batch of any course, for operators. Raises NotFound."""
     row = session.get(Batch, batch_id)
     if row is None:
         raise _nothing()
@@ -69,7 +69,7 @@ def existing_batch(session: Session, batch_id: str) -> Batch:
 
 
 def job_in(session: Session, course_id: int, job_id: str) -> Job:
-    """A job of the course. Raises NotFound."""
+    """Return a job of the course. Raises NotFound."""
     row = session.get(Job, job_id)
     if row is None or session.get_one(Enrolment, row.enrolment_id).course_id != course_id:
         raise _nothing()
@@ -77,7 +77,7 @@ def job_in(session: Session, course_id: int, job_id: str) -> Job:
 
 
 def submission_in(session: Session, course_id: int, submission_id: int) -> SubmissionRow:
-    """A submission in the course. Raises NotFound."""
+    """Return a submission in the course. Raises NotFound."""
     row = session.get(SubmissionRow, submission_id)
     if row is None or session.get_one(Enrolment, row.enrolment_id).course_id != course_id:
         raise _nothing()
@@ -85,7 +85,7 @@ def submission_in(session: Session, course_id: int, submission_id: int) -> Submi
 
 
 def own_submission(session: Session, actor: Actor, course_id: int, submission_id: int) -> SubmissionRow:
-    """A submission of the actor's own in the course. Raises NotFound."""
+    """Return a submission of the actor in the course. Raises NotFound."""
     row = submission_in(session, course_id, submission_id)
     if session.get_one(Enrolment, row.enrolment_id).person_id != actor.person_id:
         raise _nothing()
@@ -93,7 +93,7 @@ def own_submission(session: Session, actor: Actor, course_id: int, submission_id
 
 
 def student_in(session: Session, actor: Actor, course_id: int, enrolment_id: int) -> Enrolment:
-    """A student of a course that the actor instructs. Raises NotFound."""
+    """Return a student of a course that the actor instructs. Raises NotFound."""
     course_for(session, actor, course_id, Role.INSTRUCTOR)
     row = session.get(Enrolment, enrolment_id)
     if row is None or row.course_id != course_id:
@@ -104,7 +104,7 @@ def student_in(session: Session, actor: Actor, course_id: int, enrolment_id: int
 
 
 def own_enrolment(session: Session, actor: Actor, course_id: int, *roles: Role) -> Enrolment:
-    """The actor's enrolment in a course, in which they have one of these roles. Raises NotFound."""
+    """Return the actor's enrolment in a course, in which they have one of these roles. Raises NotFound."""
     mine = (Enrolment.course_id == course_id, Enrolment.person_id == actor.person_id)
     row = session.scalars(select(Enrolment).where(*mine)).one_or_none()
     if row is None or actor.roles.get(course_id) not in roles:
@@ -113,7 +113,7 @@ def own_enrolment(session: Session, actor: Actor, course_id: int, *roles: Role) 
 
 
 def names_for(service: Service, actor: Actor, course_id: int) -> HiddenNames:
-    """The labels that the actor sees in place of students' names; commands on the machine show every name."""
+    """Return the labels that the actor sees in place of students' names; commands on the machine see every name."""
     return NAMED if actor.is_machine else hidden_names_of(service.store, course_id)
 
 

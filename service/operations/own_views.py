@@ -1,4 +1,4 @@
-"""What a student sees in a course: its assignments, their own submissions, and grades as far as these are shown."""
+"""Views for students: the assignments of a course, their own submissions, and visible grades."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from submissions.assignment.task_sheet import TaskSheet, task_sheet
 
 @dataclass(frozen=True, slots=True)
 class TaskView:
-    """An assignment with a student's attempts at it."""
+    """An assignment with a student's attempts."""
 
     sheet: TaskSheet
     attempts: list[OwnSubmission]
@@ -45,7 +45,7 @@ class TaskView:
 
 @dataclass(frozen=True, slots=True)
 class SubmissionView:
-    """One of a student's submissions, and its place in the queue; None once nothing is to come."""
+    """A submission of a student and its place in the queue; None after it has ended."""
 
     submission: OwnSubmission
     place: QueuePlace | None
@@ -53,7 +53,7 @@ class SubmissionView:
 
 @dataclass(frozen=True, slots=True)
 class ReportView:
-    """One of a student's submissions with its report, where there is one, and the attempts and appeals beside it."""
+    """A submission of a student with its report, if any, and the related attempts and appeals."""
 
     submission: OwnSubmission
     place: QueuePlace | None
@@ -66,7 +66,10 @@ class ReportView:
 
 
 def list_assignments(service: Service, actor: Actor, course_id: int) -> list[OwnAssignment]:
-    """What is open to the actor or was submitted by them, most urgent first. Raises NotFound."""
+    """Return the assignments that are open to the actor or that they submitted to, most urgent first.
+
+    Raises NotFound.
+    """
     with service.store.reading() as session:
         return own_work.own_assignments(session, course_id, _enrolment_id(session, actor, course_id))
 
@@ -74,7 +77,7 @@ def list_assignments(service: Service, actor: Actor, course_id: int) -> list[Own
 def list_opened(
     service: Service, actor: Actor, course_id: int, *, limit: int, after: str = ""
 ) -> list[tuple[CourseAssignment, Allowance]]:
-    """Some of the assignments that the course shows its students, by id, those after this one. Raises NotFound."""
+    """Return at most ``limit`` opened assignments of a course, ordered by id, after this one. Raises NotFound."""
     with service.store.reading() as session:
         enrolment_id = _enrolment_id(session, actor, course_id)
         opened = [each for each in open_assignments.of_course(session, course_id) if each.opened_at is not None]
@@ -84,14 +87,14 @@ def list_opened(
 
 
 def show_sheet(service: Service, actor: Actor, course_id: int, assignment: str) -> TaskSheet:
-    """What an assignment asks of students. Raises NotFound where it is not open, unless the actor submitted to it."""
+    """Return the task of an assignment. Raises NotFound if it is not open, unless the actor submitted to it."""
     with service.store.reading() as session:
         enrolment_id = _enrolment_id(session, actor, course_id)
         return task_sheet(seen_assignment(session, course_id, enrolment_id, assignment))
 
 
 def show_given_file(service: Service, actor: Actor, course_id: int, assignment: str, file: str) -> bytes:
-    """A file that an assignment gives its students. Raises NotFound."""
+    """Return a file that an assignment provides to students. Raises NotFound."""
     given = show_sheet(service, actor, course_id, assignment).given
     if file not in given:
         raise _nothing()
@@ -99,7 +102,7 @@ def show_given_file(service: Service, actor: Actor, course_id: int, assignment: 
 
 
 def show_task(service: Service, actor: Actor, course_id: int, assignment: str) -> TaskView:
-    """An assignment with the actor's attempts at it. Raises NotFound as ``show_sheet`` does."""
+    """Return an assignment with the actor's attempts. Raises NotFound like ``show_sheet``."""
     with service.store.reading() as session:
         enrolment_id = _enrolment_id(session, actor, course_id)
         seen = seen_assignment(session, course_id, enrolment_id, assignment)
@@ -119,7 +122,10 @@ def show_task(service: Service, actor: Actor, course_id: int, assignment: str) -
 def list_submissions(
     service: Service, actor: Actor, course_id: int, *, limit: int, before: int | None = None
 ) -> list[SubmissionView]:
-    """Some of the actor's submissions in the course, the newest first, those before this id. Raises NotFound."""
+    """Return at most ``limit`` submissions of the actor in the course, newest first, before this id.
+
+    Raises NotFound.
+    """
     with service.store.reading() as session:
         enrolment_id = _enrolment_id(session, actor, course_id)
         found = own_work.own_submissions_before(session, enrolment_id, before, limit)
@@ -129,7 +135,7 @@ def list_submissions(
 
 
 def show_submission(service: Service, actor: Actor, course_id: int, submission_id: int) -> SubmissionView:
-    """One of the actor's submissions, and how far it is. Raises NotFound."""
+    """Return a submission of the actor and its progress. Raises NotFound."""
     with service.store.reading() as session:
         return _with_place(session, _own(session, _enrolment_id(session, actor, course_id), submission_id))
 
@@ -137,7 +143,7 @@ def show_submission(service: Service, actor: Actor, course_id: int, submission_i
 def show_submission_report(
     service: Service, actor: Actor, course_id: int, submission_id: int, language: Language = ENGLISH
 ) -> ReportView:
-    """One of the actor's submissions with all that its page shows. Raises NotFound."""
+    """Return a submission of the actor with the data of its page. Raises NotFound."""
     with service.store.reading() as session:
         enrolment_id = _enrolment_id(session, actor, course_id)
         found = own_work.own_attempts_beside(session, enrolment_id, submission_id)
@@ -154,7 +160,7 @@ def show_submission_report(
 
 
 def show_result(service: Service, actor: Actor, course_id: int, submission_id: int) -> tuple[str, View]:
-    """The grade's id, and what the actor may see of it. Raises NotFound, also while there is nothing to see."""
+    """Return the id of a grade and the part of it that the actor may see. Raises NotFound if nothing is visible."""
     found, view = _result(service, actor, course_id, submission_id, ENGLISH)
     return found.job_id, view
 
@@ -162,20 +168,20 @@ def show_result(service: Service, actor: Actor, course_id: int, submission_id: i
 def show_report(
     service: Service, actor: Actor, course_id: int, submission_id: int, language: Language = ENGLISH
 ) -> str:
-    """The report as a page of its own, as far as the actor may see it. Raises NotFound as ``show_result`` does."""
+    """Return the visible part of the report as a standalone page. Raises NotFound like ``show_result``."""
     found, view = _result(service, actor, course_id, submission_id, language)
     return report_alone(service.store, found.job_id, found.plots, view)
 
 
 def show_replay(service: Service, actor: Actor, course_id: int, submission_id: int) -> dict[str, Any]:
-    """What a replay plays of the trials that the actor may see. Raises NotFound as ``show_result`` does."""
+    """Return the replay data of the visible trials. Raises NotFound like ``show_result``."""
     found, view = _result(service, actor, course_id, submission_id, ENGLISH)
     with service.store.reading() as session:
         return replay_document(session, found.job_id, view)
 
 
 def show_files(service: Service, actor: Actor, course_id: int, submission_id: int) -> SubmittedFiles:
-    """The files of one of the actor's submissions. Raises NotFound."""
+    """Return the files of a submission of the actor. Raises NotFound."""
     with service.store.reading() as session:
         own_enrolment(session, actor, course_id, Role.STUDENT)
         row = own_submission(session, actor, course_id, submission_id)
@@ -183,7 +189,7 @@ def show_files(service: Service, actor: Actor, course_id: int, submission_id: in
 
 
 def seen_assignment(session: Session, course_id: int, enrolment_id: int, assignment: str) -> Assignment:
-    """An assignment that a student may see: it is open, or they have submitted to it. Raises NotFound."""
+    """Return an assignment that is open or that the student has submitted to. Raises NotFound."""
     if _is_open(session, course_id, assignment):
         return open_assignments.load(session, course_id, assignment)
     submitted = own_work.own_attempts(session, enrolment_id, assignment).newest

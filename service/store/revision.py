@@ -1,6 +1,6 @@
-"""The revision of a database's tables, and whether the code that runs here can use them. Only reads.
+"""Revision of a database's tables, and its compatibility with the running code. Read-only.
 
-``migrate.py`` brings the tables up to date. A migration says which revision's code can still use the tables after it.
+``migrate.py`` upgrades the tables. Each migration names the oldest revision whose code can still use them.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ _OLDER_ADVICE = "robomark db upgrade"
 
 @cache
 def newest_revision() -> str:
-    """The newest revision that the running code knows; a migration's file is named after its own: ``v0009_people.py``.
+    """Return the newest revision that the running code knows, from the file names of the migrations (``v0009_people.py``).
 
-    It is read once: another release can be installed in the same place while this process runs.
+    Cached, because another release can be installed in the same place while this process runs.
     """
     files = (Path(__file__).parent / "migrations" / "versions").glob("v*.py")
     return max(file.name[1:5] for file in files)
@@ -31,19 +31,19 @@ def newest_revision() -> str:
 
 @dataclass(frozen=True, slots=True)
 class SchemaState:
-    """The revision of a database's tables, None for an empty one, and the oldest revision whose code can use them."""
+    """The revision of a database's tables (None if empty), and the oldest revision whose code can use them."""
 
     revision: str | None
     oldest_compatible: str
 
     @property
     def is_usable(self) -> bool:
-        """Whether the code that runs here can use the tables as they are."""
+        """Return whether the running code can use the tables."""
         return self.revision is not None and self.oldest_compatible <= newest_revision() <= self.revision
 
     @property
     def problem(self) -> str:
-        """Why the tables cannot be used, with the fix; empty where they can."""
+        """Return the reason why the tables are unusable, with the fix; empty if they are usable."""
         if self.is_usable or self.revision is None:
             return ""
         advice = _OLDER_ADVICE if self.revision < newest_revision() else _NEWER_ADVICE
@@ -51,13 +51,13 @@ class SchemaState:
 
 
 def current_revision(engine: Engine) -> str | None:
-    """The revision the database is at; None for an empty one."""
+    """Return the revision of the database; None for an empty one."""
     with engine.begin() as connection:
         return revision_of(connection)
 
 
 def revision_of(connection: Connection) -> str | None:
-    """The revision the database is at, asked in a transaction of the caller's; None for an empty one."""
+    """Return the revision of the database within the caller's transaction; None for an empty one."""
     if not inspect(connection).has_table(_TABLE):
         return None
     found: str | None = connection.scalar(select(column("version_num")).select_from(table(_TABLE)))
@@ -65,7 +65,7 @@ def revision_of(connection: Connection) -> str | None:
 
 
 def schema_state(engine: Engine) -> SchemaState:
-    """The revision of the database and what can use it. Tables of before 0017 can be used by their own code alone."""
+    """Return the revision of the database and its compatibility. Before 0017, only the same revision is compatible."""
     with engine.begin() as connection:
         revision = revision_of(connection)
         oldest = None
@@ -75,5 +75,5 @@ def schema_state(engine: Engine) -> SchemaState:
 
 
 def needs_newer_code(session: Session) -> bool:
-    """Whether a migration has made the tables unfit for the code that runs here."""
+    """Return whether a migration has made the tables unusable for the running code."""
     return str(session.scalar(select(_COMPATIBILITY.c.oldest_compatible)) or "") > newest_revision()

@@ -1,6 +1,6 @@
-"""What the rows of the store can be: roles, lanes, and the states of jobs, plots, batches and grades.
+"""Enumerations of the store: roles, queues, and the states of jobs, plots, batches and grades.
 
-Which may follow upon which is said in ``jobs.py``.
+``jobs.py`` defines the transitions between job states.
 """
 
 from __future__ import annotations
@@ -9,58 +9,58 @@ from enum import StrEnum
 
 
 class Role(StrEnum):
-    """What somebody is in a course."""
+    """The role of a member in a course."""
 
     STUDENT = "student"
     INSTRUCTOR = "instructor"
 
 
 class CredentialKind(StrEnum):
-    """What a secret is good for."""
+    """The kind of a credential."""
 
     LINK = "link"  # signs in once
-    SESSION = "session"  # a browser that is signed in
-    TOKEN = "token"  # a program's
+    SESSION = "session"  # a signed-in browser
+    TOKEN = "token"  # for a program
 
 
 class Lane(StrEnum):
-    """Who waits for the job: a person now, or a batch."""
+    """The queue of a job: interactive for a person who waits, or batch."""
 
     INTERACTIVE = "interactive"
     BATCH = "batch"
 
 
 class JobState(StrEnum):
-    """How far a job has come on its way to a grade."""
+    """The state of a job."""
 
     QUEUED = "queued"
     RUNNING = "running"
     DONE = "done"  # has a grade
-    DEAD = "dead"  # could not be graded; ``error`` says why
-    CANCELLED = "cancelled"  # by the intake, which gives a ``CancelReason``, or by staff; ``error`` tells people why
+    DEAD = "dead"  # could not be graded; ``error`` contains the reason
+    CANCELLED = "cancelled"  # by the intake, with a ``CancelReason``, or by staff; ``error`` is for display
 
 
 class CancelReason(StrEnum):
-    """Why the intake cancelled a job."""
+    """The reason why the intake cancelled a job."""
 
     SUPERSEDED = "superseded"  # by a newer submission
-    OVER_LIMIT = "over limit"  # graded only when staff ask for it
+    OVER_LIMIT = "over limit"  # graded only if staff ask for it
 
 
 UNFINISHED = (JobState.QUEUED, JobState.RUNNING)
 
 
 class TryoutState(StrEnum):
-    """How far a program has come that a student tries without submitting it."""
+    """The state of a test run."""
 
     QUEUED = "queued"
     RUNNING = "running"
     DONE = "done"
-    FAILED = "failed"  # by a fault of ours; ``error`` says which
+    FAILED = "failed"  # by a host fault; see ``error``
 
 
 class PlotState(StrEnum):
-    """Plots come after the marks and never change them."""
+    """The state of a job's plots, which follow the marks and do not affect them."""
 
     NONE = "none"
     DUE = "due"
@@ -69,16 +69,16 @@ class PlotState(StrEnum):
 
 
 class BatchState(StrEnum):
-    """What a claim looks at; how far a batch is follows from its jobs."""
+    """The state of a batch, which controls claims. Its progress follows from its jobs."""
 
     OPEN = "open"
-    PAUSED = "paused"  # what runs goes on, what waits is not begun
+    PAUSED = "paused"  # running jobs continue, queued jobs do not start
     CANCELLED = "cancelled"
 
 
 class Standing(StrEnum):
-    """What a job's grade is to its submission. Of one submission at most one grade stands."""
+    """The standing of a job's grade within its submission. At most one grade of a submission stands."""
 
-    STANDS = "stands"  # the one that reports and exports show
-    PROPOSED = "proposed"  # of a regrade, until it is published
-    KEPT = "kept"  # another took its place
+    STANDS = "stands"  # the one shown in reports and exports
+    PROPOSED = "proposed"  # a regrade that is not published yet
+    KEPT = "kept"  # replaced by another grade

@@ -1,6 +1,6 @@
-"""The tables behind the web: how people sign in, what a course has open, what instructors set, and whom else we tell.
+"""Tables of the web service: credentials, open assignments, overrides, appeals, test runs, webhooks and LTI.
 
-Only shapes and constraints, like ``models.py``, whose tables know nothing of these.
+Contains only columns and constraints, like ``models.py``, whose tables do not refer to these.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from service.store.states import CredentialKind, Role
 
 
 class Credential(Base):
-    """What somebody signs in with, or is signed in by: only the hash of its secret is kept."""
+    """A credential; only the hash of its secret is stored."""
 
     __tablename__ = "credential"
 
@@ -27,9 +27,9 @@ class Credential(Base):
     person_id: Mapped[int] = mapped_column(ForeignKey("person.id"), index=True)
     kind: Mapped[CredentialKind]
     sha256: Mapped[str] = mapped_column(String(64), unique=True)  # of the secret
-    name: Mapped[str] = mapped_column(default="")  # what its owner calls it
-    scopes: Mapped[Any] = mapped_column(default=list)  # what it may do; empty for a session without such a limit
-    # How far it reaches: one course, one role, the courses of one platform. None where that is no limit.
+    name: Mapped[str] = mapped_column(default="")  # chosen by its owner
+    scopes: Mapped[Any] = mapped_column(default=list)  # permitted actions; empty for a session without a scope limit
+    # Reach: one course, one role, the courses of one platform. None means unlimited.
     course_id: Mapped[int | None] = mapped_column(ForeignKey("course.id"))
     role: Mapped[Role | None]
     platform_id: Mapped[int | None] = mapped_column(ForeignKey("lti_platform.id"))
@@ -41,7 +41,7 @@ class Credential(Base):
 
 
 class OpenAssignment(Base):
-    """An assignment that students of a course may submit to, in the version that they are marked against."""
+    """An assignment of a course, in the version used for marking."""
 
     __tablename__ = "open_assignment"
     __table_args__ = (Index(None, "course_id", "assignment", unique=True),)
@@ -50,15 +50,15 @@ class OpenAssignment(Base):
     course_id: Mapped[int] = mapped_column(ForeignKey("course.id"))
     assignment: Mapped[str]
     assignment_version_id: Mapped[int] = mapped_column(ForeignKey("assignment_version.id"))
-    opened_at: Mapped[datetime | None]  # None: prepared, and seen by instructors alone
+    opened_at: Mapped[datetime | None]  # None: prepared, and visible only to instructors
     closed_at: Mapped[datetime | None]
-    names_hidden: Mapped[bool] = mapped_column(default=False)  # while it is marked
-    # What its students submit on the web is all in one batch, made when it is opened first.
+    names_hidden: Mapped[bool] = mapped_column(default=False)  # during marking
+    # All web submissions to it are in one batch, created when it is first opened.
     batch_id: Mapped[str | None] = mapped_column(ForeignKey("batch.id"), index=True)
 
 
 class Override(Base):
-    """What an instructor says of one criterion of a submission, in place of the grader; it outlives a regrade."""
+    """An override of one criterion of a submission; it remains in force after a regrade."""
 
     __tablename__ = "override"
     __table_args__ = (
@@ -70,7 +70,7 @@ class Override(Base):
     submission_id: Mapped[int] = mapped_column(ForeignKey("submission.id"))
     criterion: Mapped[str]
     marks: Mapped[Decimal | None]
-    excused: Mapped[bool] = mapped_column(default=False)  # neither its marks nor its most count
+    excused: Mapped[bool] = mapped_column(default=False)  # neither its marks nor its maximum count
     reason: Mapped[str]
     actor: Mapped[str]
     made_at: Mapped[datetime]
@@ -78,7 +78,7 @@ class Override(Base):
 
 
 class Comment(Base):
-    """What an instructor writes to the student of a submission; an empty ``criterion`` is for all of it."""
+    """A comment by staff for the student; an empty ``criterion`` refers to the whole submission."""
 
     __tablename__ = "comment"
 
@@ -92,7 +92,7 @@ class Comment(Base):
 
 
 class Appeal(Base):
-    """A student asks for a second look at a submission, and an instructor answers."""
+    """An appeal of a student against a grade, with the answer of an instructor."""
 
     __tablename__ = "appeal"
 
@@ -101,12 +101,12 @@ class Appeal(Base):
     text: Mapped[str]
     asked_at: Mapped[datetime] = mapped_column(index=True)
     answer: Mapped[str | None]
-    actor: Mapped[str | None]  # who answered
+    actor: Mapped[str | None]  # the instructor who answered
     answered_at: Mapped[datetime | None]
 
 
 class Tryout(Base):
-    """A robot program that a student runs without submitting it."""
+    """A test run: a program that a student runs without submitting it."""
 
     __tablename__ = "tryout"
     __table_args__ = (Index(None, "state", "queued_at"),)
@@ -120,27 +120,27 @@ class Tryout(Base):
     attempt: Mapped[int] = mapped_column(default=0)
     queued_at: Mapped[datetime]
     finished_at: Mapped[datetime | None]
-    words: Mapped[Any | None]  # what came of it, as it is told
+    words: Mapped[Any | None]  # the result, as data for display
     replay: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
     error: Mapped[str | None]  # a sentence
 
 
 class Webhook(Base):
-    """Where somebody wants to be told of what happens in a course."""
+    """A webhook: an address that receives events of a course."""
 
     __tablename__ = "webhook"
 
     id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=new_id)
     course_id: Mapped[int] = mapped_column(ForeignKey("course.id"), index=True)
     url: Mapped[str]
-    secret: Mapped[str] = mapped_column(String(64))  # what deliveries are signed with
+    secret: Mapped[str] = mapped_column(String(64))  # signs the deliveries
     events: Mapped[Any] = mapped_column(default=list)
     created_at: Mapped[datetime]
     revoked_at: Mapped[datetime | None]
 
 
 class Delivery(Base):
-    """One thing to be told to one webhook: the outbox, written in the transaction of what it tells of."""
+    """The outbox: an event for one webhook, written in the transaction of the change that it reports."""
 
     __tablename__ = "delivery"
     __table_args__ = (Index(None, "delivered_at", "due_at"),)
@@ -157,7 +157,7 @@ class Delivery(Base):
 
 
 class IdempotentReply(Base):
-    """What was answered to a request that had a key, so that its repetition changes nothing."""
+    """The reply to a request with an idempotency key, so that repeating the request changes nothing."""
 
     __tablename__ = "idempotent_reply"
     __table_args__ = (Index(None, "credential_id", "key", unique=True),)
@@ -172,7 +172,7 @@ class IdempotentReply(Base):
 
 
 class LtiPlatform(Base):
-    """A learning platform that launches Robomark by LTI 1.3, as its administrator registered us there."""
+    """A learning platform that launches Robomark by LTI 1.3, as registered by its administrator."""
 
     __tablename__ = "lti_platform"
     __table_args__ = (Index(None, "issuer", "client_id", unique=True),)
@@ -185,20 +185,20 @@ class LtiPlatform(Base):
     authorization_url: Mapped[str]
     token_url: Mapped[str]
     keys_url: Mapped[str]
-    # Where else its services may be asked than at the addresses above.
+    # Additional origins for the platform's services.
     service_origins: Mapped[Any] = mapped_column(default=list, server_default="[]")
     created_at: Mapped[datetime]
 
 
 class LtiCourse(Base):
-    """Which course a platform's context is, and where the platform's services for it are."""
+    """The course of a platform's context, with the addresses of the platform's services for it."""
 
     __tablename__ = "lti_course"
     __table_args__ = (Index(None, "platform_id", "deployment", "context", unique=True),)
 
     id: Mapped[int] = mapped_column(primary_key=True)
     platform_id: Mapped[int] = mapped_column(ForeignKey("lti_platform.id"))
-    # A context's id is unique within its deployment. Empty where an older release did not record it.
+    # The id of a context is unique within its deployment. Empty if an older release did not record it.
     deployment: Mapped[str] = mapped_column(default="", server_default="")
     context: Mapped[str]
     course_id: Mapped[int] = mapped_column(ForeignKey("course.id"), index=True)
@@ -207,7 +207,7 @@ class LtiCourse(Base):
 
 
 class LtiPerson(Base):
-    """Whom a platform means by a subject."""
+    """The person of a platform's subject."""
 
     __tablename__ = "lti_person"
     __table_args__ = (Index(None, "platform_id", "subject", unique=True),)
@@ -219,7 +219,7 @@ class LtiPerson(Base):
 
 
 class LtiKey(Base):
-    """A key pair that we sign with; platforms read the public half."""
+    """A key pair for signing; platforms read the public key."""
 
     __tablename__ = "lti_key"
 
@@ -229,7 +229,7 @@ class LtiKey(Base):
 
 
 class LtiLaunch(Base):
-    """A launch that was begun: its state and nonce count once."""
+    """A pending launch: its state and nonce are valid once."""
 
     __tablename__ = "lti_launch"
 
@@ -240,5 +240,5 @@ class LtiLaunch(Base):
     expires_at: Mapped[datetime] = mapped_column(index=True)
 
 
-#: All tables there are: these and those of ``models.py``.
+#: All tables: these and those of ``models.py``.
 METADATA = Base.metadata

@@ -328,7 +328,7 @@ def _reached(reach: Reach) -> list[ColumnElement[bool]]:
 
 
 def _within(reach: Reach) -> list[ColumnElement[bool]]:
-    """Return the conditions for credentials that stay within this reach: only these may be viewed and revoked with it."""
+    """Return the conditions for credentials within this reach: only these may be viewed and revoked with it."""
     limits = (
         (Credential.course_id, reach.course_id),
         (Credential.role, reach.role),
