@@ -70,7 +70,7 @@ class TaughtCourse:
 def find(service: Service, actor: Actor, name: str) -> int:
     """Return the id of the course with this name. Creates the default course if it does not exist.
 
-    Raises NotFound if no other course has the name.
+    Raises NotFound for any other unknown name.
     """
     check_operator(actor)
     with service.store.reading() as session:

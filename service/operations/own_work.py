@@ -1,6 +1,6 @@
-"""What a student asks of their own work: what is open, what they submitted, and what marks they see of it.
+"""Queries for a student's own work: open assignments, submissions, and visible marks.
 
-Reads what is stored and lets ``reports.view`` decide what of it is shown; what to do with it is the pages'.
+``reports.view`` decides which marks are visible; the pages render them.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from service.store.grades.appeals import AppealLine
 from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
 from service.store.states import UNFINISHED, BatchState, CancelReason, JobState, PlotState, Standing
 
-#: Of one student and one assignment; a student who submits more often sees the newest.
+#: Per student and assignment; only the newest submissions are shown.
 MOST_SHOWN = 50
 
 
 @dataclass(frozen=True, slots=True)
 class OwnSubmission:
-    """One of a student's submissions, with the marks that its student sees; None while there are none."""
+    """A submission of a student, with the marks visible to them; None without visible marks."""
 
     id: int
     job_id: str
@@ -41,63 +41,66 @@ class OwnSubmission:
     source: str
     submitted_at: datetime
     days_late: int
-    staff_only: str  # the limit that it is over, as a sentence for staff
+    staff_only: str  # the limit that it exceeds, as a sentence for staff
     over: OverLimit | None
-    same_as: int | None  # the student's first attempt with these files, which is the same attempt
+    same_as: int | None  # the student's first attempt with the same files, which counts as the same attempt
     state: JobState
-    held_back: bool  # its batch is paused or called off
+    held_back: bool  # its batch is paused or cancelled
     suspect: bool
     superseded: bool
-    published: bool  # whether all of the grade is released
+    published: bool  # the whole grade is released
     plots: PlotState
-    shown: bool  # whether its student may see its grade
-    counts: bool  # whether its marks are those of its assignment
+    shown: bool  # its student may see its grade
+    counts: bool  # its marks count for its assignment
     released: frozenset[str] = frozenset()  # the visibilities that its student sees
     marks: Decimal | None = None
     max_marks: Decimal | None = None
 
     @property
     def waits(self) -> bool:
-        """Whether something is still to come."""
+        """Return whether the job is still queued or running."""
         return self.state in UNFINISHED
 
 
 @dataclass(frozen=True, slots=True)
 class Allowance:
-    """How often, and for how long yet, a student may submit to an assignment."""
+    """A student's remaining attempts and time for an assignment."""
 
     limits: PolicyLimits
     attempts_made: int
-    left: timedelta | None  # until the due date, their own; below zero when it is over, None where there is none
-    late_left: timedelta | None  # until nothing counts any more
+    left: timedelta | None  # until the student's due date; negative after it, None without one
+    late_left: timedelta | None  # until late submissions stop counting
 
     @property
     def attempts_left(self) -> int | None:
-        """None where there is no limit."""
+        """Number of remaining attempts; None without a limit."""
         return None if self.limits.attempts is None else max(0, self.limits.attempts - self.attempts_made)
 
     @property
     def days_left(self) -> int:
-        """Whole days until the due date, and what is left of the last one."""
+        """Days until the due date, rounded up."""
         return 0 if self.left is None else max(0, math.ceil(self.left / timedelta(days=1)))
 
     @property
     def hours_left(self) -> int | None:
-        """Whole hours until the due date; None where there is none, or it is over."""
+        """Whole hours until the due date; None without one, or after it."""
         return None if self.left is None or self.left < timedelta(0) else self.left // timedelta(hours=1)
 
     @property
     def date_over(self) -> bool:
-        """Whether a submission would be too late to count."""
+        """Return whether a submission would be too late to count."""
         return self.late_left is not None and self.late_left < timedelta(0)
 
     @property
     def used_up(self) -> bool:
-        """Whether nothing that is new counts any more."""
+        """Return whether no new submission can count."""
         return self.attempts_left == 0 or self.date_over
 
     def hours_late(self, found: OwnSubmission) -> int | None:
-        """Whole hours that it is late; None where it is in time, by a day or more, or its due date has moved since."""
+        """Return the whole hours that a submission is late.
+
+        None if it is on time or a day or more late, or if its due date has moved since.
+        """
         if found.days_late != 1 or self.limits.due_at is None or found.submitted_at <= self.limits.due_at:
             return None
         late = found.submitted_at - self.limits.due_at
@@ -106,27 +109,27 @@ class Allowance:
 
 @dataclass(frozen=True, slots=True)
 class OwnAssignment:
-    """An assignment as its student sees it in a list."""
+    """An assignment, as its student sees it in a list."""
 
     assignment: str
     title: str
     open: bool
     allowance: Allowance
     newest: OwnSubmission | None
-    counting: OwnSubmission | None  # the newest that is graded and over no limit
-    appeal: AppealLine | None  # what was asked last
+    counting: OwnSubmission | None  # the newest that is graded and within the limits
+    appeal: AppealLine | None  # the newest
 
 
 @dataclass(frozen=True, slots=True)
 class OwnAttempts:
-    """A student's submissions to an assignment, the newest first, and the one whose marks count."""
+    """A student's submissions to an assignment, newest first, and the one whose marks count."""
 
     newest: list[OwnSubmission]
     counting: OwnSubmission | None
 
 
 def own_assignments(session: Session, course_id: int, enrolment_id: int) -> list[OwnAssignment]:
-    """What is open to a student or was submitted by them: first what is open, of that what is due soonest."""
+    """Return the assignments that are open to a student or that they submitted to: open ones first, by due date."""
     found = _read(session, _submissions(enrolment_id).where(or_(_counts(enrolment_id), _is_newest(enrolment_id))))
     newest = {each.assignment: each for each in sorted(found, key=lambda each: each.attempt)}
     counting = {each.assignment: each for each in found if each.counts}
@@ -146,14 +149,14 @@ def own_assignments(session: Session, course_id: int, enrolment_id: int) -> list
 
 
 def own_attempts(session: Session, enrolment_id: int, assignment: str) -> OwnAttempts:
-    """A student's submissions to an assignment."""
+    """Return a student's submissions to an assignment."""
     return _listed(_read(session, _attempts(enrolment_id, literal(assignment))))
 
 
 def own_attempts_beside(
     session: Session, enrolment_id: int, submission_id: int
 ) -> tuple[OwnSubmission, OwnAttempts] | None:
-    """One of a student's submissions with those to the same assignment; None where they have none of this id."""
+    """Return a student's submission and all their submissions to its assignment; None if they do not have it."""
     row = aliased(SubmissionRow)
     own = (row.id == submission_id, row.enrolment_id == enrolment_id)
     assignment = select(row.assignment).where(*own).scalar_subquery()
@@ -165,7 +168,7 @@ def own_attempts_beside(
 def own_submissions_before(
     session: Session, enrolment_id: int, submission_id: int | None, limit: int
 ) -> list[OwnSubmission]:
-    """Some of a student's submissions, to whatever assignment, the newest first: those before this one."""
+    """Return at most ``limit`` submissions of a student to all assignments, newest first, before this one."""
     query = _submissions(enrolment_id)
     if submission_id is not None:
         query = query.where(SubmissionRow.id < submission_id)
@@ -173,18 +176,18 @@ def own_submissions_before(
 
 
 def own_submission(session: Session, enrolment_id: int, submission_id: int) -> OwnSubmission | None:
-    """One of a student's submissions; None where they have none of this id."""
+    """Return a student's submission; None if they do not have it."""
     found = _read(session, _submissions(enrolment_id).where(SubmissionRow.id == submission_id))
     return found[0] if found else None
 
 
 def allowance(session: Session, enrolment_id: int, assignment: str) -> Allowance:
-    """What a student may still do, extensions included."""
+    """Return the remaining attempts and time of a student, including extensions."""
     return allowances(session, enrolment_id, [assignment])[assignment]
 
 
 def allowances(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, Allowance]:
-    """The same for several assignments, in as many statements."""
+    """Return ``allowance`` for several assignments, with the same number of statements."""
     limits, at = policies.limits_of_each(session, enrolment_id, assignments), now(session)
     made = policies.attempts_made(session, enrolment_id, assignments)
     return {
@@ -202,7 +205,7 @@ _Submissions = Select[SubmissionRow, Job, str, BatchState | None, int | None, bo
 
 
 def _attempts(enrolment_id: int, assignment: ColumnElement[str], *also: ColumnElement[bool]) -> _Submissions:
-    """The newest to an assignment, the one that counts, and others that are asked for."""
+    """Return a query for the newest submissions to an assignment, the one that counts, and those that match ``also``."""
     row = aliased(SubmissionRow)
     newest = select(row.id).where(row.enrolment_id == enrolment_id, row.assignment == assignment)
     some = or_(
@@ -217,12 +220,12 @@ def _listed(found: list[OwnSubmission]) -> OwnAttempts:
 
 
 def _counts(enrolment_id: int) -> ColumnElement[bool]:
-    """Of a ``SubmissionRow`` of a student: its marks count for its assignment."""
+    """Return the condition that the marks of a student's ``SubmissionRow`` count."""
     return SubmissionRow.id.in_(current.counting(SubmissionRow.enrolment_id == enrolment_id))
 
 
 def _is_newest(enrolment_id: int) -> ColumnElement[bool]:
-    """Of a ``SubmissionRow`` of a student: none to its assignment came later."""
+    """Return the condition that a student's ``SubmissionRow`` is the newest to its assignment."""
     row = aliased(SubmissionRow)
     newest = (
         select(row.assignment, func.max(row.attempt))

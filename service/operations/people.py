@@ -30,18 +30,18 @@ _LONGEST = 200
 
 @dataclass(frozen=True, slots=True)
 class PersonView:
-    """A person, for operators: their enrolments with the courses' names, and what they sign in with."""
+    """A person, for operators: their enrolments with course names, and their credentials."""
 
     member: Member
     enrolments: tuple[tuple[str, Member], ...]
     credentials: tuple[CredentialLine, ...]
     from_platform: bool
-    elsewhere: tuple[tuple[str, Member], ...]  # instructors with the same id in other courses, who are other persons
+    elsewhere: tuple[tuple[str, Member], ...]  # other persons who are instructors with the same id in other courses
 
 
 @dataclass(frozen=True, slots=True)
 class JoinRequest:
-    """Two enrolments whose persons are one; people from a learning platform only with ``from_platform``."""
+    """Two enrolments whose persons are merged. ``from_platform`` permits merging people from a learning platform."""
 
     enrolment_id: int
     other_id: int
@@ -50,7 +50,7 @@ class JoinRequest:
 
 @dataclass(frozen=True, slots=True)
 class TokenForRequest:
-    """A token for a member of a course, which counts in this course."""
+    """A token for a member of a course, limited to this course."""
 
     name: str
     scopes: frozenset[str]
@@ -58,14 +58,14 @@ class TokenForRequest:
 
 
 def find(service: Service, actor: Actor, course: str, student: str) -> Member:
-    """The member of a course by its name and their id. Raises NotFound, UsageError where there is none."""
+    """Return the member of a course by course name and id. Raises NotFound, and UsageError if there is none."""
     check_operator(actor)
     with service.store.reading() as session:
         return membership.member(session, course, student)
 
 
 def show(service: Service, actor: Actor, enrolment_id: int) -> PersonView:
-    """A person by one of their enrolments. Raises NotFound."""
+    """Return the person of an enrolment. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
         row = _enrolment(session, enrolment_id)
@@ -79,10 +79,10 @@ def show(service: Service, actor: Actor, enrolment_id: int) -> PersonView:
 
 
 def sign_out(service: Service, actor: Actor, enrolment_id: int, *, release: bool = False) -> int:
-    """End all links, sessions and tokens of a person; returns how many ended.
+    """End all links, sessions and tokens of a person. Returns the number ended.
 
-    With ``release`` a student's next launch from the course's learning platform may take this enrolment, although
-    somebody has signed in as this person. Raises NotFound.
+    With ``release``, the student's next launch from the course's learning platform may claim this enrolment, even if
+    the person has signed in before. Raises NotFound.
     """
     check_operator(actor)
     with service.store.transaction() as session:
@@ -95,10 +95,10 @@ def sign_out(service: Service, actor: Actor, enrolment_id: int, *, release: bool
 
 
 def join(service: Service, actor: Actor, request: JoinRequest) -> Member:
-    """Make the persons of two enrolments in different courses one, and sign both out.
+    """Merge the persons of two enrolments in different courses, and sign both out.
 
-    Raises NotFound; Conflict where they are one already or both in one course; Invalid where a learning platform
-    vouches for one of them and the request does not say so.
+    Raises NotFound. Raises Conflict if they are the same person or are in the same course. Raises Invalid if one is
+    from a learning platform and the request does not permit it.
     """
     check_operator(actor)
     with service.store.transaction() as session:
@@ -126,12 +126,12 @@ def join(service: Service, actor: Actor, request: JoinRequest) -> Member:
 
 
 def enrol(service: Service, actor: Actor, course_id: int, students: Sequence[Student]) -> list[int]:
-    """Enrol students, all or none; those who are enrolled already get the names and addresses. Returns enrolments.
+    """Enrol students, all or none, and update the names and e-mail addresses of enrolled ones. Returns enrolments.
 
     Raises:
-        NotFound: there is no such course, or the actor does not instruct it.
-        Invalid: an id, a name or an address is too long.
-        UsageError: an id names nobody, or cannot be told from another's.
+        NotFound: The course does not exist, or the actor does not instruct it.
+        Invalid: An id, name or e-mail address is too long.
+        UsageError: An id is empty or ambiguous.
     """
     check_lengths(students)
     with service.store.transaction() as session:
@@ -140,7 +140,7 @@ def enrol(service: Service, actor: Actor, course_id: int, students: Sequence[Stu
 
 
 def enrol_new(service: Service, actor: Actor, course_id: int, student: Student) -> int:
-    """Enrol a student who is not in the course yet; returns the enrolment. Raises as ``enrol`` does, and Conflict."""
+    """Enrol a student who is not in the course yet. Returns the enrolment. Raises like ``enrol``, and Conflict."""
     check_lengths([student])
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -151,7 +151,7 @@ def enrol_new(service: Service, actor: Actor, course_id: int, student: Student) 
 
 
 def check_lengths(students: Sequence[Student]) -> None:
-    """Raise Invalid where an id, a name or an address is too long."""
+    """Raise Invalid if an id, a name or an e-mail address is too long."""
     for each in students:
         if max(map(len, (each.id, each.name, each.email))) > _LONGEST:
             raise Invalid(
@@ -163,10 +163,10 @@ def check_lengths(students: Sequence[Student]) -> None:
 
 @retry_conflicts
 def remove(service: Service, actor: Actor, course_id: int, enrolment_id: int) -> str:
-    """Remove somebody from a course who has submitted nothing to it; what they sign in with there ends.
+    """Remove a member without submissions from a course, and revoke their credentials there. Returns their id.
 
-    Instructors remove students, operators also instructors. Returns the id that the course had for them. Raises
-    NotFound, and UsageError for who has submitted.
+    Instructors can remove students; operators can also remove instructors. Raises NotFound, and UsageError for a member
+    with submissions.
     """
     with service.store.transaction() as session:
         lock_course(session, course_id)
@@ -182,7 +182,7 @@ def remove(service: Service, actor: Actor, course_id: int, enrolment_id: int) ->
 
 
 def issue_token(service: Service, actor: Actor, enrolment_id: int, request: TokenForRequest) -> str:
-    """The secret of a new token for a member, which counts in their course. Raises NotFound, Invalid and Conflict."""
+    """Return the secret of a new token for a member, limited to their course. Raises NotFound, Invalid and Conflict."""
     check_operator(actor)
     with service.store.transaction() as session:
         row = _enrolment(session, enrolment_id)

@@ -1,4 +1,4 @@
-"""The members of a course as its instructors see them: all, some, and one student."""
+"""Members of a course as its instructors see them: all, a page, and one student."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _A_PAGE = 100
 
 @dataclass(frozen=True, slots=True)
 class MemberPage:
-    """One page of the members who match a search, and numbers of the whole course."""
+    """A page of the members that match a search, with totals of the whole course."""
 
     members: tuple[Member, ...]
     found: int
@@ -35,7 +35,7 @@ class MemberPage:
 
 @dataclass(frozen=True, slots=True)
 class StudentView:
-    """A student with their newest submissions, except for assignments with hidden names, and their extensions."""
+    """A student with extensions and newest submissions, except to assignments with hidden names."""
 
     member: Member
     gradings: tuple[OwnGrading, ...]
@@ -46,21 +46,21 @@ class StudentView:
 
 
 def list_members(service: Service, actor: Actor, course_id: int) -> list[Member]:
-    """All members of a course, by id. Raises NotFound."""
+    """Return all members of a course, ordered by id. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         return membership.members(session, course_id)
 
 
 def list_members_after(service: Service, actor: Actor, course_id: int, enrolment_id: int, limit: int) -> list[Member]:
-    """Members of a course in the order in which they were enrolled, those after this one. Raises NotFound."""
+    """Return at most ``limit`` members of a course in order of enrolment, after this one. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         return membership.members_after(session, course_id, enrolment_id, limit)
 
 
 def search_members(service: Service, actor: Actor, course_id: int, text: str = "", number: int = 1) -> MemberPage:
-    """A page of the members whose id, name or address contains a text. Raises NotFound."""
+    """Return a page of the members whose id, name or e-mail address contains a text. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         members = membership.members(session, course_id)
@@ -82,7 +82,7 @@ def search_members(service: Service, actor: Actor, course_id: int, text: str = "
 
 
 def show_student(service: Service, actor: Actor, course_id: int, enrolment_id: int) -> StudentView:
-    """One student of a course. Raises NotFound."""
+    """Return one student of a course. Raises NotFound."""
     with service.store.reading() as session:
         row = student_in(session, actor, course_id, enrolment_id)
         hidden = open_assignments.with_names_hidden(session, course_id)

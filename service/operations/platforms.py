@@ -1,4 +1,4 @@
-"""Learning platforms: registered by operators; members fetched and marks sent by the instructors of a course."""
+"""Learning platforms: operators register them; instructors fetch members and send marks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from sim.errors import UsageError
 
 @dataclass(frozen=True, slots=True)
 class CoursePlatform:
-    """The platform that launches a course, if one does, and the course's assignments."""
+    """The platform that launches a course, if any, and the course's assignments."""
 
     link: CourseLink | None
     assignments: tuple[CourseAssignment, ...]
@@ -30,24 +30,26 @@ class CoursePlatform:
 
 @dataclass(frozen=True, slots=True)
 class EnrolledMembers:
-    """How many of a platform's members are in the course, and why others are not."""
+    """The number of a platform's members in the course, and the reasons why others were rejected."""
 
     members: int
     refused: tuple[str, ...]
 
 
 def list_platforms(service: Service, actor: Actor) -> list[Platform]:
-    """All registered platforms, by name. Raises NotFound."""
+    """Return all registered platforms, ordered by name. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
         return lti.platforms(session)
 
 
 def register(service: Service, actor: Actor, request: Registration) -> list[Platform]:
-    """Register a platform, or change the one of the same issuer and client; returns all that are registered then.
+    """Register a platform, or update the one with the same issuer and client. Returns all registered platforms.
 
-    Raises NotFound for anybody but operators, Invalid without a name or a deployment, and UsageError for an address or
-    an id that cannot be used.
+    Raises:
+        NotFound: The actor is not an operator.
+        Invalid: The name or the deployment is missing.
+        UsageError: An address or id is not usable.
     """
     check_operator(actor)
     if not request.name.strip():
@@ -61,7 +63,7 @@ def register(service: Service, actor: Actor, request: Registration) -> list[Plat
 
 
 def show_course_platform(service: Service, actor: Actor, course_id: int) -> CoursePlatform:
-    """The platform of a course. Raises NotFound."""
+    """Return the platform of a course. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         assignments = open_assignments.of_course(session, course_id)
@@ -69,9 +71,9 @@ def show_course_platform(service: Service, actor: Actor, course_id: int) -> Cour
 
 
 def enrol_members(service: Service, actor: Actor, course_id: int) -> EnrolledMembers:
-    """Enrol all members that the platform has in the course.
+    """Enrol all members of the course on the platform.
 
-    Raises NotFound, UsageError where there is no platform, PlatformError where it gives no list.
+    Raises NotFound, UsageError without a platform, PlatformError if it returns no list.
     """
     from service.lti import services
 
@@ -92,9 +94,9 @@ def enrol_members(service: Service, actor: Actor, course_id: int) -> EnrolledMem
 
 
 def pass_back(service: Service, actor: Actor, course_id: int, assignment: str) -> int:
-    """Send the published marks of an assignment to the platform's gradebook; returns how many there were.
+    """Send the published marks of an assignment to the platform's gradebook. Returns their number.
 
-    Raises NotFound, UsageError where there is no platform, PlatformError where it takes none.
+    Raises NotFound, UsageError without a platform, PlatformError if it does not accept them.
     """
     from service.lti.passing_back import send_marks
 

@@ -1,4 +1,4 @@
-"""When and how often students may submit: the policies of a course, and extensions for single students."""
+"""Deadlines and attempts: the policies of a course, and extensions for single students."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MOST_LATE_DAYS, _MOST_ATTEMPTS, _MOST_COOL_DOWN_SECONDS = 365, 1000, 600_000
 
 @dataclass(frozen=True, slots=True)
 class ExtensionRequest:
-    """Time and attempts that one student is allowed beyond the policy; an empty ``assignment`` is every one."""
+    """An extension for one student; an empty ``assignment`` means all assignments."""
 
     assignment: str = ""
     due_at: datetime | None = None
@@ -27,19 +27,19 @@ class ExtensionRequest:
 
 
 def list_policies(service: Service, actor: Actor, course_id: int) -> dict[str, PolicyLimits]:
-    """The policies of a course by assignment; the empty one is for all that have none of their own. Raises NotFound."""
+    """Return the policies of a course, by assignment; an empty assignment is the default. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         return policies.policies(session, course_id)
 
 
 def set_policy(service: Service, actor: Actor, course_id: int, assignment: str, limits: PolicyLimits) -> None:
-    """Set the limits of an assignment, or with an empty one of all that have no policy of their own.
+    """Set the limits of an assignment; an empty ``assignment`` sets the default of the course.
 
     Raises:
-        NotFound: there is no such course, or the actor does not instruct it.
-        Invalid: a limit is out of range.
-        UsageError: there is no such assignment.
+        NotFound: The course does not exist, or the actor does not instruct it.
+        Invalid: A limit is out of range.
+        UsageError: The assignment does not exist.
     """
     _check_due(limits.due_at)
     if not 0 <= limits.late_days <= _MOST_LATE_DAYS:
@@ -69,7 +69,7 @@ def set_policy(service: Service, actor: Actor, course_id: int, assignment: str, 
 
 
 def drop_policy(service: Service, actor: Actor, course_id: int, assignment: str) -> None:
-    """Remove the policy of an assignment, which then has the one for all of the course. Raises NotFound."""
+    """Remove the policy of an assignment, so that the default of the course applies. Raises NotFound."""
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         policies.drop_policy(session, course_id, assignment)
@@ -79,12 +79,12 @@ def drop_policy(service: Service, actor: Actor, course_id: int, assignment: str)
 def extend(
     service: Service, actor: Actor, course_id: int, enrolment_id: int, request: ExtensionRequest
 ) -> PolicyLimits:
-    """Allow one student more time or attempts, in place of an earlier extension for the same; returns their limits.
+    """Extend the policy for one student, replacing an earlier extension for the same assignment. Returns their limits.
 
     Raises:
-        NotFound: there is no such student, or the actor does not instruct the course.
-        Invalid: the extension allows nothing, or is out of range.
-        UsageError: there is no such assignment.
+        NotFound: The student does not exist, or the actor does not instruct the course.
+        Invalid: The extension is empty or out of range.
+        UsageError: The assignment does not exist.
     """
     if request.due_at is None and not request.more_attempts:
         raise Invalid("say what to allow: a later date, more attempts, or both")
@@ -110,7 +110,7 @@ def extend(
 
 
 def show_limits(service: Service, actor: Actor, course_id: int, enrolment_id: int, assignment: str) -> PolicyLimits:
-    """The limits of one student for an assignment, extensions included. Raises NotFound."""
+    """Return the limits of one student for an assignment, including extensions. Raises NotFound."""
     with service.store.reading() as session:
         student_in(session, actor, course_id, enrolment_id)
         return policies.limits(session, enrolment_id, assignment)

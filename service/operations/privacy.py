@@ -1,4 +1,4 @@
-"""A student's data: export all of it, erase all of it, and remove what was submitted long ago."""
+"""Privacy: export and erasure of a student's data, and purging of old submissions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MOST_DAYS = 36_500
 
 @dataclass(frozen=True, slots=True)
 class StudentData:
-    """Everything about a student as a zip."""
+    """All data of a student, as a zip."""
 
     enrolment_id: int
     zip: bytes
@@ -30,15 +30,15 @@ class StudentData:
 
 @dataclass(frozen=True, slots=True)
 class PurgeRequest:
-    """Remove submissions older than so many days; ``only_count`` removes nothing."""
+    """The minimum age in days of the submissions to remove; ``only_count`` removes nothing."""
 
     older_than_days: int
     only_count: bool = False
 
 
 def export_own(service: Service, actor: Actor, course_id: int) -> StudentData:
-    """The actor's own data in a course that they are a student of, as they may see it. Raises NotFound."""
-    # Reports take long to load.
+    """Export the actor's own data in a course as a student, as visible to them. Raises NotFound."""
+    # Reports take long to import.
     from service.student_export import export_student as exported
 
     with service.store.reading() as session:
@@ -47,7 +47,10 @@ def export_own(service: Service, actor: Actor, course_id: int) -> StudentData:
 
 
 def export_student(service: Service, actor: Actor, course_id: int, enrolment_id: int) -> StudentData:
-    """A student's data as they may see it. Instructors get none of assignments with hidden names. Raises NotFound."""
+    """Export a student's data as visible to them. Raises NotFound.
+
+    For instructors, assignments with hidden names are left out.
+    """
     from service.student_export import export_student as exported
 
     with service.store.reading() as session:
@@ -58,9 +61,9 @@ def export_student(service: Service, actor: Actor, course_id: int, enrolment_id:
 
 @retry_conflicts
 def erase_student(service: Service, actor: Actor, course_id: int, enrolment_id: int) -> Purged:
-    """Remove all submissions of a student, what came of them, and who the student is; nothing brings them back.
+    """Permanently remove all submissions of a student, their results, and personal data.
 
-    Raises NotFound, and UsageError while a submission of theirs is being graded.
+    Raises NotFound, and UsageError while a submission of the student is being graded.
     """
     with service.store.transaction() as session:
         lock_course(session, course_id)
@@ -69,9 +72,12 @@ def erase_student(service: Service, actor: Actor, course_id: int, enrolment_id: 
 
 
 def archive(service: Service, actor: Actor, file: Path) -> int:
-    """Copy the whole database into a new file; returns its size in bytes.
+    """Copy the whole database into a new file. Returns its size in bytes.
 
-    Raises Forbidden for anybody but commands, UsageError where the file exists, HostError where it cannot be written.
+    Raises:
+        Forbidden: The actor is not a command on the machine.
+        UsageError: The file exists.
+        HostError: The file cannot be written.
     """
     check_machine(actor)
     back_up(service.store.engine, file)
@@ -79,9 +85,9 @@ def archive(service: Service, actor: Actor, file: Path) -> int:
 
 
 def purge(service: Service, actor: Actor, course_id: int, request: PurgeRequest) -> Purged:
-    """Remove old submissions of a course, with grades, recordings and students who have nothing left.
+    """Remove old submissions of a course, with grades, recordings, and students without remaining submissions.
 
-    Raises Forbidden for anybody but commands, NotFound, and Invalid for a number of days that is out of range.
+    Raises Forbidden unless called by a command, NotFound, and Invalid for a number of days that is out of range.
     """
     check_machine(actor)
     if not 1 <= request.older_than_days <= _MOST_DAYS:

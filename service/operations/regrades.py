@@ -1,4 +1,4 @@
-"""Regrade a batch or one submission, publish grades, and queue what is over a limit."""
+"""Regrades of a batch or submission, publishing, and grading of submissions over a limit."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ if TYPE_CHECKING:
 def regrade_batch(
     service: Service, actor: Actor, course_id: int, batch_id: str, assignment: Assignment | str = ""
 ) -> Regraded:
-    """Queue every graded submission of a batch again and notify the workers; the old grades stand until publication.
+    """Queue a regrade of every graded submission of a batch and notify the workers. Old grades stand until publication.
 
     Args:
-        service: the installation.
-        actor: an instructor of the course, or the machine.
-        course_id: the course.
-        batch_id: the batch to grade again.
-        assignment: the assignment to grade against, or its id in the course or the catalogue. Empty: the version
-            that each submission was graded against.
+        service: The installation.
+        actor: An instructor of the course, or the machine.
+        course_id: The course.
+        batch_id: The batch to grade again.
+        assignment: The assignment to grade against, or its id in the course or the catalogue. Empty: the version that
+            each submission was graded against.
 
     Raises:
-        NotFound: the course has no such batch, or the actor does not instruct it.
-        UsageError: there is nothing to grade again, or no such assignment.
+        NotFound: The course does not have the batch, or the actor does not instruct it.
+        UsageError: There is nothing to grade again, or the assignment does not exist.
     """
     frozen = _frozen(service, actor, course_id, assignment)
     made = _regrade_batch(service, actor, course_id, batch_id, frozen)
@@ -52,7 +52,7 @@ def regrade_batch(
 
 
 def regrade_one(service: Service, actor: Actor, course_id: int, job_id: str, assignment: Assignment | str = "") -> str:
-    """Queue the submission of one grade again and notify the workers; returns the id of the new job.
+    """Queue a regrade of one submission and notify the workers. Returns the id of the new job.
 
     ``assignment`` and errors as in ``regrade_batch``.
     """
@@ -63,7 +63,7 @@ def regrade_one(service: Service, actor: Actor, course_id: int, job_id: str, ass
 
 
 def list_changes(service: Service, actor: Actor, course_id: int, batch_id: str) -> list[Change]:
-    """The changes that a batch of regrades makes, by student; none for any other batch. Raises NotFound."""
+    """Return the changes of a batch of regrades, by student; empty for any other batch. Raises NotFound."""
     hidden = names_for(service, actor, course_id)
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -73,9 +73,9 @@ def list_changes(service: Service, actor: Actor, course_id: int, batch_id: str) 
 
 @retry_conflicts
 def publish(service: Service, actor: Actor, course_id: int, batch_id: str, *, anyway: bool = False) -> Published:
-    """Let the newest grades of a batch stand, and release them to the students.
+    """Make the newest grades of a batch standing, and release them to the students.
 
-    With ``anyway`` also grades with a criterion that could not be judged. Raises NotFound.
+    ``anyway`` includes grades with unjudged criteria. Raises NotFound.
     """
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -86,9 +86,9 @@ def publish(service: Service, actor: Actor, course_id: int, batch_id: str, *, an
 
 @retry_conflicts
 def publish_one(service: Service, actor: Actor, course_id: int, job_id: str, *, anyway: bool = False) -> Published:
-    """Let the newest grade of one submission stand, and release it to its student.
+    """Make the newest grade of one submission standing, and release it to its student.
 
-    With ``anyway`` also a grade with a criterion that could not be judged. Raises NotFound.
+    ``anyway`` permits a grade with unjudged criteria. Raises NotFound.
     """
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -98,7 +98,7 @@ def publish_one(service: Service, actor: Actor, course_id: int, job_id: str, *, 
 
 
 def preview(service: Service, actor: Actor, course_id: int, batch_id: str) -> Publication:
-    """The effect that publishing a batch would have now, without ``anyway``. Raises NotFound."""
+    """Return the effect of publishing a batch now, without ``anyway``. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         batch_in(session, course_id, batch_id)
@@ -106,11 +106,11 @@ def preview(service: Service, actor: Actor, course_id: int, batch_id: str) -> Pu
 
 
 def grade_over_limit(service: Service, actor: Actor, course_id: int, job_id: str) -> None:
-    """Queue a submission that was put aside because it is over a limit, and notify the workers.
+    """Queue a submission that is over a limit, and notify the workers.
 
     Raises:
-        NotFound: the course has no such grade, or the actor does not instruct it.
-        Conflict: the submission was not put aside.
+        NotFound: The course does not have the grade, or the actor does not instruct it.
+        Conflict: The submission is not waiting for staff.
     """
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -142,7 +142,7 @@ def _regrade_one(service: Service, actor: Actor, course_id: int, job_id: str, fr
 
 
 def _frozen(service: Service, actor: Actor, course_id: int, assignment: Assignment | str) -> Frozen | None:
-    """The assignment to grade against, frozen before the transaction."""
+    """Return the assignment to grade against, frozen before the transaction."""
     if isinstance(assignment, str):
         if not assignment:
             return None
@@ -155,7 +155,7 @@ def _frozen(service: Service, actor: Actor, course_id: int, assignment: Assignme
 def _record(
     session: Session, actor: Actor, course_id: int, subject: Literal["batch", "job"], subject_id: str, done: Published
 ) -> Published:
-    """Note a publication in the activity log, and tell the course's webhooks if it released a grade."""
+    """Record a publication in the activity log, and notify the course's webhooks if a grade was released."""
     counts = {name: count for name, count in asdict(done).items() if count or name in ("published", "replaced")}
     audit.note(session, actor.name, "publish", subject, subject_id, **counts)
     if done.published:

@@ -1,6 +1,6 @@
-"""Replies to requests with a key, so that a repeated request gets the same reply and changes nothing.
+"""Replies to requests with an idempotency key, so that repeating a request returns the same reply.
 
-The interface decides which requests have keys, and when two are the same.
+The interface decides which requests have keys, and when two requests are the same.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from service.store.engine import now, retry_conflicts
 from service.store.inserting import insert_if_new
 from service.store.web_tables import IdempotentReply
 
-#: For so long a key stands for the same request.
+#: Time for which a key identifies the same request.
 KEPT = timedelta(hours=24)
-#: What was begun so long ago and never ended was ended by the server's end.
+#: Requests that started earlier and never finished were interrupted by a stop of the server.
 _ABANDONED = timedelta(minutes=15)
 _BEGUN = 0
 
 
 @dataclass(frozen=True, slots=True)
 class KeptReply:
-    """An answer that was given."""
+    """A stored reply."""
 
     request_sha256: str
     status: int
@@ -32,12 +32,12 @@ class KeptReply:
 
 
 class InProgress(Exception):
-    """The first request with this key is not answered yet."""
+    """The first request with this key is still in progress."""
 
 
 @retry_conflicts
 def begin(service: Service, actor: Actor, key: str) -> KeptReply | None:
-    """What was answered to this key; None where it is new, and is held from now on. Raises InProgress."""
+    """Return the reply for this key; None if the key is new, which reserves it. Raises InProgress."""
     mine = (IdempotentReply.credential_id == actor.credential_id, IdempotentReply.key == key)
     with service.store.transaction() as session:
         at = now(session)
@@ -55,7 +55,7 @@ def begin(service: Service, actor: Actor, key: str) -> KeptReply | None:
 
 @retry_conflicts
 def keep(service: Service, actor: Actor, key: str, reply: KeptReply) -> None:
-    """Write down what was answered."""
+    """Store the reply for this key."""
     mine = (IdempotentReply.credential_id == actor.credential_id, IdempotentReply.key == key)
     values = {"request_sha256": reply.request_sha256, "status": reply.status, "body": reply.body}
     with service.store.transaction() as session:
@@ -64,7 +64,7 @@ def keep(service: Service, actor: Actor, key: str, reply: KeptReply) -> None:
 
 @retry_conflicts
 def forget(service: Service, actor: Actor, key: str) -> None:
-    """Nothing came of the request, so the key is free again."""
+    """Release the key of a failed request."""
     mine = (IdempotentReply.credential_id == actor.credential_id, IdempotentReply.key == key)
     with service.store.transaction() as session:
         session.execute(delete(IdempotentReply).where(*mine))

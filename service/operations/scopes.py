@@ -1,4 +1,4 @@
-"""Scopes of tokens and of the sessions that follow from them. Each route says which one it needs."""
+"""Scopes of tokens and of the sessions started with them. Each route declares the scope that it needs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from types import MappingProxyType
 from service.language import translatable
 from service.store.states import Role
 
-#: By name; a token may do what its owner may do, as far as its scopes name it.
+#: By name; a token has its owner's permissions, limited to its scopes.
 SCOPES: Mapping[str, str] = MappingProxyType(
     {
         "read": translatable("read what its owner may see"),
@@ -22,7 +22,7 @@ _OF_STAFF = frozenset({"mark", "manage"})
 
 
 def offered_scopes(roles: Collection[Role], *, operator: bool, limit: frozenset[str] | None = None) -> dict[str, str]:
-    """Scopes that a token of somebody with these roles can use, within those of the session that makes it."""
+    """Return the scopes that a token of a person with these roles can use, within those of the present session."""
     is_staff = operator or Role.INSTRUCTOR in roles
     return {
         scope: words

@@ -1,6 +1,6 @@
-"""Signing in and out, and who has the secret of a session or a token.
+"""Sign-in, sign-out, and identification of the owner of a session or token.
 
-What somebody does with their own sessions and tokens is in ``credentials.py``.
+``credentials.py`` manages the sessions and tokens of a person.
 """
 
 from __future__ import annotations
@@ -16,27 +16,27 @@ from service.store.states import CredentialKind
 
 
 def identify(service: Service, secret: str, kind: CredentialKind) -> Identity | None:
-    """The owner of a session or a token, with the roles that it reaches. None if it is not valid."""
+    """Return the owner of a session or token, with the roles within its reach. None if it is not valid."""
     with service.store.reading() as session:
         return credentials.identify(session, secret, kind)
 
 
 def note_use(service: Service, identity: Identity) -> None:
-    """Record that a token is used."""
+    """Record that a token was used."""
     with service.store.transaction() as session:
         credentials.note_use(session, identity.credential_id)
 
 
 def show_link(service: Service, link: str) -> LinkOwner | None:
-    """The person whom a link would sign in. None if the link is not valid."""
+    """Return the person that a link signs in. None if the link is not valid."""
     with service.store.reading() as session:
         return credentials.owner(session, link)
 
 
 def sign_in(service: Service, actor: Actor | None, secret: str) -> NewSession | None:
-    """Exchange a link or a token for a new session, which ends the one of an ``actor`` who was signed in.
+    """Exchange a link or token for a new session, which replaces the session of ``actor``.
 
-    None if the secret is not valid, or is that of a token that signs no browser in.
+    Returns None if the secret is not valid, or the token does not permit browser sign-in.
     """
     with service.store.transaction() as session:
         started = credentials.redeem(session, secret) or credentials.start_session(session, secret)
@@ -46,7 +46,7 @@ def sign_in(service: Service, actor: Actor | None, secret: str) -> NewSession | 
 
 
 def sign_out(service: Service, actor: Actor) -> None:
-    """End the session that the actor signed in with."""
+    """End the session that the actor is signed in with."""
     with service.store.transaction() as session:
         _end_session(session, actor)
 

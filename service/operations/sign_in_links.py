@@ -1,6 +1,6 @@
-"""Links that sign people in once: for one student, for all of a course, and for any member by an operator.
+"""Single-use sign-in links: for one student, for all students of a course, and for any member by an operator.
 
-A person's newest link alone counts. What a link is exchanged for is in ``service/store/people/credentials.py``.
+Only a person's newest link is valid. ``service/store/people/credentials.py`` exchanges links for sessions.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from service.store.states import Role
 from sim.errors import UsageError
 from submissions.student_identity import Student
 
-#: How long links for a whole course last, which are passed on by other means.
+#: Lifetime in days of links for a whole course, which are distributed by other means.
 DAYS, MOST_DAYS = 7, 30
 _ELSEWHERE = "is in other courses, too, and signs in by whoever runs Robomark"
 
@@ -40,7 +40,7 @@ class StudentLink:
 
 @dataclass(frozen=True, slots=True)
 class UnusedLink:
-    """A link that still signs somebody in: its secret, whom it signs in, and until when."""
+    """A valid link: its secret, the person that it signs in, and its expiry time."""
 
     secret: str
     person_id: int
@@ -49,7 +49,7 @@ class UnusedLink:
 
 
 def make_links(service: Service, actor: Actor, course_id: int, days: int = DAYS) -> list[StudentLink]:
-    """A new link for each student of the course, by id, in place of earlier ones. Raises NotFound, Invalid."""
+    """Create a new link for each student of the course, replacing earlier ones. Raises NotFound, Invalid."""
     if not 1 <= days <= MOST_DAYS:
         raise Invalid("sign-in links last from 1 to %(most)s days", most=MOST_DAYS)
     lifetime = timedelta(days=days)
@@ -67,11 +67,11 @@ def make_links(service: Service, actor: Actor, course_id: int, days: int = DAYS)
 
 
 def make_students_link(service: Service, actor: Actor, course_id: int, enrolment_id: int, *, word: str = "") -> str:
-    """The secret of a student's new link into this course; with a ``word`` it follows from that.
+    """Return the secret of a student's new link into this course, determined by ``word`` if given.
 
     Raises:
-        NotFound: there is no such student, or the actor does not instruct the course.
-        UsageError: the student is in other courses, too, or an operator.
+        NotFound: The student does not exist, or the actor does not instruct the course.
+        UsageError: The student is also in other courses, or an operator.
     """
     with service.store.transaction() as session:
         row = student_in(session, actor, course_id, enrolment_id)
@@ -81,9 +81,9 @@ def make_students_link(service: Service, actor: Actor, course_id: int, enrolment
 
 
 def make_own_link(service: Service, actor: Actor) -> str:
-    """The secret of a new link for whoever runs a command here: an instructor of the default course, and operator.
+    """Return the secret of a new link for the user of this command, as an instructor of the default course and operator.
 
-    The account is their id. Raises Forbidden for anybody but commands.
+    The id is the account name. Raises Forbidden unless called by a command.
     """
     check_machine(actor)
     account = actor.name.partition("@")[0]
@@ -98,7 +98,7 @@ def make_own_link(service: Service, actor: Actor) -> str:
 
 
 def make_members_link(service: Service, actor: Actor, course: str, who: str) -> tuple[Member, str]:
-    """A member of a course by its name and their id, with the secret of their new link. Raises NotFound, UsageError."""
+    """Return a member of a course by course name and id, with the secret of a new link. Raises NotFound, UsageError."""
     check_operator(actor)
     with service.store.transaction() as session:
         member = membership.member(session, course, who)
@@ -106,7 +106,7 @@ def make_members_link(service: Service, actor: Actor, course: str, who: str) -> 
 
 
 def find_link(service: Service, word: str) -> UnusedLink | None:
-    """The link that was made of a word; None where there is none, or it was used or has expired."""
+    """Return the link created from a word; None if it does not exist, was used or has expired."""
     secret = credentials.link_of(word)
     with service.store.reading() as session:
         owner = credentials.owner(session, secret)
@@ -114,12 +114,12 @@ def find_link(service: Service, word: str) -> UnusedLink | None:
 
 
 def make_link(session: Session, actor: Actor, person_id: int, *, word: str = "", reach: Reach = EVERYWHERE) -> str:
-    """The secret of a person's new link, in the transaction of an operation that has checked the actor."""
+    """Return the secret of a person's new link, within the transaction of an operation that has checked the actor."""
     (secret,) = credentials.replace_links(session, [person_id], LINK_LIFETIME, word, reach).values()
     audit.note(session, actor.name, "link", "person", str(person_id))
     return secret
 
 
 def _reach(course_id: int) -> Reach:
-    """The reach of a link that an instructor makes: not beyond the course, nor what the student becomes later."""
+    """Return the reach of a link created by an instructor: only the course, and only the student role."""
     return Reach(course_id=course_id, role=Role.STUDENT)

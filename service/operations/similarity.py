@@ -1,4 +1,4 @@
-"""Similar submissions of a batch's students: a reason to look and to ask, without any effect on marks."""
+"""Similar submissions of a batch's students: a reason for a review, without any effect on marks."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from service.store.states import Role
 
 @dataclass(frozen=True, slots=True)
 class ComparedBatch:
-    """A batch, the compared submissions, and the similar ones by assignment; None where too many to compare at once.
+    """A batch, the compared submissions, and the similar ones by assignment; None if there are too many to compare.
 
-    ``source`` reads the text of a file by assignment, student and name.
+    ``source`` returns the text of a file by assignment, student and name.
     """
 
     batch: BatchLine
@@ -43,7 +43,10 @@ def show_similar(service: Service, actor: Actor, course_id: int, batch_id: str) 
 
 
 def list_similar(service: Service, actor: Actor, course_id: int, batch_id: str) -> tuple[Similarity, ...]:
-    """The same without the batch. Raises NotFound, and Invalid where too many would have to be compared at once."""
+    """Return the similar submissions like ``show_similar``.
+
+    Raises NotFound, and Invalid if there are too many to compare.
+    """
     shown = show_similar(service, actor, course_id, batch_id)
     if shown.found is None:
         raise Invalid(
@@ -59,10 +62,10 @@ def list_similar(service: Service, actor: Actor, course_id: int, batch_id: str) 
 def show_similar_in_batch(
     service: Service, actor: Actor, course_id: int, batch_id: str, given: Path | None = None
 ) -> ComparedBatch:
-    """Compare the submissions of one batch alone, however many, without the code in ``given``.
+    """Compare the submissions of one batch only, in any number, without the code in ``given``.
 
     Raises:
-        NotFound: the course has no such batch, or the actor does not instruct it.
+        NotFound: The course does not have the batch, or the actor does not instruct it.
         UsageError: ``given`` cannot be read.
     """
     hidden = names_for(service, actor, course_id)

@@ -1,4 +1,4 @@
-"""Stored grades of any course as commands on the machine load them: by the beginning of an id, with all names."""
+"""Stored grades of any course, for commands on the machine: by the beginning of an id, with all names."""
 
 from __future__ import annotations
 
@@ -19,32 +19,35 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Grading:
-    """A grade as the grader gave it, and what to grade it again with."""
+    """A grade as the grader gave it, with the input for grading it again."""
 
     job_id: str
     grade: Grade
     request: GradingRequest
     grader_sha256: str | None
-    secret_sha256: str | None  # None where it was graded before the installation had a secret
+    secret_sha256: str | None  # None if graded before the installation had a secret
     own_secret: Secret  # of the installation
 
 
 def find(service: Service, actor: Actor, grade: str) -> JobLine:
-    """The job whose id begins so. Raises NotFound for anybody but operators, UsageError where none or several do."""
+    """Return the job whose id begins with ``grade``.
+
+    Raises NotFound for non-operators, UsageError for no unique match.
+    """
     check_operator(actor)
     with service.store.reading() as session:
         return batches.job_line(session, batches.find_job(session, grade))
 
 
 def find_previous(service: Service, actor: Actor, job_id: str) -> JobLine:
-    """The grade that stands for the same student's attempt before this one. Raises NotFound, UsageError."""
+    """Return the standing grade of the same student's previous attempt. Raises NotFound, UsageError."""
     check_operator(actor)
     with service.store.reading() as session:
         return batches.job_line(session, batches.job_before(session, job_id))
 
 
 def load_words(service: Service, actor: Actor, job_id: str) -> tuple[Grade, Submission]:
-    """A grade as it counts, with recordings without ticks and images, and its submission. Raises NotFound."""
+    """Load a grade as it counts, with its submission and recordings without ticks and images. Raises NotFound."""
     from service.store.batches import intake
     from service.store.grades import results
 
@@ -54,7 +57,7 @@ def load_words(service: Service, actor: Actor, job_id: str) -> tuple[Grade, Subm
 
 
 def load(service: Service, actor: Actor, job_id: str) -> Grade:
-    """A grade as it counts, with whole recordings. Raises NotFound, and UsageError where there is no grade."""
+    """Load a grade as it counts, with whole recordings. Raises NotFound, and UsageError without a grade."""
     from service.store.grades import results
 
     check_operator(actor)
@@ -63,7 +66,7 @@ def load(service: Service, actor: Actor, job_id: str) -> Grade:
 
 
 def load_grading(service: Service, actor: Actor, grade: str) -> Grading:
-    """The grading whose id begins so. Raises NotFound, and UsageError where there is no grade."""
+    """Load the grading whose id begins with ``grade``. Raises NotFound, and UsageError without a grade."""
     from service.store.batches import intake
     from service.store.grades import results
     from service.store.installation import secret_of

@@ -1,6 +1,6 @@
-"""What a student submits: files become a submission and its job, whose student is the actor whatever the files say.
+"""Submissions by students. The student is always the actor, regardless of the content of the files.
 
-What files have to be is ``submissions.bundle``'s; what students see of their submissions is ``own_views.py``'s.
+``submissions.bundle`` defines valid files; ``own_views.py`` shows submissions to students.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ __all__ = ["Accepted"]
 
 
 class LacksPart(Invalid):
-    """One of two parts is missing: the student may have forgotten it, or do without it."""
+    """One of two parts is missing, by mistake or on purpose."""
 
 
 @dataclass(frozen=True, slots=True)
 class SendRequest:
-    """Files for an assignment; ``even_in_part`` also where one of two parts is missing."""
+    """Files for an assignment; ``even_in_part`` permits a missing part."""
 
     assignment: str
     sent: Sequence[SentFile]
@@ -43,7 +43,7 @@ class SendRequest:
 
 @dataclass(frozen=True, slots=True)
 class Sending:
-    """A student's enrolment, and the open assignment that they send files for."""
+    """A student's enrolment, and the open assignment that they submit to."""
 
     course: str
     enrolment_id: int
@@ -52,7 +52,7 @@ class Sending:
     assignment: Assignment
 
     def read(self, sent: Sequence[SentFile]) -> GradingRequest:
-        """The submission in these files. Raises UsageError where they are none."""
+        """Read the submission in these files. Raises UsageError if they are not a valid one."""
         if not sent:
             raise UsageError("nothing was sent; choose a file, or paste a program.")
         source = shown(", ".join(dict.fromkeys(each.flat_name for each in sent)))
@@ -64,9 +64,9 @@ class Sending:
 
 
 def sending(service: Service, actor: Actor, course_id: int, assignment: str) -> Sending:
-    """What a student sends files for.
+    """Return the student's enrolment and the open assignment.
 
-    Raises NotFound where there is no such assignment for students, and UsageError where it is closed.
+    Raises NotFound if students cannot see the assignment, UsageError if it is closed.
     """
     with service.store.reading() as session:
         enrolment = own_enrolment(session, actor, course_id, Role.STUDENT)
@@ -84,9 +84,9 @@ def submit(service: Service, actor: Actor, course_id: int, request: SendRequest)
     """Accept a student's files for an assignment, and notify the workers.
 
     Raises:
-        NotFound: there is no such assignment for students.
-        LacksPart: one of two parts is missing.
-        UsageError: the assignment is closed, or the files are no submission.
+        NotFound: Students cannot see the assignment.
+        LacksPart: One of two parts is missing.
+        UsageError: The assignment is closed, or the files are not a valid submission.
     """
     way = sending(service, actor, course_id, request.assignment)
     asked = way.read(request.sent)

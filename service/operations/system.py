@@ -1,4 +1,4 @@
-"""The installation as its operators see it: queues, workers, checks and failed jobs."""
+"""System status for operators: queues, workers, checks and failed jobs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class SystemView:
-    """The whole service at one moment."""
+    """Status of the whole service at one moment."""
 
     version: str
     findings: tuple[Finding, ...]
@@ -36,7 +36,7 @@ class SystemView:
 
 
 def show(service: Service, actor: Actor) -> SystemView:
-    """The state of the service. Raises NotFound for anybody but operators."""
+    """Return the status of the service. Raises NotFound unless the actor is an operator."""
     from service.doctor import examine_service
 
     check_operator(actor)
@@ -55,13 +55,13 @@ def show(service: Service, actor: Actor) -> SystemView:
 
 
 def collect_metrics(service: Service) -> ServiceMetrics:
-    """The metrics of the whole service at one moment, which name no person and are for anybody."""
+    """Return the metrics of the whole service, which are public because they name no person."""
     with service.store.reading() as session:
         return collect(session)
 
 
 def list_workers(service: Service, actor: Actor) -> list[tuple[WorkerLine, InQuarantine | None]]:
-    """The known workers by name, each with its quarantine if it is in one. Raises NotFound."""
+    """Return the known workers by name, each with its quarantine if it is in one. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
         quarantined = {each.worker: each for each in workers.in_quarantine(session)}
@@ -69,7 +69,7 @@ def list_workers(service: Service, actor: Actor) -> list[tuple[WorkerLine, InQua
 
 
 def list_failed(service: Service, actor: Actor) -> list[DeadLetter]:
-    """The newest failed jobs of all courses. Raises NotFound."""
+    """Return the newest failed jobs of all courses. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
         return dead_letters.dead_letters(session)

@@ -1,4 +1,4 @@
-"""Test runs: a student's program is run once without being submitted. They leave no marks and are kept for a day."""
+"""Test runs of student programs, without submitting them. They leave no marks and are kept for a day."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ __all__ = ["TryoutLine"]
 
 @dataclass(frozen=True, slots=True)
 class TestRunView:
-    """What a student ran last for an assignment, and what the assignment asks for."""
+    """A student's newest test run of an assignment, and the assignment's task."""
 
     sheet: TaskSheet
-    seconds: float | None  # simulated; None where no robot is run that students see
+    seconds: float | None  # simulated; None without a scenario visible to students
     line: TryoutLine | None
     replay: bytes | None  # compressed
     submission: Submission | None
 
 
 def start(service: Service, actor: Actor, course_id: int, assignment: str, sent: Sequence[SentFile]) -> str:
-    """Queue a program to be run without submitting it, and notify the workers; returns the id of the test run.
+    """Queue a test run and notify the workers. Returns the id of the test run.
 
-    Raises NotFound where there is no such assignment for students, and UsageError where it is closed, no robot is run
-    that students see, the files are no submission, or the student runs too many.
+    Raises NotFound if students cannot see the assignment. Raises UsageError if it is closed or has no visible scenario,
+    the files are not a valid submission, or the student has too many test runs.
     """
     way = sending(service, actor, course_id, assignment)
     if tryout_assignment(way.assignment) is None:
@@ -53,7 +53,7 @@ def start(service: Service, actor: Actor, course_id: int, assignment: str, sent:
 
 
 def show_newest(service: Service, actor: Actor, course_id: int, assignment: str) -> TestRunView:
-    """What the actor ran last for an assignment, with its program. Raises NotFound where they may not see it."""
+    """Return the actor's newest test run of an assignment, with its program. Raises NotFound if they may not see it."""
     with service.store.reading() as session:
         enrolment_id = own_enrolment(session, actor, course_id, Role.STUDENT).id
         seen = seen_assignment(session, course_id, enrolment_id, assignment)
@@ -66,7 +66,7 @@ def show_newest(service: Service, actor: Actor, course_id: int, assignment: str)
 
 
 def find_newest(service: Service, actor: Actor, course_id: int, assignment: str) -> TryoutLine | None:
-    """How far the test run is that the actor started last for an assignment; None where there is none."""
+    """Return the state of the actor's newest test run of an assignment; None if there is none."""
     with service.store.reading() as session:
         enrolment_id = own_enrolment(session, actor, course_id, Role.STUDENT).id
         newest = tryouts.newest(session, enrolment_id, assignment)
@@ -74,13 +74,13 @@ def find_newest(service: Service, actor: Actor, course_id: int, assignment: str)
 
 
 def show(service: Service, actor: Actor, course_id: int, tryout_id: str) -> TryoutLine:
-    """One of the actor's test runs. Raises NotFound."""
+    """Return one of the actor's test runs. Raises NotFound."""
     with service.store.reading() as session:
         return _own(session, actor, course_id, tryout_id)
 
 
 def show_replay(service: Service, actor: Actor, course_id: int, tryout_id: str) -> bytes:
-    """What a replay of one of the actor's test runs plays, compressed. Raises NotFound, also where there is nothing."""
+    """Return the compressed replay of one of the actor's test runs. Raises NotFound, also without a replay."""
     with service.store.reading() as session:
         replay = tryouts.replay_of(session, _own(session, actor, course_id, tryout_id).id)
     if replay is None:

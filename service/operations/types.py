@@ -1,6 +1,6 @@
-"""Types of the database that requests and results of operations carry, for pages, API and commands to import.
+"""Store types in the requests and results of operations, for pages, API and commands to import.
 
-Imports nothing heavy, so that a command can import it before it runs.
+Has no slow imports, so that commands can import it at start-up.
 """
 
 from service.store.states import BatchState as BatchState

@@ -1,4 +1,4 @@
-"""Webhooks of a course: addresses that are told of events in it, and the deliveries to them."""
+"""Webhooks of a course: addresses that receive events, and the deliveries to them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from service.store.states import Role
 
 
 def list_webhooks(service: Service, actor: Actor, course_id: int) -> list[WebhookLine]:
-    """The webhooks of a course, the oldest first. Raises NotFound."""
+    """Return the webhooks of a course, oldest first. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         return webhooks.of_course(session, course_id)
@@ -26,9 +26,9 @@ def list_webhooks(service: Service, actor: Actor, course_id: int) -> list[Webhoo
 def create(
     service: Service, actor: Actor, course_id: int, url: str, events: Collection[WebhookEvent]
 ) -> tuple[WebhookLine, str]:
-    """A new webhook, and the secret that its deliveries are signed with, which is shown this once.
+    """Create a webhook and the secret that signs its deliveries, which is returned only once.
 
-    Raises NotFound, and UsageError for an address that cannot be used or where the course has too many webhooks.
+    Raises NotFound, and UsageError for an invalid address or too many webhooks in the course.
     """
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -38,7 +38,7 @@ def create(
 
 
 def revoke(service: Service, actor: Actor, course_id: int, webhook_id: str) -> None:
-    """Revoke a webhook, with the deliveries that wait for it. Raises NotFound."""
+    """Revoke a webhook and its pending deliveries. Raises NotFound."""
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         if not webhooks.revoke(session, course_id, webhook_id):
@@ -49,7 +49,7 @@ def revoke(service: Service, actor: Actor, course_id: int, webhook_id: str) -> N
 def list_deliveries(
     service: Service, actor: Actor, course_id: int, limit: int, after: tuple[datetime, str] | None = None
 ) -> list[DeliveryLine]:
-    """Deliveries to a course's webhooks, the newest first, after the one of a moment and id. Raises NotFound."""
+    """Return deliveries of a course, newest first, after the one with this time and id. Raises NotFound."""
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         return webhooks.deliveries(session, course_id, limit, after)

@@ -1,1 +1,1 @@
-"""Who grades when: the broker, the workers, and the self-test that each must pass."""
+"""Queue processing: the broker, the workers, and the self-test that each worker must pass."""

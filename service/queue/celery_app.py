@@ -1,6 +1,6 @@
-"""Celery, set up so that a lost, doubled or late message does no harm: the database row is the job.
+"""Celery app with settings for which lost, duplicate or late messages do no harm: the database row is the job.
 
-Makes an app from settings; tasks are in ``tasks.py``, and nothing here connects to anything.
+Creates an app from settings without connecting; ``tasks.py`` contains the tasks.
 """
 
 from __future__ import annotations
@@ -13,26 +13,26 @@ from service.store.states import Lane
 
 TRYOUTS = "tryouts"
 PLOTS = "plots"
-#: In the order in which a worker empties them: whoever tries a program waits for it, and is bounded in how often.
+#: In order of priority for a worker. Students wait for test runs, whose number is limited.
 QUEUES = (Lane.INTERACTIVE.value, TRYOUTS, Lane.BATCH.value, PLOTS)
 GRADE_TASK = "robomark.grade"
 TRYOUT_TASK = "robomark.try"
 PLOT_TASK = "robomark.plot"
 
-#: The key under which the worker's command line tells its pool children that they are to do without the sandbox; no
-#: setting, variable or task can.
+#: Key with which the worker's command line disables the sandbox of its pool children. No setting, environment variable
+#: or task can set it.
 NO_SANDBOX = "robomark_no_sandbox"
 
-#: So long after a job may take no longer, an exception is raised in what still runs, and its process is killed. The
-#: sandbox and the lease end everything earlier; this frees a process that hangs all the same.
+#: Seconds after the job limit until an exception is raised in the task, and until its process is killed. The sandbox
+#: and the lease end everything earlier; this frees a process that hangs despite them.
 GRACE_SECONDS = (30, 60)
 
-#: A pool child is replaced when it has grown so far (KiB); one with its zygotes' parents is far below.
+#: Memory in KiB above which a pool child is replaced; a child with its zygotes' parents is far below.
 _CHILD_KIB = 1_000_000
 
 
 def make_celery(settings: Settings) -> Celery:
-    """A Celery app for this broker. ``settings.broker_url`` must name one."""
+    """Create a Celery app for this broker. ``settings.broker_url`` must be set."""
     app = Celery("robomark", broker=settings.broker_url, include=["service.queue.tasks"], set_as_current=False)
     exchange = Exchange("robomark", type="direct")
     soft, hard = (settings.job_seconds + more for more in GRACE_SECONDS)
@@ -47,7 +47,7 @@ def make_celery(settings: Settings) -> Celery:
         task_create_missing_queues=False,
         task_acks_late=True,
         worker_prefetch_multiplier=1,
-        # The lease and the sweeper retry, bounded by the job's attempts; the broker would do it for ever.
+        # The lease and the sweeper retry, limited by the job's attempts; the broker would retry forever.
         task_reject_on_worker_lost=False,
         task_retry_on_worker_lost=False,
         task_acks_on_failure=True,

@@ -1,6 +1,6 @@
-"""The embedded default: the bundled broker and one worker process, started by us, ending with us.
+"""Embedded services: the bundled broker and one worker process, started and stopped with this process.
 
-Does nothing that a separate Redis and ``robomark worker`` would not do; it only saves starting them.
+Equivalent to a separate Redis and ``robomark worker``, without starting them manually.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _SHORT_LIVES = 3
 
 
 class EmbeddedServices:
-    """Broker and worker, for as long as the ``with`` lasts; what already runs in this home is used as it is."""
+    """Broker and worker for the duration of a ``with`` block; services that already run in this home are reused."""
 
     def __init__(self, settings: Settings, store: Store) -> None:
         self._broker = EmbeddedBroker(settings)
@@ -28,17 +28,17 @@ class EmbeddedServices:
         self._worker = SupervisedWorker(self.settings, store, settings.home / "log" / "worker.log")
 
     def ensure(self) -> None:
-        """Start what is not there, or not there any more. Raises HostError when it cannot be started."""
+        """Start missing services. Raises HostError if one cannot be started."""
         if self._worker.process.short_lives >= _SHORT_LIVES:
             log = self._worker.process.log
             raise HostError(f"the worker ends as soon as it is started; {log} may tell why")
         if self._worker.process.pid is not None or not worker_lives(self.settings):
             self._worker.ensure()
-        # It is there long before the worker needs it.
+        # It responds long before the worker needs it.
         self._broker.ensure()
 
     def stop(self, grace_seconds: float) -> None:
-        """End what was started here; the jobs in flight go back after ``grace_seconds``."""
+        """Stop the services started here; unfinished jobs are requeued after ``grace_seconds``."""
         self._worker.stop(grace_seconds)
         self._broker.stop()
 

@@ -1,6 +1,6 @@
-"""One job from claim to stored marks, and one job's plots: what a worker does when it is notified.
+"""Processing of one job from claim to stored marks, and of one job's plots, after a notification.
 
-Knows no Celery; ``tasks.py`` calls it with what the pool child keeps warm.
+Independent of Celery; ``tasks.py`` calls it with the objects that the pool child keeps.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ Result = TypeVar("Result")
 
 
 class JobOutcome(Enum):
-    """What came of a notice."""
+    """The outcome of a notification."""
 
     NOTHING_DUE = "nothing due"
     GRADED = "graded"
-    STOPPED = "stopped"  # cancelled, or another worker has the job
+    STOPPED = "stopped"  # cancelled, or claimed by another worker
     UNUSABLE = "unusable"  # the job is dead: no attempt could grade it
-    HOST_FAULT = "host fault"  # ours; the job is tried again, or dead
+    HOST_FAULT = "host fault"  # the job is retried, or dead
 
 
 def grade_next(store: Store, settings: Settings, runner: TrialRunner, worker: str) -> JobOutcome:
-    """Claim the job whose turn it is, grade it and store its marks.
+    """Claim the next job, grade it and store its marks.
 
-    Only trouble with the database itself raises: whatever else happens to a claimed job is written into its row.
+    Raises only for problems with the database; every other failure of a claimed job is stored in its row.
     """
     claim = jobs.claim(store, worker, settings.lease_seconds)
     if claim is None:
@@ -62,7 +62,7 @@ def grade_next(store: Store, settings: Settings, runner: TrialRunner, worker: st
             _end(lambda: jobs.give_up(store, claim, reason))
             return JobOutcome.UNUSABLE
         except Exception as error:
-            # Whatever it was, it was not the student: their faults come back as verdicts.
+            # This is never the student's fault: their faults are returned as verdicts.
             _log.exception("job.host_error")
             reason = str(error) if isinstance(error, HostError) else f"{type(error).__name__}: {error}"
             _end(lambda: jobs.fail(store, claim, reason, jobs.Retry(settings.backoff_seconds)))
@@ -71,7 +71,7 @@ def grade_next(store: Store, settings: Settings, runner: TrialRunner, worker: st
 
 
 def plot_next(store: Store, settings: Settings) -> str | None:
-    """Draw and keep the plots of the job that has waited longest. Returns its id; None when none is due."""
+    """Draw and store the plots that are due longest. Returns the id of their job; None if none is due."""
     job_id = plots.claim(store, settings.job_seconds)
     if job_id is None:
         return None
@@ -108,7 +108,7 @@ def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Cl
             observe=observe,
             runner=runner,
         )
-        # Marks that were made when all had taken too long can lack what was broken off.
+        # Marks made after the time limit may lack interrupted trials.
         keeper.check()
         graded_at = progress.now()
         for result in graded.criteria:
@@ -116,13 +116,13 @@ def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Cl
                 _log.error("criterion.unjudged", criterion=result.id, cause=result.unjudged)
         _refuse_broken(graded)
         prepared = results.prepare(graded)
-    # The work is done: a database that is away for a moment must not lose it.
+    # The work is done, so a short outage of the database must not lose it.
     _persistent(lambda: jobs.finish(store, claim, prepared, graded_at, progress.trials_at), settings.lease_seconds)
     _log.info("job.graded", verdict=graded.verdict.value, seconds=round(progress.seconds, 3))
 
 
 def _refuse_broken(graded: Grade) -> None:
-    """Raises HostError where this machine, and not the student, ended a trial."""
+    """Raise HostError if this machine, and not the student, ended a trial."""
     broken = next((trial for trial in graded.trials if trial.verdict is Verdict.HOST_ERROR), None)
     if broken is not None:
         faults = faults_of(broken.recording)
@@ -130,32 +130,32 @@ def _refuse_broken(graded: Grade) -> None:
 
 
 class _Progress:
-    """How far the grading of a job has come since its claim."""
+    """Progress of the grading of a job since its claim."""
 
     def __init__(self, claim: jobs.Claim) -> None:
         self._claimed_at = claim.at
         self._begun = time.monotonic()
         self.share = 0.0
-        self.trials_at: datetime | None = None  # when the last trial had been run
+        self.trials_at: datetime | None = None  # time at which the last trial ended
 
     @property
     def seconds(self) -> float:
-        """Since the claim."""
+        """Seconds since the claim."""
         return time.monotonic() - self._begun
 
     def now(self) -> datetime:
-        """By the database's clock: this machine's own may be wrong."""
+        """Return the time by the database's clock, because this machine's clock may be wrong."""
         return self._claimed_at + timedelta(seconds=self.seconds)
 
     def saw(self, told: GradingProgress) -> None:
-        """Take in how many trials are done."""
+        """Update the number of finished trials."""
         self.share = told.trials_done / max(1, told.trials)
         if told.trials_done >= told.trials and self.trials_at is None:
             self.trials_at = self.now()
 
 
 def _persistent(change: Callable[[], Result], seconds: float) -> Result:
-    """Try a change again while the database cannot be reached, for as long as ``seconds``."""
+    """Repeat a change while the database is unreachable, for at most ``seconds``."""
     until = time.monotonic() + seconds
     pause = 0.1
     while True:

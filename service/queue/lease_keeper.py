@@ -1,6 +1,6 @@
-"""A lease, renewed from a thread for as long as something is done under it, however long that says nothing.
+"""Lease that is renewed from a thread while work is in progress.
 
-Whose lease it is, and how it is renewed in the database, is the caller's.
+The caller provides the lease and the function that renews it in the database.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from sqlalchemy.exc import DBAPIError
 from sim.errors import Cancelled, HostError
 
 _log = structlog.get_logger(__name__)
-#: Whoever waits sees progress so often, however long the lease.
+#: Maximum interval between progress updates, regardless of the lease.
 _PROGRESS_SECONDS = 2.0
 
-#: After a renewal that failed, as one does that finds the database locked, the next is tried so soon.
+#: Delay after a failed renewal, for example because the database was locked.
 _AGAIN_SECONDS = 0.2
 
-# A process that is forked in the middle of a renewal would have its locks held for ever. Every fork waits for a running
-# renewal, so a renewal may not wait long itself.
+# A process forked during a renewal would keep its locks forever. Every fork waits for a running renewal, so a renewal
+# must not wait long.
 _renewing = Lock()
 os.register_at_fork(before=_renewing.acquire, after_in_parent=_renewing.release, after_in_child=_renewing.release)
 
 
 class LeaseKeeper:
-    """Renews a lease while it is entered; ``check`` tells when what is done under it must stop."""
+    """Renews a lease within a ``with`` block; ``check`` raises when the work must stop."""
 
     def __init__(self, renew: Callable[[], None], lease_seconds: float, most_seconds: float) -> None:
-        """``renew`` raises Cancelled when the lease is lost. After ``most_seconds`` it is no longer renewed."""
+        """Create a keeper. ``renew`` raises Cancelled if the lease is lost. Renewals stop after ``most_seconds``."""
         self._renew = renew
         self._every = min(lease_seconds / 3, _PROGRESS_SECONDS)
         self._most = most_seconds
@@ -51,14 +51,14 @@ class LeaseKeeper:
         self._thread.join()
 
     def check(self) -> None:
-        """Raises Cancelled when the lease is lost, HostError when all has taken too long."""
+        """Raise Cancelled if the lease is lost, HostError if the time limit has passed."""
         if self._lost is not None:
             raise self._lost
         if time.monotonic() > self._until:
             raise HostError(f"it took longer than {self._most:.0f} s")
 
     def _run(self) -> None:
-        # What hangs for good must not be held for good.
+        # A task that hangs forever must not keep its lease.
         wait = self._every
         while not self._ended.wait(wait) and time.monotonic() <= self._until:
             wait = self._every
@@ -69,7 +69,7 @@ class LeaseKeeper:
                     self._lost = lost
                     return
                 except DBAPIError as error:
-                    # The next renewal tries again; should the lease run out meanwhile, the token tells.
+                    # The next renewal tries again. If the lease expires meanwhile, its token is rejected.
                     wait = min(self._every, _AGAIN_SECONDS)
                     _log.warning("heartbeat.failed", error=str(error))
                 except Exception:

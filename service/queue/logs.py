@@ -1,6 +1,6 @@
-"""Log lines of services, with the job's id where there is one: for a person in front of a terminal, else JSON.
+"""Logging of services, with the job's id if there is one: readable text on a terminal, otherwise JSON.
 
-Commands that people run do not log; they print.
+Commands that people run print instead of logging.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from structlog.typing import Processor
 
 
 def configure_logging(level: str) -> None:
-    """Everything from ``level`` on, our own and the libraries', on standard error: a JSON object a line, or words."""
+    """Log everything from ``level`` on to standard error, as text or as one JSON object per line."""
     number = logging.getLevelNamesMapping()[level]
     shared: list[Processor] = [
         structlog.contextvars.merge_contextvars,
@@ -33,7 +33,7 @@ def configure_logging(level: str) -> None:
     )
     logging.basicConfig(level=number, handlers=[handler], force=True)
     logging.captureWarnings(True)
-    # What Celery's pool says of its processes goes to no other logger's handlers.
+    # Messages of Celery's pool about its processes go to no other logger's handlers.
     logging.getLogger("multiprocessing").handlers = [handler]
     structlog.configure(
         processors=[*shared, structlog.stdlib.ProcessorFormatter.wrap_for_formatter],
@@ -44,7 +44,7 @@ def configure_logging(level: str) -> None:
 
 
 def announce(event: str, sentence: str) -> None:
-    """What a service says of itself at any level, on standard output: a sentence for a person, else a JSON object."""
+    """Print a message of a service to standard output: a sentence on a terminal, otherwise a JSON object."""
     if sys.stdout.isatty():
         print(sentence, flush=True)
     else:

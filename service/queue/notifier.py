@@ -1,7 +1,7 @@
-"""Tells workers through the broker that there is work. A notice that is lost, doubled or late does no harm.
+"""Notification of workers through the broker. Lost, duplicate or late notifications do no harm.
 
-No notice fails when the broker or the database does, as what it is about is committed already: the lease reaper
-notifies again.
+An unreachable broker or database does not make a notification fail, because its change is already committed: the lease
+reaper notifies again.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from service.store.queue.lease_reaper import forget_notices, note_notices, reque
 from service.store.states import Lane
 
 _log = structlog.get_logger(__name__)
-#: What a broker that is not there can raise.
+#: Errors raised for an unreachable broker.
 _AWAY = (BrokerError, RedisError, OSError)
 
 
 @dataclass(frozen=True, slots=True)
 class Notifier:
-    """Publishes notices, and catches up on those that were lost."""
+    """Publisher of notifications, which also repeats lost ones."""
 
     app: Celery
     store: Store
     settings: Settings
 
     def grade(self, lane: Lane, count: int = 1) -> None:
-        """Notify for ``count`` jobs of a lane that were just taken in."""
+        """Notify for ``count`` new jobs of a queue."""
         if count <= 0:
             return
         try:
-            # Noted first: a claim passes over a row that is being written to, and the notice would be for nothing.
+            # Stored first: a claim skips a row that is being written, so an earlier notification would be lost.
             noted = note_notices(self.store, lane, count)
             if not self._publish(GRADE_TASK, lane.value, count):
                 forget_notices(self.store, noted)
@@ -51,7 +51,7 @@ class Notifier:
             _log.warning("notify.failed", task=GRADE_TASK, count=count, error=str(error))
 
     def try_out(self, count: int = 1) -> None:
-        """Notify for ``count`` programs that students try."""
+        """Notify for ``count`` test runs."""
         self._publish(TRYOUT_TASK, TRYOUTS, count)
 
     def plot(self, count: int = 1) -> None:
@@ -59,10 +59,10 @@ class Notifier:
         self._publish(PLOT_TASK, PLOTS, count)
 
     def catch_up(self) -> None:
-        """Take back lost jobs, and notice for what is due and not notified for.
+        """Requeue lost jobs, and notify for due jobs without a notification.
 
-        No more notices are published than there are due jobs without one in the broker's queue, so that a day
-        without a worker leaves no heap of them.
+        Publishes at most as many notifications as there are due jobs without one in the broker, so that they do not
+        accumulate while no worker runs.
         """
         requeue_lost(self.store, Retry(self.settings.backoff_seconds))
         for lane, wanting in wanting_notices(self.store, self.settings.notify_seconds).items():
@@ -75,7 +75,7 @@ class Notifier:
             self.plot(self._lacking(PLOTS, waiting))
 
     def waiting(self) -> int:
-        """How many notices lie in the broker; 0 when it is away."""
+        """Return the number of notifications in the broker; 0 if it is unreachable."""
         return sum(self._depths(QUEUES) or ())
 
     def _lacking(self, queue: str, due: int) -> int:

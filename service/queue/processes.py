@@ -1,6 +1,6 @@
-"""Child processes of a service: started so that they end with us, ended in two steps, their logs kept small.
+"""Child processes of a service: started so that they end with it, stopped in two steps, with small logs.
 
-Knows neither broker nor worker; also makes sure that what lies in the run folder is what it should be.
+Independent of broker and worker. Also checks the file types in the run folder.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ def start_process(
     at_our_end: signal.Signals,
     kept_open: Sequence[int] = (),
 ) -> subprocess.Popen[bytes]:
-    """A child in a session of its own that gets ``at_our_end`` when this thread ends, however it ends.
+    """Start a child in a new session that gets the signal ``at_our_end`` when this thread ends for any reason.
 
-    It has the variables ``extra`` beside a clean environment, and inherits the descriptors ``kept_open`` and no other.
-    Raises HostError when it cannot be started.
+    The child gets the variables ``extra`` in a clean environment and inherits only the descriptors ``kept_open``.
+    Raises HostError if it cannot be started.
     """
     try:
         keep_small(run_file(log))
@@ -54,7 +54,7 @@ def start_process(
 
 
 def end_processes(processes: Sequence[subprocess.Popen[bytes]], grace_seconds: float) -> None:
-    """Ask them all to end, then make those that have not, and wait until all have."""
+    """Terminate all processes, kill those that do not end in time, and wait for all."""
     for process in processes:
         process.terminate()
     until = time.monotonic() + grace_seconds
@@ -68,16 +68,16 @@ def end_processes(processes: Sequence[subprocess.Popen[bytes]], grace_seconds: f
 
 
 def keep_small(log: Path) -> None:
-    """Begin a log afresh when it has grown too long, keeping the one before; whoever writes it need not know."""
+    """Truncate a log that is too long and keep a copy of it; the writing process is not affected."""
     if log.exists() and log.stat().st_size > _LOG_BYTES:
         shutil.copyfile(log, log.with_suffix(".log.1"))
         os.truncate(log, 0)
 
 
 def run_file(path: Path, kind: Callable[[int], bool] = stat.S_ISREG) -> Path:
-    """A path in the run folder where a file of this ``kind`` is, or nothing; what else lies there is removed.
+    """Return a path in the run folder after removing anything there that is not a file of this ``kind``.
 
-    Raises HostError when the folder cannot be used.
+    Raises HostError if the folder is not usable.
     """
     try:
         if not path.parent.is_dir():

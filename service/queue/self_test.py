@@ -1,6 +1,6 @@
-"""A process of a worker checks itself: it grades a submission whose recordings' hashes and marks are known.
+"""Self-test of a worker process: it grades a submission with known marks and recording hashes.
 
-What follows from a wrong answer is ``service.store.queue.self_tests``'s; this module only asks the question.
+``service.store.queue.self_tests`` handles the result; this module only runs the test.
 """
 
 from __future__ import annotations
@@ -31,36 +31,36 @@ from submissions.submission import Submission
 
 _log = structlog.get_logger(__name__)
 _ANSWER = QUESTION / "answer.json"
-#: How long a process that was spared the question at its start may work before it is asked.
+#: Maximum delay of the first self-test if it was skipped at start-up.
 _SOON_SECONDS = 30.0
-#: A trial that ended so was cut by the machine or its load, and says nothing of the simulator.
+#: A trial with such an end was cut short by the machine or its load, and is not evidence against the simulator.
 _CUT = frozenset({Verdict.HOST_ERROR, Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED})
 
 
 class SelfTestAnswer(Enum):
-    """What came of a look."""
+    """The result of a self-test."""
 
     RIGHT = "right"
     WRONG = "wrong"
-    UNCLEAR = "unclear"  # the machine could not grade it; that accuses nobody
+    UNCLEAR = "unclear"  # the machine could not grade it, which counts against no worker
 
 
 @dataclass(frozen=True, slots=True)
 class KnownAnswer:
-    """What grading the known submission gives: the marks and the hash of each trial's recording."""
+    """The expected result of the known submission: its marks and the hash of each trial's recording."""
 
     marks: str
     chains: tuple[str, ...]
 
 
 def known() -> KnownAnswer:
-    """What a worker must find."""
+    """Return the expected result."""
     told = json.loads(_ANSWER.read_text(encoding="utf-8"))
     return KnownAnswer(told["marks"], tuple(told["chains"]))
 
 
 def ask(runner: TrialRunner) -> KnownAnswer | None:
-    """What this process finds; None when a limit of the machine cut it. Raises HostError when it cannot grade."""
+    """Grade the known submission; None if a limit of the machine cut it short. Raises HostError if grading fails."""
     submission, assignment = _question()
     graded = grade(submission, assignment, runner=runner)
     cut = any(trial.verdict in _CUT for trial in graded.trials) or any(result.unjudged for result in graded.criteria)
@@ -68,12 +68,12 @@ def ask(runner: TrialRunner) -> KnownAnswer | None:
 
 
 def found(graded: Grade) -> KnownAnswer:
-    """The marks of a grade, and the hash of each trial's recording."""
+    """Return the marks of a grade, and the hash of each trial's recording."""
     return KnownAnswer(str(graded.marks), tuple(trial.recording.sha256 for trial in graded.trials))
 
 
 def difference(expected: KnownAnswer, actual: KnownAnswer) -> str:
-    """One sentence; empty where they are the same."""
+    """Return a sentence that describes the difference; empty if there is none."""
     if actual.chains != expected.chains:
         pairs = zip(expected.chains, actual.chains, strict=False)
         number = next((i for i, (ours, theirs) in enumerate(pairs, 1) if ours != theirs), len(expected.chains))
@@ -87,15 +87,15 @@ def difference(expected: KnownAnswer, actual: KnownAnswer) -> str:
 
 
 class Watch:
-    """Looks after one process of a worker: at its start, before a job when it is time, and while it has none.
+    """Self-tests of one worker process: at start-up, before a job when one is due, and while idle.
 
-    Grading and looking take turns; whoever grades holds ``busy``.
+    Grading and self-tests exclude each other: use ``busy`` while grading.
     """
 
     def __init__(
         self, store: Store, runner: TrialRunner, worker: str, every_seconds: float, right: RightAnswer | None = None
     ) -> None:
-        """``right`` is where a right answer is written down for those that start later."""
+        """Create a watch. ``right`` records a pass for processes that start later."""
         self._right = right
         self._store = store
         self._runner = runner
@@ -108,14 +108,14 @@ class Watch:
 
     @contextmanager
     def busy(self) -> Iterator[None]:
-        """For as long as a job is graded; looks first if it is time. What is found wrong stops the claim itself."""
+        """Block self-tests while a job is graded, after running one that is due. A failed test prevents the claim."""
         with self._lock:
             if time.monotonic() >= self._next:
                 self._look()
             yield
 
     def begin(self) -> None:
-        """Look now; or soon, where this build has answered rightly on this machine not long ago, or does now."""
+        """Run the self-test now, or soon if this build has passed recently on this machine."""
         with nullcontext() if self._right is None else self._right.alone():
             if self._right is not None and self._right.given:
                 self._next = time.monotonic() + min(self._every, _SOON_SECONDS)
@@ -123,18 +123,18 @@ class Watch:
                 self.look()
 
     def look(self) -> SelfTestAnswer:
-        """Grade the known answer now, and write down what came of it."""
+        """Run the self-test now and store its result."""
         with self._lock:
             return self._look()
 
     def keep_looking(self) -> None:
-        """Look again and again from a thread that lives as long as the process, so that idleness hides nothing."""
+        """Repeat the self-test from a thread until the process ends, so that idle workers are tested, too."""
         if self._thread is None:
             self._thread = Thread(target=self._run, name="self_test", daemon=True)
             self._thread.start()
 
     def end(self) -> None:
-        """Look no more."""
+        """Stop the self-tests."""
         self._ended.set()
         with self._lock:
             self._next = float("inf")
@@ -162,7 +162,7 @@ class Watch:
                 self._right.forget()
             spoilt = self_tests.quarantine(self._store, self._worker, wrong)
         except Exception:
-            # Trouble with the machine or the database shows in the jobs themselves.
+            # Problems with the machine or the database are visible in the jobs themselves.
             _log.exception("self_test.unclear")
             return SelfTestAnswer.UNCLEAR
         _log.error(
@@ -187,7 +187,7 @@ def _start(answer: KnownAnswer, number: int) -> str:
 
 
 def write_answer() -> None:
-    """Write down as known what this checkout finds; for whoever changes the simulator on purpose."""
+    """Store the result of this checkout as expected, after an intended change of the simulator."""
     with TrialRunner() as runner:
         actual = ask(runner)
     if actual is None:

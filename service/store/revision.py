@@ -21,7 +21,7 @@ _OLDER_ADVICE = "robomark db upgrade"
 
 @cache
 def newest_revision() -> str:
-    """Return the newest revision that the running code knows, from the file names of the migrations (``v0009_people.py``).
+    """Return the newest revision that the running code knows, from the migrations' file names (``v0009_people.py``).
 
     Cached, because another release can be installed in the same place while this process runs.
     """
