@@ -1,1 +1,1 @@
-"""Robomark as it is used: grading, the store, the queue, reports, pages and the command line."""
+"""Robomark's service: grading, store, queue, reports, web pages and command line."""

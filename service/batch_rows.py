@@ -1,6 +1,6 @@
-"""The rows of a batch as tables have them: the grade of each submission, or why it has none.
+"""Rows of a batch for tables: the grade of each submission, or the reason why it has none.
 
-What a table makes of a row is ``service.reports``'; the database is only read.
+``service.reports`` renders the rows; the database is only read.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from submissions.student_identity import Refusal, Student
 def rows_of(
     store: Store, lines: Sequence[JobLine], refusals: Sequence[Refusal] = (), *, published: bool = False
 ) -> list[TableRow[Grade]]:
-    """A row for each submission and each refusal; with ``published``, no other grade is shown."""
+    """Return a row for each submission and rejection; ``published`` hides unpublished grades."""
     reasons = {line.id: why_not_shown(line, published=published) for line in lines}
     with store.reading() as session:
         grades = dict(results.load_each(session, [line.id for line in lines if not reasons[line.id]]))
@@ -33,7 +33,7 @@ def rows_of(
 
 
 def row_of(line: JobLine, grade: Grade | None, reason: str = "") -> TableRow[Grade]:
-    """The row of one job."""
+    """Return the row of one job."""
     student = Student(line.student, line.name, line.email)
     reason = reason or missing_words(line.missing)
     told, for_staff = _told(line), line.staff_only is not None
@@ -41,12 +41,12 @@ def row_of(line: JobLine, grade: Grade | None, reason: str = "") -> TableRow[Gra
 
 
 def refused_row(refusal: Refusal) -> TableRow[Grade]:
-    """The row of what was not taken in."""
+    """Return the row of a rejected file."""
     return TableRow(refusal.student, refusal.source, refusal.assignment, reason=refusal.reason, refused=True)
 
 
 def why_not_shown(line: JobLine, *, published: bool = False) -> str:
-    """Why a job has no grade to be shown; empty if it has one."""
+    """Return the reason why a job has no visible grade; empty if it has one."""
     match line.state:
         case JobState.QUEUED:
             return "waits to be graded"
@@ -62,7 +62,7 @@ def why_not_shown(line: JobLine, *, published: bool = False) -> str:
 
 
 def _told(line: JobLine) -> str:
-    """Why a job has no grade, where its student is told otherwise than staff: faults of ours are for staff."""
+    """Return the reason for students if it differs from the one for staff, who also see host faults."""
     match line.state:
         case JobState.DEAD:
             return "could not be graded yet; the staff of your course can see why"

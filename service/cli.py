@@ -1,14 +1,14 @@
-"""Where the ``robomark`` command begins: nothing but the signals, so that a Ctrl-C while the rest loads is no error.
+"""Entry point of the ``robomark`` command: handles signals, so that Ctrl-C during imports is not an error.
 
-The commands are put together in ``command_line.py``.
+``command_line.py`` assembles the commands.
 """
 
 from __future__ import annotations
 
 import sys
 
-# With ``python -m`` or ``-c``, and by an empty entry in PYTHONPATH, the current folder is on the path. It may be one of
-# submissions: no module that is imported from here on must be one of its files. Python itself has loaded ``os``.
+# With ``python -m`` or ``-c``, and with an empty entry in PYTHONPATH, the current folder is on the path. It may
+# contain submissions, so later imports must not find its files. Python itself has already imported ``os``.
 _own = __file__.rpartition("/service/")[0]
 _here = sys.modules["os"].getcwd()
 sys.path[:] = [folder for folder in sys.path if folder == _own or (folder.startswith("/") and folder != _here)]
@@ -22,10 +22,11 @@ _STOPPED = 130
 
 
 def main() -> NoReturn:
-    """Run the command; 0 when it did what it should, 2 for a mistake of the caller's, 3 when it could not."""
+    """Run the command. Exit status 0 for success, 2 for a mistake by the caller, 3 for a failure."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _stop)
-    # Imports throw nothing away, and to look for garbage is a tenth of what they cost; until a command is loaded.
+    # Imports create little garbage, and collecting it would take a tenth of their time; re-enabled once a command is
+    # loaded.
     gc.disable()
     from service.command_line import main as run
 
@@ -33,11 +34,11 @@ def main() -> NoReturn:
     try:
         run()
     finally:
-        # Nor is it looked through when Python ends, which would take a tenth of a second.
+        # Collection at exit would also take a tenth of a second.
         gc.freeze()
 
 
 def _stop(_number: int, _frame: object) -> NoReturn:
-    """Nothing is begun yet, so nothing is to be cleared away."""
+    """Exit immediately: nothing has started, so there is nothing to clean up."""
     os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, b"robomark: stopped\n")
     os._exit(_STOPPED)

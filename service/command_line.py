@@ -1,6 +1,6 @@
-"""The ``robomark`` command line: puts the commands together and turns every error into one sentence and a status.
+"""The ``robomark`` command line: assembles the commands and converts errors to one sentence and an exit status.
 
-The commands themselves are in modules of their own, named after them; ``cli.py`` is where the command begins.
+Each command is in its own module; ``cli.py`` is the entry point.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ _CONTEXT = {"help_option_names": ["-h", "--help"]}
 
 
 class _ChecksLess:
-    """A command that has Typer check those words alone which are not yet what they should be.
+    """A command whose parameters Typer validates only if they do not have their final type yet.
 
-    To check even a flag that nobody gave, Typer imports pydantic, which takes longer than most of what only asks.
+    Typer imports pydantic to validate any parameter, even a missing flag, which takes longer than most simple commands.
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """The words that are left over."""
+        """Parse the arguments and return the remaining ones."""
         command: Any = super()
         for parameter in command.get_params(ctx):
             parameter.process_value = _unless_needless(parameter)
@@ -47,7 +47,7 @@ class _ChecksLess:
 
 
 def _unless_needless(parameter: Any) -> Callable[[Any, Any], Any]:
-    """How the parameter takes a value: as it is when it is of its type, or may be missing and is."""
+    """Return a value processor that skips validation for values of the right type, and for missing optional ones."""
     checked = parameter.process_value
     may_be_missing = not (parameter.required or parameter.multiple or parameter.nargs == -1)
 
@@ -60,26 +60,26 @@ def _unless_needless(parameter: Any) -> Callable[[Any, Any], Any]:
 
 
 class _Command(_ChecksLess, TyperCommand):
-    """One that does something."""
+    """A command that is not a group."""
 
 
 class _Commands(_ChecksLess, TyperGroup):
-    """Commands by name and summary. One is imported when it is to run, which takes a while, and no other."""
+    """A group of commands. Only the selected command is imported, because imports are slow."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
-        """The name, the command itself, and the words after it."""
+        """Return the name, the command, and the remaining arguments."""
         name, listed, rest = super().resolve_command(ctx, args)
         if name is None or isinstance(listed, _Commands):
             return name, listed, rest
         command = load_command(*ctx.command_path.split()[1:], name)
-        # What is imported stays, so that it is never looked through.
+        # Imported objects are permanent, so the collector skips them.
         gc.freeze()
         gc.enable()
         return name, command, rest
 
 
 def load_command(*path: str) -> Any:
-    """The command that is called by these words, imported, as Typer runs it."""
+    """Import a command by its path and return it as Typer runs it."""
     *groups, name = path
     listed: Any = COMMANDS
     for group in groups:
@@ -97,7 +97,7 @@ def load_command(*path: str) -> Any:
 
 
 def _shared_options() -> list[Any]:
-    """The options that every command has which shows something and ends."""
+    """Return the options shared by all commands that print a result and exit."""
     app = typer.Typer(add_completion=False)
     app.command()(_shared)
     return get_command(app).params
@@ -146,7 +146,7 @@ def _list(app: typer.Typer, commands: Mapping[str, Command | CommandGroup]) -> N
 
 def _print_version(asked: bool) -> None:
     if asked:
-        # Finding it costs more than all the rest of a --help.
+        # Imported here, because it takes longer than the rest of --help.
         from service.version import GRADER_VERSION
 
         print(f"robomark {GRADER_VERSION}")
@@ -159,7 +159,7 @@ def _root(
         typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and end."),
     ] = False,
 ) -> None:
-    """What comes before the command."""
+    """Options before the command."""
 
 
 def _nothing() -> None:
@@ -167,12 +167,12 @@ def _nothing() -> None:
 
 
 def main() -> NoReturn:
-    """Run the command; 0 when it did what it should, 2 for a mistake of the caller's, 3 when it could not."""
+    """Run the command. Exit status 0 for success, 2 for a mistake by the caller, 3 for a failure."""
     _prepare_streams()
-    # What a service manager sends is taken like Ctrl-C: children and temporary files are cleared away.
+    # A stop by a service manager is handled like Ctrl-C: children and temporary files are cleaned up.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        # Typer gives back the status of what it ends by itself: help, and a stop by Ctrl-C.
+        # Typer returns the status of its own exits: help, and a stop by Ctrl-C.
         ending = _command_line()(prog_name="robomark", standalone_mode=False)
         sys.stdout.flush()
     except UsageError as error:
@@ -188,7 +188,7 @@ def main() -> NoReturn:
     except BrokenPipeError:
         _end_unread()
     except SystemExit as ended:
-        # Typer itself ends so: after it has completed a word for the shell, or when nobody reads what it prints.
+        # Typer itself exits this way after shell completion, or if the output is closed.
         if not ended.code:
             raise
         _end_unread()
@@ -212,10 +212,13 @@ def main() -> NoReturn:
 
 
 def _prepare_streams() -> None:
-    """Text of any kind can be printed, whatever the locale; a closed stream takes no other file's place."""
+    """Make all text printable in any locale, and replace closed streams.
+
+    Without a replacement, the descriptor of a closed stream would be reused for another file.
+    """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
-            # The lowest free descriptor is the closed stream's own.
+            # The lowest free descriptor is that of the closed stream.
             setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
@@ -228,7 +231,7 @@ def _debug() -> None:
 
 
 def _end_misspelt(error: TyperException) -> NoReturn:
-    """A command line that cannot be read; a group of commands without one shows its help instead."""
+    """Exit for an invalid command line; a group without a command prints its help."""
     sentence = error.format_message().strip()
     if not sentence or "\n" in sentence:
         print(sentence, file=sys.stderr)
@@ -240,7 +243,7 @@ def _end_misspelt(error: TyperException) -> NoReturn:
 
 
 def _end_unread() -> NoReturn:
-    """The reader of our output has gone; nothing is left to say, and the interpreter must not try to."""
+    """Exit silently after the reader closed our output, so that the interpreter does not write to it."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(_STOPPED)
 

@@ -1,6 +1,6 @@
-"""All commands by name: where each is, and what the lists of commands say of it. Imports none of them.
+"""Table of all commands with their modules and summaries. Imports none of them.
 
-What a command does is told by its own module; ``command_line.py`` loads the one that is to run.
+Each command has its own help text; ``command_line.py`` loads the selected one.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """``module:name`` below ``service.commands``; ``serves`` is what runs until it is told to stop, and logs."""
+    """A command at ``module:name`` below ``service.commands``; ``serves`` marks those that run until stopped and log."""
 
     where: str
     summary: str
@@ -21,13 +21,13 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class CommandGroup:
-    """Commands that are called by the group's name and their own."""
+    """A named group of commands."""
 
     summary: str
     commands: Mapping[str, Command]
 
 
-#: In the order in which help lists them.
+#: In the order of the help text.
 COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
     {
         "run": Command("run:run", "Run a robot program or a notebook in the simulator."),

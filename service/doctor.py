@@ -1,7 +1,7 @@
-"""What could keep this machine, or the whole service, from grading: one list of named checks.
+"""Checks of this machine and of the whole service that find problems which prevent grading.
 
-``robomark doctor`` prints what is found on this machine, ``/health/ready`` what is found of the service. Nothing here
-raises, and nothing is changed but that the home folder is made.
+``robomark doctor`` prints the findings for this machine, ``/health/ready`` those for the service. Nothing here raises.
+The only change is that the home folder is created.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from service.version import GRADER_VERSION, release_problem
 from sim.errors import RobomarkError
 from submissions.seeds import name_of
 
-#: The packages of the distribution, beside the record of it.
+#: Packages of the distribution, next to its metadata.
 _PACKAGES = frozenset({"robomark", "sim", "models", "responders", "submissions", "service"})
 _FREE_BYTES = 1_000_000_000
 _OLDEST_BROKER = (6, 2)
@@ -59,7 +59,7 @@ _log = structlog.get_logger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing looked at: whether it is well, and a sentence."""
+    """The result of one check: whether it passed, and a sentence."""
 
     what: str
     well: bool
@@ -68,9 +68,9 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing to look at: on this machine, for whoever runs it, and, where grading needs it, of the whole service.
+    """A check of this machine, and optionally of the whole service if grading depends on it.
 
-    What is told of the service tells a stranger nothing: no address, no name, no text of an error.
+    Findings for the service are public, so they contain no addresses, names or error texts.
     """
 
     what: str
@@ -79,12 +79,12 @@ class Check:
 
 
 def examine(settings: Settings) -> list[Finding]:
-    """Everything that can be looked at from here, in an order that a reader can follow."""
+    """Run all checks of this machine, in reading order."""
     return [_found_here(check, settings) for check in CHECKS]
 
 
 def examine_service(settings: Settings, store: Store) -> list[Finding]:
-    """Everything without which nothing is graded. ``settings.broker_url`` must name a broker."""
+    """Run all checks of the service. ``settings.broker_url`` must be set."""
     return [_found_of_service(check, settings, store) for check in CHECKS if check.of_service is not None]
 
 
@@ -133,7 +133,7 @@ def _python(_settings: Settings) -> tuple[bool, str]:
 
 
 def _files(_settings: Settings) -> tuple[bool, str]:
-    """Whether our files are those that were installed: another distribution can have a ``models/`` of its own."""
+    """Check that the installed files are unchanged: another distribution may contain a ``models/`` folder, too."""
     recorded = [file for file in metadata.files("robomark") or () if file.hash is not None]
     ours = [file for file in recorded if file.parts[0] in _PACKAGES]
     if not ours:
@@ -176,7 +176,7 @@ def _sandbox_of_workers(_settings: Settings, store: Store) -> tuple[bool, str]:
 
 
 def _control_groups(settings: Settings) -> tuple[bool, str]:
-    """An extra, so that nothing is wrong without it; a unit may well have what this process has not."""
+    """Check control groups, which are optional. A worker's unit may have them although this process does not."""
     reason = control_group.why_not()
     told = f"a worker started from here has {'one for each grading at a time' if reason is None else f'none: {reason}'}"
     with _opened(settings) as store:
@@ -190,7 +190,7 @@ def _control_groups(settings: Settings) -> tuple[bool, str]:
 
 
 def _between_trials(_settings: Settings) -> tuple[bool, str]:
-    """Without this workers here give assignments with hidden scenarios back."""
+    """Check the isolation between trials; without it, workers here do not grade hidden scenarios."""
     from responders.sandbox.manager import Sandboxes
 
     with Sandboxes() as sandboxes:
@@ -231,7 +231,7 @@ def _tables(_settings: Settings, store: Store) -> tuple[bool, str]:
 
 
 def _secret(settings: Settings) -> tuple[bool, str]:
-    """Whether the trials here have the worlds that the newest grade had."""
+    """Check that trials here have the same worlds as the newest grade."""
     whose = "the database's" if settings.own_secret is None else "that of ROBOMARK_SECRET"
     with _opened(settings) as store:
         if store is None:
@@ -274,7 +274,7 @@ def _broker_of_service(settings: Settings, _store: Store) -> tuple[bool, str]:
 
 
 def _known_answer(settings: Settings) -> tuple[bool, str]:
-    """Whether this machine grades the known answer rightly, and every worker did lately."""
+    """Check that this machine passes the self-test and that all workers passed recently."""
     from service.grading.trial_runner import TrialRunner
     from service.queue import self_test as known_answers
 
@@ -297,7 +297,7 @@ def _known_answer(settings: Settings) -> tuple[bool, str]:
 
 
 def _clock(settings: Settings) -> tuple[bool, str]:
-    """Leases go by the database's clock, so that a wrong one here only spoils the logs."""
+    """Compare the clocks. Leases use the database's clock, so a wrong clock here affects only logs."""
     with _opened(settings) as store:
         if store is None:
             return True, "nothing to compare it with yet"
@@ -350,7 +350,7 @@ def _queue_of_service(_settings: Settings, store: Store) -> tuple[bool, str]:
     told += f"; {dead} dead: robomark batch list, and retry" if dead else ""
     if waiting and oldest > _LONG_SECONDS and not any(seen.lately for seen in metrics.workers):
         return False, f"{told}; no worker was heard of lately"
-    # Between two jobs of a long backlog none runs for a moment.
+    # In a long backlog, no job may be running for a moment between two jobs.
     idle = metrics.idle_seconds > _STUCK_SECONDS and not metrics.count(JobState.RUNNING)
     if waiting and oldest > _STUCK_SECONDS and idle:
         return False, f"{told}; workers live and none begins it: their logs may say why, and restarting them may help"
@@ -364,7 +364,7 @@ def _lately(store: Store) -> list[workers.WorkerDescription]:
 
 @contextmanager
 def _opened(settings: Settings) -> Iterator[Store | None]:
-    """The database as it is; None where it has no tables of this release."""
+    """Open the database without changes; None if it has no tables of this release."""
     engine = open_engine(settings.database)
     try:
         yield Store(engine, settings.own_secret) if schema_state(engine).is_usable else None

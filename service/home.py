@@ -1,6 +1,6 @@
-"""The home is ours alone: made so, repaired where it is not, refused where it cannot be; and what is made by default.
+"""Privacy of the home folder: created private, repaired if it is not, and rejected if it cannot be private.
 
-What lies in the home is the business of whoever puts it there; reports and exports lie elsewhere.
+Also sets the process default for new files. Reports and exports are stored elsewhere.
 """
 
 from __future__ import annotations
@@ -31,35 +31,35 @@ if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
 _log = logging.getLogger(__name__)
-#: What in the home is Robomark's; another's files beside it are left as they are, and out of reach all the same.
+#: Robomark's files in the home. Other files there are not changed, but are inaccessible to other users, too.
 _OURS = ("robomark.db*", "run", "log", "broker*", "uploads")
 _OF_OTHERS = 0o077
-#: Root, and the number that root has in a name space of users which does not know it.
+#: Root, and the number of root in a user namespace that does not map it.
 _POWERFUL = (0, 65534)
 _users_umask: ContextVar[int] = ContextVar("users_umask")
 
 
 def keep_private() -> None:
-    """From now on this process makes what nobody but this user can read; but for what is made ``for_the_user``."""
+    """Make files created by this process readable only by this user, except those created ``for_the_user``."""
     if _users_umask.get(None) is None:
         _users_umask.set(os.umask(_OF_OTHERS))
-        # Searched first; the loader is Python's own in all but this.
+        # Searched first; differs from Python's loader only in the permissions.
         sys.path_hooks.insert(0, FileFinder.path_hook(*_LOADERS))
         sys.path_importer_cache.clear()
 
 
 class _SharedBytecode(SourceFileLoader):
-    """What Python keeps of a module lies beside it, for every user that reads it, a sandbox's child among them."""
+    """Loader that stores bytecode readable by all users, including a sandbox's child."""
 
     def set_data(self, path: str, data: ReadableBuffer, *, _mode: int = 0o666) -> None:
-        """Keep it as any Python does."""
+        """Write the bytecode with the user's normal permissions."""
         with for_the_user():
             super().set_data(path, data, _mode=_mode)
 
 
 @contextmanager
 def for_the_user() -> Iterator[None]:
-    """What is made in here lies where the user wants it, and who can read it is for the user's own umask to say."""
+    """Create files with the user's own umask within this context."""
     users = _users_umask.get(None)
     if users is None:
         yield
@@ -79,10 +79,9 @@ _LOADERS: tuple[tuple[type[Any], list[str]], ...] = (
 
 
 def open_home(home: Path) -> None:
-    """Make the home, or make it and what is in it private again, and say so.
+    """Create the home, or repair its privacy and report the repair.
 
-    Raises UsageError for a home that is another's or lies where others could put one of theirs in its place,
-    HostError when it cannot be made.
+    Raises UsageError if another user owns the home or could replace it, HostError if it cannot be created.
     """
     if home in (Path("/"), *_folders_of_all()):
         raise UsageError(f"the home {home} is not for Robomark alone; expected a folder of its own in ROBOMARK_HOME")
@@ -100,7 +99,7 @@ def open_home(home: Path) -> None:
 
 
 def _folders_of_all() -> tuple[Path, ...]:
-    """The folders in which users have theirs."""
+    """Return the folders that contain users' homes."""
     try:
         return tuple(Path.home().parents)
     except RuntimeError:
@@ -108,7 +107,7 @@ def _folders_of_all() -> tuple[Path, ...]:
 
 
 def _check_way(home: Path) -> None:
-    """Whoever owns a folder or link on the way, or may write there, could put another home in this one's place."""
+    """Check the parents of the home: an owner or writer of one of them could replace the home."""
     for path in (home, *home.parents):
         if path.is_symlink():
             _check_owner(home, path, path.lstat(), _POWERFUL)
@@ -140,7 +139,7 @@ def _called(user: int) -> str:
 
 
 def _repair(home: Path) -> int:
-    """How much of it was open to others. It is closed from the top, so that nobody comes in between."""
+    """Make the home private, from the top down, and return the number of open paths."""
     repaired: int = _close(home, home.resolve())
     for path in sorted(found for name in _OURS for found in home.glob(name)):
         repaired += _close(home, path)
@@ -153,7 +152,7 @@ def _repair(home: Path) -> int:
 
 
 def _close(home: Path, path: Path) -> bool:
-    """Whether it was open to others. What another put into the home is refused, for it would be trusted."""
+    """Make a path private and return whether it was open. Rejects files of other users, which would be trusted."""
     try:
         found = path.lstat()
         _check_owner(home, path, found)
@@ -161,6 +160,6 @@ def _close(home: Path, path: Path) -> bool:
         if was_open:
             path.chmod(stat.S_IMODE(found.st_mode) & ~_OF_OTHERS)
     except FileNotFoundError:
-        # Services come and go.
+        # Services create and delete files concurrently.
         return False
     return was_open

@@ -1,6 +1,6 @@
-"""The secret of this home, for commands that need no database besides: read without opening it, once it is there.
+"""The secret of this home, for commands that otherwise need no database: read directly if it exists.
 
-What the secret is for is ``submissions.seeds``'; where it is made, ``service.store``'s migrations.
+``submissions.seeds`` uses the secret; the migrations of ``service.store`` create it.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from submissions.seeds import Secret
 
 
 def secret_here(settings: Settings) -> Secret:
-    """The environment's, else that of the database, which is made if there is none.
+    """Return the secret of the environment, otherwise that of the database, creating it if necessary.
 
-    Raises HostError when it can be neither read nor kept.
+    Raises HostError if it can be neither read nor stored.
     """
     return settings.own_secret or _read(settings) or _opened(settings)
 
 
 def _read(settings: Settings) -> Secret | None:
-    """What a SQLite file has; None where there is none, or not yet."""
+    """Read the secret of a SQLite file; None if there is none yet."""
     file = Path(settings.database.removeprefix("sqlite:///"))
     if not file.is_file():
         return None
@@ -36,7 +36,7 @@ def _read(settings: Settings) -> Secret | None:
 
 
 def _opened(settings: Settings) -> Secret:
-    # Costs as much as a short grading.
+    # Imported here, because this takes as long as a short grading.
     from service.store.engine import open_store
     from service.store.installation import secret_of
 

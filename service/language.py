@@ -1,6 +1,6 @@
-"""The languages that pages and reports speak: English as written, others from their catalogues in ``locale``.
+"""Languages of pages and reports: English as in the source, others from catalogues in ``locale``.
 
-Which one a reader gets is decided by whoever knows the reader; nothing here remembers it.
+The caller chooses the language for a reader.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ SOURCE = "en"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Language:
-    """One of them, handed on to whatever makes sentences."""
+    """A language, passed to every function that creates sentences."""
 
     code: str
     catalogue: gettext.NullTranslations
 
     def say(self, sentence: str, /, **parts: object) -> str:
-        """A sentence of ours: ``%(name)s`` in it stands for a part, and ``%%`` for a per cent sign."""
+        """Translate a sentence. ``%(name)s`` is replaced by a part, and ``%%`` by a per cent sign."""
         return self.catalogue.gettext(sentence) % parts
 
     def tell(self, sentence: str | Sentence) -> str:
-        """A sentence that was made elsewhere, with those that stand in it."""
+        """Translate a sentence created elsewhere, including nested sentences."""
         if isinstance(sentence, str):
             return sentence
         if not sentence.values:
@@ -37,11 +37,11 @@ class Language:
         return self.say(sentence.template, **told)
 
     def counted(self, one: str, many: str, count: int, /, **parts: object) -> str:
-        """The same, of one thing or of ``count``, which is a part of that name."""
+        """Translate a sentence in the singular or plural; ``count`` is available as a part."""
         return self.catalogue.ngettext(one, many, count) % {"count": count, **parts}
 
     def whole(self, number: int) -> str:
-        """A whole number as people write it: a comma between thousands is a decimal comma to many."""
+        """Format an integer with thousands separators; outside English, with spaces instead of commas."""
         return f"{number:,}" if self.code == SOURCE else f"{number:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
 
 
@@ -49,14 +49,14 @@ ENGLISH = Language(SOURCE, gettext.NullTranslations())
 
 
 def translatable(sentence: str) -> str:
-    """The sentence itself: marks one that will be said in the reader's language."""
+    """Mark a sentence for translation and return it unchanged."""
     return sentence
 
 
 @lru_cache(maxsize=1)
 def languages() -> Mapping[str, str]:
-    """What there is, by code: what each calls itself."""
-    # What reads catalogues takes long to load; English needs none of it.
+    """Return the available languages: a mapping of codes to their own names."""
+    # Imported here, because it is slow and English does not need it.
     from importlib.resources import files
 
     from babel.core import Locale
@@ -68,7 +68,7 @@ def languages() -> Mapping[str, str]:
 
 @lru_cache(maxsize=16)
 def language_called(code: str) -> Language:
-    """The one of ``languages`` with this code."""
+    """Return the language with this code."""
     if code == SOURCE:
         return ENGLISH
     import io

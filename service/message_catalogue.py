@@ -1,6 +1,6 @@
-"""Keeps the languages' catalogues up with what is said: ``python -m service.message_catalogue`` writes what is new.
+"""Update of the message catalogues: ``python -m service.message_catalogue`` adds new messages.
 
-Which languages there are, and how they are spoken, is ``language.py``'s.
+``language.py`` defines the languages.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from babel.messages.pofile import read_po, write_po
 
 from service.language import SOURCE, languages
 
-#: What speaks to readers in their own language; all else speaks English.
+#: Sources whose messages are translated; everything else is in English.
 _METHODS = [
     ("web/templates/**.html", "jinja2"),
     ("reports/templates/**.html", "jinja2"),
@@ -23,7 +23,7 @@ _METHODS = [
     ("operations/**.py", "python"),
     ("grading/endings.py", "python"),
 ]
-#: What is refused of what students send: who raises it does not know who reads it.
+#: Sources of translated errors about submissions: the code that raises them does not know the reader.
 _RAISED = [
     (f"{name}.py", "python")
     for name in (
@@ -57,7 +57,7 @@ _OPTIONS = {pattern: {"silent": "false", "trimmed": "true"} for pattern, kind in
 
 
 def messages() -> Catalog:
-    """Everything that pages and reports say, with the places where."""
+    """Extract all messages of pages and reports, with their locations."""
     catalogue = Catalog(project="Robomark", charset="utf-8")
     service, submissions = (Path(str(files(package))) for package in ("service", "submissions"))
     told = [
@@ -71,12 +71,12 @@ def messages() -> Catalog:
 
 
 def catalogue_file(code: str) -> Path:
-    """Where the catalogue of a language is."""
+    """Return the catalogue file of a language."""
     return Path(str(files("service"))) / "locale" / f"{code}.po"
 
 
 def update(code: str) -> Catalog:
-    """A language's catalogue with all that is said now; what is said no more is gone."""
+    """Return a language's catalogue with all present messages and without obsolete ones."""
     with catalogue_file(code).open("rb") as file:
         kept = read_po(file, locale=code)
     kept.update(messages(), no_fuzzy_matching=True)
@@ -85,7 +85,7 @@ def update(code: str) -> Catalog:
 
 
 def main() -> None:
-    """Bring every catalogue up to date."""
+    """Update every catalogue."""
     for code in languages():
         if code != SOURCE:
             updated = update(code)

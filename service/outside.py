@@ -1,7 +1,7 @@
-"""Asks addresses of the network, without letting them reach what only this machine or its network can.
+"""Outgoing HTTP requests that cannot reach addresses which only this machine or its network can reach.
 
-Who asks says which networks it may reach besides the internet at large; what an answer means is for them to say.
-A name is resolved once, all that it resolves to is looked at, and what was looked at is what is connected to.
+The caller names additional permitted networks. A name is resolved once, all its addresses are checked, and only a
+checked address is connected to.
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ from urllib.parse import urlsplit
 
 from sim.errors import RobomarkError
 
-#: For the whole of it, from the connection to the end of what is read.
+#: Time limit for the whole request, from the connection to the end of the body.
 SECONDS = 10.0
 _MOST_RESOLVED = 20
 Networks = Sequence[IPv4Network | IPv6Network]
-#: What may be reached besides public addresses.
+#: No networks besides public addresses.
 NO_OTHERS: Networks = ()
-#: What Python 3.11 calls global and is not, or leads to an address that is not looked at.
+#: Networks that Python 3.11 wrongly considers global, or that lead to an unchecked address.
 _NOT_PUBLIC: Networks = tuple(
     map(
         ip_network,
         (
-            "192.0.0.0/24",  # protocols' own
-            "192.88.99.0/24",  # relays of 6to4, given up
-            "::/96",  # addresses of the older kind, given up
-            "64:ff9b::/96",  # translated to addresses of the older kind
-            "64:ff9b:1::/48",  # the same, within one network
+            "192.0.0.0/24",  # protocol assignments
+            "192.88.99.0/24",  # 6to4 relays, deprecated
+            "::/96",  # IPv4-compatible addresses, deprecated
+            "64:ff9b::/96",  # translated to IPv4
+            "64:ff9b:1::/48",  # translated to IPv4 within one network
             "100::/64",  # discarded
-            "2001::/23",  # protocols' own
-            "2001:db8::/32",  # in documents
-            "3fff::/20",  # in documents
-            "5f00::/16",  # segments of routes
-            "fec0::/10",  # sites' own, given up for fc00::/7
+            "2001::/23",  # protocol assignments
+            "2001:db8::/32",  # documentation
+            "3fff::/20",  # documentation
+            "5f00::/16",  # segment routing
+            "fec0::/10",  # site-local addresses, deprecated in favour of fc00::/7
         ),
     )
 )
@@ -47,15 +47,15 @@ ALL_OTHERS: Networks = (ip_network("0.0.0.0/0"), ip_network("::/0"))
 
 
 class NotReached(RobomarkError):
-    """An address that may not be asked, or did not answer."""
+    """An address that may not be requested, or did not respond."""
 
 
 @dataclass(frozen=True, slots=True)
 class OutsideAnswer:
-    """What was answered: its body as far as it was asked for, and a byte more where there is more."""
+    """The response, with its body up to the limit plus one byte if it is longer."""
 
     status: int
-    headers: Mapping[str, str]  # by name in small letters
+    headers: Mapping[str, str]  # by lower-case name
     body: bytes
 
 
@@ -70,15 +70,15 @@ class _Target:
 def ask(
     url: str, *, method: str, body: bytes | None, headers: Mapping[str, str], others: Networks, most_bytes: int = 0
 ) -> OutsideAnswer:
-    """What an address answers; no redirection is followed.
+    """Send a request and return the response, without following redirections.
 
-    ``others`` are the networks that it may be in besides the internet at large. Raises NotReached.
+    ``others`` are permitted networks in addition to public addresses. Raises NotReached.
     """
     target = _target(url)
     addresses = _addresses(target, others)
     try:
         sock = _connected(target, addresses)
-        # Each read has its own bound; whoever answers a byte at a time is cut off by this one.
+        # Each read has its own time limit; this one stops a server that sends single bytes.
         ending = Timer(SECONDS, _shut, [sock])
         ending.daemon = True
         ending.start()
@@ -89,7 +89,7 @@ def ask(
             try:
                 answer = _asked(connection, sock, target, method, body, headers, most_bytes)
             finally:
-                # Set by now, if it has rung: what was read then is not whole.
+                # If the timer has fired, the response is incomplete.
                 late = ending.finished.is_set()
                 ending.cancel()
     except (OSError, http.client.HTTPException, ValueError) as error:
@@ -133,10 +133,10 @@ def _target(url: str) -> _Target:
 
 
 def _addresses(target: _Target, others: Networks) -> list[str]:
-    """Where to connect to.
+    """Return the addresses to connect to.
 
-    Raises NotReached where there is nothing of this name or any of its addresses is neither public nor in ``others``,
-    in the same words: which of both it is would tell the names of a network inside.
+    Raises NotReached if the name is unknown, or any address is neither public nor in ``others``. The message is the
+    same for both, because it would otherwise reveal internal names.
     """
     try:
         found = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_STREAM)[:_MOST_RESOLVED]
@@ -149,7 +149,7 @@ def _addresses(target: _Target, others: Networks) -> list[str]:
 
 
 def _connected(target: _Target, addresses: Sequence[str]) -> socket.socket:
-    """To the first that can be connected to, with TLS still to begin. Raises OSError."""
+    """Connect to the first reachable address, before any TLS handshake. Raises OSError."""
     for place, address in enumerate(addresses, start=1):
         try:
             plain = socket.create_connection((address, target.port), timeout=SECONDS / len(addresses))
@@ -170,10 +170,10 @@ def _is_in(address: str, networks: Networks) -> bool:
 
 
 def is_public(address: str) -> bool:
-    """Whether an address belongs to the internet at large, and leads to none that does not."""
+    """Return whether an address is public and does not embed one that is not."""
     found = ip_address(address.partition("%")[0])
     if isinstance(found, IPv6Address):
-        # What carries an address of the older kind is as public as that; translators take what nobody checked.
+        # An address that embeds an IPv4 address is as public as that one; translators accept unchecked addresses.
         carried = found.ipv4_mapped or found.sixtofour or (found.teredo and found.teredo[1])
         if carried:
             return is_public(str(carried))

@@ -1,6 +1,6 @@
-"""The plots of a grade against its assignment: the one place that knows both the floors and the drawing.
+"""Plots of a grade; the only module that uses both the floors and the drawing code.
 
-Keeps nothing and knows no queue; what is drawn is kept by ``store.plots``.
+Stores nothing and is independent of the queue; ``store.plots`` stores the plots.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from submissions.submission import Submission
 
 
 def draw(grade: Grade, assignment: Assignment, submission: Submission) -> dict[str, bytes]:
-    """Every plot of the grade, name -> PNG; floors of the assignment's own, and a notebook's diagrams, as such."""
-    # A worker need not load it before its first grade.
+    """Draw every plot of a grade, with the assignment's own floors and a notebook's diagrams. Maps names to PNG."""
+    # Imported here, because a worker does not need it before its first grade.
     from service.reports.plots.drawn import draw_all
 
     return draw_all(grade, own_floors(assignment), diagrams_in(submission.notebook).cells)
 
 
 def own_floors(assignment: Assignment) -> dict[str, Pixels]:
-    """The floor of the assignment's own, by its name, if it has one."""
+    """Return the assignment's own floor by name; empty if it has none."""
     from sim.floors import floor_from_image
 
     world = assignment.world

@@ -1,6 +1,6 @@
-"""Writes reports of grades that are stored: reads what each is made of, once, and hands it to ``service.reports``.
+"""Report files of stored grades: loads the data once and passes it to ``service.reports``.
 
-What a report says is decided there, and nothing there reads the database; what is not drawn yet is drawn here.
+``service.reports`` decides on the content without reading the database. Missing plots are drawn here.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _INDEX = "index.html"
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """The report of one job, and the plots in it: name -> PNG."""
+    """The report file of a job, and its plots as a mapping of name to PNG."""
 
     path: Path
     plots: Mapping[str, bytes]
@@ -62,9 +62,9 @@ def write_report(
     over: JobLine | None = None,
     language: Language = ENGLISH,
 ) -> Written:
-    """The page of one graded job, called by ``stem``; its replay has the trials of ``over`` over its own.
+    """Write the page of a graded job as ``stem``.html; its replay overlays the trials of ``over``.
 
-    Raises UsageError when the folder cannot be written to, and where the reader may not see them.
+    Raises UsageError if the folder is not writable, or the reader may not see those trials.
     """
     html, drawn = _page(store, line, grade, over, language)
     return Written(write_page(folder, f"{stem}.html", html), drawn)
@@ -78,9 +78,9 @@ def write_grade_replay(
     over: JobLine | None = None,
     language: Language = ENGLISH,
 ) -> None:
-    """All trials of one graded job that its report may show, with those of ``over`` over them.
+    """Write the replay of all visible trials of a graded job, overlaid with those of ``over``.
 
-    Raises UsageError when the file cannot be written, and where the reader may not see them.
+    Raises UsageError if the file cannot be written, or the reader may not see those trials.
     """
     with store.reading() as session:
         submission = intake.load_submission(session, line.id)
@@ -91,9 +91,9 @@ def write_grade_replay(
 
 
 def write_grade_film(store: Store, line: JobLine, grade: Grade, path: Path, number: int | None) -> None:
-    """One trial that the report of a graded job may show, by its number there; without one, the one it opens with.
+    """Write the film of a visible trial by its number in the report; without one, of the trial that it opens with.
 
-    Raises UsageError when there is none, and when the file cannot be written.
+    Raises UsageError if there is none, or the file cannot be written.
     """
     with store.reading() as session:
         floors = own_floors(intake.load_assignment(session, line.id))
@@ -107,7 +107,7 @@ def write_grade_film(store: Store, line: JobLine, grade: Grade, path: Path, numb
 
 
 def report_pages(store: Store, lines: Sequence[JobLine], refusals: Sequence[Refusal]) -> Iterator[ReportPage]:
-    """A page for each of the graded jobs, then one for each who was refused."""
+    """Yield a page for each graded job, then one for each rejection."""
     for line in lines:
         with store.reading() as session:
             grade = results.load(session, line.id)
@@ -118,10 +118,10 @@ def report_pages(store: Store, lines: Sequence[JobLine], refusals: Sequence[Refu
 
 
 def write_batch(store: Store, title: str, lines: Sequence[JobLine], refusals: Sequence[Refusal], folder: Path) -> Path:
-    """A page for each graded job and each who was refused, and one that lists them all; where that one is.
+    """Write a page for each graded job and rejection, and an index. Returns the path of the index.
 
-    Pages are named after the student, and after the assignment where one student has several. Raises UsageError when
-    the folder cannot be written to.
+    Pages are named after the student, and after the assignment if a student has several. Raises UsageError if the
+    folder is not writable.
     """
     graded = [line for line in lines if not why_not_shown(line)]
     names = [(line.student, line.assignment) for line in graded]
@@ -158,24 +158,24 @@ def write_batch(store: Store, title: str, lines: Sequence[JobLine], refusals: Se
 
 
 def report_body(store: Store, job_id: str, plotted: PlotState, view: View) -> ReportParts:
-    """The report of one graded job as one reader may see it, for a page with a frame of its own.
+    """Return the report of a graded job for one reader, as parts of another page.
 
-    Plots that are not drawn yet are left out: whoever waits for a page does not wait for them.
+    Plots that are not drawn yet are left out, so that the page does not wait for them.
     """
     return report_parts(view, *_kept(store, job_id, plotted, view))
 
 
 def report_alone(store: Store, job_id: str, plotted: PlotState, view: View) -> str:
-    """The same as a page of its own."""
+    """Return the report as a standalone page."""
     return report(view, *_kept(store, job_id, plotted, view))
 
 
 def report_each(
     session: Session, views: Iterable[tuple[str, View]], job_ids: Collection[str]
 ) -> Iterator[tuple[str, View, str]]:
-    """Each of the graded jobs with what its reader may see and the report of that as a page of its own.
+    """Yield the id, view and standalone report of each graded job.
 
-    All are read in the same few statements. ``views`` are those of ``job_ids``, in the database's order of ids.
+    All data is read with a fixed number of statements. ``views`` must match ``job_ids``, ordered by id.
     """
     submissions, drawn = intake.load_each_submission(session, job_ids), plots.load_each(session, job_ids)
     floors: dict[tuple[str, str], Mapping[str, Pixels]] = {}
@@ -193,7 +193,7 @@ def _is_built_in(view: View) -> bool:
 def _kept(
     store: Store, job_id: str, plotted: PlotState, view: View
 ) -> tuple[Mapping[str, bytes], Submission, Mapping[str, Pixels]]:
-    """The plots, the submission and the floors that a report shows."""
+    """Load the plots, the submission and the floors of a report."""
     with store.reading() as session:
         submission = intake.load_submission(session, job_id)
         drawn = plots.load(session, job_id) if plotted is PlotState.DONE else {}
@@ -204,7 +204,7 @@ def _kept(
 def _page(
     store: Store, line: JobLine, grade: Grade, over: JobLine | None = None, language: Language = ENGLISH
 ) -> tuple[str, Mapping[str, bytes]]:
-    """The page of one graded job, and its plots."""
+    """Return the page of a graded job, and its plots."""
     with store.reading() as session:
         submission = intake.load_submission(session, line.id)
         view = _view(session, line, grade, language)
@@ -220,14 +220,14 @@ def _page(
 
 
 def _view(session: Session, line: JobLine, grade: Grade, language: Language = ENGLISH) -> View:
-    """What the reader of the job's report may see."""
+    """Return the part of a job's grade that the reader of its report may see."""
     if line.staff_only is not None:
         return staff_view(grade, language)
     return student_view(grade, policies.released(session, line.id), language)
 
 
 def _others(session: Session, line: JobLine, view: View, over: JobLine | None) -> OtherTrials:
-    """The trials of ``over`` as far as the reader of the view may see them."""
+    """Return the trials of ``over`` that the reader of the view may see."""
     if over is None:
         return NO_OTHERS
     reason = why_not_shown(over)
@@ -244,7 +244,7 @@ def _others(session: Session, line: JobLine, view: View, over: JobLine | None) -
 
 
 def _called(over: JobLine, line: JobLine) -> str:
-    """What the other trials are called beside those of ``line``."""
+    """Return the label of the overlaid trials in the report of ``line``."""
     if over.student == REFERENCE:
         return "the reference"
     if over.student != line.student:

@@ -1,7 +1,7 @@
-"""What an operator can set, read once from the environment (``ROBOMARK_...``) and handed down as a frozen value.
+"""Settings of an installation, read once from the environment (``ROBOMARK_...``) into a frozen value.
 
-What the environment should not show may lie in files instead. Nothing else in Robomark reads the environment; nothing
-here opens a connection.
+Confidential settings can be stored in files instead. No other module reads settings from the environment, and this one
+opens no connection.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from sim.errors import UsageError
 from submissions.seeds import PUBLIC, Secret
 
 PREFIX = "ROBOMARK_"
-#: A folder with files that are named as settings; it is called so by systemd, too.
+#: Variable with a folder whose files are named after settings; systemd uses the same name.
 SECRET_FILES = "CREDENTIALS_DIRECTORY"
 _SHORTEST_SECRET = 16
 _READ = "read"
@@ -26,7 +26,7 @@ Written = TypeVar("Written", str, Path)
 
 
 def default_home() -> Path:
-    """The user's data directory, as the XDG base directory specification has it."""
+    """Return the user's data directory, according to the XDG base directory specification."""
     data = os.environ.get("XDG_DATA_HOME", "")
     try:
         base = Path(data) if data.startswith("/") else Path.home() / ".local" / "share"
@@ -38,7 +38,7 @@ def default_home() -> Path:
 
 
 def _setting(read: Callable[[Any], Any], **default: Any) -> Any:
-    """A setting; ``read`` takes it as it is written or given, and raises ValueError saying what was expected."""
+    """Define a setting; ``read`` converts the written or given value and raises ValueError with the expected form."""
     return field(**default, metadata={_READ: read})
 
 
@@ -58,7 +58,7 @@ def _broker(url: str) -> str:
 def _database(url: str) -> str:
     if not url:
         return url
-    # Costs more than all else that settings do.
+    # Imported here, because it takes longer than everything else in the settings.
     from sqlalchemy.engine import make_url
     from sqlalchemy.exc import ArgumentError
 
@@ -81,7 +81,7 @@ def _address(url: str) -> str:
 
 
 def names_in(written: str) -> tuple[str, ...]:
-    """The parts of a list with commas."""
+    """Split a comma-separated list."""
     return tuple(part for each in written.split(",") if (part := each.strip().lower()))
 
 
@@ -154,42 +154,42 @@ def _between(least: float, number: float, most: float) -> float:
 class Settings:
     """All settings. An empty ``broker_url`` means the bundled server, an empty ``database_url`` SQLite in ``home``.
 
-    Raises UsageError: naming the variable, its value and what was expected.
+    Raises:
+        UsageError: A value is invalid; names the variable, its value and the expected form.
     """
 
     home: Path = field(default_factory=default_home, metadata={_READ: _folder})
     broker_url: str = _setting(_broker, default="")
     database_url: str = _setting(_database, default="")
     concurrency: int = _setting(_count(1, 256), default_factory=lambda: len(os.sched_getaffinity(0)))
-    #: A worker that has not been heard of for this long has lost its job.
+    #: A worker that has not been seen for this long loses its job.
     lease_seconds: float = _setting(_seconds(0.5, 3600), default=60.0)
-    #: How often a job is begun, at most, when machines fail under it.
+    #: Maximum number of attempts of a job after host faults.
     max_attempts: int = _setting(_count(1, 20), default=3)
-    #: The wait before a second attempt; it doubles with each further one.
+    #: Delay before the second attempt; doubles with each further one.
     backoff_seconds: float = _setting(_seconds(0, 3600), default=5.0)
-    #: How long one whole job may take in real time: the backstop behind all other limits.
+    #: Time limit for one whole job in real time, in addition to all other limits.
     job_seconds: float = _setting(_seconds(1, 86_400), default=900.0)
-    #: How often each process of a worker grades the known answer.
+    #: Interval between self-tests of each process of a worker.
     self_test_seconds: float = _setting(_seconds(1, 86_400), default=300.0)
-    #: A queued job whose notice is older than this may be notified again.
+    #: Age after which the notification of a queued job may be repeated.
     notify_seconds: float = _setting(_seconds(0.1, 3600), default=10.0)
-    #: What the processes of one grading may take together, where a worker has control groups; more where the
-    #: assignment allows them more.
+    #: Memory limit for all processes of one grading, if the worker has control groups; an assignment can raise it.
     slot_memory_mb: int = _setting(_count(256, 1_000_000), default=1536)
     log_level: str = _setting(_log_level, default="WARNING")
-    #: Where browsers find the web server, when others than this machine are to reach it.
+    #: Public address of the web server, if it is reachable from other machines.
     public_url: str = _setting(_address, default="")
-    #: How often a token may call the API; as often again at once, after a rest.
+    #: Limit of API calls per token; bursts of the same size are allowed after a pause.
     api_calls_per_minute: float = _setting(_seconds(1, 1_000_000), default=600.0)
-    #: What all submissions of one student to one assignment may have together.
+    #: Maximum total size of one student's submissions to one assignment.
     student_quota_mb: int = _setting(_count(1, 1_000_000), default=200)
-    #: Proxies whose X-Forwarded-For is believed: addresses or networks, with commas between.
+    #: Proxies whose X-Forwarded-For header is trusted: comma-separated addresses or networks.
     trusted_proxies: str = _setting(_networks, default="")
-    #: Names by which /health and /metrics answer besides addresses and the public name, with commas between.
+    #: Comma-separated host names for /health and /metrics, in addition to addresses and the public name.
     probe_hosts: str = _setting(_host_names, default="")
-    #: Whether webhooks may lead to addresses of the own network, which else are refused.
+    #: Permit webhooks to private networks, which are rejected otherwise.
     webhooks_inside: bool = _setting(_whether, default=False)
-    #: Wins over the database's own; empty where there is none.
+    #: Overrides the database's secret; empty for none.
     secret: Secret = field(default=PUBLIC, metadata={_READ: _secret})
 
     def __post_init__(self) -> None:
@@ -203,7 +203,7 @@ class Settings:
 
     @property
     def own_secret(self) -> Secret | None:
-        """What the environment has in place of the database's secret."""
+        """The secret of the environment, which overrides the database's; None if there is none."""
         return None if self.secret == PUBLIC else self.secret
 
     @property
@@ -212,20 +212,20 @@ class Settings:
         return self.database_url or f"sqlite:///{self.home / 'robomark.db'}"
 
     def with_broker(self, url: str) -> Self:
-        """The same settings, with a broker that is known to be there."""
+        """Return the same settings with the address of a running broker."""
         return replace(self, broker_url=url)
 
     def environment(self) -> dict[str, str]:
-        """The variables that make a child process read these same settings; but the secret, which it inherits."""
+        """Return the variables that give a child process the same settings, except the secret, which it inherits."""
         told = {name: str(value) for name, value in asdict(self).items() if name != "secret"}
         return {_variable(name): text for name, text in told.items() if text}
 
 
 def load_settings(**overrides: object) -> Settings:
-    """Settings from the environment, else from secret files; ``overrides`` win.
+    """Load settings from the environment, otherwise from secret files; ``overrides`` take precedence.
 
     Raises:
-        UsageError: naming the variable, its value and what was expected.
+        UsageError: A value is invalid; names the variable, its value and the expected form.
     """
     folder = os.environ.get(SECRET_FILES) or None
     if folder is not None and not Path(folder).is_dir():
@@ -244,7 +244,7 @@ def _in_files(folder: Path) -> dict[str, str]:
 
 
 def _of_settings(named: Mapping[str, Written]) -> dict[str, Written]:
-    """What there is for settings; nothing is said by a variable that is empty."""
+    """Return the values that belong to settings, skipping empty ones."""
     variables = {_variable(each.name): each.name for each in fields(Settings)}
     return {variables[name.upper()]: found for name, found in named.items() if name.upper() in variables and found}
 

@@ -1,6 +1,6 @@
-"""All there is of one student, as they may see it, in one zip: who they are, what they submitted, what came of it.
+"""Export of one student's data as a zip: personal data, submissions and results, as visible to the student.
 
-What a student may see is ``service.reports.view``'s; nothing is removed here.
+``service.reports.view`` decides on visibility; nothing is removed here.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from service.store.models import Course, Enrolment, Extension, Job, Person, Subm
 from service.store.people import membership
 from service.store.web_tables import Appeal, Credential
 
-#: How many submissions are fetched at once.
+#: Number of submissions fetched at once.
 _AT_ONCE = 10
 
 
 def export_student(store: Store, enrolment_id: int, without: Set[str] = frozenset()) -> bytes:
-    """Return the zip, without the submissions for some assignments.
+    """Return the zip, without the submissions to the assignments in ``without``.
 
-    Times and sizes would tell which rows with hidden names are the student's. So would the times of sign-ins and of the
-    enrolment, which are left out with them.
+    With such assignments, times of sign-ins and of the enrolment are left out, too. Like times and sizes of
+    submissions, they could identify the student's rows among hidden names.
     """
     sink = io.BytesIO()
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive, store.reading() as session:
@@ -69,10 +69,10 @@ def _student(session: Session, enrolment: Enrolment, course: str) -> dict[str, A
 
 
 def _moments(session: Session, enrolment: Enrolment, person: Person) -> dict[str, Any]:
-    """When a student came and signed in, as far as it belongs to this course."""
+    """Return the times of enrolment and sign-ins that belong to this course."""
     here = Credential.course_id == enrolment.course_id
     if not membership.is_more_than(session, enrolment):
-        # One course is all they have, so what reaches everywhere reaches this course alone.
+        # The student has only this course, so unlimited credentials belong to it, too.
         here = or_(here, Credential.course_id.is_(None))
     signs_in = select(Credential).where(Credential.person_id == person.id, here).order_by(Credential.created_at)
     names = ("kind", "name", "created_at", "expires_at", "used_at", "revoked_at")
@@ -83,7 +83,7 @@ def _moments(session: Session, enrolment: Enrolment, person: Person) -> dict[str
 
 
 def _submissions(session: Session, mine: ColumnElement[bool]) -> Iterator[tuple[int, dict[str, Any], bytes]]:
-    """The submissions in their order: the id, what is told of it, and what was submitted."""
+    """Yield the id, the data and the packed files of each submission, ordered by id."""
     asked = select(Appeal).join(SubmissionRow, Appeal.submission_id == SubmissionRow.id).where(mine)
     appeals: dict[int, list[Appeal]] = {}
     for appeal in session.scalars(asked.order_by(Appeal.id)):
@@ -97,7 +97,7 @@ def _submissions(session: Session, mine: ColumnElement[bool]) -> Iterator[tuple[
 
 
 def _seen_grades(session: Session, mine: ColumnElement[bool]) -> Iterator[tuple[int, View, str]]:
-    """Of each submission whose grade its student may see: the id, what they may see, and the report of that."""
+    """Yield the id, view and report of each submission whose grade the student may see."""
     query = select(Job.id, Job.submission_id).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
     submission_of = dict(session.execute(query.where(mine, *current.CAN_COUNT)).all())
     released = policies.released_of_each(session, submission_of)

@@ -1,6 +1,6 @@
-"""A program run once without being marked: in the first scenario that students see, by a seed that everybody may know.
+"""Test runs: a program runs once, unmarked, in the first visible scenario with a public seed.
 
-The sandbox and the simulator are those of grading; whose program it is and who waits for it is ``store.tryouts``'s.
+Uses the sandbox and simulator of grading; ``store.tryouts`` stores owners and results.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from submissions.seeds import PUBLIC
 from submissions.submission import PART_FILES, Submission
 from submissions.sweep import NO_SWEEP
 
-#: Simulated; of an assignment that runs shorter, its own.
+#: Simulated seconds; less if the assignment's own limit is shorter.
 LONGEST_SECONDS = 30.0
 _PROGRAM_CPU, _RESPONDER_CPU, _ALL_CPU, _ALL_SLEEP, _ALL_OUTPUT_MB = 3.0, 5.0, 10.0, 10.0, 8
 _MOST_LINES = 400
@@ -37,7 +37,7 @@ _LONGEST_LINE = 400
 
 @dataclass(frozen=True, slots=True)
 class TryoutResult:
-    """What came of it: what is told, as plain data, and what the replay plays, compressed."""
+    """The result of a test run: plain data for display, and the compressed replay."""
 
     verdict: Verdict
     words: dict[str, Any]
@@ -45,9 +45,9 @@ class TryoutResult:
 
 
 def tryout_assignment(assignment: Assignment) -> Assignment | None:
-    """The one trial in which programs are tried; None where no robot is run that students see.
+    """Return an assignment with the single trial of test runs; None without a visible scenario.
 
-    Nothing of it follows from a secret, nothing is marked, and no more is allowed than an assignment allows itself.
+    It depends on no secret, has no marks, and allows no more than the original assignment.
     """
     shown = next((each for each in assignment.scenarios if each.visibility == "visible"), None)
     if shown is None or assignment.training is not None:
@@ -67,7 +67,7 @@ def tryout_assignment(assignment: Assignment) -> Assignment | None:
     return replace(
         assignment,
         scenarios=(once,),
-        # What may not be imported there may not be imported here.
+        # The same imports are forbidden as in the assignment.
         criteria=tuple(each for each in assignment.criteria if isinstance(each, SourceRules)),
         limits=replace(
             limits,
@@ -82,7 +82,7 @@ def tryout_assignment(assignment: Assignment) -> Assignment | None:
 
 
 def run_tryout(submission: Submission, once: Assignment, runner: TrialRunner, observe: Observe) -> TryoutResult:
-    """Run a submission in the trial of a ``tryout_assignment``; raises as ``grade`` does."""
+    """Run a submission in the trial of a ``tryout_assignment``. Raises like ``grade``."""
     graded = grade(submission, once, secret=PUBLIC, runner=runner, observe=observe)
     run = replace(graded, criteria=(), hints=(), missing="", notes=_notes(graded, submission))
     replay = replay_of_grade(student_view(run), submission, own_floors(once)) if run.trials else None
@@ -90,7 +90,7 @@ def run_tryout(submission: Submission, once: Assignment, runner: TrialRunner, ob
 
 
 def _notes(graded: Grade, submission: Submission) -> tuple[str, ...]:
-    """What a part that is not there means where nothing is marked."""
+    """Return the notes, with the note about a missing part rephrased for a run without marks."""
     if not graded.missing:
         return graded.notes
     with_marks = {missing_part_note(part, submission.files) for part in PART_FILES}

@@ -1,4 +1,4 @@
-"""Which Robomark grades: the version that reports name, and a hash of everything that decides over marks."""
+"""Version of the grader: the release named in reports, and a hash of everything that affects marks."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from pathlib import Path
 GRADER_VERSION = version("robomark")
 
 _PACKAGES = Path(__file__).parent.parent
-#: What the marks follow from; an assignment has a hash of its own.
+#: Code and data that affect marks; assignments have their own hash.
 _DECIDING = ("sim", "models", "responders", "submissions", "service/grading")
 _NOT_DECIDING = {"__pycache__", "catalogue", "examples"}
-#: Every library that the deciding code imports, and those that these compute with.
+#: Libraries imported by that code, and the libraries that these compute with.
 _DISTRIBUTIONS = (
     *("pybullet", "numpy", "scipy", "scikit-learn", "joblib", "threadpoolctl", "pandas", "pillow", "google-re2"),
     *("onnxruntime", "ai-edge-litert", "pydantic", "pydantic-core", "pyyaml"),
@@ -23,7 +23,10 @@ _DISTRIBUTIONS = (
 
 
 def release_problem() -> str:
-    """Why this process must be restarted: the installed release is not the one that runs. Empty where it is."""
+    """Return the reason why this process must be restarted: a different release is installed.
+
+    Empty if there is none.
+    """
     installed = _version("robomark")
     if installed == GRADER_VERSION:
         return ""
@@ -32,7 +35,7 @@ def release_problem() -> str:
 
 @cache
 def grader_sha256() -> str:
-    """Hash of the grading code, its data and the libraries it stands on: where it is the same, marks are too."""
+    """Return the hash of the grading code, its data and libraries. Equal hashes mean equal marks."""
     digest = hashlib.sha256(platform.python_version().encode())
     for name in _DISTRIBUTIONS:
         digest.update(f"{name} {_version(name)}\n".encode())
@@ -43,7 +46,7 @@ def grader_sha256() -> str:
 
 
 def _version(distribution: str) -> str:
-    """The version that is installed now; "none" for a library that is not."""
+    """Return the version that is installed now; "none" for a missing library."""
     try:
         return version(distribution)
     except PackageNotFoundError:

@@ -1,6 +1,6 @@
-"""Sends what the outbox holds: one thread of each web server, which claims before it sends.
+"""Sender of webhook deliveries: one thread in each web server, which claims deliveries from the outbox.
 
-What is told, and how often it is tried, is ``store/outbox.py``'s.
+``store/outbox.py`` defines the events and retries.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _AT_ONCE = 8
 
 
 class WebhookSender:
-    """Sends while it is open, to public addresses and to these networks."""
+    """Sends deliveries within a ``with`` block, to public addresses and to these networks."""
 
     def __init__(self, store: Store, others: Networks) -> None:
         self._store = store
@@ -40,7 +40,7 @@ class WebhookSender:
         return self
 
     def __exit__(self, *_: object) -> None:
-        # What is being sent is sent again by the next server, should this one not see its end.
+        # If this process ends during a delivery, the next server sends it again.
         self._ended.set()
         self._thread.join(timeout=1.0)
 
@@ -54,7 +54,7 @@ class WebhookSender:
 
 
 def send_due(store: Store, others: Networks) -> int:
-    """Send some of what is due; how many that were."""
+    """Send some of the due deliveries. Returns their number."""
     claimed = outbox.claim(store, _AT_ONCE)
     if claimed:
         with ThreadPoolExecutor(_AT_ONCE) as pool:
@@ -63,7 +63,7 @@ def send_due(store: Store, others: Networks) -> int:
 
 
 def signature(secret: str, at: int, body: bytes) -> str:
-    """What the header ``Robomark-Signature`` says of a body that was sent at this second."""
+    """Return the value of the ``Robomark-Signature`` header for a body sent at this second."""
     signed = hmac.new(secret.encode(), f"{at}.".encode() + body, hashlib.sha256).hexdigest()
     return f"t={at},v1={signed}"
 

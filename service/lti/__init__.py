@@ -1,1 +1,1 @@
-"""Learning platforms that launch Robomark by LTI 1.3, tell it who is in a course, and take its marks."""
+"""LTI 1.3: launches from learning platforms, member lists, and passback of marks."""

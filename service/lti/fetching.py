@@ -1,6 +1,6 @@
-"""Requests to a platform for JSON, to addresses whose origin an operator registered, in whatever network they are.
+"""JSON requests to platforms, at origins that an operator registered, in any network.
 
-How an address is asked, and how long, is ``service.outside``'s.
+``service.outside`` contains connection handling and time-outs.
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ _MOST_BYTES = 4 * 2**20
 
 
 class PlatformError(HostError):
-    """A learning platform does not do what it is asked."""
+    """A learning platform did not fulfil a request."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fetched:
-    """What a platform answered."""
+    """The reply of a platform."""
 
-    value: Any  # JSON; None where it answered nothing
+    value: Any  # JSON; None for an empty reply
     link: str  # the header that names further pages
 
 
 def fetch(
     url: str, *, method: str = "GET", body: bytes | None = None, headers: Mapping[str, str] | None = None
 ) -> Fetched:
-    """The answer to one request. Raises PlatformError, saying whom was asked, where it is no answer or no JSON."""
+    """Send one request and return the reply. Raises PlatformError, with the host, for a failure or invalid JSON."""
     host = url.partition("//")[2].partition("/")[0]
     told = {"User-Agent": f"Robomark/{GRADER_VERSION}", **(headers or {})}
     try:
         answer = ask(url, method=method, body=body, headers=told, others=ALL_OTHERS, most_bytes=_MOST_BYTES)
     except NotReached as error:
         raise PlatformError(f"The platform at {host} cannot be asked: {error}") from None
-    # What is sent has our token in it, which is for nobody else: a redirection is no answer, either.
+    # Requests contain our token, which no other host may get, so a redirection is an error, too.
     if not 200 <= answer.status < 300:
         raise PlatformError(f"The platform at {host} answered {answer.status} to a {method}")
     if len(answer.body) > _MOST_BYTES:

@@ -1,4 +1,4 @@
-"""Our key pair: what we sign with towards platforms, and the public half that they read."""
+"""The key pair that signs messages to platforms, and the public key set that they read."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BITS = 2048
 
 
 def signing_key(session: Session) -> tuple[str, str]:
-    """Id and PEM of the key to sign with, made when it is first asked for."""
+    """Return the id and PEM of the signing key, creating it on first use."""
     if not lti.private_keys(session):
         lock_installation(session)
     if not lti.private_keys(session):
@@ -29,7 +29,7 @@ def signing_key(session: Session) -> tuple[str, str]:
 
 
 def public_keys(session: Session) -> dict[str, Any]:
-    """The JSON Web Key Set (RFC 7517) of all our keys."""
+    """Return the JSON Web Key Set (RFC 7517) of all keys."""
     return {"keys": [_public(key_id, pem) for key_id, pem in lti.private_keys(session)]}
 
 

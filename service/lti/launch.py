@@ -1,6 +1,6 @@
-"""A launch by LTI 1.3: the login that a platform begins, and the identity token that it ends with.
+"""LTI 1.3 launches: the login started by a platform, and the identity token that completes it.
 
-After the 1EdTech Security Framework 1.0, section 5.1, and LTI core 1.3, section 5; signs nobody in itself.
+Follows the 1EdTech Security Framework 1.0, section 5.1, and LTI core 1.3, section 5. Does not sign anyone in.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _LONGEST = 250
 
 @dataclass(frozen=True, slots=True)
 class Launch:
-    """What a platform vouches for: who comes, as what, and to which course."""
+    """The claims of a platform: the person, their role and the course."""
 
     subject: str
     student: Student
@@ -45,7 +45,7 @@ class Launch:
 def authorization_address(
     platform: Platform, redirect_uri: str, login_hint: str, message_hint: str | None, state: str, nonce: str
 ) -> str:
-    """Where the browser goes to be told apart by the platform."""
+    """Return the platform's address that authenticates the user."""
     asked = {
         "scope": "openid",
         "response_type": "id_token",
@@ -64,9 +64,9 @@ def authorization_address(
 
 
 def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
-    """What the token says, if the platform signed it for us, now, and for the launch that was begun.
+    """Verify the signature, audience, time and nonce of an identity token and return its launch.
 
-    Raises UsageError where it is not to be trusted, and PlatformError where the platform's keys cannot be had.
+    Raises UsageError if the token is not trusted, PlatformError if the platform's keys cannot be fetched.
     """
     claims = _claims(pending, id_token)
     if claims.get(f"{CLAIM}version") != "1.3.0":
@@ -95,15 +95,15 @@ def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
 
 
 def role_of(roles: object) -> Role:
-    """An instructor of the course, or else a student; what somebody is in the institution gives them nothing here."""
+    """Return instructor for an instructor of the course, otherwise student. Roles in the institution do not count."""
     named = {role for role in roles if isinstance(role, str)} if isinstance(roles, list) else set()
     return Role.INSTRUCTOR if named & {f"{_MEMBERSHIP}#Instructor", "Instructor"} else Role.STUDENT
 
 
 def student_of(platform: Platform, subject: str, id: str | None, name: str | None, email: str | None) -> Student:
-    """A platform's person as a student of a course: by the institution's id if the platform sends one.
+    """Convert a person of a platform to a student, with the institution's id if the platform sends one.
 
-    Only names and addresses are cut: two ids that were cut could be equal.
+    Only names and e-mail addresses are truncated, because truncated ids could collide.
     """
     return Student(id or f"{platform.name} {subject}", (name or "")[:_LONGEST], (email or "")[:_LONGEST])
 
@@ -144,11 +144,11 @@ def _table(claims: Mapping[str, Any], name: str) -> Mapping[str, Any]:
 
 
 def text_of(table: Mapping[str, Any], name: str) -> str | None:
-    """A text of what a platform said; None where it said none, or no text."""
+    """Return a string value sent by a platform; None if it is missing or not a string."""
     value = table.get(name)
     return value if isinstance(value, str) and value else None
 
 
 def tables_in(value: object) -> list[Mapping[str, Any]]:
-    """The tables in a list that a platform sent; what is none is passed over."""
+    """Return the objects in a list sent by a platform, skipping other values."""
     return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []

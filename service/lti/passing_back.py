@@ -1,4 +1,4 @@
-"""Published marks on their way to a platform's gradebook: the grade that stands of each student whom it knows."""
+"""Passback of published marks to a platform's gradebook: the standing grade of each student that it knows."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from sim.errors import UsageError
 
 
 def send_marks(store: Store, link: CourseLink, course_id: int, assignment: str) -> int:
-    """Send the published marks of an assignment; how many there were.
+    """Send the published marks of an assignment. Returns their number.
 
-    Raises UsageError where nobody of the course submitted to it, PlatformError where the platform takes none.
+    Raises UsageError without submissions to it in the course, PlatformError if the platform does not accept them.
     """
     with store.reading() as session:
         title = session.scalar(
@@ -35,7 +35,7 @@ def send_marks(store: Store, link: CourseLink, course_id: int, assignment: str) 
 
 
 def _published(session: Session, link: CourseLink, course_id: int, assignment: str) -> list[Score]:
-    """The attempt of each student that counts, where its grade is published and not all of it is excused."""
+    """Return the current attempt of each student whose grade is published and not excused completely."""
     subjects = lti.subjects(session, link.platform, course_id)
     query = (
         select(Enrolment.student, Job.marks, Job.max_marks)
@@ -50,7 +50,7 @@ def _published(session: Session, link: CourseLink, course_id: int, assignment: s
         )
         .order_by(SubmissionRow.id)
     )
-    # A platform passes over what is not newer than what it has, and marks change after they are published.
+    # A platform ignores scores that are not newer than its own, and marks can change after publication.
     at = now(session)
     return [
         Score(subjects[student], marks, max_marks, at)

@@ -1,6 +1,6 @@
-"""A platform's services: who is in a course (Names and Role Provisioning 2.0), and marks (Assignment and Grade 2.0).
+"""Services of a platform: members (Names and Role Provisioning 2.0) and marks (Assignment and Grade 2.0).
 
-Which marks are sent is the caller's to say.
+The caller selects the marks to send.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _ASSERTION_SECONDS = 60
 
 @dataclass(frozen=True, slots=True)
 class PlatformMember:
-    """Somebody whom a platform has in a course."""
+    """A member of a course on a platform."""
 
     subject: str
     student: Student
@@ -60,7 +60,7 @@ class Score:
 
 
 def members(store: Store, link: CourseLink) -> list[PlatformMember]:
-    """Everybody who is active in the course. Raises PlatformError where the platform gives no list."""
+    """Return the active members of the course. Raises PlatformError if the platform returns no list."""
     if link.members_url is None:
         raise PlatformError("The platform has told no address of its list of members")
     _check_origin(link.platform, link.members_url)
@@ -80,9 +80,9 @@ def members(store: Store, link: CourseLink) -> list[PlatformMember]:
 
 
 def send_scores(store: Store, link: CourseLink, assignment: str, title: str, scores: list[Score]) -> int:
-    """Write marks into the platform's column for the assignment, which is made where there is none; how many went.
+    """Send marks to the platform's column for the assignment, creating it if necessary. Returns their number.
 
-    Raises PlatformError where the platform takes none.
+    Raises PlatformError if the platform does not accept them.
     """
     if link.lineitems_url is None:
         raise PlatformError("The platform has told no address of its marks")
@@ -131,7 +131,7 @@ def _column(platform: Platform, lineitems_url: str, token: str, assignment: str,
 
 
 def _token(store: Store, platform: Platform, scopes: str) -> str:
-    """An access token, asked for with our signature (RFC 7523)."""
+    """Request an access token with a signed assertion (RFC 7523)."""
     with store.transaction() as session:
         key_id, pem = signing_key(session)
     at = int(time.time())
@@ -158,7 +158,7 @@ def _token(store: Store, platform: Platform, scopes: str) -> str:
 
 
 def _ask(platform: Platform, url: str, **request: Any) -> Fetched:
-    """Call an address that a launch or the platform named, if its origin is registered. Raises PlatformError."""
+    """Call an address from a launch or the platform if its origin is registered. Raises PlatformError."""
     _check_origin(platform, url)
     return fetch(url, **request)
 
@@ -182,7 +182,7 @@ def _pages(platform: Platform, url: str, headers: Mapping[str, str]) -> Iterator
 
 
 def _full(roles: object) -> list[str]:
-    """Roles with their whole names: in lists of members short ones are allowed."""
+    """Return roles with their full names: short names are allowed in member lists."""
     named = roles if isinstance(roles, list) else []
     prefix = "http://purl.imsglobal.org/vocab/lis/v2/membership#"
     return [role if "/" in role else f"{prefix}{role}" for role in named if isinstance(role, str)]

@@ -205,7 +205,7 @@ _Submissions = Select[SubmissionRow, Job, str, BatchState | None, int | None, bo
 
 
 def _attempts(enrolment_id: int, assignment: ColumnElement[str], *also: ColumnElement[bool]) -> _Submissions:
-    """Return a query for the newest submissions to an assignment, the one that counts, and those that match ``also``."""
+    """Return a query for the newest submissions to an assignment, the one that counts, and those matching ``also``."""
     row = aliased(SubmissionRow)
     newest = select(row.id).where(row.enrolment_id == enrolment_id, row.assignment == assignment)
     some = or_(

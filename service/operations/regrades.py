@@ -31,7 +31,9 @@ if TYPE_CHECKING:
 def regrade_batch(
     service: Service, actor: Actor, course_id: int, batch_id: str, assignment: Assignment | str = ""
 ) -> Regraded:
-    """Queue a regrade of every graded submission of a batch and notify the workers. Old grades stand until publication.
+    """Queue a regrade of every graded submission of a batch and notify the workers.
+
+    The old grades are in effect until the regrades are published.
 
     Args:
         service: The installation.

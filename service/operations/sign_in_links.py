@@ -81,7 +81,7 @@ def make_students_link(service: Service, actor: Actor, course_id: int, enrolment
 
 
 def make_own_link(service: Service, actor: Actor) -> str:
-    """Return the secret of a new link for the user of this command, as an instructor of the default course and operator.
+    """Return the secret of a new link for the user of this command, as operator and default course instructor.
 
     The id is the account name. Raises Forbidden unless called by a command.
     """

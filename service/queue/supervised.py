@@ -1,6 +1,6 @@
-"""Processes that are started again when they end: a worker, and whatever else a service consists of.
+"""Supervised processes, which are restarted when they end: workers and other parts of a service.
 
-Runs no loop of its own; whoever supervises calls ``ensure`` again and again.
+Contains no loop; the supervisor calls ``ensure`` repeatedly.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from service.store.engine import Store
 from service.store.queue import jobs, workers
 from sim.processes import python_command
 
-#: Imports throw nothing away, and to look for garbage is a tenth of what they cost.
+#: Imports create little garbage, and collecting it would take a tenth of their time.
 _WORKER = "import gc; gc.disable(); from service.queue.worker import main; main()"
-#: One that ends sooner than this after its start is started again only after a wait, which doubles.
+#: A process that ends sooner than this after its start is restarted only after a delay, which doubles.
 _SHORT_LIFE_SECONDS = 10.0
 _LONGEST_WAIT_SECONDS = 60.0
-#: A worker that has taken no message and not even looked for so long is ended; its start alone can take a while.
+#: A worker without activity for this long is stopped; its start alone can take a while.
 _SILENT_SECONDS = 120.0
 _LONGEST_LOOK_SECONDS = 2.0
 _PING_SECONDS = 2.0
 
 
 class SupervisedProcess:
-    """One process: started when it does not run, at once or, after short lives, after longer and longer waits."""
+    """A process that is started when it does not run, with increasing delays after short lives."""
 
     def __init__(self, command: Sequence[str], environment: dict[str, str], log: Path, kept_open: Sequence[int] = ()):
         self._command = command
@@ -41,20 +41,20 @@ class SupervisedProcess:
         self._process: subprocess.Popen[bytes] | None = None
         self._begun = 0.0
         self._not_before = 0.0
-        self.short_lives = 0  # one after another
+        self.short_lives = 0  # consecutive
 
     @property
     def pid(self) -> int | None:
-        """Its process id, if it was started and not yet seen to end."""
+        """The process id, if it was started and has not been seen to end."""
         return None if self._process is None else self._process.pid
 
     @property
     def log(self) -> Path:
-        """Where its output goes."""
+        """The file with its output."""
         return self._log
 
     def ended(self) -> bool:
-        """Whether it has ended since it was last started. True once for each end."""
+        """Return whether it has ended since its last start. True once for each end."""
         if self._process is None or self._process.poll() is None:
             return False
         self._process = None
@@ -65,7 +65,10 @@ class SupervisedProcess:
         return True
 
     def start(self, extra: dict[str, str]) -> bool:
-        """Start it with these variables more, unless it runs or its wait is not over. Whether it was started."""
+        """Start it with these additional variables, unless it runs or its delay is not over.
+
+        Return whether it started.
+        """
         if self._process is not None or time.monotonic() < self._not_before:
             return False
         self._begun = time.monotonic()
@@ -75,29 +78,29 @@ class SupervisedProcess:
         return True
 
     def kill(self) -> None:
-        """Make it end now."""
+        """Kill it and wait for its end."""
         if self._process is not None:
             self._process.kill()
             self._process.wait()
 
     def stop(self, grace_seconds: float) -> None:
-        """End it for good."""
+        """Stop it permanently."""
         stop_all([self], grace_seconds)
 
     def keep_log_small(self) -> None:
-        """Begin the log afresh when it has grown too long."""
+        """Truncate the log if it is too long."""
         keep_small(self._log)
 
 
 def stop_all(supervised: Sequence[SupervisedProcess], grace_seconds: float) -> None:
-    """End them for good, side by side."""
+    """Stop processes permanently, in parallel."""
     end_processes([each._process for each in supervised if each._process is not None], grace_seconds)
     for each in supervised:
         each._process = None
 
 
 class SupervisedWorker:
-    """One worker process; when it ends, or no longer takes messages, what it held goes back and another is started."""
+    """A worker process. If it ends or becomes unresponsive, its jobs are requeued and a new one is started."""
 
     def __init__(self, settings: Settings, store: Store, log: Path) -> None:
         self._settings = settings
@@ -110,14 +113,14 @@ class SupervisedWorker:
 
     @property
     def takes_messages(self) -> bool:
-        """Whether it has begun to look for work."""
+        """Return whether it has started to look for jobs."""
         try:
             return alive_path(self._settings, self._name).stat().st_size > 0
         except OSError:
             return False
 
     def ensure(self) -> None:
-        """Start it if it does not run and its wait is over."""
+        """Start it if it does not run and its delay is over."""
         if self.process.pid is not None and self._is_silent():
             self.process.kill()
         if self.process.ended():
@@ -126,7 +129,7 @@ class SupervisedWorker:
             self._start()
 
     def forget(self) -> int:
-        """Give back what it held, now that it has ended and nobody can fence us. Returns how many jobs that were."""
+        """Requeue the jobs of the ended worker, which cannot finish them any more. Returns their number."""
         if not self._name:
             return 0
         given_back = jobs.release_worker(self._store, self._name)
@@ -136,19 +139,22 @@ class SupervisedWorker:
         return given_back
 
     def stop(self, grace_seconds: float) -> int:
-        """End it for good; returns how many jobs in flight went back."""
+        """Stop it permanently. Returns the number of requeued jobs."""
         self.process.stop(grace_seconds)
         return self.forget()
 
     def _start(self) -> None:
-        # One whose end could not be written down in the database is not forgotten.
+        # Handles an earlier worker whose end could not be stored in the database.
         self.forget()
         name = new_worker_name()
         if self.process.start({WORKER_VARIABLE: name}):
             self._name, self._seen, self._silent, self._looked = name, 0, 0.0, time.monotonic()
 
     def _is_silent(self) -> bool:
-        """Whether it has not touched its file for long, though the broker answers. Only looks count, not clocks."""
+        """Return whether it has not touched its file for long although the broker responds.
+
+        Counts only observed time, so changes of the clock have no effect.
+        """
         moment = time.monotonic()
         self._silent += min(moment - self._looked, _LONGEST_LOOK_SECONDS)
         self._looked = moment

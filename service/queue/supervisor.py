@@ -1,6 +1,6 @@
-"""All of a service on one machine: broker, workers and web server, each started again when it ends.
+"""Supervisor of a whole service on one machine: broker, workers and web server, each restarted when it ends.
 
-Runs no loop of its own and prints nothing; ``commands/up.py`` does.
+Contains no loop and prints nothing; ``commands/up.py`` does.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _SHORT_LIVES = 3
 
 
 class Supervisor:
-    """Broker (unless the settings name one), workers, and a web server on a socket that listens (unless None)."""
+    """Broker (unless configured externally), workers, and a web server on a listening socket (unless None)."""
 
     def __init__(self, settings: Settings, store: Store, workers: int, listening: socket.socket | None) -> None:
         self._store = store
@@ -41,11 +41,11 @@ class Supervisor:
 
     @property
     def ready(self) -> bool:
-        """Whether every worker looks for work."""
+        """Return whether every worker looks for jobs."""
         return all(worker.takes_messages for worker in self.workers)
 
     def ensure(self) -> None:
-        """Start what is not there, or not there any more. Raises HostError when the broker cannot be started."""
+        """Start missing processes. Raises HostError if the broker cannot be started."""
         if self._broker is not None:
             self._broker.ensure()
         for worker in self.workers:
@@ -57,14 +57,14 @@ class Supervisor:
             web.keep_log_small()
 
     def short_lived(self) -> str | None:
-        """A sentence about a process that ends again and again as soon as it is started; None where none does."""
+        """Return a sentence about a process that repeatedly ends right after its start; None if there is none."""
         for process in [*(worker.process for worker in self.workers), *self._web]:
             if process.short_lives >= _SHORT_LIVES:
                 return f"a process ends as soon as it is started; {process.log} may tell why"
         return None
 
     def stop(self) -> int:
-        """End everything that was started here; returns how many jobs in flight went back."""
+        """Stop everything that was started here. Returns the number of requeued jobs."""
         stop_all([*(worker.process for worker in self.workers), *self._web], _GRACE_SECONDS)
         given_back = sum(worker.forget() for worker in self.workers)
         if self._broker is not None:
@@ -83,9 +83,9 @@ class Supervisor:
 
 @contextmanager
 def alone_in(settings: Settings) -> Iterator[Callable[[str], None]]:
-    """Holds the place of the one service of a home; what it gives leaves a note for whoever finds the place taken.
+    """Lock a home for a single service. Yields a function that stores a note for other processes.
 
-    Raises UsageError, with the note, when it is taken. The place is free again when this process has ended, however.
+    Raises UsageError, with the note, if the home is locked. The lock is released when this process ends for any reason.
     """
     open_home(settings.home)
     path = run_file(settings.home / "run" / "up.lock")

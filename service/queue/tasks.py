@@ -1,7 +1,7 @@
-"""The three Celery tasks, and what a pool child keeps warm for them: the runner and the database.
+"""The three Celery tasks, and the objects that a pool child keeps for them: the runner and the database.
 
-A task is a notice and carries nothing; what to do is claimed in the database. The worker's first process knows the
-tasks by their names alone: what does them is loaded in the pool children.
+A task is a notification without content; the work is claimed in the database. The worker's main process knows the tasks
+only by name: their code is loaded in the pool children.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _log = structlog.get_logger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class PoolChild:
-    """What one pool child holds from its first task to its end."""
+    """The objects that a pool child keeps from its first task until it ends."""
 
     settings: Settings
     store: Store
@@ -39,25 +39,25 @@ class PoolChild:
     watch: Watch
 
     def close(self) -> None:
-        """Stop watching, and give back the runner and the store."""
+        """Stop the self-tests, and close the runner and the store."""
         self.watch.end()
         self.runner.close()
         self.store.close()
 
 
 class WarmTask(Task):  # type: ignore[type-arg]
-    """A task with its pool child's things; they are made in the child, never before the fork of one."""
+    """A task with access to the objects of its pool child, which are created only after the fork."""
 
     abstract = True
 
     @property
     def child(self) -> PoolChild:
-        """The things of this process, made when first asked for."""
+        """The objects of this process, created on first access."""
         return _children.child
 
 
 class _Children:
-    """The pool child of this process, made when first asked for."""
+    """Holder of this process's pool child, created on first access."""
 
     @cached_property
     def child(self) -> PoolChild:
@@ -71,7 +71,7 @@ class _Children:
         group = None if unsafe else control_group.for_this_process(settings.slot_memory_mb)
         sandboxes = Sandboxes(NONE if unsafe else FULL, group)
         try:
-            # They load what they need while this process does.
+            # They load their imports while this process continues.
             right = right_answer(settings.home / "run")
             for role in ANSWERED_BY if right.is_ours_to_ask() else ():
                 sandboxes.begin(role, ())
@@ -90,7 +90,7 @@ class _Children:
         return PoolChild(settings, store, runner, watch)
 
     def drop(self) -> None:
-        """Close what there is; the next task makes it afresh."""
+        """Close the objects; the next task creates new ones."""
         if "child" in vars(self):
             self.child.close()
             del self.child
@@ -101,7 +101,7 @@ _children = _Children()
 
 @shared_task(bind=True, base=WarmTask, name=GRADE_TASK)
 def grade_notice(task: WarmTask) -> None:
-    """Grade the job whose turn it is, then ask for its plots."""
+    """Grade the next job, then notify for its plots."""
     from service.queue.alive import worker_name
     from service.queue.grading_job import JobOutcome, grade_next
 
@@ -114,13 +114,13 @@ def grade_notice(task: WarmTask) -> None:
 
         Notifier(task.app, child.store, child.settings).plot()
     elif outcome is JobOutcome.HOST_FAULT:
-        # Whatever broke may be something that was kept warm.
+        # The error may have damaged an object that is reused.
         _children.drop()
 
 
 @shared_task(bind=True, base=WarmTask, name=TRYOUT_TASK)
 def tryout_notice(task: WarmTask) -> None:
-    """Run the program that a student has waited for longest."""
+    """Run the oldest test run."""
     from service.queue.trying import try_next
 
     child = task.child
@@ -128,20 +128,20 @@ def tryout_notice(task: WarmTask) -> None:
     with child.watch.busy():
         ran_well = try_next(child.store, child.settings, child.runner)
     if not ran_well:
-        # Whatever broke may be something that was kept warm.
+        # The error may have damaged an object that is reused.
         _children.drop()
 
 
 @shared_task(bind=True, base=WarmTask, name=PLOT_TASK)
 def plot_notice(task: WarmTask) -> None:
-    """Draw the plots that have waited longest."""
+    """Draw the plots that are due longest."""
     from service.queue.grading_job import plot_next
 
     child = task.child
     try:
         plot_next(child.store, child.settings)
     except Exception:
-        # The row says that they are still due; they are tried again, a bounded number of times.
+        # The row still marks them as due, so they are retried a limited number of times.
         _log.exception("plots.failed")
 
 
@@ -152,15 +152,15 @@ def _log_as_we_do(**_: object) -> None:
 
 @signals.worker_process_init.connect
 def _begin(**_: object) -> None:
-    # When the machine runs out of memory a pool child goes before its parent, as student code does before both.
+    # If memory runs out, a pool child is killed before its parent, and student code before both.
     with suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text("300")
-    # Imports throw nothing away, and to look for garbage is a tenth of what they cost.
+    # Imports create little garbage, and collecting it would take a tenth of their time.
     gc.disable()
-    # A failure here would end the pool child, and its successor, and so on; a task's own is written down.
+    # An exception here would end the pool child and each successor; an exception in a task is stored.
     try:
         child = _children.child
-        # A first job would wait for it.
+        # Otherwise the first job would wait for it.
         from service.queue import grading_job  # noqa: F401
 
         child.runner.check_sandbox()
@@ -176,5 +176,5 @@ def _begin(**_: object) -> None:
 @signals.worker_process_shutdown.connect
 def _end(exitcode: int, **_: object) -> None:
     _children.drop()
-    # Celery would sleep for a second, to be killed by a parent that only waits for its end.
+    # Celery would sleep for a second before its parent, which only waits for the end, kills it.
     os._exit(exitcode)

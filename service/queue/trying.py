@@ -1,6 +1,6 @@
-"""One tryout from claim to what came of it: what a worker does when it is notified that a student tries a program.
+"""Processing of one test run from claim to result, after a notification.
 
-Knows no Celery; ``tasks.py`` calls it with what the pool child keeps warm.
+Independent of Celery; ``tasks.py`` calls it with the objects that the pool child keeps.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _log = structlog.get_logger(__name__)
 
 
 def try_next(store: Store, settings: Settings, runner: TrialRunner) -> bool:
-    """Run the tryout that has waited longest, if there is one; false where a fault of ours ended it."""
+    """Run the oldest test run, if there is one. Return False if a host fault ended it."""
     claimed = tryouts.claim(store, settings.lease_seconds)
     if claimed is None:
         return True
@@ -35,7 +35,7 @@ def try_next(store: Store, settings: Settings, runner: TrialRunner) -> bool:
         except UsageError as error:
             tryouts.finish(store, claimed, {"refused": str(error)}, None)
         except Exception:
-            # Whatever it was, it was not the student: their faults come back as verdicts.
+            # This is never the student's fault: their faults are returned as verdicts.
             _log.exception("tryout.host_error")
             tryouts.fail(store, claimed, "Something went wrong here, not with your program; try it again in a minute.")
             return False

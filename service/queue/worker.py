@@ -1,6 +1,6 @@
-"""The worker: a Celery process with spawned pool children, a sweeper, and a file that shows it is alive.
+"""The worker: a Celery process with spawned pool children, a sweeper and a heartbeat file.
 
-Run as ``python -m service.queue.worker``; settings come from the environment. What a task does is in ``tasks.py``.
+Run as ``python -m service.queue.worker``; settings come from the environment. ``tasks.py`` contains the tasks.
 """
 
 from __future__ import annotations
@@ -34,17 +34,15 @@ from sim.errors import UsageError
 from sim.processes import leave_current_folder
 
 _log = structlog.get_logger(__name__)
-#: The exit status of a worker that graded the known answer wrongly.
+#: Exit status of a worker that failed a self-test.
 QUARANTINED = 3
 
 
 def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
-    """Work until told to stop; returns the exit status. ``settings.broker_url`` must name a broker.
+    """Work until stopped. Returns the exit status. ``settings.broker_url`` must be set.
 
-    ``unsafe`` does without the sandbox; every grade says so.
-
-    Raises UsageError without one, HostError when the database cannot be used or the sandbox round student code cannot
-    be put up.
+    ``unsafe`` disables the sandbox, which every grade records. Raises UsageError without a broker, HostError if the
+    database is not usable or the sandbox for student code cannot be created.
     """
     if not settings.broker_url:
         raise UsageError("a worker needs a broker: set ROBOMARK_BROKER_URL")
@@ -59,21 +57,21 @@ def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
         app = make_celery(settings)
         app.conf[NO_SANDBOX] = unsafe
         app.finalize()
-        # Celery's own worker. Only after it is loaded the sandbox is asked: the zygote has had time to begin meanwhile.
+        # Celery's worker. The sandbox is checked after this import, so that the zygote can start meanwhile.
         celery_worker = app.Worker
         sandbox = sandboxes.check()
     os.environ.update(settings.environment())
     name = os.environ.setdefault(WORKER_VARIABLE, new_worker_name())
-    # A responder's arithmetic is small; threads of the linear algebra library would only fight for the cores.
+    # A responder's arithmetic is small; threads of the linear algebra library would only compete for the cores.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     with open_store(settings) as store, run_file(lock_path(settings)).open("a") as lock, shown_alive(settings, name):
-        # Shared: several workers of one home may live; whoever asks wants to know whether any does.
+        # A shared lock: a home can have several workers, and others only check whether any is alive.
         fcntl.flock(lock, fcntl.LOCK_SH)
         described = WorkerDescription(name, socket.gethostname(), settings.concurrency, GRADER_VERSION, sandbox)
         add_steps(app, store, settings, described, alive_path(settings, name))
         try:
-            # Celery's own command line would load all of its other commands first.
+            # Celery's command line would load all of its other commands first.
             worker = celery_worker(
                 hostname=f"{name}@{described.host}",
                 pool_cls="prefork",
@@ -88,7 +86,7 @@ def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
         except SystemExit as end:
             status = end.code if isinstance(end.code, int) else 1
         finally:
-            # However it was told to end, nobody waits for the lease of what it did not finish.
+            # Requeue unfinished jobs after any kind of stop, so that they do not wait for their leases.
             _give_back(store, name)
         with suppress(DBAPIError):
             status = QUARANTINED if _in_quarantine(store, name) else status
@@ -109,9 +107,9 @@ def _give_back(store: Store, name: str) -> None:
 
 
 def main() -> NoReturn:
-    """Be a worker, as the environment says, and nothing else."""
+    """Run a worker with the settings of the environment."""
     keep_private()
-    # What was imported stays, and is looked through neither while it works nor when it ends.
+    # Imported objects are permanent, so the collector skips them during work and at exit.
     gc.freeze()
     gc.enable()
     status = run_worker(load_settings())

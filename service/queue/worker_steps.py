@@ -1,6 +1,6 @@
-"""What a worker does beside its messages: it sweeps, shows that it lives, and notices when it has gone deaf.
+"""Additional steps of a worker: lease reaper, heartbeat, and detection of a lost connection to the broker.
 
-The steps hang on Celery's own; what a message leads to is in ``tasks.py``.
+They extend Celery's own steps; ``tasks.py`` processes the messages.
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ _log = structlog.get_logger(__name__)
 _ALIVE_SECONDS = 5.0
 _LONGEST_REAP_SECONDS = 5.0
 _UNBLOCK_SECONDS = 1.0
-#: So many times in a row messages waited, this worker had nothing to do, and it took none.
+#: Number of consecutive beats with waiting messages, an idle worker and no message received.
 _DEAF_BEATS = 3
-#: Why a worker claims nothing for which the tables are too new.
+#: Reason why a worker claims no jobs if the tables are too new.
 OUTDATED = "it begins nothing more, as the database needs a newer release: install that and restart"
 
 
 @dataclass(slots=True)
 class _Beat:
-    """What the two threads tell each other. Moments are by a clock that nobody sets."""
+    """State shared by the two threads. Times are monotonic."""
 
-    at: float = float("-inf")  # when the consumer was last seen to run
-    waiting: int = 0  # messages that lie in the broker
+    at: float = float("-inf")  # time of the last activity of the consumer
+    waiting: int = 0  # messages in the broker
     is_outdated: bool = False  # the database needs newer code than this worker's
 
     @property
@@ -56,10 +56,10 @@ class _Beat:
 
 
 class _Hearing:
-    """Whether the consumer still hears the broker.
+    """Detection of a consumer that no longer receives messages.
 
-    It does not, for one, when the broker went away while every process was busy: the messages in hand are then never
-    acknowledged, so that none is asked for any more (kombu pauses the connection, and does not see that it is closed).
+    For example, if the broker disappears while every process is busy, their messages are never acknowledged. Then no
+    further ones are requested, because kombu pauses the connection without noticing that it is closed.
     """
 
     def __init__(self, beat: _Beat) -> None:
@@ -68,7 +68,7 @@ class _Hearing:
         self._beats = 0
 
     def check(self) -> None:
-        """Called at each beat; raises what makes Celery connect anew when the worker has gone deaf."""
+        """Check at each beat. Raises an error that makes Celery reconnect if the worker receives no messages."""
         taken = state.all_total_count[0]
         idle = not state.reserved_requests and not state.active_requests
         deaf = idle and self._state.waiting > 0 and taken == self._taken
@@ -79,7 +79,7 @@ class _Hearing:
 
 
 def add_steps(app: Celery, store: Store, settings: Settings, worker: WorkerDescription, alive: Path) -> None:
-    """Make the workers of this app reap leases, and write down in the file and in the database that they live."""
+    """Add the lease reaper and the heartbeat, in a file and in the database, to the workers of this app."""
     beat = _Beat()
     app.conf.broker_transport_options["client_name"] = worker.name
     notifier = Notifier(app, store, settings)
@@ -88,7 +88,7 @@ def add_steps(app: Celery, store: Store, settings: Settings, worker: WorkerDescr
     problems: set[str] = set()
 
     def catch_up() -> bool:
-        """Whether the worker may go on."""
+        """Return whether the worker may continue."""
         with store.reading() as session:
             beat.is_outdated = beat.is_outdated or needs_newer_code(session)
         problem = OUTDATED if beat.is_outdated else release_problem()
@@ -98,7 +98,7 @@ def add_steps(app: Celery, store: Store, settings: Settings, worker: WorkerDescr
         if beat.recent:
             workers.beat(store, replace(worker, problem=problem))
         if beat.is_outdated:
-            # Others take back lost jobs and notify, with the code that fits the tables.
+            # Workers with matching code requeue lost jobs and notify.
             return True
         notifier.catch_up()
         beat.waiting = notifier.waiting()
@@ -119,7 +119,7 @@ def add_steps(app: Celery, store: Store, settings: Settings, worker: WorkerDescr
 
 
 class _Reaping(bootsteps.StartStopStep):
-    """Catches up beside the worker's own loop, which must never wait for the database."""
+    """Catch-up in a separate thread, because the worker's own loop must never wait for the database."""
 
     what: Callable[[], bool]
     every_seconds: float
@@ -141,7 +141,7 @@ class _Reaping(bootsteps.StartStopStep):
         while not self._ended.wait(self.every_seconds):
             try:
                 if not self.what():
-                    # It can claim nothing and finish nothing any more, and must not take others' notices.
+                    # It cannot claim or finish jobs any more, and must not take other workers' notifications.
                     _log.error("worker.ends", reason="it is in quarantine; robomark doctor says why")
                     os.kill(os.getpid(), signal.SIGTERM)
                     return
@@ -150,21 +150,21 @@ class _Reaping(bootsteps.StartStopStep):
 
 
 class _Beating(bootsteps.StartStopStep):
-    """A step of the consumer, not the worker: a worker that lost its broker for good must not look alive."""
+    """A step of the consumer rather than the worker: a worker without a broker must not look alive."""
 
     requires = ("celery.worker.consumer.tasks:Tasks",)
     beat: _Beat
     file: Path
     hearing: _Hearing
     broker_url: str
-    client_name: str  # of our connections to the broker
+    client_name: str  # of the worker's connections to the broker
 
     def start(self, parent: Any) -> None:
         self._consumer = parent
         self._takes = True
         self._beat()
         self._timer = parent.timer.call_repeatedly(_ALIVE_SECONDS, self._beat)
-        # Told to end, the consumer would else notice when it next looks up by itself, after up to a second.
+        # Otherwise the consumer would notice a stop only at its next wake-up, after up to a second.
         self._waking = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         parent.hub.add_reader(self._waking[0], os.read, self._waking[0], 64)
         signal.set_wakeup_fd(self._waking[1], warn_on_full_buffer=False)
@@ -179,10 +179,10 @@ class _Beating(bootsteps.StartStopStep):
             self._hurry()
 
     def _hurry(self) -> None:
-        """Do without Celery's waits for what may still come, where nothing was being done."""
-        # The thread in which timers go on until the pool has ended sleeps for half a second.
+        """Skip Celery's waits at exit if no task is running."""
+        # The thread that runs timers until the pool has ended sleeps for half a second.
         set_event_loop(None)
-        # And the broker is given a second to answer whether there is a message.
+        # The consumer also waits up to a second for the broker's next message.
         client = broker_client(self.broker_url, _UNBLOCK_SECONDS)
         with suppress(RedisError, OSError), client:
             for each in client.client_list():
@@ -194,12 +194,12 @@ class _Beating(bootsteps.StartStopStep):
         try:
             self.file.write_text("takes messages\n")
         except OSError as error:
-            # A full disk must not end a worker that has work to do.
+            # A full disk must not end a worker that has jobs.
             _log.warning("alive.failed", error=str(error))
         if not self.beat.is_outdated:
             self.hearing.check()
         elif self._takes:
-            # The messages are for workers that can claim; what was begun is finished.
+            # Messages are for workers that can claim; started jobs are finished.
             self._takes = False
             for queue in QUEUES:
                 self._consumer.cancel_task_queue(queue)

@@ -57,7 +57,7 @@ def back_up(source: Engine, file: Path) -> None:
 
 
 def restore(file: Path, target: Engine) -> None:
-    """Restore a backup into an empty database of either kind, completely or not at all.
+    """Restore a backup into an empty database of either kind, in one transaction.
 
     A backup of an older release is upgraded during the restore; the file itself is not changed.
 

@@ -1,7 +1,7 @@
-"""Publishing: makes the newest regrades standing and releases grades to students, for a batch or one submission.
+"""Publishing of grades: makes the newest regrades standing and releases grades to students.
 
-Staff-only and unjudged grades are held back and counted. A preview is available. ``service.operations.regrades`` owns
-the transactions.
+Works on a batch or on one submission. Staff-only and unjudged grades are held back and counted. A preview is available.
+``service.operations.regrades`` owns the transactions.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def publish(session: Session, batch_id: str, *, actor: str, anyway: bool = False
 
 
 def publish_one(session: Session, job_id: str, *, actor: str, anyway: bool = False) -> Published:
-    """Publish like ``publish``, for the submission of one job only."""
+    """Publish the grade of one submission, selected by a job, like ``publish``."""
     return _publish(session, select(Job.submission_id).where(Job.id == job_id), actor=actor, anyway=anyway)
 
 

@@ -1,6 +1,6 @@
 """Regrades after a change of an assignment or the grader: queues them, and reports changes and reasons.
 
-The old grades stand until the new ones are published (``publishing.py``). Nothing is graded here.
+Old grades are in effect until the new ones are published (``publishing.py``). Nothing is graded here.
 ``service.operations.regrades`` owns the transactions.
 """
 

@@ -43,10 +43,7 @@ NAMED = HiddenNames(frozenset(), b"")
 
 
 def hidden_names_of(store: Store, course_id: int) -> HiddenNames:
-    """Return the hidden names of a course.
-
-    Labels are keyed by the installation's secret, so nobody can compute them.
-    """
+    """Return the hidden names of a course. Labels are keyed by the installation's secret, so they cannot be guessed."""
     own_secret = select(Installation.secret).scalar_subquery()
     with store.reading() as session:
         rows = session.execute(select(OpenAssignment.assignment, own_secret).where(*are_hidden(course_id))).all()
