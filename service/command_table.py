@@ -12,7 +12,10 @@ from types import MappingProxyType
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A command at ``module:name`` below ``service.commands``; ``serves`` marks those that run until stopped and log."""
+    """A command at ``module:name`` below ``service.commands``.
+
+    ``serves`` marks those that run until stopped and log.
+    """
 
     where: str
     summary: str

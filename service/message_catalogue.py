@@ -76,7 +76,7 @@ def catalogue_file(code: str) -> Path:
 
 
 def update(code: str) -> Catalog:
-    """Return a language's catalogue with all present messages and without obsolete ones."""
+    """Return a language's catalogue with all current messages and without obsolete ones."""
     with catalogue_file(code).open("rb") as file:
         kept = read_po(file, locale=code)
     kept.update(messages(), no_fuzzy_matching=True)

@@ -75,7 +75,7 @@ def list_changes(service: Service, actor: Actor, course_id: int, batch_id: str) 
 
 @retry_conflicts
 def publish(service: Service, actor: Actor, course_id: int, batch_id: str, *, anyway: bool = False) -> Published:
-    """Make the newest grades of a batch standing, and release them to the students.
+    """Publish the newest grades of a batch, which become the standing grades.
 
     ``anyway`` includes grades with unjudged criteria. Raises NotFound.
     """
@@ -88,7 +88,7 @@ def publish(service: Service, actor: Actor, course_id: int, batch_id: str, *, an
 
 @retry_conflicts
 def publish_one(service: Service, actor: Actor, course_id: int, job_id: str, *, anyway: bool = False) -> Published:
-    """Make the newest grade of one submission standing, and release it to its student.
+    """Publish the newest grade of one submission, which becomes its standing grade.
 
     ``anyway`` permits a grade with unjudged criteria. Raises NotFound.
     """

@@ -22,7 +22,7 @@ _OF_STAFF = frozenset({"mark", "manage"})
 
 
 def offered_scopes(roles: Collection[Role], *, operator: bool, limit: frozenset[str] | None = None) -> dict[str, str]:
-    """Return the scopes that a token of a person with these roles can use, within those of the present session."""
+    """Return the scopes that a token of a person with these roles can use, within those of the current session."""
     is_staff = operator or Role.INSTRUCTOR in roles
     return {
         scope: words

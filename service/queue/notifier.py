@@ -43,7 +43,7 @@ class Notifier:
         if count <= 0:
             return
         try:
-            # Stored first: a claim skips a row that is being written, so an earlier notification would be lost.
+            # Stored first: a claim skips a row that is being written, so an earlier notification would have no effect.
             noted = note_notices(self.store, lane, count)
             if not self._publish(GRADE_TASK, lane.value, count):
                 forget_notices(self.store, noted)

@@ -27,7 +27,7 @@ _HOLDS_SECONDS = 86_400
 #: A process that waits longer runs the self-test itself, because the start of a pool child has a time limit.
 _LONGEST_WAIT_SECONDS = 20.0
 _LOOK_SECONDS = 0.02
-#: Identify a machine and its present boot.
+#: Identify a machine and its current boot.
 _MACHINE = (Path("/proc/sys/kernel/random/boot_id"), Path("/proc/version"))
 _PROCESSORS = Path("/proc/cpuinfo")
 
@@ -99,7 +99,7 @@ def right_answer(folder: Path) -> RightAnswer:
 
 
 def _build_and_machine(question: bytes) -> str:
-    # Only the first processor, without its present clock rate. An empty line ends it.
+    # Only the first processor, without its current clock rate. An empty line ends it.
     first = _text(_PROCESSORS).partition("\n\n")[0].splitlines()
     processor = [line for line in first if "MHz" not in line]
     parts = [grader_sha256(), platform.node(), *map(_text, _MACHINE), *processor]

@@ -114,8 +114,7 @@ def _copy_rows(source: Engine, target: Engine) -> None:
         if into.scalar(select(func.count()).select_from(Course)) or into.scalar(select(func.count()).select_from(Job)):
             where = target.url.render_as_string(hide_password=True)
             raise UsageError(f"the database {where} is not empty, expected one in which nothing was submitted yet")
-        # The target's rows were created with its tables. Its secret is replaced too, because the restored worlds
-        # depend on it.
+        # Both rows were created with the target's tables and are replaced. The restored secret determines the worlds.
         into.execute(delete(Installation))
         into.execute(delete(SchemaCompatibility))
         for table in METADATA.sorted_tables:

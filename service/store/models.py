@@ -202,7 +202,7 @@ class Job(Base):
     lease: Mapped[str | None] = mapped_column(String(32))
     lease_until: Mapped[datetime | None]
     heartbeat_at: Mapped[datetime | None]
-    worker: Mapped[str | None]  # the present or last owner
+    worker: Mapped[str | None]  # the current or last owner
     process: Mapped[int | None]  # the process of that worker
     progress: Mapped[float] = mapped_column(default=0.0)  # 0 to 1
     error: Mapped[str | None]  # a sentence: the last host fault, or the reason of the final failure

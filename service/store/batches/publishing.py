@@ -1,4 +1,4 @@
-"""Publishing of grades: makes the newest regrades standing and releases grades to students.
+"""Publishing of grades: the newest regrade of a submission becomes its standing grade, which students can see.
 
 Works on a batch or on one submission. Staff-only and unjudged grades are held back and counted. A preview is available.
 ``service.operations.regrades`` owns the transactions.
@@ -40,7 +40,7 @@ class Publication:
 
 
 def publish(session: Session, batch_id: str, *, actor: str, anyway: bool = False) -> Published:
-    """Make the newest regrade of each submission of the batch standing, and publish all standing grades.
+    """Publish the standing grades of a batch. The newest regrade of each submission becomes its standing grade first.
 
     Grades that are suspect, over a limit or have an unjudged criterion are not published. ``anyway`` includes those
     with an unjudged criterion.

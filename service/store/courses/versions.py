@@ -94,7 +94,7 @@ def assignment_from_bytes(content: bytes) -> Assignment:
 
 
 def _in_todays_words(content: dict[str, Any]) -> dict[str, Any]:
-    """Return the stored tables of an assignment with keys renamed to their present names."""
+    """Return the stored tables of an assignment with keys renamed to their current names."""
     kept = {name: _renamed(content[name]) for name in ("world", "training") if content.get(name) is not None}
     return content | kept | {"criteria": [_renamed(table) for table in content["criteria"]]}
 

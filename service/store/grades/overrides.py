@@ -79,7 +79,7 @@ def set_marks(
 
     Raises:
         UsageError: The grade or criterion is unknown, the marks are out of range, or the reason is missing.
-        MarksChanged: The present override is not the one in ``seen``.
+        MarksChanged: The current override is not the one in ``seen``.
     """
     submission_id, line = _criterion(session, job_id, criterion, seen)
     if not marks.is_finite() or not _NONE <= marks <= line.worth or marks != marks.quantize(_FINEST):

@@ -373,7 +373,7 @@ def _row(
 def _forget_expired(session: Session, at: datetime) -> None:
     """Delete credentials that expired long ago.
 
-    Stored replies are deleted with them; audit entries name no credentials.
+    Tokens are kept, because stored replies refer to them. The activity log names people, not credentials.
     """
     expired = (Credential.expires_at < at - _FORGOTTEN, Credential.kind != CredentialKind.TOKEN)
     session.execute(delete(Credential).where(*expired))

@@ -259,7 +259,10 @@ def enrol(session: Session, platform: Platform, course_id: int, subject: str, st
 
 
 def _new_enrolment(session: Session, course_id: int, student: Student, person_id: int | None) -> Enrolment:
-    """Return an enrolment that belongs to no other person, for the given person or a new one."""
+    """Return an unclaimed enrolment for the student, belonging to the given person or to a new one.
+
+    Raises UsageError if another person has claimed the student's id.
+    """
     row = session.get_one(Enrolment, Students(session, course_id).enrol(student, now(session)))
     if not _is_nobodys(session, row):
         raise UsageError(
