@@ -30,7 +30,7 @@ _FORGOTTEN = timedelta(days=30)
 
 
 class WebhookEvent(StrEnum):
-    """Events that webhooks can subscribe to."""
+    """What webhooks can be told of."""
 
     GRADE_FINISHED = "grade.finished"
     BATCH_FINISHED = "batch.finished"

@@ -9,14 +9,14 @@ from enum import StrEnum
 
 
 class Role(StrEnum):
-    """The role of a member in a course."""
+    """What somebody is in a course."""
 
     STUDENT = "student"
     INSTRUCTOR = "instructor"
 
 
 class CredentialKind(StrEnum):
-    """The kind of a credential."""
+    """What a secret is good for."""
 
     LINK = "link"  # signs in once
     SESSION = "session"  # a signed-in browser
@@ -24,14 +24,14 @@ class CredentialKind(StrEnum):
 
 
 class Lane(StrEnum):
-    """The queue of a job: interactive for a person who waits, or batch."""
+    """Who waits for the job: a person now, or a batch."""
 
     INTERACTIVE = "interactive"
     BATCH = "batch"
 
 
 class JobState(StrEnum):
-    """The state of a job."""
+    """How far a job has come on its way to a grade."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -51,7 +51,7 @@ UNFINISHED = (JobState.QUEUED, JobState.RUNNING)
 
 
 class TryoutState(StrEnum):
-    """The state of a test run."""
+    """How far a program has come that a student tries without submitting it."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -69,7 +69,7 @@ class PlotState(StrEnum):
 
 
 class BatchState(StrEnum):
-    """The state of a batch, which controls claims. Its progress follows from its jobs."""
+    """What a claim looks at; how far a batch is follows from its jobs."""
 
     OPEN = "open"
     PAUSED = "paused"  # running jobs continue, queued jobs do not start
@@ -77,7 +77,7 @@ class BatchState(StrEnum):
 
 
 class Standing(StrEnum):
-    """The standing of a job's grade within its submission. At most one grade of a submission stands."""
+    """What a job's grade is to its submission. Of one submission at most one grade stands."""
 
     STANDS = "stands"  # the one shown in reports and exports
     PROPOSED = "proposed"  # a regrade that is not published yet
