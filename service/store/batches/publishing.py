@@ -132,7 +132,7 @@ def _plan(session: Session, gradings: Sequence[Job], ids: Select[int], *, anyway
 
 
 def _stands(jobs: Sequence[Job], unjudged: Set[str]) -> tuple[Job | None, list[Job]]:
-    """Return the job that becomes the standing one of a submission, and the jobs that it replaces.
+    """Return the new standing job of a submission, and the jobs that it replaces.
 
     The newest trusted regrade replaces the standing job, regardless of its age, and every older proposal. Ungraded and
     ``unjudged`` jobs remain proposals.
