@@ -16,6 +16,7 @@ from pathlib import Path
 from pydantic import TypeAdapter
 
 from sim.errors import UsageError
+from sim.readers.json_text import read_json
 from submissions.raw_files import SentFile, shown
 from submissions.student_identity import Refusal
 
@@ -140,7 +141,7 @@ class KeptUploads:
 
     def _read(self, upload_id: str) -> KeptUpload | None:
         try:
-            return _NOTES.validate_json((self._folder / upload_id / _NOTE).read_bytes())
+            return _NOTES.validate_python(read_json((self._folder / upload_id / _NOTE).read_bytes()))
         except (OSError, ValueError):
             return None
 

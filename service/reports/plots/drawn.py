@@ -8,28 +8,18 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
-from matplotlib.figure import Figure
-
-from service.grading.grade import AccuracyCurve, CriterionResult, Grade, Prediction
+from service.grading.grade import CriterionResult, Grade, Prediction
 from service.language import ENGLISH, Language
-from service.reports.plots.confusion import draw_confusion
-from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
-from service.reports.plots.misread import draw_misread
 from service.reports.plots.own_diagrams import OwnDiagram, own_diagrams
-from service.reports.plots.path import draw_path
 from service.reports.plots.plot import Plot, hidden_suffix, slug, title_of, trial_name
-from service.reports.plots.predictions import draw_predictions
-from service.reports.plots.sensor import draw_sensors
 from service.reports.plots.sensor_images import chosen_predictions, is_right, misread
-from service.reports.plots.taken import tracks, worst_track
-from service.reports.plots.track import draw_track
+from service.reports.plots.taken import tracks
 from service.reports.readable import one_line, turned
 from service.reports.view import is_for_staff, scenarios, staff_view, student_view, tells_of_hidden, worst_trial
 from sim.floors.canvas import Pixels
-from sim.recorded import floor_of, stood_still
+from sim.recorded import stood_still
 from sim.recording import Pose, Recording
 from submissions.diagram_cells import DiagramCell
-from submissions.sweep import CONDITIONS, Varied
 
 _NO_IMAGES: Mapping[str, Pixels] = MappingProxyType({})
 
@@ -65,7 +55,7 @@ def draw_all(
 
 def _picture(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> bytes:
     # The drawing library is loaded only if there is something to draw.
-    from service.reports.plots.drawn import figure_of
+    from service.reports.plots.figures import figure_of
     from service.reports.plots.style import png
 
     return png(figure_of(grade, plot, images))
@@ -247,46 +237,3 @@ def _told_of_path(recording: Recording, language: Language) -> str:
 
 def _at(pose: Pose) -> str:
     return f"({pose.x:.0f}, {pose.y:.0f})"
-
-
-def figure_of(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Figure:
-    """Draw the plot."""
-    if plot.kind == "path":
-        trial = grade.trials[plot.subject]
-        return draw_path(trial, plot.title, _floor(trial.recording, images))
-    if plot.kind == "sensors":
-        return draw_sensors(grade.trials[plot.subject], plot.title)
-    result = grade.criteria[plot.subject]
-    if plot.kind == "confusion" and result.accuracy is not None:
-        return draw_confusion(result, result.accuracy, plot.title)
-    if plot.kind == "curves":
-        return draw_curves([_panel(curve) for curve in result.curves], plot.title, one_line(result.title, 60))
-    if plot.kind == "track":
-        worst = worst_track(result.predictions, grade.trials)
-        floor = _floor(grade.trials[worst].recording, images)
-        return draw_track(result.predictions, grade.trials, plot.title, floor)
-    if plot.kind == "misread":
-        return draw_misread(misread(result.predictions), len(result.predictions), plot.title)
-    return draw_predictions(result.predictions, plot.title)
-
-
-def _panel(curve: AccuracyCurve) -> AccuracyPanel:
-    about = CONDITIONS[curve.along] if curve.along in CONDITIONS else Varied(curve.along, "", 0, 0)
-    levels = curve.levels
-    drawn = Curve(
-        "",
-        tuple(level.at for level in levels),
-        tuple(level.value for level in levels),
-        tuple(level.low for level in levels),
-        tuple(level.high for level in levels),
-        tuple(level.n for level in levels),
-    )
-    return AccuracyPanel(about.words, about.unit, (drawn,), curve.asked)
-
-
-def _floor(recording: Recording, images: Mapping[str, Pixels]) -> Pixels | None:
-    """Return the floor of the trial, with the same digits and label patches."""
-    if recording.background in images:
-        return images[recording.background]
-    floor = floor_of(recording)
-    return floor.pixels if floor else None
