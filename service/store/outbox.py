@@ -30,7 +30,7 @@ _FORGOTTEN = timedelta(days=30)
 
 
 class WebhookEvent(StrEnum):
-    """What webhooks can be told of."""
+    """Events that webhooks can subscribe to."""
 
     GRADE_FINISHED = "grade.finished"
     BATCH_FINISHED = "batch.finished"

@@ -9,14 +9,14 @@ from enum import StrEnum
 
 
 class Role(StrEnum):
-    """What somebody is in a course."""
+    """The role of a member in a course."""
 
     STUDENT = "student"
     INSTRUCTOR = "instructor"
 
 
 class CredentialKind(StrEnum):
-    """What a secret is good for."""
+    """The kind of a credential."""
 
     LINK = "link"  # signs in once
     SESSION = "session"  # a signed-in browser
@@ -24,14 +24,14 @@ class CredentialKind(StrEnum):
 
 
 class Lane(StrEnum):
-    """Who waits for the job: a person now, or a batch."""
+    """The queue of a job: interactive for a person who waits, or batch."""
 
     INTERACTIVE = "interactive"
     BATCH = "batch"
 
 
 class JobState(StrEnum):
-    """How far a job has come on its way to a grade."""
+    """The state of a job."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -51,7 +51,7 @@ UNFINISHED = (JobState.QUEUED, JobState.RUNNING)
 
 
 class TryoutState(StrEnum):
-    """How far a program has come that a student tries without submitting it."""
+    """The state of a test run."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -69,7 +69,7 @@ class PlotState(StrEnum):
 
 
 class BatchState(StrEnum):
-    """What a claim looks at; how far a batch is follows from its jobs."""
+    """The state of a batch, which controls claims. Its progress follows from its jobs."""
 
     OPEN = "open"
     PAUSED = "paused"  # running jobs continue, queued jobs do not start
@@ -77,7 +77,7 @@ class BatchState(StrEnum):
 
 
 class Standing(StrEnum):
-    """What a job's grade is to its submission. Of one submission at most one grade stands."""
+    """The standing of a job's grade within its submission. At most one grade of a submission stands."""
 
     STANDS = "stands"  # the one shown in reports and exports
     PROPOSED = "proposed"  # a regrade that is not published yet
