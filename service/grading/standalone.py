@@ -25,6 +25,7 @@ from sim.floors import Floor, floor, floor_from_image, names
 from sim.recording import TICK, Recording
 from sim.robot import robot
 from sim.world import Noise
+from submissions.assignment.limits import DEFAULT_LIMITS
 from submissions.magics import Flags, Setup, setup, split_program
 from submissions.marked_run import runs_of
 from submissions.notebook import ReadNotebook, is_script, read_notebook, read_script
@@ -33,8 +34,8 @@ from submissions.submission import Notebook
 
 _IMAGES = (".png", ".jpg", ".jpeg")
 _FILES_BYTES = 16 << 20
-_RESPONDER = ChildLimits(10.0, 512 << 20)
-_PROGRAM = ChildLimits(5.0, 128 << 20)
+_RESPONDER = ChildLimits(DEFAULT_LIMITS.responder_cpu, DEFAULT_LIMITS.responder_memory_mb << 20)
+_PROGRAM = ChildLimits(DEFAULT_LIMITS.program_cpu, DEFAULT_LIMITS.program_memory_mb << 20)
 _NETWORKS = {"mlp_shapes_14x14.joblib": "shapes"}
 
 
@@ -44,7 +45,7 @@ class RunLimits:
 
     responder: ChildLimits = _RESPONDER
     program: ChildLimits = _PROGRAM
-    output_bytes: int = 1_000_000
+    output_bytes: int = DEFAULT_LIMITS.output_bytes
     programs_cpu_seconds: float = 150.0
 
     def meter(self) -> JobMeter:

@@ -21,7 +21,8 @@ from sim.motion import gap
 from sim.recording import Pose
 from sim.robot import usual_robot
 from submissions.assignment.criterion_parts import check_given, read_criteria, sources_of
-from submissions.assignment.definition import Assignment, Limits, Parts, Scenario, Training, WorldSpec
+from submissions.assignment.definition import Assignment, Parts, Scenario, Training, WorldSpec
+from submissions.assignment.limits import Limits
 from submissions.assignment.other_parts import SAME, check_robots, read_agents, second_poses_of
 from submissions.assignment.problems import Path as Place
 from submissions.assignment.problems import Problems, checked_table, no_double, tables_of, texts_in

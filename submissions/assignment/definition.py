@@ -15,6 +15,7 @@ from typing import Literal
 from responders.channel import Channel
 from sim.chance import Stream
 from sim.recording import Pose
+from submissions.assignment.limits import DEFAULT_LIMITS, Limits
 from submissions.criteria import AnyCriterion
 from submissions.seeds import PUBLIC, Secret, world_seed
 from submissions.sweep import NO_SWEEP, Coordinates, Sweep
@@ -100,27 +101,6 @@ class Training:
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
-    """Limits for each child process of a trial (CPU seconds, MB, bytes of output), and for all trials together.
-
-    The default of ``all_cpu`` allows ten trials at their limits and one second for each trial.
-    """
-
-    program_cpu: float = 5.0
-    responder_cpu: float = 10.0
-    program_memory_mb: int = 128
-    responder_memory_mb: int = 512
-    output_bytes: int = 1_000_000
-    all_cpu: float | None = None
-    all_sleep: float = 20.0  # seconds of real time in which processes are idle, after half a second for each
-    all_output_mb: int = 64  # of stored data: texts, messages, images, calls
-
-    def all_cpu_of(self, trials: int) -> float:
-        """Return the CPU seconds for ``trials`` trials together."""
-        return self.all_cpu if self.all_cpu is not None else 10 * (self.program_cpu + self.responder_cpu) + trials
-
-
-@dataclass(frozen=True, slots=True)
 class Trial:
     """One run of an assignment. ``pose`` is the start pose, with offset and jitter applied."""
 
@@ -146,7 +126,7 @@ class Assignment:
     parts: Parts
     scenarios: tuple[Scenario, ...]
     criteria: tuple[AnyCriterion, ...]
-    limits: Limits = Limits()
+    limits: Limits = DEFAULT_LIMITS
     section: str = ""  # section of the course that sets the task
     description: str = ""
     given: Mapping[str, bytes] = field(default_factory=dict)  # files that are copied into the responder's folder

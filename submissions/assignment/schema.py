@@ -18,6 +18,7 @@ from pydantic_core import ErrorDetails
 from sim.floors import HEIGHT, OBSTACLE_PRESETS, WIDTH
 from sim.motion import Rectangle
 from sim.robot import ROBOTS
+from submissions.assignment.limits import DEFAULT_LIMITS
 from submissions.nearest import did_you_mean, listed
 from submissions.strict_table import Entries, StrictTable
 from submissions.sweep import CONDITIONS
@@ -210,14 +211,14 @@ class TrainingTable(StrictTable):
 class LimitsTable(StrictTable):
     """Limits for one trial, and for all trials together (``all_``)."""
 
-    program_cpu: float = Field(default=5.0, gt=0, le=120)
-    responder_cpu: float = Field(default=10.0, gt=0, le=120)
-    program_memory_mb: int = Field(default=128, ge=64, le=4096)
-    responder_memory_mb: int = Field(default=512, ge=64, le=4096)
-    output_bytes: int = Field(default=1_000_000, ge=1000, le=50_000_000)
-    all_cpu: float | None = Field(default=None, gt=0, le=3600)
-    all_sleep: float = Field(default=20.0, ge=1, le=600)
-    all_output_mb: int = Field(default=64, ge=1, le=1024)
+    program_cpu: float = Field(default=DEFAULT_LIMITS.program_cpu, gt=0, le=120)
+    responder_cpu: float = Field(default=DEFAULT_LIMITS.responder_cpu, gt=0, le=120)
+    program_memory_mb: int = Field(default=DEFAULT_LIMITS.program_memory_mb, ge=64, le=4096)
+    responder_memory_mb: int = Field(default=DEFAULT_LIMITS.responder_memory_mb, ge=64, le=4096)
+    output_bytes: int = Field(default=DEFAULT_LIMITS.output_bytes, ge=1000, le=50_000_000)
+    all_cpu: float | None = Field(default=DEFAULT_LIMITS.all_cpu, gt=0, le=3600)
+    all_sleep: float = Field(default=DEFAULT_LIMITS.all_sleep, ge=1, le=600)
+    all_output_mb: int = Field(default=DEFAULT_LIMITS.all_output_mb, ge=1, le=1024)
 
 
 @dataclass(frozen=True, slots=True)

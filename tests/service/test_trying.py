@@ -21,7 +21,8 @@ from service.store.queue.tryouts import TryoutLine
 from service.store.states import TryoutState
 from service.trying import LONGEST_SECONDS, tryout_assignment
 from sim.errors import HostError
-from submissions.assignment.definition import Assignment, Limits, Scenario, Visibility
+from submissions.assignment.definition import Assignment, Scenario, Visibility
+from submissions.assignment.limits import Limits
 from submissions.assignment.reader import find_assignment
 from submissions.packed import pack_submission
 from submissions.seeds import Secret

@@ -21,7 +21,8 @@ from service.reports.formats.json_output import json_text
 from service.reports.html import report
 from service.reports.view import student_view
 from sim.recording import Verdict
-from submissions.assignment.definition import Assignment, Limits, Parts, WorldSpec
+from submissions.assignment.definition import Assignment, Parts, WorldSpec
+from submissions.assignment.limits import Limits
 from submissions.assignment.problems import AssignmentProblems
 from submissions.assignment.reader import read_assignment
 from submissions.criteria import Criterion

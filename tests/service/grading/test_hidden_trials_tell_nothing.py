@@ -29,7 +29,8 @@ from service.reports.html import report
 from service.reports.plots.drawn import draw_all
 from service.reports.view import gradebook_view, student_view
 from sim.recording import Pose
-from submissions.assignment.definition import Assignment, Limits, Parts, Scenario, Training, WorldSpec
+from submissions.assignment.definition import Assignment, Parts, Scenario, Training, WorldSpec
+from submissions.assignment.limits import Limits
 from submissions.assignment.reader import find_assignment
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.submission import Cell, Notebook, Submission
