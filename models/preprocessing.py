@@ -35,7 +35,7 @@ def luma(rgb: NDArray[np.integer]) -> Grey:
 
 
 def noisy(grey: Grey, noise: int, chance: Stream, draw: int) -> Grey:
-    """Add the light sensor's noise to each colour channel, as ``sim/sensors.py`` does."""
+    """Add the light sensor's noise to each colour channel, as ``sim/light_sensors.py`` does."""
     offsets = chance.uniforms(draw, grey.size * 3).reshape(*grey.shape, 3) * (2 * noise) - noise
     return luma(np.clip(np.floor(grey[..., None] + offsets + 0.5), 0, 255).astype(np.uint8))
 

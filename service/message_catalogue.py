@@ -21,7 +21,7 @@ _METHODS = [
     ("web/**.py", "python"),
     ("reports/**.py", "python"),
     ("operations/**.py", "python"),
-    ("grading/endings.py", "python"),
+    ("grading/verdict_labels.py", "python"),
 ]
 #: Sources of translated errors about submissions: the code that raises them does not know the reader.
 _RAISED = [

@@ -17,8 +17,8 @@ from service.reports.readable import readable
 from service.reports.replay.document import packed, replay_of_grade
 from service.reports.replay.trial import moment_hash
 from service.reports.transcript import transcript
+from service.reports.verdict_sentences import grade_words
 from service.reports.view import student_view
-from service.reports.words import grade_words
 from sim.recorded import faults_of
 from sim.recording import Verdict
 from submissions.assignment.definition import Assignment

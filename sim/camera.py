@@ -1,7 +1,7 @@
 """PyBullet camera over the floor: square windows for the light sensors, seen from straight above.
 
 The camera is orthographic and shifted by half a pixel, so that each image pixel is exactly one pixel of the printed
-floor. ``sensors.py`` places the sensors and interprets the windows.
+floor. ``light_sensors.py`` places the sensors and interprets the windows.
 """
 
 from __future__ import annotations

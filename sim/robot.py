@@ -1,6 +1,7 @@
 """RoboLab's robots: dimensions, sensor positions and wheel acceleration.
 
-Local coordinates start at the middle of the axle, with x to the robot's right and y forward; lengths are in mm.
+Local coordinates start at the middle of the axle, with x to the robot's right and y forward; lengths are in mm. A new
+sensor begins as a column with ``sensor=`` in ``recording.py``; ``world.py`` measures it and ``brick/`` offers it.
 """
 
 from __future__ import annotations

@@ -20,10 +20,10 @@ from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.chance import Stream
 from sim.drive import Drive
+from sim.light_sensors import Footprint, LightReader, footprint
 from sim.motion import COURSE_PHYSICS, Physics
 from sim.recording import COLUMNS, SECOND, SENSORS, TICK, Pose, Ticks, Touch
 from sim.robot import Robot
-from sim.sensors import Footprint, LightReader, footprint
 from sim.trigonometry import sincos
 
 #: A row: the time and all columns, those of the chain first.

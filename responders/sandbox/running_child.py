@@ -1,6 +1,7 @@
 """A child process with student code: communication, limits and termination.
 
-The cause of its end is read from the scheduler's clock and the wait status, never from the child's own data.
+The cause of its end is read from the scheduler's clock and the wait status, never from the child's own data. Callers
+set the limits; an assignment's are in ``submissions/assignment/limits.py``.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from decimal import ROUND_HALF_UP, Decimal
 from math import sqrt
 from typing import TYPE_CHECKING
 
-from service.grading.endings import ENDED
+from service.grading.verdict_labels import ENDED
 from sim.recording import Verdict
 
 if TYPE_CHECKING:

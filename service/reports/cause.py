@@ -14,7 +14,7 @@ from service.grading.grade import Accuracy, CriterionResult, Evidence, Grade
 from service.language import ENGLISH, Language
 from service.reports.faults import SourceLine, excerpt_around, fault_groups, source_called
 from service.reports.readable import one_line, readable
-from service.reports.words import (
+from service.reports.verdict_sentences import (
     FULL_MARKS,
     accuracy_counted,
     grade_words,

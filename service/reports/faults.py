@@ -14,7 +14,7 @@ from responders.code import Code
 from service.grading.grade import Grade
 from service.language import ENGLISH, Language, translatable
 from service.reports.readable import one_line, readable
-from service.reports.words import trial_words
+from service.reports.verdict_sentences import trial_words
 from sim.errors import UsageError
 from sim.recorded import faults_of
 from sim.recording import Fault, Verdict

@@ -30,8 +30,8 @@ from service.reports.readable import number, readable
 from service.reports.replay.document import REPORT_BYTES, Pixels, packed, replay_of_grade
 from service.reports.replay.labels import replay_words
 from service.reports.rows import TableRow
+from service.reports.verdict_sentences import verdict_words
 from service.reports.view import NO_OTHERS, OtherTrials, View
-from service.reports.words import verdict_words
 from sim.recording import Verdict
 from submissions.submission import Submission
 

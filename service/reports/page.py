@@ -24,8 +24,7 @@ from service.reports.readable import message_words, number, one_line, readable, 
 from service.reports.recognition_table import ClassLine, RecognitionTable, recognition_table
 from service.reports.replay.trial import loss_moment, moment_hash
 from service.reports.robots import called, messages_of, robots_of
-from service.reports.view import View, scenarios, worst_trial
-from service.reports.words import (
+from service.reports.verdict_sentences import (
     KINDS,
     VerdictWords,
     channel_words,
@@ -35,6 +34,7 @@ from service.reports.words import (
     trial_words,
     verdict_words,
 )
+from service.reports.view import View, scenarios, worst_trial
 from sim.recorded import printed_alone, stood_still
 from sim.recording import Fault, Recording, Verdict
 from submissions.diagram_cells import diagrams_in

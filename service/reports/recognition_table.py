@@ -11,7 +11,7 @@ from service.grading.grade import Accuracy, CriterionResult
 from service.grading.judging.per_class import class_scores
 from service.language import ENGLISH, Language
 from service.reports.readable import one_line
-from service.reports.words import accuracy_counted
+from service.reports.verdict_sentences import accuracy_counted
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from service.grading.grade import CriterionResult, Grade, Shown, TrialResult, un
 from service.grading.judging.message_parts import shown_words
 from service.grading.statistics import marks_out_of_all
 from service.language import ENGLISH, Language
-from service.reports.words import by_hand_words
+from service.reports.verdict_sentences import by_hand_words
 from sim.errors import UsageError
 from sim.recording import Verdict
 from submissions.assignment.folder import REFERENCE

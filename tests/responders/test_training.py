@@ -14,8 +14,8 @@ from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.judging.collecting import pairs
 from service.grading.trial_runner import TrialRunner
+from service.reports.verdict_sentences import accuracy_words
 from service.reports.view import student_view
-from service.reports.words import accuracy_words
 from sim.errors import UsageError
 from sim.recording import Recording, Verdict
 from submissions.assignment.definition import Assignment

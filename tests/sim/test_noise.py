@@ -13,9 +13,9 @@ from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.camera import CachedCamera
 from sim.chance import Stream
+from sim.light_sensors import Footprint, LightReader
 from sim.recording import Pose
 from sim.robot import LightSensor
-from sim.sensors import Footprint, LightReader
 from sim.world import Noise
 from submissions.assignment.reader import find_assignment
 from submissions.submission import Submission

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.camera import HEIGHT, WIDTH, sensor_mask
+from sim.light_sensors import Footprint, footprint
 from sim.recorded import pose_after, pose_at, robot_of, seconds_at
 from sim.recording import Floats, Pose, Recording
 from sim.robot import LightSensor
-from sim.sensors import Footprint, footprint
 from sim.trigonometry import sincos
 from submissions.criteria.places import Area, LineToFollow, Part, Zone
 

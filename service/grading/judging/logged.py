@@ -20,9 +20,9 @@ from service.grading.judging.precision import Strays, tempered
 from service.grading.judging.readings import were_read
 from sim.camera import HEIGHT, WIDTH, sensor_mask
 from sim.floors import Floor
+from sim.light_sensors import Footprint
 from sim.recorded import floor_of, pose_after, pose_at, seconds_at
 from sim.recording import Datum, Image, Recording
-from sim.sensors import Footprint
 from submissions.criteria.logged import Datalog, ImageLog
 
 Check = tuple[Fraction, str]  # the fraction reached, and the message if it is below 1

@@ -14,8 +14,8 @@ from service.grading.grade import Grade
 from service.reports.formats.registry import table
 from service.reports.readable import number, one_line
 from service.reports.rows import TableRow
+from service.reports.verdict_sentences import comments_of, hints_of
 from service.reports.view import View, staff_view
-from service.reports.words import comments_of, hints_of
 
 #: The beginning of a formula in a cell. Spreadsheets that separate by semicolons (German Excel) or tabs split one of
 #: our cells into several.

@@ -17,8 +17,8 @@ from service.reports.faults import faults_beside
 from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import json_number, readable
 from service.reports.rows import TableRow, rows_for_students
+from service.reports.verdict_sentences import comments_of
 from service.reports.view import GradebookView, gradebook_view
-from service.reports.words import comments_of
 from submissions.submission import Submission
 
 

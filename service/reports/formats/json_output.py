@@ -16,8 +16,8 @@ from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import json_number
 from service.reports.rows import TableRow
 from service.reports.trace import agent_messages, storable
+from service.reports.verdict_sentences import hints_of
 from service.reports.view import View, staff_view
-from service.reports.words import hints_of
 from sim.recording import Message, Recording
 from submissions.submission import Submission
 

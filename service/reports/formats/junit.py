@@ -13,8 +13,8 @@ from service.reports.cause import diagnose, excerpt_lines
 from service.reports.formats.registry import document, refusal, table
 from service.reports.readable import number, one_line, readable
 from service.reports.rows import TableRow
+from service.reports.verdict_sentences import comments_of, hints_of
 from service.reports.view import View, staff_view
-from service.reports.words import comments_of, hints_of
 from sim.recording import Verdict
 from submissions.submission import Submission
 

@@ -18,8 +18,8 @@ from service.reports.formats.csv_output import csv_text, rows_as_given, safe_cel
 from service.reports.formats.registry import FilledIn, filled_in, packed, table
 from service.reports.readable import number, one_line
 from service.reports.rows import ReportPage, TableRow, rows_for_students
+from service.reports.verdict_sentences import comments_of
 from service.reports.view import GradebookView, gradebook_view
-from service.reports.words import comments_of
 from sim.errors import UsageError
 from sim.readers.csv_text import read_rows
 from sim.readers.unreadable import Unreadable

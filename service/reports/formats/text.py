@@ -12,8 +12,8 @@ from service.reports.cause import Diagnosis, diagnose, ended, excerpt_lines
 from service.reports.faults import FaultGroup, faults_beside
 from service.reports.formats.registry import document
 from service.reports.readable import number, one_line, readable
+from service.reports.verdict_sentences import accuracy_words, channel_words, comments_of, cost_words, grade_words
 from service.reports.view import View, staff_view
-from service.reports.words import accuracy_words, channel_words, comments_of, cost_words, grade_words
 from submissions.submission import Submission
 
 _WIDTH = 96

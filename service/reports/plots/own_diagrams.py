@@ -15,8 +15,8 @@ from service.reports.plots.difference import Differences, differences, in_words
 from service.reports.plots.plot import Plot, trial_name
 from service.reports.plots.talk import talks
 from service.reports.readable import one_line
+from service.reports.verdict_sentences import trial_words
 from service.reports.view import is_for_staff
-from service.reports.words import trial_words
 from submissions.diagram import DiagramKind
 from submissions.diagram_cells import DiagramCell
 

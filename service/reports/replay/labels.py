@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from service.language import Language, translatable
 from service.reports.robots import CALLED
-from service.reports.words import KINDS
+from service.reports.verdict_sentences import KINDS
 
 #: By the script's keys.
 _SENTENCES: Mapping[str, str] = MappingProxyType(

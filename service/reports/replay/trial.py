@@ -20,7 +20,7 @@ from service.reports.faults import place_words
 from service.reports.readable import message_words, number, one_line, readable
 from service.reports.replay.sources import Place, Sources
 from service.reports.robots import PARTNER_OF, answering, robots_of
-from service.reports.words import trial_words, verdict_words
+from service.reports.verdict_sentences import trial_words, verdict_words
 from sim.recorded import pose_at, printed_alone, robot_of
 from sim.recording import COLUMNS, SECOND, Image, Pose, Recording, Ticks, Verdict
 from sim.robot import LightSensor

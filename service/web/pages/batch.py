@@ -29,7 +29,7 @@ from service.operations.batch_views import (
 )
 from service.operations.types import BatchState, JobState
 from service.reports.formats import FORMATS
-from service.reports.words import verdict_words
+from service.reports.verdict_sentences import verdict_words
 from service.web.access import InCourse, Instructing, RowName
 from service.web.context import Context, WebContext
 from service.web.language import language_of

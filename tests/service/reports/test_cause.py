@@ -22,8 +22,8 @@ from service.reports.formats.rich_text import rich_report
 from service.reports.formats.text import plain_text
 from service.reports.html import report
 from service.reports.page import page_of
+from service.reports.verdict_sentences import FULL_MARKS
 from service.reports.view import gradebook_view, staff_view, student_view
-from service.reports.words import FULL_MARKS
 from sim.recording import Fault, Verdict
 
 ERROR = "NameError: name 'pasrer' is not defined"

@@ -23,8 +23,8 @@ from service.reports.formats.moodle import moodle_csv
 from service.reports.formats.rich_text import rich_report
 from service.reports.formats.text import plain_text
 from service.reports.html import report
+from service.reports.verdict_sentences import verdict_words
 from service.reports.view import View, gradebook_view, staff_view, student_view, worst_trial
-from service.reports.words import verdict_words
 from sim.recording import Verdict
 
 pytestmark = pytest.mark.fast

@@ -1,4 +1,4 @@
-"""Short labels for verdicts, as used in tables. Full sentences about verdicts are in ``reports.words``."""
+"""Short labels for verdicts, as used in tables. Full sentences about verdicts are in ``reports.verdict_sentences``."""
 
 from __future__ import annotations
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
-from service.grading.endings import ENDED
 from service.grading.grade import Accuracy, CriterionResult, Grade, TrialResult
+from service.grading.verdict_labels import ENDED
 from service.language import ENGLISH, Language, translatable
 from service.reports.readable import number, one_line, readable
 from sim.recorded import faults_of
