@@ -1,1 +1,1 @@
-"""The commands of ``robomark``, each module a group of them."""
+"""Commands of ``robomark``: one module for each group."""

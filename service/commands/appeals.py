@@ -1,4 +1,4 @@
-"""``robomark appeals``: what students ask again, and the answers."""
+"""``robomark appeals``: list the appeals of students and answer them."""
 
 from __future__ import annotations
 

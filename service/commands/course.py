@@ -1,6 +1,6 @@
-"""``robomark course``: when and how often students may submit, and what single students are allowed beyond it.
+"""``robomark course``: deadlines and attempts, extensions, students and assignments of a course.
 
-The rules for a submission are in ``service/store/courses/policies.py``.
+``service/store/courses/policies.py`` contains the submission rules.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def prepare(
     course: InCourse = DEFAULT_COURSE,
 ) -> None:
     """Put an assignment into a course, not yet open; again, to mark by what it says now."""
-    # With all kinds of criteria, which other commands need not wait for.
+    # This import loads all kinds of criteria, which other commands do not need.
     from submissions.assignment.reader import find_assignment
 
     found = find_assignment(assignment)

@@ -1,6 +1,6 @@
-"""``robomark db``: bring the tables up to date, copy all there is, bring it back, and remove what is old.
+"""``robomark db``: upgrade the tables, back up, restore, and remove old data.
 
-What is copied and what goes is decided in ``store/backup.py`` and ``store/purge.py``.
+``store/backup.py`` and ``store/purge.py`` define which data is copied or removed.
 """
 
 from __future__ import annotations

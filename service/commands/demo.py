@@ -1,4 +1,4 @@
-"""``robomark demo``: grades the example submissions through the queue, as a first look at the whole service."""
+"""``robomark demo``: grade the example submissions through the queue, as a demonstration of the whole service."""
 
 from __future__ import annotations
 

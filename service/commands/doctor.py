@@ -1,4 +1,4 @@
-"""``robomark doctor``: what could keep this machine from grading. What is looked at is ``service/doctor.py``'s."""
+"""``robomark doctor``: problems that prevent grading on this machine. ``service/doctor.py`` contains the checks."""
 
 from __future__ import annotations
 

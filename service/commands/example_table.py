@@ -1,6 +1,6 @@
-"""How checked assignments are shown: one table for the whole catalogue, a few lines for one.
+"""Tables of checked assignments: one table for the whole catalogue, or details of one assignment.
 
-Only words; the grading is ``grading/example_check.py``.
+This module only formats. ``grading/example_check.py`` does the grading.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from submissions.assignment.folder import REFERENCE
 
 
 def catalogue_table(checked: Iterable[CheckedAssignment]) -> Table:
-    """A row for each assignment: marks of the reference and of the wrong solutions, time, measures."""
+    """Return a table with a row for each assignment: marks of the reference and wrong solutions, time, measures."""
     numbers = ("of", REFERENCE, "s")
     made = table("section", "assignment", "of", REFERENCE, "others", "s", "measures (original)", right=numbers)
     for each in checked:
@@ -34,7 +34,7 @@ def catalogue_table(checked: Iterable[CheckedAssignment]) -> Table:
 
 
 def examples_table(checked: CheckedAssignment) -> Table:
-    """A row for each example of one assignment."""
+    """Return a table with a row for each example of one assignment."""
     made = table("example", "marks", "loses", "as expected", "s", right=("marks", "s"))
     for example in checked.examples:
         made.add_row(
@@ -48,7 +48,7 @@ def examples_table(checked: CheckedAssignment) -> Table:
 
 
 def measures_table(checked: CheckedAssignment) -> Table:
-    """What the reference measured beside the measures of the original simulator."""
+    """Return a table that compares the reference's measures with those of the original simulator."""
     made = table("measure", "here", "original", "unit", "", right=("here", "original"))
     for measure in checked.measures:
         made.add_row(

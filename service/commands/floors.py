@@ -1,4 +1,4 @@
-"""``robomark floors``: a page with every floor, to choose one and to read coordinates off it."""
+"""``robomark floors``: a page with every floor, to choose one and to read coordinates from it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``robomark grade``: what can be said to it. What it does is ``grading.py``'s, which takes long to load."""
+"""``robomark grade``: its options. ``grading.py``, which loads slowly, does the work."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from service.language import SOURCE
 
 
 def _documents() -> tuple[str, ...]:
-    """The formats that have a document for one grade."""
+    """Return the names of the formats that can show one grade."""
     from service.reports.formats import FORMATS
 
     return tuple(name for name, form in FORMATS.items() if form.document is not None)

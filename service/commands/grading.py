@@ -1,6 +1,6 @@
-"""Grades submissions here and now, without queue or database, and prints each or all together.
+"""Grade submissions on this machine, without queue or database, and print the results.
 
-What grading is stands in ``service/grading``; no format is known here.
+``service/grading`` does the grading, and ``service/reports`` defines the formats.
 """
 
 from __future__ import annotations
@@ -46,19 +46,29 @@ def grade_all(
     run: str | None,
     unsafe: bool,
 ) -> None:
-    """Grade and print each, or all together; ``given`` are the flags of the channel, ``run`` is of a notebook.
+    """Grade the submissions and print the results, one by one or in one document.
 
-    ``language`` is the code of the one that reports are in.
+    Args:
+        submissions: Paths of the submissions.
+        assignment: Id or folder of the assignment. None takes the one that each submission names.
+        report: Folder for the reports, or None.
+        form: Name of the output format.
+        given: Values of the channel flags, by name.
+        language: Code of the reports' language.
+        run: The run to mark, for a notebook with several runs.
+        unsafe: Run student code without the sandbox.
 
-    Raises for the worst of them.
+    Raises:
+        HostError: At least one submission could not be graded.
+        UsageError: At least one submission was rejected, and all others were graded.
     """
-    # A mistake of the instructor's is no submission's.
+    # Read the assignment first: a mistake in it is not an error of a submission.
     named = None if assignment is None else find_assignment(assignment)
     chosen = FORMATS[form]
     together = chosen.table if len(submissions) > 1 else None
     rows: list[TableRow[Grade]] = []
     if report is not None:
-        # Drawing takes long to load.
+        # The plotting library loads slowly.
         from service.reports.written import prepare_folder, write_report
 
         prepare_folder(report)
@@ -104,7 +114,7 @@ def grade_all(
 
 
 def _with_run(submission: Submission, run: str | None) -> Submission:
-    """The submission with another run to be marked. Raises UsageError for one that has no runs."""
+    """Return the submission with ``run`` as the marked run. Raises UsageError if it is not a notebook."""
     if run is None:
         return submission
     if submission.notebook is None:
@@ -113,7 +123,10 @@ def _with_run(submission: Submission, run: str | None) -> Submission:
 
 
 def _on_channel(asked: Assignment, given: Mapping[str, object]) -> Assignment:
-    """The assignment with the channel of the flags in every scenario: another one, for it marks otherwise."""
+    """Return the assignment with the channel flags applied to every scenario.
+
+    The result has a version of its own, because its marks differ.
+    """
     if not given:
         return asked
     scenarios = tuple(replace(each, channel=changed(each.channel, given)) for each in asked.scenarios)
@@ -122,7 +135,7 @@ def _on_channel(asked: Assignment, given: Mapping[str, object]) -> Assignment:
 
 
 def _tried(given: Mapping[str, object]) -> tuple[str, ...]:
-    """What a grade must say of itself when flags have changed what it was made with."""
+    """Return the notes for a grade that was made with channel flags."""
     words = ", ".join(f"{name} {value}" for name, value in given.items())
     return (f"tried with another channel than the assignment's ({words}); these are not its marks",) if given else ()
 
@@ -135,7 +148,7 @@ def _print(form: Format, graded: Grade, submission: Submission) -> None:
 
 
 def _like_others(paths: Sequence[Path]) -> dict[Path, str]:
-    """The submissions whose reports would take each other's place in one folder, each with a sentence."""
+    """Return the submissions whose reports would overwrite each other, with an error sentence for each."""
     names = {path: named_by(path) for path in paths}
     near = alike(names.values())
     times = Counter(map(named_by, paths))
@@ -147,9 +160,14 @@ def _like_others(paths: Sequence[Path]) -> dict[Path, str]:
 
 
 def read_with_assignment(path: Path, asked: Assignment | None) -> tuple[Submission, Assignment]:
-    """A submission and what it is marked against: ``asked``, or else the assignment that the submission names.
+    """Read a submission and return it with its assignment.
 
-    Raises UsageError when either cannot be used.
+    Args:
+        path: The submission.
+        asked: The assignment. None takes the one that the submission names.
+
+    Raises:
+        UsageError: The submission or the assignment is invalid.
     """
     if asked is not None:
         return read_submission(path, asked=asked.parts), asked

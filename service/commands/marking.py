@@ -1,4 +1,4 @@
-"""``robomark mark``: what instructors set by hand in a grade that is stored, and what they write to its student."""
+"""``robomark mark``: adjust the marks of a stored grade, excuse criteria, and comment for the student."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def history(grade: GradeId) -> None:
 
 
 def _tell(changed: Marking) -> None:
-    """Say what the grade comes to after a change."""
+    """Print the marks of the grade after a change."""
     line = changed.line
     document(job=line)
     tell(f"{line.student}, {line.assignment}: {out_of(line.marks, line.max_marks)}")

@@ -1,4 +1,4 @@
-"""What a command acts with: the installation, and its user as the operator of the machine."""
+"""The installation and the user for commands. The user acts as operator."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def operating() -> Iterator[tuple[Service, Actor]]:
-    """The installation, open meanwhile, and the user of this command as its operator."""
+    """Open the installation and yield it with the command's user as operator."""
     from service.operations.context import Service, machine_operator, open_store
 
     settings = load_settings()
@@ -27,10 +27,11 @@ def operating() -> Iterator[tuple[Service, Actor]]:
 
 @dataclass(frozen=True, slots=True)
 class _LateNotifier:
-    """The notifier of the workers, which loads the queue when there is something to notify for.
+    """A notifier for the workers that loads the queue only when needed.
 
-    Without a named broker and with no service running in the home nobody is notified: workers that start later look
-    for waiting jobs themselves.
+    It notifies nobody if no broker is configured and no service runs in the home folder. Workers that start later find
+    the
+    waiting jobs themselves.
     """
 
     settings: Settings

@@ -1,4 +1,4 @@
-"""Options that several commands share, and groups of options: a dataclass each, whose fields are options."""
+"""Options that several commands share, and option groups: dataclasses whose fields are options."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ _INFRARED = ("beacon", "range", "facing", "blocked_by")
 
 
 def format_option(words: str, names: Callable[[], Iterable[str]]) -> Any:
-    """An option that takes one of ``names``, which are asked for when it is given: the formats take long to load."""
+    """Return an option that accepts one of ``names``.
+
+    ``names`` is called only when the option is used, because the formats load slowly.
+    """
 
     def checked(name: str) -> str:
         known = tuple(names())
@@ -36,7 +39,7 @@ def format_option(words: str, names: Callable[[], Iterable[str]]) -> Any:
 
 
 def _known_language(code: str) -> str:
-    # English needs no catalogue, and to find out which others there are takes long to load.
+    # English needs no catalogue, and listing the other languages is slow.
     if code != SOURCE and code not in languages():
         raise typer.BadParameter(f"{code!r} is not one of {', '.join(map(repr, languages()))}")
     return code
@@ -66,9 +69,9 @@ FilmOption = Annotated[
 
 
 def with_option_groups(command: Callable[..., None]) -> Callable[..., None]:
-    """The command as Typer shall see it: each parameter that is a dataclass is replaced by its fields.
+    """Replace each dataclass parameter of a command by its fields, for Typer.
 
-    Fields are annotated and have their defaults as the parameters of a command do.
+    The fields need annotations and defaults, like the parameters of a command.
     """
     hints = get_type_hints(command, include_extras=True)
     groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
@@ -109,7 +112,7 @@ def _default(field: Field[Any]) -> object:
 
 @dataclass(frozen=True, slots=True)
 class ChannelFlags:
-    """The flags, as a group of options."""
+    """The channel flags as an option group."""
 
     link: Annotated[str | None, typer.Option("--link", help="cable or infrared.")] = None
     beacon: Annotated[
@@ -130,7 +133,11 @@ class ChannelFlags:
     ] = None
 
     def given(self) -> dict[str, object]:
-        """Those that were given, as an assignment's table has them. Raises UsageError for a beacon that is no place."""
+        """Return the flags that were given, in the form of an assignment's channel table.
+
+        Raises:
+            UsageError: ``--beacon`` is not a pair of coordinates.
+        """
         given: dict[str, object] = {name: value for name, value in asdict(self).items() if value is not None}
         if self.beacon is not None:
             try:
@@ -141,7 +148,7 @@ class ChannelFlags:
 
 
 def changed(channel: Channel, given: Mapping[str, object]) -> Channel:
-    """The channel with what the flags say. Raises UsageError where it cannot be so."""
+    """Return the channel with the flags applied. Raises UsageError if the values are invalid."""
     if not given:
         return channel
     from responders.channel import Channel

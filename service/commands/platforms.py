@@ -1,4 +1,4 @@
-"""``robomark platform``: learning platforms, the members that are fetched from them and the marks that are sent."""
+"""``robomark platform``: register learning platforms, fetch their members and send marks."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""``robomark course export-student``, ``delete-student`` and ``purge``: a student's data on request, and what is old.
+"""``robomark course export-student``, ``delete-student`` and ``purge``: export or delete personal and old data.
 
-The rules are in ``service/store/purge.py``.
+``service/store/purge.py`` contains the rules.
 """
 
 from __future__ import annotations

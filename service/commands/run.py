@@ -1,4 +1,4 @@
-"""``robomark run``: its options, the magic's flags among them. What it does is ``running.py``'s."""
+"""``robomark run``: its options, including the flags of the magic. ``running.py`` does the work."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sim.errors import UsageError
 
 
 class Tick(StrEnum):
-    """How long a tick is, by the names that an assignment's world has for it."""
+    """Tick lengths, by their names in an assignment's world."""
 
     THIRTIETH = "thirtieth"
     BROWSER = "browser"
@@ -42,7 +42,7 @@ class MagicFlags:
 
     @property
     def values(self) -> dict[str, str | None]:
-        """The values of those that have one, by their letters."""
+        """Return the flags that have a value, by letter."""
         return {
             "b": self.background,
             "r": self.robot_setup,
@@ -57,13 +57,13 @@ class MagicFlags:
 
     @property
     def switches(self) -> frozenset[str]:
-        """The letters of the others that were given."""
+        """Return the letters of the switches that were given."""
         return frozenset(letter for letter, on in (("p", self.pen_down), ("L", self.collab), ("m", self.move)) if on)
 
 
 @dataclass(frozen=True, slots=True)
 class PanelFlags:
-    """Flags of ``%sim_magic`` that show or hide parts of the original's page, which mean nothing here."""
+    """The flags of ``%sim_magic`` for panels of the original simulator's page. They have no effect here."""
 
     output: Annotated[bool, typer.Option("-O", "--output", hidden=True)] = False
     array: Annotated[bool, typer.Option("-A", "--array", hidden=True)] = False
@@ -85,7 +85,7 @@ class PanelFlags:
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """What the flags of the magic do not say of a run."""
+    """Conditions of a run that the magic's flags do not cover."""
 
     responder: Annotated[str | None, typer.Option(help="FILE[:NAME] that answers the program's messages.")] = None
     second: Annotated[
@@ -104,7 +104,7 @@ class Conditions:
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """The files that a run is kept in."""
+    """The files in which a run is saved."""
 
     replay: Annotated[
         Path | None, typer.Option(help="Write a page that plays the run to this file; its data if it is a .json.")
@@ -121,7 +121,7 @@ class Kept:
     ] = None
 
     def check(self) -> None:
-        """Raise UsageError where these cannot be written so."""
+        """Raise UsageError if the options do not fit together."""
         if self.picture is not None and self.picture.suffix.lower() != ".png":
             raise UsageError(f"--picture {self.picture}: expected a name that ends in .png")
         if self.over is not None and self.replay is None:

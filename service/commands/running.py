@@ -1,4 +1,7 @@
-"""What ``robomark run`` shows and keeps of a run. Its options are ``run.py``'s; the run is the grader's."""
+"""Run a robot program or notebook for ``robomark run``, and show and save the results.
+
+``run.py`` contains the options. The program runs as it does in grading.
+"""
 
 from __future__ import annotations
 
@@ -57,7 +60,7 @@ from submissions.submission import Notebook
 def run_file(
     path: Path, magic: MagicFlags, conditions: Conditions, channel: ChannelFlags, kept: Kept, *, unsafe: bool
 ) -> None:
-    """Run what is in a file, a robot program or a notebook; show what happened, and keep what is to be kept."""
+    """Run a robot program or notebook, show the results, and save the requested files."""
     if kept.diagrams is not None:
         prepare_folder(kept.diagrams)
     options = _options(magic, conditions, channel)
@@ -133,7 +136,7 @@ def _run_program(
 
 
 def _other_program(path: Path) -> ProgramFile:
-    """A program that is run in the first one's world, whatever its own first line says of one."""
+    """Read a program that runs in the first program's world. Any magic line of its own is ignored."""
     read = read_runnable(path)
     if not isinstance(read, ProgramFile):
         raise UsageError(f"--over {path.name} is a notebook, expected a robot program")
@@ -173,7 +176,7 @@ def _write(path: Path, data: bytes) -> None:
 
 
 def _show(recording: Recording) -> None:
-    """What was printed, spoken, answered and heard, in order, and how it ended."""
+    """Print the messages of a run in order, and the outcome."""
     for t, text in transcript(recording):
         tell(f"{t:8.2f} s  {readable(text, 400)}")
     for which, own in robots_of(recording):
@@ -193,7 +196,7 @@ def _show(recording: Recording) -> None:
 
 
 def _told(recording: Recording) -> dict[str, Any]:
-    """What a document says of a run."""
+    """Return the JSON value for a run."""
     faults = [
         {
             "t": fault.t,
@@ -214,7 +217,7 @@ def _drawn(recording: Recording, name: str, seed: int, own: Floor | None) -> byt
 
 
 def _show_notebook(executed: ExecutedNotebook, show: Callable[[Recording], None]) -> None:
-    """Print what the cells printed, each run by ``show`` where a cell started it, and what was left out."""
+    """Print the output of the cells and the skipped cells. ``show`` prints each robot run."""
     shown = 0
     for run in executed.runs:
         _show_output(executed.output[shown : run.printed])
@@ -237,7 +240,7 @@ def _show_output(text: str) -> None:
 
 
 def _show_diagrams(notebook: Notebook, folder: Path | None) -> None:
-    """The diagrams of the notebook's cells as files, if there is a folder for them, and which cannot be drawn."""
+    """Write the diagrams of the notebook's cells into ``folder``, if given, and report those that cannot be drawn."""
     found = diagrams_in(notebook)
     for problem in found.problems:
         note(f"note: {readable(problem, 400)}")

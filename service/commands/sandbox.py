@@ -1,4 +1,4 @@
-"""``robomark sandbox``: which layers stand round student code on this machine, and what is missing."""
+"""``robomark sandbox``: the sandbox layers that work on this machine, and those that are missing."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""The whole service on this machine, or its web server alone, until it is told to stop.
+"""Run the whole service or only its web server on this machine, until it is stopped.
 
-What is kept running is ``supervisor.py``'s and ``web``'s.
+``supervisor.py`` keeps the processes running. ``web`` contains the web server.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from sim.processes import leave_current_folder
 
 _log = structlog.get_logger(__name__)
 _LOOK_SECONDS = 0.5
-#: In the home, readable by its owner alone.
+#: This file is in the home folder, and only its owner can read it.
 _LINK_FILE = "sign-in-link"
 
 
 def bring_up(workers: int, host: str, port: int, *, serve: bool) -> None:
-    """Keep broker, workers and web server up until Ctrl-C."""
+    """Run broker, workers and web server until Ctrl-C."""
     settings = load_settings()
     configure_logging(settings.log_level)
     leave_current_folder()
-    # Before there are others in this group: it can only be divided when nobody is left in it.
+    # Divide the control group first: this is only possible while it contains no other process.
     control_group.divide()
     if serve:
         check_reach(host, settings)
@@ -48,7 +48,7 @@ def bring_up(workers: int, host: str, port: int, *, serve: bool) -> None:
         link = ""
         leave_note(where)
         with Sandboxes() as sandboxes:
-            # Here the reason can be said; a worker that refuses would only be seen to end.
+            # Check here to report the reason. Otherwise the user only sees that the worker stopped.
             sandboxes.check()
         service, actor = held.enter_context(operating())
         try:
@@ -60,7 +60,7 @@ def bring_up(workers: int, host: str, port: int, *, serve: bool) -> None:
 
 
 def answer(host: str, port: int) -> None:
-    """Answer on the web until Ctrl-C."""
+    """Run the web server until Ctrl-C."""
     settings = load_settings()
     configure_logging(settings.log_level)
     check_reach(host, settings)
@@ -92,7 +92,10 @@ def _keep_up(settings: Settings, service: Supervisor, where: str) -> None:
 
 
 def _told_link(settings: Settings, link: str) -> str:
-    """How to sign in: the link on a terminal, else where it is; what is printed there ends up in a journal for many."""
+    """Return how to sign in: the link itself on a terminal, otherwise the path of a private file with the link.
+
+    Standard output that is not a terminal often goes to a journal that many people can read.
+    """
     if sys.stdout.isatty():
         return f"sign in by {link}"
     path = settings.home / _LINK_FILE
@@ -103,7 +106,7 @@ def _told_link(settings: Settings, link: str) -> str:
 
 
 def _first_link(service: Service, actor: Actor, listening_at: str) -> str:
-    """A link that signs whoever brings the service up in, once, as an instructor and operator."""
+    """Return a link that signs the user who started the service in once, as instructor and operator."""
     secret = sign_in_links.make_own_link(service, actor)
     return f"{service.settings.public_url or listening_at}/sign-in/{secret}"
 
@@ -117,7 +120,7 @@ def _until_ready(service: Supervisor) -> None:
 
 
 def _ensure(service: Supervisor) -> None:
-    """Once up, nothing but Ctrl-C ends it: what cannot be started now is tried again."""
+    """Restart stopped services. Errors are only logged, and the next call tries again."""
     try:
         service.ensure()
     except (RobomarkError, DatabaseError, OSError) as error:

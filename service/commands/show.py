@@ -1,4 +1,4 @@
-"""``robomark show``: one grade that is stored."""
+"""``robomark show``: one stored grade."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from service.operations.stored_grades import JobLine
 from service.operations.types import JobState
 from sim.errors import UsageError
 
-#: No id begins so: none has an o.
+#: This word cannot be the beginning of an id, because ids contain no ``o``.
 _BEFORE = "before"
 
 
@@ -58,7 +58,7 @@ def show(
             document(job=line, grade=None)
             tell(_not_graded(line))
             return
-        # They take longer to load than to find that there is no grade.
+        # These modules load slowly, so the grade is looked up first.
         from service.reports.formats.json_output import json_document
         from service.reports.formats.text import plain_text
         from service.reports.view import staff_view
@@ -71,7 +71,7 @@ def show(
         tell("; ".join([f"plots: {line.plots.value}", by, f"the student's attempt {line.attempt}", *remarks(line)]))
         if replay is None and film is None and output is None:
             return
-        # A page draws plots that are not there yet.
+        # Writing a report draws missing plots, so this import is slow.
         from service.report_files import write_grade_film, write_grade_replay, write_report
         from service.reports.written import file_stem
 

@@ -1,6 +1,7 @@
-"""What a command shows: results to standard output, in words or as one JSON document; all else to standard error.
+"""Output of commands: results to standard output as text or one JSON document, everything else to standard error.
 
-Knows no command. A terminal gets colours and lines as wide as it is; where there is none, nothing is wrapped or cut.
+The module is independent of the commands. On a terminal, output has colours and the terminal's width. Otherwise no line
+is wrapped or shortened.
 """
 
 from __future__ import annotations
@@ -19,44 +20,44 @@ if TYPE_CHECKING:
     from rich.console import Console, RenderableType
     from rich.table import Table
 
-#: Of the shape of every document; it changes when a key goes or means something else.
+#: Version of the JSON documents. It changes when a key is removed or changes its meaning.
 SCHEMA = 1
 
 _json: ContextVar[bool] = ContextVar("json", default=False)
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
-#: Wider than any line.
+#: A width that no line reaches.
 _UNWRAPPED = 1_000_000
 
 
 def want_json(asked: bool) -> None:
-    """From now on results are shown as one JSON document."""
+    """Select JSON output for the rest of this command."""
     _json.set(asked)
 
 
 def want_quiet(asked: bool) -> None:
-    """From now on nothing is shown but results and what went wrong."""
+    """Suppress everything except results and errors for the rest of this command."""
     _quiet.set(asked)
 
 
 def wants_json() -> bool:
-    """Whether the result is to be a document."""
+    """Return whether the output format is JSON."""
     return _json.get()
 
 
 def document(**values: object) -> None:
-    """The whole result of the command as JSON, where that is wanted."""
+    """Print the command's whole result as a JSON document, if JSON output is selected."""
     if wants_json():
         print(json.dumps({"schema": SCHEMA, **values}, indent=2, default=_plain, allow_nan=False))
 
 
 def tell(sentence: str) -> None:
-    """A line of the result, in words."""
+    """Print a line of the result, unless JSON output is selected."""
     if not wants_json():
         print(sentence)
 
 
 def show(*parts: RenderableType) -> None:
-    """Parts of the result, in words and tables."""
+    """Print texts and tables of the result, unless JSON output is selected."""
     if wants_json():
         return
     on_terminal = sys.stdout.isatty()
@@ -64,25 +65,25 @@ def show(*parts: RenderableType) -> None:
     with console.capture() as shown:
         for part in parts:
             console.print(part)
-    # A table fills its last column with blanks, which nobody wants in a file.
+    # Rich pads the last column with spaces, which are removed in files.
     lines = shown.get().split("\n")
     sys.stdout.write("\n".join(lines if on_terminal else (line.rstrip() for line in lines)))
 
 
 def note(sentence: str) -> None:
-    """A line about the work or the result, which is no part of it."""
+    """Print a message to standard error, unless ``--quiet`` is set."""
     if not _quiet.get():
         print(sentence, file=sys.stderr)
 
 
 def progress() -> Console:
-    """Where it is shown how far the work is; a terminal alone shows what moves."""
+    """Return the console for progress bars. It shows them only on a terminal."""
     on_terminal = sys.stderr.isatty()
     return _console(on_terminal, stderr=True, quiet=_quiet.get() or not on_terminal)
 
 
 def table(*headings: str, right: Collection[str] = (), title: str = "") -> Table:
-    """An empty table without lines round it; ``right`` names the headings whose columns are numbers."""
+    """Return an empty table without borders. ``right`` contains the headings of right-aligned columns."""
     from rich.table import Table
 
     made = Table(box=None, pad_edge=False, title=title or None, title_justify="left", show_header=any(headings))
@@ -98,7 +99,7 @@ def _console(on_terminal: bool, **options: Any) -> Console:
 
 
 def _plain(value: Any) -> Any:
-    """What JSON has no word for."""
+    """Convert a value that JSON does not support. Raises TypeError for an unknown type."""
     match value:
         case Decimal():
             return int(value) if value == value.to_integral_value() else float(value)

@@ -1,6 +1,6 @@
-"""How the statistics of assignments are shown on a terminal: a sentence and two tables for each.
+"""Statistics of assignments for the terminal: a sentence and two tables for each.
 
-What they are is ``grading/statistics.py``'s.
+``grading/statistics.py`` computes them.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from service.grading.statistics import AssignmentStatistics
 
 _MOST_CAUSES = 5
-#: Students that a row names.
+#: Maximum number of students that a row names.
 _MOST_NAMED = 10
 
 
 def statistics_parts(found: Iterable[AssignmentStatistics]) -> Iterator[RenderableType]:
-    """What is to be shown of each assignment, after an empty line."""
+    """Yield the texts and tables of each assignment, each after an empty line."""
     for each in found:
         spread = "" if each.spread is None else f", standard deviation {each.spread:.2f}"
         yield (
@@ -41,5 +41,5 @@ def statistics_parts(found: Iterable[AssignmentStatistics]) -> Iterator[Renderab
 
 
 def named(students: tuple[str, ...]) -> str:
-    """The first of them by name, and that there are more."""
+    """Return the first student names, and dots if there are more."""
     return ", ".join(students[:_MOST_NAMED]) + (" ..." if len(students) > _MOST_NAMED else "")

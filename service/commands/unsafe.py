@@ -1,4 +1,4 @@
-"""What is said, and never left out, whenever student code is let loose."""
+"""The warning that is always shown when student code runs without the sandbox."""
 
 from __future__ import annotations
 
@@ -6,5 +6,5 @@ import sys
 
 
 def warn_of_no_sandbox() -> None:
-    """Say so; ``--quiet`` does not hide it."""
+    """Print the warning. ``--quiet`` does not suppress it."""
     print("robomark: NO SANDBOX: these submissions can read and change everything that you can", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""``robomark up`` and ``robomark serve``: what can be said to them. What they do is ``serving.py``'s."""
+"""``robomark up`` and ``robomark serve``: their options. ``serving.py`` does the work."""
 
 from __future__ import annotations
 

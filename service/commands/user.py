@@ -1,6 +1,6 @@
-"""``robomark user``: instructors and operators, and how anybody signs in on the web.
+"""``robomark user``: instructors, operators and sign-in credentials.
 
-Students come with their submissions or by ``robomark course enrol``.
+Students are added with their submissions or by ``robomark course enrol``.
 """
 
 from __future__ import annotations

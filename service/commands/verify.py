@@ -1,4 +1,4 @@
-"""``robomark verify``: what can be said to it. What it does is ``verifying.py``'s, which takes long to load."""
+"""``robomark verify``: its options. ``verifying.py``, which loads slowly, does the work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs a stored grading again, here, and compares every recording's hash and the marks."""
+"""Repeat a stored grading on this machine and compare the recordings' hashes and the marks."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from submissions.criteria import Criterion
 from submissions.grading_request import GradingRequest
 from submissions.seeds import PUBLIC, Secret, name_of
 
-#: A trial as stored, and as run again.
+#: A stored trial and its repetition.
 Row = tuple[TrialResult, TrialResult]
 
-#: Where the difference comes from, in words.
+#: Explanation of a difference, by cause.
 _REASONS = {
     "program": "three gradings of it in fresh processes differ from each other, so the program uses chance of its own, "
     "such as addresses of objects or the processor's clock",
     "grader": "three gradings of it in fresh processes are the same, so the fault is Robomark's and not the program's; "
     "please report it with both versions",
 }
-#: How far such a trial came is decided by the machine and its load, so no hash is promised for it.
+#: The machine and its load decide when such a trial ends, so its hash can differ.
 _CUT = frozenset({Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR})
 
 
 def verify_grade(grade: str) -> None:
-    """Run the grading with this id again. Raises HostError if anything differs that must not."""
+    """Repeat the grading with this id. Raises HostError for an unexpected difference."""
     with operating() as (service, actor):
         grading = stored_grades.load_grading(service, actor, grade)
     stored, grading_request, secret = grading.grade, grading.request, _secret_of(grading)
@@ -63,9 +63,9 @@ def verify_grade(grade: str) -> None:
 
 
 def _grade_again(request: GradingRequest, secret: Secret, earlier: int = 0) -> Grade:
-    """Grade the submission, every trial of it, in processes of their own, and before it so many ``earlier`` times.
+    """Grade every trial of the submission in fresh processes, after grading it ``earlier`` times.
 
-    In a name space of its own process numbers begin anew, so only earlier processes make them differ.
+    In a new process namespace, process ids start again at 1. Only earlier processes make the ids differ.
     """
     with TrialRunner(spares=False) as runner:
         for _ in range(earlier):
@@ -76,10 +76,11 @@ def _grade_again(request: GradingRequest, secret: Secret, earlier: int = 0) -> G
 def _cause_of(
     rows: Sequence[Row], marks: Sequence[str], again: Grade, request: GradingRequest, secret: Secret
 ) -> str | None:
-    """Return why trials or marks differ from the stored ones: grade twice more, in fresh processes each time.
+    """Return the cause of the differences, ``program`` or ``grader``, or None if nothing differs.
 
-    A program that draws chance of its own differs from itself; Robomark, which simulates every chance that it offers,
-    does not. None if nothing differs.
+    Grades the submission twice more, each time in fresh processes. If these gradings also differ, the program uses its
+    own
+    randomness. Robomark itself is deterministic.
     """
     trials = [number for number, row in enumerate(rows) if _compared(*row) == "differs"]
     criteria = [number for number, compared in enumerate(marks) if compared == "differs"]
@@ -95,7 +96,7 @@ def _cause_of(
 
 
 def _told(job_id: str, stored: Grade, again: Grade, rows: Sequence[Row]) -> dict[str, object]:
-    """What a document says of the comparison."""
+    """Return the JSON value for the comparison."""
     return {
         "grade": job_id,
         "marks": stored.marks,
@@ -114,7 +115,7 @@ def _told(job_id: str, stored: Grade, again: Grade, rows: Sequence[Row]) -> dict
 
 
 def _secret_of(grading: Grading) -> Secret:
-    """The secret that the grade was given with. Raises HostError when it is not the one that is at hand."""
+    """Return the secret that the grading used. Raises HostError if this installation has another secret."""
     own, needed = grading.own_secret, grading.secret_sha256
     if needed is None:
         note("graded before this installation had a secret: again in the worlds of then")
@@ -129,7 +130,10 @@ def _secret_of(grading: Grading) -> Secret:
 
 
 def _compare_marks(stored: Grade, again: Grade, rows: Sequence[Row], criteria: Sequence[Criterion]) -> list[str]:
-    """Compare the marks of each criterion. Only one that looks at a trial which a limit cut short may differ."""
+    """Return ``same``, ``cut by a limit`` or ``differs`` for each criterion.
+
+    Marks may only differ if the criterion uses a trial that a limit cut short.
+    """
     by_id = {criterion.id: criterion for criterion in criteria}
     cut = {before.scenario for before, after in rows if _compared(before, after) == "cut by a limit"}
     return [
@@ -154,7 +158,7 @@ def _compared(before: TrialResult, after: TrialResult) -> str:
 
 
 def _begin_alike(before: Recording, after: Recording) -> bool:
-    """Return whether all that one of the two said is what the other said first."""
+    """Return whether the output of one recording is a prefix of the other's output."""
     pairs = (*zip(before.spoken, after.spoken, strict=False), *zip(before.printed, after.printed, strict=False))
     messages = zip(before.messages, after.messages, strict=False)
     return all(one == other for one, other in pairs) and all(

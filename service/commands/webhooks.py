@@ -1,4 +1,4 @@
-"""``robomark webhook``: addresses that are told of events in a course, and the deliveries to them."""
+"""``robomark webhook``: manage the webhooks of a course and list their deliveries."""
 
 from __future__ import annotations
 

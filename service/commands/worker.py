@@ -1,4 +1,4 @@
-"""``robomark worker``: grades what is queued. What a worker does is ``queue/worker.py``'s."""
+"""``robomark worker``: grade queued jobs. ``queue/worker.py`` implements the worker."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def worker(
     if settings.broker_url:
         status = run_worker(settings, unsafe=unsafe)
     else:
-        # Before the broker is in this group: it can only be divided when nobody is left in it.
+        # Divide the control group before the broker starts: this is only possible while no other process is in it.
         control_group.divide()
         with EmbeddedBroker(settings) as broker:
             status = run_worker(broker.settings, unsafe=unsafe)

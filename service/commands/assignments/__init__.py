@@ -1,1 +1,1 @@
-"""``robomark assignments``, a module for each kind of command."""
+"""``robomark assignments``: one module for each kind of command."""

@@ -1,4 +1,4 @@
-"""``robomark assignments check``: what can be said to it. What it does is ``examples.py``'s, which loads long."""
+"""``robomark assignments check``: its options. ``examples.py``, which loads slowly, does the work."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Grades the examples of one assignment, or of the whole catalogue, and shows whether they get what they must.
+"""Grade the examples of one assignment or of the whole catalogue, and compare the results with the expected ones.
 
-The grading is ``grading/example_check.py``'s.
+``grading/example_check.py`` does the grading.
 """
 
 from __future__ import annotations
@@ -23,7 +23,15 @@ from submissions.assignment.folder import FILE_NAME, REFERENCE, catalogue
 
 
 def check(assignment: str | None, *, write_expected: bool) -> None:
-    """Check one assignment, or the whole catalogue. Raises AssignmentError, with all that is not as it must be."""
+    """Check one assignment, or the whole catalogue if ``assignment`` is None.
+
+    Args:
+        assignment: Catalogue id or folder of the assignment.
+        write_expected: Write the results of examples without expectations as their expectations.
+
+    Raises:
+        AssignmentError: Lists everything that differs from the expectations.
+    """
     with TrialRunner() as runner:
         if assignment is not None:
             checked = [check_examples(assignment, runner=runner)]
@@ -50,7 +58,7 @@ def check(assignment: str | None, *, write_expected: bool) -> None:
 
 
 def _told(checked: CheckedAssignment) -> dict[str, Any]:
-    """What a document says of an assignment and its examples."""
+    """Return the JSON value for an assignment and its examples."""
     return {
         "id": checked.assignment.id,
         "version": checked.assignment.version,
@@ -71,7 +79,7 @@ def _told(checked: CheckedAssignment) -> dict[str, Any]:
 
 
 def _noted(assignment: str, checked: CheckedAssignment) -> CheckedAssignment:
-    """As it is with the new expectations, which are written for somebody to read over."""
+    """Write the missing expectations to a file for review, and return the check result with them."""
     if not checked.unwritten:
         tell(f"{EXPECTED} has a table for every example that could be noted: nothing was written")
         return checked

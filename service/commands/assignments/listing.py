@@ -1,4 +1,4 @@
-"""``robomark assignments list``: the catalogue, a line each."""
+"""``robomark assignments list``: the catalogue as a table."""
 
 from __future__ import annotations
 

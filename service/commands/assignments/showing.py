@@ -1,4 +1,4 @@
-"""``robomark assignments show``: what one assignment asks for, and how it is marked."""
+"""``robomark assignments show``: the task of one assignment and its criteria."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def show(assignment: Which) -> None:
 
 
 def _told(found: Assignment, trials: dict[str, int]) -> dict[str, object]:
-    """What a document says of an assignment."""
+    """Return the JSON value for an assignment."""
     return {
         "id": found.id,
         "title": found.title,
@@ -63,7 +63,7 @@ def _told(found: Assignment, trials: dict[str, int]) -> dict[str, object]:
 
 
 def _cell(which: str) -> str:
-    """The marked robot program of a notebook, in words."""
+    """Describe which notebook cell contains the marked robot program."""
     if which.isdecimal():
         return f"robot program {which}"
     return "the last robot program" if which == "last" else f'the cell tagged "{which.removeprefix("tag:")}"'

@@ -1,4 +1,4 @@
-"""The argument that names an assignment."""
+"""The command-line argument that names an assignment."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ Which = Annotated[str, typer.Argument(help="Its id in the catalogue, or its fold
 
 
 def count_words(number: int, one: str, many: str) -> str:
-    """``1 trial``, ``2 trials``."""
+    """Return the number with its noun: ``1 trial``, ``2 trials``."""
     return f"{number} {one if number == 1 else many}"

@@ -1,4 +1,4 @@
-"""``robomark assignments new``, ``export`` and ``autograder``: folders that are made of assignments, or for them."""
+"""``robomark assignments new``, ``export`` and ``autograder``: write the folders of assignments and autograders."""
 
 from __future__ import annotations
 

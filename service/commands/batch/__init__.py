@@ -1,1 +1,1 @@
-"""``robomark batch``, a module for each kind of command; ``app.py`` puts them together."""
+"""``robomark batch``: one module for each kind of command. ``app.py`` combines them."""

@@ -1,6 +1,6 @@
-"""Waits for batches with the services that run, or with our own for as long as it takes.
+"""Waiting for batches, with the running services or with services started for this command.
 
-What is shown of them meanwhile is ``waiting.py``'s.
+``waiting.py`` shows the progress.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ _GRACE_SECONDS = 15.0
 
 @dataclass(frozen=True, slots=True)
 class AwaitedBatches:
-    """Batches that services grade meanwhile."""
+    """Batches that are being graded while the command waits."""
 
     waiting: Sequence[Waiting]
     end_services: Callable[[], object]
 
     def for_marks(self) -> None:
-        """Return when all marks are there."""
+        """Wait until all jobs have ended."""
         for each in self.waiting:
             each.for_marks()
 
     def for_plots(self) -> None:
-        """Return when all plots are there; services of our own begin to end then."""
+        """Wait until all plots are drawn, then start stopping the services of this command."""
         for each in self.waiting:
             each.for_plots()
         self.end_services()
@@ -46,7 +46,10 @@ class AwaitedBatches:
 
 @dataclass(frozen=True, slots=True)
 class NotifiedLater:
-    """No notices to workers, where the batches are awaited: ``Services.awaited`` notifies workers of its own."""
+    """A notifier that does nothing, for commands that wait.
+
+    These commands use ``Services.awaited``, which notifies the workers itself.
+    """
 
     def grade(self, lane: Lane, count: int = 1) -> None:
         """Do nothing."""
@@ -60,7 +63,14 @@ class NotifiedLater:
 
 @dataclass(frozen=True, slots=True)
 class Services:
-    """Who grades: what the settings name, or a broker and a worker of our own."""
+    """The services that grade: those in the settings, or a broker and a worker started by this command.
+
+    Attributes:
+        settings: Settings that include the broker's address.
+        ours: True if this command started the services.
+        keep_up: Restarts services that stopped.
+        end: Stops the services.
+    """
 
     settings: Settings
     ours: bool
@@ -68,9 +78,16 @@ class Services:
     end: Callable[[], object]
 
     def awaited(self, service: Service, actor: Actor, batch_ids: Sequence[str], new: int) -> AwaitedBatches:
-        """Batches of which ``new`` jobs were queued just now.
+        """Notify the workers and return the batches to wait for.
 
-        Raises HostError where student code is to be run here and cannot be enclosed.
+        Args:
+            service: The installation.
+            actor: The user who waits.
+            batch_ids: Ids of the batches. Finished and paused batches are skipped.
+            new: Number of jobs that were just queued.
+
+        Raises:
+            HostError: Student code would run on this machine, but the sandbox cannot be set up.
         """
         unfinished = _unfinished(service, actor, batch_ids)
         if not unfinished:
@@ -78,14 +95,14 @@ class Services:
         with Sandboxes() as sandboxes:
             if self.ours:
                 sandboxes.begin("robot", ())
-            # It begins meanwhile, and so does the worker.
+            # These imports run while the sandbox and the worker start.
             from service.commands.batch.waiting import Waiting
             from service.operations.types import Lane
             from service.queue.celery_app import make_celery
             from service.queue.notifier import Notifier
 
             if self.ours:
-                # Here the reason can be said; a worker that refuses would only be seen to end.
+                # Check here to report the reason. Otherwise the user only sees that the worker stopped.
                 sandboxes.check()
         notifier = Notifier(make_celery(self.settings), service.store, self.settings)
         notifier.grade(Lane.BATCH, new)
@@ -95,7 +112,10 @@ class Services:
 
 @contextmanager
 def started(service: Service) -> Iterator[Services]:
-    """Services that begin to start, and are waited for no more than they must be; ours end with the ``with``."""
+    """Yield the services that grade. Services started here stop at the end of the ``with`` block.
+
+    The function does not wait until the services are ready.
+    """
     settings = service.settings
     if settings.broker_url:
         yield Services(settings, False, _nothing, _nothing)
@@ -107,7 +127,10 @@ def started(service: Service) -> Iterator[Services]:
 
 @contextmanager
 def awaited(service: Service, actor: Actor, batch_ids: Sequence[str], new: int) -> Iterator[AwaitedBatches]:
-    """Batches of which ``new`` jobs were queued just now; services of our own have ended when the ``with`` ends."""
+    """Notify the workers about ``new`` queued jobs and yield the batches to wait for.
+
+    Services started here have stopped when the ``with`` block ends.
+    """
     if not _unfinished(service, actor, batch_ids):
         yield AwaitedBatches((), _nothing)
         return
@@ -116,7 +139,7 @@ def awaited(service: Service, actor: Actor, batch_ids: Sequence[str], new: int) 
 
 
 def _unfinished(service: Service, actor: Actor, batch_ids: Sequence[str]) -> list[str]:
-    """The batches to wait for; one that is paused would keep its waiter for ever, and is only named."""
+    """Return the ids of unfinished batches. Paused batches are only reported, because they would never finish."""
     from service.operations.batch_views import look
     from service.operations.types import BatchState
 
@@ -133,4 +156,4 @@ def _unfinished(service: Service, actor: Actor, batch_ids: Sequence[str]) -> lis
 
 
 def _nothing() -> None:
-    """Services that are not ours are kept up, and ended, by others."""
+    """Do nothing. Services that were not started by this command are managed elsewhere."""

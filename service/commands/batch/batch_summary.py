@@ -1,4 +1,4 @@
-"""What commands say of a batch and of its jobs in words; the tables beside it are ``tables.py``'s."""
+"""Sentences about a batch and its jobs. ``tables.py`` contains the tables."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from service.operations.types import BatchState, JobState
 if TYPE_CHECKING:
     from service.operations.batch_views import BatchLine, JobLine
 
-#: Students that a sentence names.
+#: Maximum number of students that a sentence names.
 _MOST_NAMED = 10
 
 
 def summary(line: BatchLine) -> str:
-    """How many jobs of a batch are in each state."""
+    """Return the number of jobs in each state as text."""
     if line.web_assignment is not None:
         held = "open: " if line.takes_in else "closed: "
     else:
@@ -26,7 +26,7 @@ def summary(line: BatchLine) -> str:
 
 
 def remarks(line: JobLine) -> list[str]:
-    """What else is to be known of a grade, beside its marks."""
+    """Return the remarks about a grade, for example ``2 days late`` or ``published``."""
     from service.operations.batch_views import in_days
 
     told = {
@@ -45,7 +45,7 @@ def remarks(line: JobLine) -> list[str]:
 
 
 def unjudged_words(lines: Sequence[JobLine]) -> str:
-    """Whose grades lack the judgement of a criterion; empty where none does."""
+    """Return a sentence about grades with criteria that were not judged, or an empty string if there are none."""
     students = [line.student for line in lines if line.unjudged]
     if not students:
         return ""
@@ -55,7 +55,7 @@ def unjudged_words(lines: Sequence[JobLine]) -> str:
 
 
 def out_of(marks: Decimal | None, most: Decimal | None) -> str:
-    """Marks and the most there are; empty where there are none."""
+    """Return the marks and the maximum, such as ``7 / 10``. Return an empty string without marks."""
     if marks is None:
         return ""
     return f"{marks.normalize():f}" if most is None else f"{marks.normalize():f} / {most.normalize():f}"

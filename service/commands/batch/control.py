@@ -1,4 +1,4 @@
-"""``robomark batch pause``, ``resume``, ``cancel`` and ``retry``: each prints in one sentence what it changed."""
+"""``robomark batch pause``, ``resume``, ``cancel`` and ``retry``. Each command prints the change in one sentence."""
 
 from __future__ import annotations
 

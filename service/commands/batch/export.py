@@ -1,4 +1,4 @@
-"""``robomark batch export``: what can be said to it. What it does is ``exporting.py``'s, which takes long to load."""
+"""``robomark batch export``: its options. ``exporting.py``, which loads slowly, does the work."""
 
 from __future__ import annotations
 

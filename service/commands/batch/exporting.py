@@ -1,6 +1,6 @@
-"""Writes the marks of a batch as one document, or as a file for each submission.
+"""Write the marks of a batch as one document, or as one file for each submission.
 
-What a document says is ``service.reports``'.
+``service.reports`` defines the formats.
 """
 
 from __future__ import annotations
@@ -19,12 +19,23 @@ from service.operations.exports import Export, ExportRequest, export
 from service.reports.formats import FORMATS, Format
 from sim.errors import UsageError
 
-#: Rows that a sentence names.
+#: Maximum number of rows that a sentence names.
 _MOST_NAMED = 10
 
 
 def export_batch(batch: str, form: str, output: Path | None, worksheet: Path | None, *, published: bool) -> None:
-    """Write the batch whose id begins so in this format. Raises UsageError where the two do not go together."""
+    """Write a batch in the given format.
+
+    Args:
+        batch: Batch id, or the beginning of it.
+        form: Name of the format.
+        output: File or folder to write. None means standard output.
+        worksheet: Moodle's grading worksheet to fill in.
+        published: Export only published grades.
+
+    Raises:
+        UsageError: The options do not fit the format.
+    """
     chosen = FORMATS[form]
     if output is None and (chosen.packed is not None or (chosen.table is None and chosen.document is not None)):
         what = "a folder" if chosen.document is not None else "a file"
@@ -73,7 +84,10 @@ def _read(worksheet: Path) -> str:
 
 
 def _is_for_files(chosen: Format, output: Path) -> bool:
-    """Whether a file for each submission is meant: ``output`` is a folder, or nothing yet and has no suffix."""
+    """Return whether to write one file for each submission into the folder ``output``.
+
+    This is the case if ``output`` is a folder, or if it does not exist and has no suffix.
+    """
     if chosen.document is None:
         return False
     return chosen.table is None or output.is_dir() or (not output.suffix and not output.exists())

@@ -1,6 +1,6 @@
-"""Shows whose submissions of a batch are alike, for staff to look at.
+"""List similar submissions of a batch for staff to review.
 
-What is alike is decided in ``service.similarity``; marks neither come from it nor change by it.
+``service.similarity`` finds them. Similarity never changes marks.
 """
 
 from __future__ import annotations
@@ -15,12 +15,21 @@ from service.reports.similarity import as_plain, similarity_page, similarity_row
 from service.reports.view import SimilarityView, staff_similarity
 from service.reports.written import prepare_folder, write_page
 
-#: Pairs on the screen and on the page; the JSON has all.
+#: Maximum number of pairs on the screen and on the page. The JSON output contains all pairs.
 _MOST_SHOWN = 100
 
 
 def find_similar(batch: str, given: Path | None, output: Path | None) -> None:
-    """Show the pairs, and write the page with the evidence. Raises UsageError for what cannot be read or written."""
+    """Print the similar pairs and write the page with the evidence.
+
+    Args:
+        batch: Batch id, or the beginning of it.
+        given: File or folder of Python code to ignore, because students received it.
+        output: Page to write, or None.
+
+    Raises:
+        UsageError: A file cannot be read or written.
+    """
     if output is not None:
         prepare_folder(output)
     with operating() as (service, actor):

@@ -1,4 +1,4 @@
-"""``robomark batch list``: the newest batches, a line each."""
+"""``robomark batch list``: the newest batches as a table."""
 
 from __future__ import annotations
 

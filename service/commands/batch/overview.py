@@ -1,4 +1,4 @@
-"""``robomark batch overview``: what came of a batch at a glance, as its page on the web has it."""
+"""``robomark batch overview``: the results of a batch, as on its web page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``robomark batch regrade``, ``publish`` and those of one grade: grade again, see what changes, let it stand."""
+"""``robomark batch regrade``, ``publish`` and related commands: regrade, compare and publish grades."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def regrade(
     wait: Annotated[bool, typer.Option("--wait", help="Wait for the new grades and show what they change.")] = False,
 ) -> None:
     """Grade a batch again after its assignment or the grader changed; the old grades stand until you publish."""
-    # The queue takes long to load, which publishing need not wait for.
+    # The queue loads slowly, and publishing does not need it.
     from service.commands.batch.awaited import NotifiedLater, awaited
     from service.operations import batches
     from service.operations import regrades as operations
@@ -138,7 +138,7 @@ def preview_publication(batch: BatchId) -> None:
 
 
 def _assignment(name: str | None) -> Assignment | str:
-    """The id of an assignment of the course or the catalogue, or the assignment in a folder of this machine."""
+    """Return an assignment id as given, or the assignment if ``name`` is a folder on this machine."""
     from submissions.assignment.folder import catalogue
     from submissions.assignment.reader import find_assignment
 
@@ -152,7 +152,7 @@ def _tell_published(of_what: str, done: Published) -> None:
 
 
 def _counted(done: Published, verb: str) -> str:
-    """How many grades are published, and how many are left for which reason."""
+    """Return a sentence with the number of published grades and of those held back, with reasons."""
     left = [
         f"{count} {what}"
         for count, what in (

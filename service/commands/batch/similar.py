@@ -1,4 +1,4 @@
-"""``robomark batch similar``: what can be said to it. What it does is ``finding_similar.py``'s, which loads long."""
+"""``robomark batch similar``: its options. ``finding_similar.py``, which loads slowly, does the work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``robomark batch status``: how far one batch is, the marks that are there, and what they come to for a class."""
+"""``robomark batch status``: progress, marks and class statistics of one batch."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``robomark batch submit``: what can be said to it. What it does is ``submitting.py``'s, which takes long to load."""
+"""``robomark batch submit``: its options. ``submitting.py``, which loads slowly, does the work."""
 
 from __future__ import annotations
 
@@ -60,7 +60,10 @@ def submit_and_wait(
     people: Path | None = None,
     course: str | None = None,
 ) -> int:
-    """Queue submissions, grade them with the services that run or with our own, and return how many were refused."""
+    """Queue submissions, wait for their grades and return the number of rejected submissions.
+
+    Uses the running services, or starts its own.
+    """
     from service.commands.batch.awaited import started
     from service.queue.logs import configure_logging
     from service.reports.written import prepare_folder
@@ -69,7 +72,7 @@ def submit_and_wait(
         prepare_folder(output)
     with operating() as (service, actor), started(service) as services:
         configure_logging(service.settings.log_level)
-        # The worker begins while this loads, and while submissions are read and stored.
+        # The worker starts during this import and while submissions are read and stored.
         from service.commands.batch.submitting import BatchToSubmit, submit_to
 
         batch = BatchToSubmit(grading_requests, assignment, people, course, again)

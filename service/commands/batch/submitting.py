@@ -1,6 +1,6 @@
-"""Hands submissions to the queue, says what was taken in and what was not, and waits for marks.
+"""Queue submissions, report accepted and rejected ones, and wait for marks.
 
-Reading the folder is ``batch_folder.py``'s; the grading itself is the workers'.
+``batch_folder.py`` reads the folder. The workers do the grading.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class BatchToSubmit:
 
 
 def submit(asked: BatchToSubmit) -> int:
-    """Queue submissions, print who grades them, and return how many were refused."""
+    """Queue submissions, print which services grade them, and return the number of rejected submissions."""
     with operating() as (service, actor):
         done = _submit(service, actor, asked)
         if done.batch is not None:
@@ -65,11 +65,23 @@ def _who_grades(lively: Sequence[WorkerDescription]) -> str:
 
 
 def submit_to(services: Services, service: Service, actor: Actor, asked: BatchToSubmit, output: Path | None) -> int:
-    """Queue submissions, have the services grade them, and show the marks.
+    """Queue submissions, wait until the services have graded them, and show the marks.
 
-    Returns how many were refused. What was submitted already is graded ``again``, or shown as it is. Raises
-    UsageError when none could be taken in, HostError when one could not be graded, Cancelled when one was
-    cancelled meanwhile.
+    Args:
+        services: The services that grade.
+        service: The installation.
+        actor: The user who submits.
+        asked: The command's options. With ``again``, known submissions are graded again. Otherwise their grades are
+            shown.
+        output: Folder for the reports, or None.
+
+    Returns:
+        The number of rejected submissions.
+
+    Raises:
+        UsageError: No submission was accepted.
+        HostError: A submission could not be graded.
+        Cancelled: A job was cancelled meanwhile.
     """
     done = _submit(replace(service, notifier=NotifiedLater()), actor, asked)
     own = [] if done.batch is None else [done.batch.id]
@@ -91,7 +103,7 @@ def submit_to(services: Services, service: Service, actor: Actor, asked: BatchTo
 
 
 def _submit(service: Service, actor: Actor, asked: BatchToSubmit) -> SubmittedBatch:
-    """Take in what can be read, and say what was new of it."""
+    """Queue the readable submissions and report how many are new."""
     course_id = operations.course_of_batches(service, actor, asked.course)
     assignment = _assignment(service, actor, course_id, asked.assignment)
     checked = read_batch_for(asked.path, assignment, None if asked.people is None else read_people(asked.people))
@@ -120,7 +132,7 @@ def _submit(service: Service, actor: Actor, asked: BatchToSubmit) -> SubmittedBa
 
 
 def _assignment(service: Service, actor: Actor, course_id: int, name: str | None) -> Assignment | None:
-    """The assignment in a folder of this machine, otherwise as the course has it, otherwise the catalogue's."""
+    """Return the assignment: from a folder on this machine, from the course, or from the catalogue, in this order."""
     if name is None:
         return None
     if Path(name).exists() and name not in catalogue():
@@ -129,7 +141,7 @@ def _assignment(service: Service, actor: Actor, course_id: int, name: str | None
 
 
 def _accepted_keys(done: SubmittedBatch) -> dict[str, object]:
-    """What a document says of what was taken in."""
+    """Return the JSON values for the accepted submissions."""
     return {
         "batch": None if done.batch is None else done.batch.id,
         "queued": done.queued,
@@ -149,8 +161,8 @@ def _hint(known: AlreadySubmitted) -> str:
 def _shown(
     service: Service, actor: Actor, batch: AwaitedBatches, done: SubmittedBatch, name: str, output: Path | None
 ) -> tuple[list[JobLine], tuple[AssignmentStatistics, ...], Path | None]:
-    """Show the marks of what was new and of what was known when they are there, and write their reports."""
-    # Whoever grades starts meanwhile.
+    """Wait for the marks, show those of new and known submissions, and write the reports."""
+    # The services start during these imports.
     from service.commands.batch.tables import marks_table
     from service.commands.statistics_shown import statistics_parts
     from service.report_files import write_batch

@@ -1,4 +1,4 @@
-"""The tables that ``robomark batch`` prints: marks, what a regrade changes, and who did what."""
+"""Tables of ``robomark batch``: marks, changes by a regrade, and the activity log."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ _STYLES: Mapping[JobState, str] = MappingProxyType(
 
 
 def marks_table(lines: Sequence[JobLine], refusals: Sequence[Refusal] = ()) -> Table:
-    """A row a submission, taken in or not: marks, accuracy, verdict, and what else is to be known of it."""
+    """Return a table with one row for each submission, including rejected ones.
+
+    The columns are marks, accuracy, verdict and remarks.
+    """
     named = any(line.name not in ("", line.student) for line in lines)
     headings = ("student", *(["name"] if named else []), "assignment", "marks", "accuracy", "verdict", "grade")
     made = table(*headings, right=("marks", "accuracy"))
@@ -53,7 +56,7 @@ def marks_table(lines: Sequence[JobLine], refusals: Sequence[Refusal] = ()) -> T
 
 
 def refusals_table(refusals: Sequence[Refusal]) -> Table:
-    """What was not taken in, and why."""
+    """Return a table of rejected submissions with reasons."""
     made = table("not taken in", "why")
     for refusal in refusals:
         made.add_row(refusal.source, refusal.reason)
@@ -61,7 +64,10 @@ def refusals_table(refusals: Sequence[Refusal]) -> Table:
 
 
 def changes_table(changes: Sequence[Change]) -> RenderableType:
-    """A row a submission whose marks change, or that needs a look; the others are counted."""
+    """Return a table with a row for each submission that a regrade changes or that needs review.
+
+    A line below the table counts the other submissions.
+    """
     made = table("student", "before", "after", "criteria that changed", "why", "grade", right=("before", "after"))
     shown = [change for change in changes if _worth_a_row(change)]
     for change in shown:
@@ -80,7 +86,7 @@ def changes_table(changes: Sequence[Change]) -> RenderableType:
 
 
 def rank_table(ranks: RankTable) -> RenderableType:
-    """A row a student, the best first."""
+    """Return a table with one row for each student, best first."""
     measure = ", ".join(filter(None, (ranks.measure, ranks.unit)))
     made = table("place", "student", measure, "95 % interval", "trials that count", right=("place", measure))
     for row in ranks.texts:
@@ -89,7 +95,7 @@ def rank_table(ranks: RankTable) -> RenderableType:
 
 
 def history_table(history: Sequence[AuditEntry]) -> Table:
-    """Who did what, and when."""
+    """Return a table of the activity log."""
     made = table("when", "who", "did", "what came of it")
     for entry in history:
         detail = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in entry.detail.items())

@@ -1,6 +1,6 @@
-"""Waits for a batch: keeps the services up, sweeps, and shows how far it is, how fast, and the time left.
+"""Waiting for a batch: restarts services, requeues lost jobs, and shows progress, speed and remaining time.
 
-Grades nothing itself.
+This module grades nothing itself.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from service.operations.context import Actor, Service
 from service.operations.types import BatchState
 from service.queue.notifier import Notifier
 
-#: Whoever has waited for long sees the end a little later, and takes no time from those who grade.
+#: The interval between queries grows with the waiting time, so that long waits cost the workers little.
 _SHORTEST_LOOK_SECONDS = 0.05
 _LONGEST_LOOK_SECONDS = 0.25
-_LOOKS = 20  # in the time that was waited so far
+_LOOKS = 20  # queries during the time waited so far
 _REAP_SECONDS = 2.0
 
 
 class _Rate(ProgressColumn):
-    """How many a minute and the time left, from the beginning of this wait."""
+    """Progress column with jobs a minute and the remaining time, measured since this wait began."""
 
     def render(self, task: Task) -> Text:
         elapsed = task.elapsed or 0.0
@@ -50,9 +50,9 @@ class _Rate(ProgressColumn):
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """Somebody who waits for a batch.
+    """Waits for one batch.
 
-    ``keep_up`` is called again and again, to start again what has ended; what it raises ends the waiting.
+    The wait calls ``keep_up`` repeatedly to restart services that stopped. An exception from it ends the wait.
     """
 
     service: Service
@@ -63,21 +63,26 @@ class Waiting:
     keep_up: Callable[[], None]
 
     def for_marks(self) -> None:
-        """Return when every job of the batch has ended."""
+        """Wait until every job of the batch has ended."""
         self._wait("grading", lambda state: (state.jobs, state.ended, state.partial))
 
     def for_plots(self) -> None:
-        """Return when the plots of all graded jobs are drawn, or given up."""
+        """Wait until the plots of all graded jobs are drawn or given up."""
         most = self._look()[0].plots_due
         self._wait("plots", lambda state: (max(most, state.plots_due), most - state.plots_due, 0.0))
 
     def _look(self) -> tuple[BatchProgress, bool]:
-        """How far it is, and whether it is paused; each look takes time from those who grade."""
+        """Return the progress and True if the batch is paused. Each call takes time from the workers."""
         far, state = look(self.service, self.actor, self.batch_id)
         return far, state is BatchState.PAUSED
 
     def _wait(self, what: str, count: Callable[[BatchProgress], tuple[int, int, float]]) -> None:
-        """``count`` gives how many there are, how many are done, and how much of the next ones."""
+        """Show a progress bar until everything is done.
+
+        Args:
+            what: Label of the progress bar.
+            count: Returns the total, the number of finished items, and the finished fraction of running items.
+        """
         total, before, _ = count(self._look()[0])
         columns = (
             TextColumn("{task.description}"),

@@ -1,1 +1,1 @@
-"""``robomark models``, a module for each kind of command."""
+"""``robomark models``: one module for each kind of command."""

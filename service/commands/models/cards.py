@@ -1,4 +1,4 @@
-"""``robomark models list`` and ``compare``: what the cards of classifiers say. Nothing is measured."""
+"""``robomark models list`` and ``compare``: the contents of model cards. These commands measure nothing."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def compare(
 
 
 def _told(about: Card) -> dict[str, Any]:
-    """What a document says of a card."""
+    """Return the JSON value for a model card."""
     accuracy = about.measured.accuracy
     low, high = accuracy.interval
     return {
@@ -71,7 +71,7 @@ def _told(about: Card) -> dict[str, Any]:
 
 
 def _in_common(about: Sequence[Card]) -> list[list[CardCurve]]:
-    """The curves that every card has, for each what the cards have of it."""
+    """Return the curves that all cards share. Each entry lists the curve of every card."""
     found = []
     for first in about[0].measured.curves:
         same = [

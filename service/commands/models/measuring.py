@@ -1,4 +1,4 @@
-"""``robomark models train`` and ``evaluate``: a classifier trained or measured again, here."""
+"""``robomark models train`` and ``evaluate``: train or measure a classifier on this machine."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def evaluate(name: Name, output: Output = None) -> None:
         from service.reports.written import prepare_folder
 
         prepare_folder(output)
-    # scikit-learn takes a second to import, which no other command should have to wait for.
+    # scikit-learn takes a second to import, and other commands do not need it.
     from models.evaluation import evaluate as measure
 
     result = measure(name)

@@ -1,4 +1,4 @@
-"""What the commands about classifiers have in common: their arguments, and how an interval and a file are told."""
+"""Shared parts of the model commands: arguments, formatting of intervals, and writing files."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ Output = Annotated[
 
 
 def interval(tally: Tally) -> str:
-    """The 95 % interval, in words."""
+    """Return the 95 % interval as text."""
     low, high = tally.interval
     return f"{low:.3f} to {high:.3f}"
 
 
 def keep(path: Path, data: bytes) -> None:
-    """Write a file for the user and say where. Raises UsageError where it cannot be written."""
+    """Write a file and print its path. Raises UsageError if it cannot be written."""
     try:
         with for_the_user():
             path.write_bytes(data)
