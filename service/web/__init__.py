@@ -1,1 +1,1 @@
-"""The pages and the measures that are served over HTTP."""
+"""The web server: pages, the API and metrics over HTTP."""

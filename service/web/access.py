@@ -1,7 +1,7 @@
-"""Who asks, and what they may come near: every route but the few that are for anybody takes one of these.
+"""Access control for pages: the dependencies that identify the reader and check their role.
 
-Somebody without the role is told that there is nothing there, so that no answer tells what exists. What of a grade a
-reader may see is ``reports/view.py``'s.
+All routes except a few public ones use one of them. A reader without the role gets 404, so that responses don't reveal
+which objects exist. ``reports/view.py`` decides which parts of a grade a reader may see.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SESSION_COOKIE = "robomark"
 CSRF_FIELD = "csrf"
 CSRF_HEADER = "x-csrf-token"
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
-#: Numbers and names of rows in a path, a query or a form, within what every database can be asked for.
+#: Row numbers and names in paths, queries and forms, limited to values that every database accepts.
 HIGHEST_NUMBER = 2**31 - 1
 RowNumber = Annotated[int, Path(ge=1, le=HIGHEST_NUMBER)]
 RowName = Annotated[str, Path(pattern="^[0-9a-z]{1,32}$")]
@@ -38,40 +38,40 @@ SentRowName = Annotated[str, Form(pattern="^[0-9a-z]{0,32}$")]
 
 
 class SignInNeeded(RobomarkError):
-    """Nobody is signed in where somebody has to be."""
+    """The request needs a signed-in user."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """Somebody who is signed in with a browser, and what follows from their session alone."""
+    """A user who is signed in with a browser, and keys derived from their session."""
 
     identity: Identity
-    csrf: str  # the word that their forms have to carry
-    link_key: bytes = field(repr=False)  # what the links that they make for others follow from
+    csrf: str  # the CSRF token of their forms
+    link_key: bytes = field(repr=False)  # key for deriving the links that they create for others
 
     @property
     def acting(self) -> Actor:
-        """The reader as operations know them."""
+        """Return the reader as an actor for operations."""
         return actor_from(self.identity)
 
 
 @dataclass(frozen=True, slots=True)
 class InCourse:
-    """A reader in a course that they have a role in."""
+    """A reader with a role in a course."""
 
     reader: Reader
     course_id: int
-    course: str  # its name
-    appeals: int = 0  # that wait for an instructor's answer
+    course: str  # the course's name
+    appeals: int = 0  # number of open appeals, for instructors
 
     @property
     def acting(self) -> Actor:
-        """The reader as operations know them."""
+        """Return the reader as an actor for operations."""
         return self.reader.acting
 
 
 def actor_from(identity: Identity) -> Actor:
-    """The actor that operations know a signed-in person as."""
+    """Return the actor for a signed-in person."""
     return Actor(
         f"{identity.name} (person {identity.person_id})",
         identity.person_id,
@@ -83,7 +83,7 @@ def actor_from(identity: Identity) -> Actor:
 
 
 def csrf_word(session_secret: str) -> str:
-    """What a form has to carry: it follows from the session, and the session does not follow from it."""
+    """Return the CSRF token for a session. It does not reveal the session's secret."""
     return _following(session_secret, b"robomark csrf").hex()
 
 
@@ -92,7 +92,7 @@ def _following(session_secret: str, what: bytes) -> bytes:
 
 
 def reader_of(request: Request, context: Context) -> Reader | None:
-    """Who is signed in, if anybody is."""
+    """Return the signed-in reader, or None."""
     secret = request.cookies.get(SESSION_COOKIE, "")
     if not secret:
         return None
@@ -117,7 +117,11 @@ SignedIn = Annotated[Reader, Depends(_signed_in)]
 
 
 async def same_site(request: Request, reader: MaybeReader) -> None:
-    """What changes something has to come from a page of ours: by its word, and by what the browser says of itself."""
+    """Reject changes that other sites send, by the CSRF token and the browser's origin headers.
+
+    Raises:
+        HTTPException: 403 if the request comes from another site or its CSRF token is wrong.
+    """
     if request.method in _SAFE:
         return
     if not _is_from_here(request):
@@ -134,7 +138,10 @@ async def same_site(request: Request, reader: MaybeReader) -> None:
 
 
 def _is_from_here(request: Request) -> bool:
-    """Return what the browser says of where the request comes from; older ones send the origin alone, programs none."""
+    """Return whether the browser reports this site as the request's origin.
+
+    Older browsers send only ``Origin``. Clients that send neither header are accepted.
+    """
     site = request.headers.get("sec-fetch-site")
     if site is not None:
         return site in ("same-origin", "none")
@@ -147,7 +154,7 @@ def _is_from_here(request: Request) -> bool:
 
 
 def nothing_here() -> HTTPException:
-    """What is answered where there is nothing, or nothing for this reader."""
+    """Return the 404 response for objects that do not exist or that the reader may not see."""
     return HTTPException(404, translatable("There is nothing here, or nothing that you may see."))
 
 
@@ -167,7 +174,7 @@ def _operating(reader: SignedIn) -> Reader:
     return reader
 
 
-#: An instructor of the course in the path, a student of it, and who runs the installation.
+#: An instructor of the course in the path, a student of it, and an operator.
 Instructing = Annotated[InCourse, Depends(_instructing)]
 Studying = Annotated[InCourse, Depends(_studying)]
 Operating = Annotated[Reader, Depends(_operating)]

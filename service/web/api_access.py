@@ -1,4 +1,4 @@
-"""Who asks the API: a token whose owner has the role, and whose scopes name what is done. Cookies do not count here."""
+"""Access control for the API: a request needs a token with the scope, whose owner has the role. Cookies are ignored."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from service.operations.types import CredentialKind, Role
 from service.web.access import RowNumber, SignInNeeded, actor_from, nothing_here
 from service.web.context import Context
 
-#: Says in the description of the API how to sign in; who it is, is found below.
+#: Describes the authentication in the OpenAPI document. ``caller_of`` checks the token.
 bearer = HTTPBearer(auto_error=False, description="A token of `/account` or of `robomark user token`.")
 
 
@@ -31,25 +31,30 @@ class Caller:
 
     @property
     def acting(self) -> Actor:
-        """The caller as operations know them."""
+        """Return the caller as an actor for operations."""
         return actor_from(self.identity)
 
 
 @dataclass(frozen=True, slots=True)
 class CallerInCourse:
-    """The owner of a token in a course that they have a role in."""
+    """The owner of a token in a course in which they have a role."""
 
     caller: Caller
     course_id: int
 
     @property
     def acting(self) -> Actor:
-        """The caller as operations know them."""
+        """Return the caller as an actor for operations."""
         return self.caller.acting
 
 
 def caller_of(request: Request, context: Context) -> Caller:
-    """Whose token a request has. Raises SignInNeeded without one, HTTPException 429 where it comes too often."""
+    """Return the owner of the request's token.
+
+    Raises:
+        SignInNeeded: The token is missing or invalid.
+        HTTPException: 429 if the token's rate limit is exceeded.
+    """
     scheme, secret = get_authorization_scheme_param(request.headers.get("authorization"))
     if scheme.lower() != "bearer" or not secret:
         raise SignInNeeded("a token is needed")
@@ -70,7 +75,7 @@ Called = Annotated[Caller, Depends(_called)]
 
 
 def with_scope(scope: str) -> Callable[[Caller], Caller]:
-    """A dependency: the caller, where their token may do this. Use as ``Depends(with_scope("read"))``."""
+    """Return a dependency that requires a token scope. Use as ``Depends(with_scope("read"))``."""
     assert scope in SCOPES
 
     def caller(caller: Called) -> Caller:
@@ -82,7 +87,7 @@ def with_scope(scope: str) -> Callable[[Caller], Caller]:
 
 
 def in_course(role: Role, scope: str) -> Callable[[int, Caller, Context], CallerInCourse]:
-    """A dependency: the caller with this role in the path's course, where their token may do this."""
+    """Return a dependency that requires a role in the path's course and a token scope."""
     scoped = with_scope(scope)
 
     def caller_in_course(course_id: RowNumber, caller: Called, context: Context) -> CallerInCourse:
@@ -93,7 +98,7 @@ def in_course(role: Role, scope: str) -> Callable[[int, Caller, Context], Caller
 
 
 def operating(scope: str) -> Callable[[Caller], Caller]:
-    """A dependency: the caller, where they run the installation and their token may do this."""
+    """Return a dependency that requires an operator and a token scope."""
     scoped = with_scope(scope)
 
     def operator(caller: Called) -> Caller:

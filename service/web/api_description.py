@@ -1,6 +1,6 @@
-"""The description of the API that programs read: OpenAPI 3.1, with what every route can be answered besides its own.
+"""The OpenAPI 3.1 document of the API, including the error responses that all routes share.
 
-What each route does is told where it is.
+The routes' docstrings describe the routes.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ _KEY = {
 
 
 def described(app: FastAPI) -> dict[str, Any]:
-    """The description, made once."""
+    """Return the OpenAPI document. It is generated once."""
     if app.openapi_schema is None:
         found = get_openapi(title="Robomark", version=app.version, description=_ABOUT.strip(), routes=app.routes)
         schemas = found.setdefault("components", {}).setdefault("schemas", {})
@@ -85,7 +85,7 @@ def described(app: FastAPI) -> dict[str, Any]:
             for method, operation in operations.items():
                 _complete(method, operation)
         for schema in schemas.values():
-            # FastAPI leaves out what is null, of examples too.
+            # FastAPI omits null values, in examples too.
             for example in schema.get("examples", ()):
                 example.update({name: None for name in schema.get("required", ()) if name not in example})
         app.openapi_schema = found

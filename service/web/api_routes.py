@@ -1,6 +1,6 @@
-"""What every route of the API has: it can be asked for again by a key, lists come in pages, answers have a tag.
+"""Shared features of API routes: idempotency keys, pages of lists, and entity tags.
 
-What a route does is told in ``api/``; how the whole is described in ``api_description.py``.
+``api/`` contains the routes, and ``api_description.py`` generates the OpenAPI document.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from sim.readers.unreadable import Unreadable
 _log = structlog.get_logger(__name__)
 KEY_HEADER = "idempotency-key"
 LONGEST_KEY = 200
-#: Lists, tables and their entries in the JSON of a body.
+#: Maximum number of arrays, objects and their entries in a JSON body.
 _MOST_VALUES = 20_000
-#: For a route that takes no key: it changes nothing, or answers a secret that is to be kept nowhere.
+#: For routes without an idempotency key: they change nothing, or return a secret that must not be stored.
 NO_KEY: Mapping[str, Any] = MappingProxyType({"x-no-key": True})
 _Item = TypeVar("_Item")
-#: What a route can be answered, by status, as the description tells it.
+#: Responses of a route for the OpenAPI document, by status.
 Described = dict[int | str, dict[str, Any]]
 
 Limit = Annotated[int, Query(ge=1, le=200, description="How many at most.")]
@@ -58,7 +58,13 @@ class Listed(BaseModel, Generic[_Item]):
 def page_of(
     found: Sequence[_Item], limit: int, place: Callable[[_Item], Sequence[str | int | datetime]]
 ) -> Listed[_Item]:
-    """The page of a list of which one more than ``limit`` was looked for; ``place`` says where in it something is."""
+    """Return a page of a list.
+
+    Args:
+        found: The items, with one more than ``limit`` if there is a next page.
+        limit: Maximum number of items on the page.
+        place: Returns the sort key of an item, which the next page starts after.
+    """
     more = len(found) > limit
     return Listed(items=list(found[:limit]), next=_cursor(place(found[limit - 1])) if more else None)
 
@@ -69,7 +75,7 @@ def _cursor(place: Sequence[str | int | datetime]) -> str:
 
 
 def place_after(after: str, *kinds: type) -> tuple[Any, ...] | None:
-    """The place that a ``next`` of ours holds; None for the beginning. Raises HTTPException 422 for another text."""
+    """Return the sort key in a cursor, or None for the first page. Raises HTTPException 422 for an invalid cursor."""
     if not after:
         return None
     try:
@@ -88,7 +94,7 @@ def _part(part: object, kind: type) -> object:
 
 
 def tagged(request: Request, body: bytes, media_type: str, **headers: str) -> Response:
-    """The answer with its tag; without its body for whoever has it already."""
+    """Return the response with an entity tag, or 304 without a body if the client already has this version."""
     tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
     told = {"etag": tag, "cache-control": "private, no-cache", **headers}
     known = request.headers.get("if-none-match", "")
@@ -98,10 +104,10 @@ def tagged(request: Request, body: bytes, media_type: str, **headers: str) -> Re
 
 
 class ApiRequest(Request):
-    """A request whose JSON is bounded, and parsed where it holds up nobody else."""
+    """A request whose JSON is limited in size and is parsed in a worker thread."""
 
     async def json(self) -> Any:
-        """Return the body's value. Raises HTTPException 422 where reading it would take too much work."""
+        """Return the parsed body. Raises HTTPException 422 if it is invalid or too complex."""
         if not hasattr(self, "_json"):
             try:
                 self._json = await run_in_threadpool(read_json, await self.body(), most_values=_MOST_VALUES)
@@ -111,10 +117,10 @@ class ApiRequest(Request):
 
 
 class RepeatableRoute(APIRoute):
-    """A route that answers the same to the same request with the same ``Idempotency-Key``, and does it once."""
+    """A route that runs a request once for each ``Idempotency-Key`` and repeats the response afterwards."""
 
     def get_route_handler(self) -> Callable[[Request], Awaitable[Response]]:  # type: ignore[override]
-        """As FastAPI asks for it."""
+        """Return FastAPI's handler, extended by idempotency keys."""
         run = super().get_route_handler()
 
         async def handler(request: Request) -> Response:
@@ -128,7 +134,7 @@ class RepeatableRoute(APIRoute):
 
 
 def api_router(tag: str) -> APIRouter:
-    """A router for one subject."""
+    """Return a router for one subject."""
     return APIRouter(tags=[tag], route_class=RepeatableRoute)
 
 
@@ -137,7 +143,7 @@ async def _once(request: Request, key: str, run: Callable[[Request], Awaitable[R
         raise HTTPException(422, f"Idempotency-Key: expected from 1 to {LONGEST_KEY} printable characters.")
     context: WebContext = request.app.state.context
     caller = await run_in_threadpool(caller_of, request, context)
-    # A reply is that to the caller's role: with another one the request is a new one, and is refused or done as such.
+    # The role is part of the key: after a change of role, the request runs again and is checked again.
     mine = (context.service, caller.acting, f"{_standing(request, caller.identity)} {key}")
     hashed = _Hashed(request)
     try:
@@ -160,20 +166,20 @@ async def _once(request: Request, key: str, run: Callable[[Request], Awaitable[R
     try:
         await run_in_threadpool(replies.keep, *mine, reply)
     except DatabaseError as error:
-        # It is done: whoever asked is answered so, and a repetition is refused until the key expires.
+        # The request has succeeded, so the client gets its response. Repetitions are rejected until the key expires.
         _log.error("web.reply_not_kept", path=request.url.path, error=str(error))
     return answer
 
 
 def _standing(request: Request, identity: Identity) -> str:
-    """The caller's role in the course of the path, and whether they are an operator."""
+    """Return the caller's role in the path's course, and ``operator`` for operators, as part of the key."""
     course = str(request.path_params.get("course_id", ""))
     role = identity.roles.get(int(course)) if course.isdecimal() and len(course) < 20 else None
     return f"{role or ''}{' operator' if identity.operator else ''}"
 
 
 class _Hashed:
-    """A request whose body is hashed as it is read; what it asks for is part of the hash."""
+    """A request that computes a hash of method, address and body while the body is read."""
 
     def __init__(self, request: Request) -> None:
         self._receive: Receive = request.receive
@@ -181,7 +187,7 @@ class _Hashed:
         self._ended = False
 
     async def receive(self) -> Message:
-        """As ASGI has it."""
+        """Receive a message, as an ASGI callable."""
         message = await self._receive()
         if message["type"] == "http.request":
             self._hash.update(message.get("body", b""))
@@ -191,7 +197,7 @@ class _Hashed:
         return message
 
     async def whole(self) -> str:
-        """The hash of all of it."""
+        """Read the rest of the body and return the hash."""
         while not self._ended:
             await self.receive()
         return self._hash.hexdigest()

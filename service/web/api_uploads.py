@@ -1,6 +1,6 @@
-"""Files that are sent with a request: read only when it is known that whoever sends them may.
+"""Uploads of the API: dependencies that read files only after the sender's permission is checked.
 
-What they have to be is said where they are taken in.
+The modules that use the files validate their contents.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from starlette.exceptions import HTTPException
 
 from submissions.raw_files import MAX_FILES, MAX_TOTAL_BYTES, MEGABYTE, SentFile
 
-#: The longest upload of each kind; what may be in it is for its reader to say.
+#: Maximum size of each kind of upload. The readers of the files limit their contents.
 LARGEST_BATCH = 200 * MEGABYTE
 LARGEST_ASSIGNMENT = 130 * MEGABYTE
 LARGEST_SUBMISSION = MAX_TOTAL_BYTES + 2 * MEGABYTE
 LARGEST_TABLE = 11 * MEGABYTE
 _ZIP = "application/zip"
 _ZIPS = (_ZIP, "application/x-zip-compressed", "application/octet-stream")
-#: How the description tells of such a body.
+#: OpenAPI description of a body that is a zip.
 ZIP_BODY: dict[str, Any] = {
     "requestBody": {"required": True, "content": {_ZIP: {"schema": {"type": "string", "format": "binary"}}}}
 }
@@ -41,7 +41,7 @@ async def _uploaded(request: Request) -> AsyncIterator[Path]:
         yield path
 
 
-#: A zip, for routes that take one; stands behind who may send it, so that nobody else's is read.
+#: An uploaded zip. Put it after the permission dependency, so that only permitted uploads are read.
 Uploaded = Annotated[Path, Depends(_uploaded)]
 
 _FORM = "multipart/form-data"
@@ -72,5 +72,5 @@ async def _sent(request: Request) -> AsyncIterator[Sequence[SentFile]]:
         yield [SentFile(each.filename or "", each.file) for each in found]
 
 
-#: The files of a form, likewise.
+#: The files of an uploaded form. The same order applies.
 Sent = Annotated[Sequence[SentFile], Depends(_sent)]

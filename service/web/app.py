@@ -1,7 +1,7 @@
-"""The web application: pages for people, the API for programs, liveness, readiness and metrics.
+"""The web application: pages, the API, health checks and metrics.
 
-Holds no state of its own but how often somebody asked; everything it tells is in the database. A module of ``pages`` or
-``api`` that has a ``router`` is served; what other sites may post to is in a page module's ``cross_site_router``.
+Apart from rate limits, it keeps no state; all data is in the database. Every module in ``pages`` and ``api`` with a
+``router`` is served. A page module's ``cross_site_router`` contains routes that other sites may post to.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from service.web.security import Guarded
 
 
 def make_app(settings: Settings, store: Store) -> FastAPI:
-    """The application for one database and one broker."""
-    # The pages that FastAPI brings for its descriptions load scripts from elsewhere.
+    """Return the application for one database and one broker."""
+    # FastAPI's own documentation pages are disabled, because they load scripts from other sites.
     app = FastAPI(
         title="Robomark",
         version=GRADER_VERSION,
@@ -58,7 +58,7 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
 
     @app.get("/static/{name}", include_in_schema=False)
     def static(name: str) -> Response:
-        """A file that pages load; its name changes when it does."""
+        """Return a static file. Its name contains its hash, so caches can store it for ever."""
         if name not in static_files():
             raise HTTPException(404, translatable("There is no such file."))
         media_type, data = static_files()[name]
@@ -70,7 +70,7 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
 
 @cache
 def _pages_and_api() -> APIRouter:
-    """The routes of all modules, which are the same in every application and take half a second to prepare."""
+    """Return the routes of all modules. They are cached, because creating them takes half a second."""
     all_routes = APIRouter()
     for module in pkgutil.iter_modules(pages.__path__, f"{pages.__name__}."):
         found = importlib.import_module(module.name)
@@ -87,12 +87,12 @@ def _pages_and_api() -> APIRouter:
 def _add_probes(app: FastAPI, service: Service) -> None:
     @app.get("/health/live", include_in_schema=False)
     def live() -> JSONResponse:
-        """This process answers; nothing else is looked at."""
+        """Report that this process responds, without checking anything else."""
         return JSONResponse({"live": True})
 
     @app.get("/health/ready", include_in_schema=False)
     def ready() -> JSONResponse:
-        """Whether submissions would be graded now: 200, or 503 with what is not well."""
+        """Return 200 if submissions would be graded now, otherwise 503 with the problems."""
         findings = examine_service(service.settings, service.store)
         is_ready = all(finding.well for finding in findings)
         checks = {finding.what: {"well": finding.well, "sentence": finding.sentence} for finding in findings}
@@ -100,7 +100,7 @@ def _add_probes(app: FastAPI, service: Service) -> None:
 
     @app.get("/metrics", include_in_schema=False)
     def metrics() -> Response:
-        """The metrics of the whole service, for Prometheus."""
+        """Return the metrics of the whole service for Prometheus."""
         try:
             return Response(metrics_text(service), media_type=CONTENT_TYPE_LATEST)
         except DatabaseError:

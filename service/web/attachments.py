@@ -1,4 +1,4 @@
-"""Files that a browser keeps and never shows, by names that are safe in a header and on every disk."""
+"""Downloads: responses that browsers save, with file names that are safe in headers and on all file systems."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from urllib.parse import quote
 
 from fastapi.responses import Response
 
-#: Of a file's name; proxies refuse headers of a few kilobytes, and a character takes up to twelve bytes.
+#: Maximum length of a file name. A character takes up to twelve bytes, and proxies limit headers to a few kilobytes.
 _LONGEST = 150
 
 
 def attachment(data: bytes, name: str, media_type: str = "application/octet-stream") -> Response:
-    """The answer that has a browser save a file; ``name`` may be anything, and is shortened if it is long."""
+    """Return a response that the browser saves as a file. Any ``name`` is allowed; long names are shortened."""
     suffix = PurePosixPath(name).suffix[:20]
     name = name if len(name) <= _LONGEST else name[: _LONGEST - len(suffix)] + suffix
     plain = re.sub(r"[^\w.-]+", "_", name, flags=re.ASCII).lstrip(".") or "file"

@@ -1,6 +1,6 @@
-"""Reads a zip of submissions that an instructor uploads, for the pages and for the API, one at a time.
+"""Reading of uploaded zips with submissions, for pages and API. Only one upload is read at a time.
 
-What of it can be taken in is ``submissions.batch_folder``'s to say.
+``submissions.batch_folder`` decides which submissions are accepted.
 """
 
 from __future__ import annotations
@@ -21,12 +21,22 @@ _UNPACKING_SECONDS = 30
 def read_upload(
     context: WebContext, actor: Actor, course_id: int, path: Path, assignment: str, people: People | None = None
 ) -> BatchContents:
-    """What of a zip or folder would be taken in, and what not. Raises UsageError where it cannot be read at all.
+    """Read a zip or folder and return its accepted and rejected submissions.
 
-    Without ``assignment`` each submission names its own.
+    Args:
+        context: The web server's context.
+        actor: The instructor.
+        course_id: The course.
+        path: The zip or folder.
+        assignment: Id of the assignment. If it is empty, each submission names its own.
+        people: Table of names and email addresses.
+
+    Raises:
+        UsageError: The upload cannot be read at all.
+        HTTPException: 503 if another upload is being read.
     """
     asked = assignment_for(context.service, actor, course_id, assignment)
-    # Each may need gigabytes of temporary disk.
+    # One at a time, because an upload may need gigabytes of temporary disk space.
     if not context.unpacking.acquire(timeout=_UNPACKING_SECONDS):
         raise Declined(503, Sentence("Another upload is being read; try again in a minute."), {"retry-after": "60"})
     try:

@@ -1,4 +1,4 @@
-"""What every page and every answer of the API works with: the service, and the limits of this web server."""
+"""The context of pages and API routes: the service, and the limits of this web server."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from service.web.rate_limits import RateLimits
 
 @dataclass(frozen=True, slots=True)
 class WebContext:
-    """One web server's."""
+    """The context of one web server."""
 
     service: Service
     limits: RateLimits
-    #: Held by whoever unpacks a batch: one at a time.
+    #: Held while a batch is unpacked, so that only one is unpacked at a time.
     unpacking: BoundedSemaphore = field(default_factory=BoundedSemaphore)
 
     @property
     def settings(self) -> Settings:
-        """Those of the service."""
+        """Return the settings of the service."""
         return self.service.settings
 
 

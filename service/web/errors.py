@@ -1,6 +1,6 @@
-"""What is answered when something cannot be: a page with one sentence for people, problem+json for programs.
+"""Error responses: a page with one sentence for people, problem+json for programs.
 
-Never a traceback; what was ours is in the log.
+They never contain a traceback. Internal errors are logged.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from sim.errors import HostError, RobomarkError, UsageError
 from sim.sentences import Sentence
 
 _log = structlog.get_logger(__name__)
-#: What the router says of paths and methods that there are not.
+#: Messages for the router's own errors: unknown paths and methods.
 _OF_THE_ROUTER = {
     (404, "Not Found"): Sentence("There is nothing here, or nothing that you may see."),
     (405, "Method Not Allowed"): Sentence(
@@ -34,10 +34,10 @@ _OF_THE_ROUTER = {
     ),
 }
 _OURS = Sentence("Something went wrong here, not with you; it is written down. Try again in a minute.")
-#: HTTP status of each kind of refusal; every other one is 422.
+#: HTTP status of each kind of error; all others give 422.
 _STATUS: dict[type[UsageError], int] = {NotFound: 404, Forbidden: 403, Conflict: 409}
 _NO_DATABASE = Sentence("The database does not answer. Try again in a minute.")
-#: A request can have changed something before its last question to the database failed.
+#: The change may be saved even if the database failed afterwards.
 _NO_DATABASE_CHANGING = Sentence(
     "The database does not answer. Before you try again in a minute, check whether your change was saved."
 )
@@ -47,7 +47,7 @@ _CONFLICT = Sentence(
 
 
 def add_error_pages(app: FastAPI) -> None:
-    """Let every error of a route become its answer."""
+    """Register the handlers that turn exceptions of routes into responses."""
     app.add_exception_handler(SignInNeeded, _sign_in_needed)
     app.add_exception_handler(HTTPException, _refused)
     app.add_exception_handler(RequestValidationError, _misread)
@@ -112,7 +112,7 @@ async def _database(request: Request, error: Exception) -> Response:
 
 
 async def _surprise(request: Request, error: Exception) -> Response:
-    # The server logs the trace of what nothing else has handled.
+    # The server logs the traceback of unhandled exceptions.
     _log.error("web.surprise", path=request.url.path, error=f"{type(error).__name__}: {error}")
     return answer(request, 500, _OURS)
 
@@ -120,7 +120,7 @@ async def _surprise(request: Request, error: Exception) -> Response:
 def answer(
     request: Request, status: int, said: Sentence | RobomarkError, headers: dict[str, str] | None = None
 ) -> Response:
-    """What is said, as whoever asks can read it: a person in their language, a program in English."""
+    """Return an error response: a page in the reader's language, or a problem in English for the API."""
     asked_by_program = request.url.path.startswith(API)
     language = ENGLISH if asked_by_program else language_of(request)
     sentence = language.tell(said) if isinstance(said, Sentence) else sentence_of(said, language)
@@ -136,8 +136,8 @@ def answer(
 
 
 def sentence_of(error: RobomarkError, language: Language) -> str:
-    """What an error says, as a sentence on a page."""
+    """Return the error's message as a complete sentence in this language."""
     text = language.tell(error.said)
-    # The name of a file stays as it is.
+    # A file name at the beginning is not capitalised.
     first = text[:1] if "." in text.partition(" ")[0] else text[:1].upper()
     return f"{first}{text[1:]}{'' if text.endswith(('.', '!', '?')) else '.'}"

@@ -1,6 +1,6 @@
-"""What was uploaded and is not taken in yet: kept in the home for a day, until its sender says yes or no.
+"""Uploads that wait for confirmation. They are kept in the home folder for a day, or until the sender decides.
 
-What of it would be taken in is ``batch_uploads.py``'s to say. A sender has a few at a time, all senders together some.
+``batch_uploads.py`` reads them. The number of uploads is limited for each sender and in total.
 """
 
 from __future__ import annotations
@@ -29,30 +29,30 @@ _NOTE = "upload.json"
 
 @dataclass(frozen=True, slots=True)
 class ExpectedSubmission:
-    """A submission that would be taken in, and what is to be known of it first."""
+    """A submission that would be accepted, with the remarks to show before confirming."""
 
     student: str
     name: str
     assignment: str
     source: str
-    missing: str = ""  # the file of the part that it lacks
+    missing: str = ""  # the file of a missing part, or empty
     enrolled: bool = True
     known: bool = False
     copied: bool = False
-    empty: str = ""  # a file of it that has nothing in it
+    empty: str = ""  # an empty file of the submission, or an empty string
 
 
 @dataclass(frozen=True, slots=True)
 class KeptUpload:
-    """One upload, and what would come of it."""
+    """One upload, with its accepted and rejected submissions."""
 
     id: str
     person_id: int
     course_id: int
     name: str
     assignment: str
-    people: str  # the name of the table of people; empty where there is none
-    file: str  # what the submissions are in; empty: in a folder
+    people: str  # file name of the table of people; empty without a table
+    file: str  # file name of the zip; empty if the submissions are single files in a folder
     expected: tuple[ExpectedSubmission, ...] = ()
     refusals: tuple[Refusal, ...] = ()
 
@@ -61,15 +61,16 @@ _NOTES = TypeAdapter(KeptUpload)
 
 
 class KeptUploads:
-    """The uploads in one home."""
+    """The uploads in one home folder."""
 
     def __init__(self, home: Path) -> None:
         self._folder = home / "uploads"
 
     def begin(self, person_id: int, course_id: int, assignment: str) -> KeptUpload:
-        """A new place; what is too old goes, and of one sender the oldest beyond a few.
+        """Create an empty upload, after removing expired uploads and the sender's oldest ones over the limit.
 
-        Raises UsageError where others have filled all places.
+        Raises:
+            UsageError: Too many uploads of all senders are waiting.
         """
         self._folder.mkdir(mode=0o700, exist_ok=True)
         own = []
@@ -90,39 +91,40 @@ class KeptUploads:
         return made
 
     def write(self, upload: KeptUpload) -> None:
-        """Note what is known of an upload."""
+        """Save the metadata of an upload."""
         (self._folder / upload.id / _NOTE).write_bytes(_NOTES.dump_json(upload))
 
     def find(self, upload_id: str, person_id: int, course_id: int) -> KeptUpload | None:
-        """An upload of this sender to this course; None where there is none, or not any more."""
+        """Return an upload of this sender to this course, or None if it does not exist or has expired."""
         found = self._read(upload_id) if upload_id.isalnum() else None
         if found is None or (found.person_id, found.course_id) != (person_id, course_id):
             return None
         return found
 
     def waiting(self, person_id: int, course_id: int) -> list[KeptUpload]:
-        """Those of this sender to this course that were looked at and are neither taken in nor discarded."""
+        """Return the uploads of this sender to this course that were read but neither confirmed nor discarded."""
         names = [path.name for path in self._folder.iterdir()] if self._folder.is_dir() else []
         found = [each for name in sorted(names) if (each := self.find(name, person_id, course_id)) is not None]
         return [each for each in found if each.expected or each.refusals]
 
     def remove(self, upload: KeptUpload) -> None:
-        """Forget it."""
+        """Delete an upload."""
         shutil.rmtree(self._folder / upload.id, ignore_errors=True)
 
     def submissions(self, upload: KeptUpload) -> Path:
-        """Where its submissions are: a zip, or a folder of files."""
+        """Return the path of the submissions: a zip, or a folder of files."""
         folder = self._folder / upload.id / "batch"
         return folder / upload.file if upload.file else folder
 
     def people(self, upload: KeptUpload) -> Path | None:
-        """Where its table of people is, if it has one."""
+        """Return the path of the table of people, or None."""
         return self._folder / upload.id / "people" / upload.people if upload.people else None
 
     def lay(self, upload: KeptUpload, files: Sequence[SentFile], into: str) -> list[str]:
-        """Copy what was sent into a folder of the upload; the names they have there.
+        """Copy files into a folder of the upload and return their names there.
 
-        Raises UsageError for a name that is none, or is there twice.
+        Raises:
+            UsageError: There are too many files, or a name is invalid or occurs twice.
         """
         if len(files) > _MOST_FILES:
             raise UsageError(f"{len(files)} files were sent, expected at most {_MOST_FILES}, or one zip of them")
@@ -146,13 +148,13 @@ class KeptUploads:
             return None
 
     def _remove_begun(self, path: Path) -> None:
-        # What has no note yet may be another's that is being made this moment.
+        # A folder without metadata may belong to an upload that is being created at this moment.
         if path.stat().st_mtime < time.time() - 60:
             shutil.rmtree(path, ignore_errors=True)
 
 
 def file_name(sent: SentFile) -> str:
-    """A name that lies in its folder and nowhere else. Raises UsageError where there is none, or it is too long."""
+    """Return a safe file name without folders. Raises UsageError if it is empty or too long."""
     name = "".join("?" if unicodedata.category(c)[0] == "C" else c for c in sent.flat_name).strip().lstrip(".")
     if not name:
         raise UsageError("a file without a name was sent, expected one that names its student")

@@ -1,4 +1,4 @@
-"""The language in which a reader of the pages gets them. What languages there are is ``service/language.py``'s."""
+"""Selection of the language of a page. ``service/language.py`` defines the available languages."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ COOKIE = "language"
 
 
 def language_of(request: Request) -> Language:
-    """What the reader chose, else what the browser asks for, else English."""
+    """Return the language that the reader chose, else the one that the browser prefers, else English."""
     chosen = request.cookies.get(COOKIE, "")
     if chosen in languages():
         return language_called(chosen)

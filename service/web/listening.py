@@ -1,6 +1,6 @@
-"""Sockets that listen: made before anything else is started, so that a port that is taken is said at once.
+"""Listening sockets. They are created before anything else, to report a port that is in use immediately.
 
-What is answered on them is ``server.py``'s.
+``server.py`` serves requests on them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from sim.errors import UsageError
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A socket that listens; port 0 takes any that is free. Raises UsageError when the address cannot be had."""
+    """Return a listening socket. Port 0 selects a free port. Raises UsageError if the address is not available."""
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         with ExitStack() as on_failure:
@@ -30,7 +30,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def check_reach(host: str, settings: Settings) -> None:
-    """Raises UsageError where others than this machine would reach the server, and nobody said how they are to."""
+    """Raise UsageError if other machines can reach the server and no public URL is set."""
     try:
         found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     except OSError:
@@ -44,6 +44,6 @@ def check_reach(host: str, settings: Settings) -> None:
 
 
 def address(listening: socket.socket) -> str:
-    """Where a browser finds it."""
+    """Return the URL of the server for browsers."""
     host, port = listening.getsockname()[:2]
     return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"

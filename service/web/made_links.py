@@ -1,6 +1,7 @@
-"""A link that somebody made for somebody else, shown to its maker for as long as it counts, and kept nowhere.
+"""Sign-in links that a user created for somebody else. They are shown to their creator until they are used or expire.
 
-It follows from the maker's session and a word in the address, so nobody else can read it off that address.
+A link is derived from the creator's session and a word in the page's address. It is not stored, and nobody else can
+derive it from the address.
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ from service.operations import sign_in_links
 from service.web.access import Reader
 from service.web.context import WebContext
 
-#: The word in an address; empty where no link is shown.
+#: The word in the page's address; empty if no link is shown.
 LinkWord = Annotated[str, Query(alias="link", max_length=64)]
 
 
 @dataclass(frozen=True, slots=True)
 class MadeLink:
-    """Where it leads, whom to, and how long yet."""
+    """A sign-in link with its owner and its time of expiry."""
 
     url: str
     person_id: int
@@ -33,17 +34,17 @@ class MadeLink:
 
 
 def new_word() -> str:
-    """A word for an address."""
+    """Return a random word for a page's address."""
     return secrets.token_urlsafe(16)
 
 
 def secret_word(reader: Reader, word: str) -> str:
-    """What the link of an address's word is made of."""
+    """Return the secret that is derived from the reader's session and the word."""
     return base64.urlsafe_b64encode(hmac.digest(reader.link_key, word.encode(), "sha256")).decode().rstrip("=")
 
 
 def made_link(request: Request, context: WebContext, reader: Reader, word: str) -> MadeLink | None:
-    """The link of an address's word; None where there is none, or it was used or has expired."""
+    """Return the link for a word, or None if it does not exist, was used or has expired."""
     found = sign_in_links.find_link(context.service, secret_word(reader, word)) if word else None
     if found is None:
         return None
@@ -51,6 +52,6 @@ def made_link(request: Request, context: WebContext, reader: Reader, word: str) 
 
 
 def sign_in_address(request: Request, context: WebContext, secret: str) -> str:
-    """Where a link's secret is exchanged for a session."""
+    """Return the URL that exchanges a link's secret for a session."""
     start = context.settings.public_url or str(request.base_url).rstrip("/")
     return f"{start}/sign-in/{secret}"

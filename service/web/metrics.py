@@ -1,6 +1,6 @@
-"""The metrics of the service as Prometheus reads them, taken from the database at each look.
+"""The metrics of the service for Prometheus. Each request reads them from the database.
 
-Counts that only grow are counters even here: they are sums over rows that are never deleted.
+Values that only increase are counters: they are sums over rows that are never deleted.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _ENDED = (JobState.DONE, JobState.DEAD, JobState.CANCELLED)
 
 
 def metrics_text(service: Service) -> bytes:
-    """All metrics in Prometheus's text format."""
+    """Return all metrics in Prometheus's text format."""
     registry = CollectorRegistry(auto_describe=False)
     registry.register(_Figures(service))
     return generate_latest(registry)
@@ -41,7 +41,7 @@ class _Figures(Collector):
         yield from _times(metrics)
 
     def describe(self) -> Iterable[Metric]:
-        """Nothing beforehand: the database need not be there when the collector is made."""
+        """Return no descriptions, so that the collector can be created without the database."""
         return ()
 
 

@@ -1,4 +1,4 @@
-"""Moments that people read and write on pages: in the zone of this server, which is said with each."""
+"""Dates and times on pages: parsing, and the server's time zone, which is shown with each of them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,14 @@ from submissions.roster import moment
 
 
 def written_moment(text: str) -> datetime | None:
-    """The moment, the end of a day that has no time; None for nothing. Raises UsageError for anything else."""
+    """Parse a date and time. A date alone means the end of that day.
+
+    Returns:
+        The moment, or None for an empty text.
+
+    Raises:
+        UsageError: The text is not a date.
+    """
     if not text.strip():
         return None
     try:
@@ -22,7 +29,7 @@ def written_moment(text: str) -> datetime | None:
 
 
 def zone_of(moment: datetime) -> str:
-    """The zone that this server is in at a moment, by its offset: UTC, UTC+1, UTC-3:30."""
+    """Return the server's UTC offset at a moment: ``UTC``, ``UTC+1``, ``UTC-3:30``."""
     ahead = moment.astimezone().utcoffset() or timedelta()
     hours, minutes = divmod(abs(ahead) // timedelta(minutes=1), 60)
     if not hours and not minutes:
@@ -31,5 +38,5 @@ def zone_of(moment: datetime) -> str:
 
 
 def zone_now() -> str:
-    """The zone that this server is in."""
+    """Return the server's current UTC offset."""
     return zone_of(datetime.now(UTC))

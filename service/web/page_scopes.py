@@ -1,12 +1,12 @@
-"""The scope that each page needs of a session that a token opened, the same as its route of the API."""
+"""Scopes of pages, for sessions that were opened with a token. Each page needs the scope of the same API route."""
 
 from __future__ import annotations
 
 import re
 
-#: Pages that every session may open, and the way out.
+#: Pages that every session may open, and signing out.
 _FOR_EVERY_SESSION = frozenset({"GET /", "GET /account", "POST /sign-out"})
-#: By a pattern in the route of what changes something; the first that fits.
+#: Scopes of routes that change something, by a pattern in the route. The first match counts.
 _CHANGES = (
     (re.compile(r"^/account/"), "sign-in"),
     (re.compile(r"/worksheet$"), "read"),
@@ -17,7 +17,7 @@ _CHANGES = (
 
 
 def scope_of_page(method: str, route: str) -> str | None:
-    """The scope for a method and a route such as ``/courses/{course_id}/batches``; None if any session may."""
+    """Return the scope for a method and a route such as ``/courses/{course_id}/batches``, or None if none is needed."""
     if f"{method} {route}" in _FOR_EVERY_SESSION:
         return None
     if method in ("GET", "HEAD"):

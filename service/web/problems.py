@@ -1,4 +1,4 @@
-"""What programs are told when something cannot be: a problem as RFC 9457 has it. For people that is ``errors.py``'s."""
+"""Error responses of the API, in the format of RFC 9457. ``errors.py`` contains those for people."""
 
 from __future__ import annotations
 
@@ -10,6 +10,6 @@ API = "/api/"
 
 
 def problem(status: int, sentence: str, headers: dict[str, str] | None = None) -> JSONResponse:
-    """One sentence for a program, and for the person who reads its log."""
+    """Return a problem+json response with one sentence."""
     body = {"type": "about:blank", "title": HTTPStatus(status).phrase, "status": status, "detail": sentence}
     return JSONResponse(body, status, headers, "application/problem+json")

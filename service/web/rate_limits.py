@@ -1,4 +1,4 @@
-"""How often somebody may do something: a bucket that fills with time, for each who asks. Kept by one process alone."""
+"""Rate limits by token bucket, with a bucket for each user or address. Each server process has its own."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ _MOST_KNOWN = 10_000
 
 
 class RateLimit:
-    """So many at once, and so many a minute after that."""
+    """A rate limit with a burst size and a number of calls per minute."""
 
     def __init__(self, burst: int, per_minute: float, clock: Callable[[], float] = time.monotonic) -> None:
         self._burst = float(burst)
         self._per_second = per_minute / 60
         self._clock = clock
         self._lock = threading.Lock()
-        self._left: OrderedDict[str, tuple[float, float]] = OrderedDict()  # what is left, and when that was
+        self._left: OrderedDict[str, tuple[float, float]] = OrderedDict()  # calls left, and the time of that count
 
     def spend(self, who: str) -> None:
-        """Count one for ``who``. Raises HTTPException 429, which says when to come again, where nothing is left."""
+        """Count one call of ``who``. Raises HTTPException 429 with ``Retry-After`` if the bucket is empty."""
         with self._lock:
             left, at = self._now(who)
             self._left.pop(who, None)
@@ -49,17 +49,17 @@ class RateLimit:
 
 @dataclass(frozen=True, slots=True)
 class RateLimits:
-    """Those of one web server, by what they count."""
+    """The rate limits of one web server."""
 
-    #: Tries to sign in that failed, by address; behind a proxy that is not trusted all come from one.
+    #: Failed sign-ins, by address. Behind an untrusted proxy, all requests have the same address.
     failed_sign_ins: RateLimit = field(default_factory=lambda: RateLimit(burst=30, per_minute=30))
-    #: Launches from platforms that are not registered, by address.
+    #: Launches from unregistered platforms, by address.
     unknown_platforms: RateLimit = field(default_factory=lambda: RateLimit(burst=300, per_minute=300))
-    #: Submissions of one person, whatever the course and the way.
+    #: Submissions of one person, in all courses, by page or API.
     submissions: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
-    #: Programs of one person that are tried; how many are run in all is the store's to say.
+    #: Test runs of one person. The store limits the total number.
     tryouts: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
-    #: Calls of the API, by token; the settings say how many.
+    #: API calls, by token. The settings define the limit.
     api_calls: RateLimit = field(default_factory=lambda: RateLimit(burst=600, per_minute=600))
-    #: Pages and their images, by person; as many as calls of the API.
+    #: Pages and their images, by person. The limit is the same as for API calls.
     page_calls: RateLimit = field(default_factory=lambda: RateLimit(burst=600, per_minute=600))

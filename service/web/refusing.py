@@ -1,4 +1,4 @@
-"""A refusal that keeps its sentence and its values apart, for pages and API alike. How it looks is ``errors.py``'s."""
+"""An HTTP error whose message can be translated, for pages and API. ``errors.py`` renders it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sim.sentences import Sentence
 
 
 class Declined(HTTPException):
-    """An ``HTTPException`` whose detail can be said in the reader's language; ``detail`` is the English."""
+    """An ``HTTPException`` with a translatable message. ``detail`` contains the English text."""
 
     def __init__(self, status: int, said: Sentence, headers: Mapping[str, str] | None = None) -> None:
         super().__init__(status, str(said), headers)
@@ -18,5 +18,5 @@ class Declined(HTTPException):
 
 
 def said_in(error: HTTPException) -> Sentence:
-    """What any of them says."""
+    """Return the message of any HTTPException as a Sentence."""
     return error.said if isinstance(error, Declined) else Sentence(str(error.detail))

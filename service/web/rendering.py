@@ -1,4 +1,4 @@
-"""Pages from templates: escaped, in the reader's language, in the one frame. Decides nothing about what is shown."""
+"""Rendering of page templates, with escaping, in the reader's language. This module makes no access decisions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _LONGEST_TEXT = 20_000
 def page(
     request: Request, reader: Reader | None, template: str, *, status_code: int = 200, **context: object
 ) -> HTMLResponse:
-    """A page of ``templates`` for somebody, or for anybody."""
+    """Render a template as a page. ``reader`` is None for readers who are not signed in."""
     language = language_of(request)
     told = {
         "request": request,
@@ -44,13 +44,13 @@ def page(
 
 
 def wants_part(request: Request) -> bool:
-    """Whether htmx asks, which puts a part of a page in place of the one it shows."""
+    """Return whether htmx requests a part of the page."""
     return request.headers.get("hx-request") == "true"
 
 
 @lru_cache(maxsize=1)
 def static_files() -> Mapping[str, tuple[str, bytes]]:
-    """The files that pages load, by the name they are served under, which has their hash: media type and content."""
+    """Return media type and content of the static files, by served name. The names contain a hash of the content."""
     web = files("service.web").joinpath("static")
     contents = {
         "htmx.js": web.joinpath("htmx.min.js").read_text(encoding="utf-8"),
@@ -69,7 +69,7 @@ def static_files() -> Mapping[str, tuple[str, bytes]]:
 
 @lru_cache(maxsize=1)
 def statics() -> Mapping[str, str]:
-    """Where each file is, by its name without the hash: ``robomark.css``."""
+    """Return the paths of the static files, by name without the hash, such as ``robomark.css``."""
     return MappingProxyType(
         {f"{name.split('.')[0]}.{name.rsplit('.', 1)[1]}": f"/static/{name}" for name in static_files()}
     )
@@ -97,7 +97,7 @@ def _environment(language: Language) -> Environment:
 
 
 def _shown(value: object) -> object:
-    """Applied to every expression of a template, before it is escaped."""
+    """Make text readable. Jinja applies this function to every expression before escaping."""
     if isinstance(value, str) and not isinstance(value, Markup):
         return readable(value, _LONGEST_TEXT, lines=400)
     return value
@@ -108,7 +108,7 @@ def _marks(value: Decimal | None) -> str:
 
 
 def _moment(value: datetime | None) -> Markup | str:
-    """A moment for people, and for programs that read the page."""
+    """Return a ``time`` element with the moment in the server's time zone."""
     if value is None:
         return "–"
     here = value.astimezone()
@@ -117,17 +117,20 @@ def _moment(value: datetime | None) -> Markup | str:
 
 
 def _typed(text: str) -> Markup:
-    """What somebody typed, whole and as it was, for the field that they typed it into."""
+    """Return text for a textarea, unshortened.
+
+    Browsers ignore the first newline in a textarea, so one is prepended.
+    """
     return Markup("\n") + escape(text)
 
 
 def _share(marks: Decimal | None, max_marks: Decimal | None) -> float:
-    """So much of a hundred."""
+    """Return the marks as a percentage of the maximum."""
     return 0.0 if not marks or not max_marks else round(100 * float(marks / max_marks), 1)
 
 
 def _duration(value: timedelta) -> str:
-    """Hours, minutes and seconds, as a clock shows them; of less than a minute the seconds."""
+    """Return a duration such as ``1:02:03 h``, ``2:03 min`` or ``3 s``."""
     minutes, seconds = divmod(max(0, round(value.total_seconds())), 60)
     hours, minutes = divmod(minutes, 60)
     if hours:

@@ -1,7 +1,7 @@
-"""Which request bodies are read: who sends one is known by its headers first, and only declared uploads are long.
+"""Limits of request bodies: senders are checked before the body is read, and only uploads may be large.
 
-Plain ASGI in front of FastAPI, which reads and parses a body before it asks who sends it. Roles are checked again by
-the route; here they keep an upload from being read that its route would refuse.
+This is plain ASGI middleware, because FastAPI reads the body before it checks the sender. The routes check roles again;
+the check here only avoids reading uploads that the route would reject.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from service.web.context import WebContext
 from service.web.problems import API
 
 MEGABYTE = 2**20
-#: Of a request whose route declares no upload: a form or JSON.
+#: Maximum size of a form or JSON body, for routes that declare no upload.
 LARGEST_FORM = MEGABYTE
-#: Of those that anybody may send: a sign-in link, or a learning platform's word of who comes.
+#: Maximum size for public routes: sign-in links and launches by learning platforms.
 _LARGEST_OF_ANYBODY = 128 * 1024
 _FOR_ANYBODY = frozenset({"/sign-in", "/language", "/lti/login", "/lti/launch"})
 _WITHOUT_BODY = frozenset({"GET", "HEAD", "OPTIONS", "TRACE"})
@@ -39,7 +39,7 @@ _Endpoint = TypeVar("_Endpoint", bound=Callable[..., object])
 
 
 class TooMuch(HTTPException):
-    """A body was longer than is read."""
+    """The request body is too large."""
 
     def __init__(self, most: int) -> None:
         amount = f"{most // MEGABYTE} MB" if most >= MEGABYTE else f"{most // 1024} kB"
@@ -48,14 +48,14 @@ class TooMuch(HTTPException):
 
 @dataclass(frozen=True, slots=True)
 class Upload:
-    """How many bytes a route takes, and from whom in its course."""
+    """The maximum size in bytes of a route's upload, and the course role that may send it."""
 
     most: int
     role: Role
 
 
 def takes_upload(most: int, role: Role) -> Callable[[_Endpoint], _Endpoint]:
-    """Declare that the endpoint takes a body of up to ``most`` bytes. Every other endpoint takes ``LARGEST_FORM``."""
+    """Declare that an endpoint accepts bodies of up to ``most`` bytes. All others accept ``LARGEST_FORM``."""
 
     def declared(endpoint: _Endpoint) -> _Endpoint:
         setattr(endpoint, _MARK, Upload(most, role))
@@ -72,14 +72,14 @@ class _UploadRoute:
 
 
 class BodyGate:
-    """An application whose bodies are read up to their bounds, and of known senders alone."""
+    """ASGI middleware that limits the size of bodies and rejects unknown senders."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
         self._uploads: Sequence[_UploadRoute] | None = None
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer one request, as ASGI has it."""
+        """Handle one ASGI request."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -101,7 +101,7 @@ class BodyGate:
         await self._app(scope, _counted(receive, most), send)
 
     def _upload(self, scope: Scope) -> tuple[Upload | None, str]:
-        """The upload that the request's route declares, and the course in its path."""
+        """Return the upload that the request's route declares, and the course id in the path."""
         if self._uploads is None:
             self._uploads = tuple(
                 _UploadRoute(compile_path(route.path)[0], frozenset(route.methods or ()), upload)
@@ -115,7 +115,7 @@ class BodyGate:
 
 
 def _check_sender(request: Request, upload: Upload | None, course: str) -> None:
-    """Raise what the route would raise for this sender."""
+    """Raise the exception that the route would raise for this sender."""
     identity = _identity(request)
     if identity is None:
         raise SignInNeeded("who sends this is not known")
@@ -143,7 +143,7 @@ def _check_length(headers: Headers, most: int) -> None:
 
 
 def _counted(receive: Receive, most: int) -> Receive:
-    """The body as it comes, until it is too much."""
+    """Wrap ``receive`` and raise TooMuch when the body exceeds ``most`` bytes."""
     so_far = 0
 
     async def counted() -> Message:

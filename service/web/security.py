@@ -1,6 +1,6 @@
-"""What holds for every answer: the headers that keep a page to itself, and the names that the server answers to.
+"""Security headers and the check of the Host header, for all responses.
 
-Plain ASGI, so that nothing inside can forget it. Who may see what is ``access.py``'s.
+This is plain ASGI middleware, so that no route can omit it. ``access.py`` checks permissions.
 """
 
 from __future__ import annotations
@@ -31,12 +31,15 @@ _HEADERS = {
 }
 _NAME_AND_PORT = re.compile(r"(\[[^\]]*\]|[^:]*):[0-9]*")
 _LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
-#: Asked by what watches over the service: by an address, by no name at all, or by a name that the operator set.
+#: Paths for monitoring. Probes may use an address, no name, or a name that the operator configured.
 _PROBES = ("/health/", "/metrics")
 
 
 class Guarded:
-    """An application behind the headers and the names. ``public_url`` is empty on the own machine alone."""
+    """ASGI middleware that sets the headers and checks the Host header.
+
+    ``public_url`` is empty if only this machine can reach the server.
+    """
 
     def __init__(self, app: ASGIApp, public_url: str, probe_hosts: str = "") -> None:
         self._app = app
@@ -46,7 +49,7 @@ class Guarded:
         self._secure = parts.scheme == "https"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer one request, as ASGI has it."""
+        """Handle one ASGI request."""
         if scope["type"] != "http":
             return
         headers = Headers(scope=scope)
@@ -59,7 +62,7 @@ class Guarded:
     def _answers_to(self, host: str, path: str) -> bool:
         if not path.startswith(_PROBES):
             return host in self._names
-        # A page elsewhere can give a name of its own to an address inside, but cannot make a browser leave it out.
+        # DNS rebinding uses a name of the attacker's site. A browser cannot omit the Host header.
         return not host or _is_address(host) or host in self._probe_names
 
     def _headed(self, send: Send) -> Send:
@@ -89,6 +92,6 @@ def _is_address(host: str) -> bool:
 
 
 def _host(header: str) -> str:
-    """The name in a Host header, without its port."""
+    """Return the host name of a Host header without the port."""
     found = _NAME_AND_PORT.fullmatch(header)
     return (found[1] or header if found else header).lower()

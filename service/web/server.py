@@ -1,6 +1,6 @@
-"""Listens, and lets uvicorn answer. What is answered is in ``app.py``.
+"""The web server process: uvicorn on an existing listening socket. ``app.py`` contains the application.
 
-Run as ``python -m service.web.server DESCRIPTOR`` on a socket that listens already.
+Start it with ``python -m service.web.server DESCRIPTOR``, where DESCRIPTOR is the socket's file descriptor.
 """
 
 from __future__ import annotations
@@ -24,7 +24,11 @@ from sim.processes import leave_current_folder
 
 
 def serve_on(settings: Settings, listening: socket.socket) -> None:
-    """Answer until told to stop, with uploads in the home. Raises HostError when the database cannot be used."""
+    """Serve until stopped, with temporary uploads in a folder of this process.
+
+    Raises:
+        HostError: The database cannot be used.
+    """
     configure_logging(settings.log_level)
     open_home(settings.home)
     leave_current_folder()
@@ -37,14 +41,14 @@ def serve_on(settings: Settings, listening: socket.socket) -> None:
 
 
 def server_config(settings: Settings, application: ASGIApp) -> uvicorn.Config:
-    """How uvicorn serves the application."""
+    """Return the uvicorn configuration for the application."""
     return uvicorn.Config(
         application,
         log_config=None,
         access_log=False,
         server_header=False,
         lifespan="off",
-        # By default it believes whoever asks from this machine, which a proxy on it does for everybody.
+        # By default, uvicorn trusts all local clients. A proxy on this machine would make every client trusted.
         proxy_headers=bool(settings.trusted_proxies),
         forwarded_allow_ips=settings.trusted_proxies or None,
         timeout_graceful_shutdown=5,

@@ -1,4 +1,4 @@
-"""Students' files taken in by the pages and the API, as often as one person may send some."""
+"""Rate-limited submissions and test runs of students, for pages and API."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from submissions.raw_files import SentFile
 
 
 def submit(context: WebContext, actor: Actor, course_id: int, request: SendRequest) -> Accepted:
-    """Submit files. Raises HTTPException 429 where they come too often, and as ``submissions.submit`` does."""
+    """Submit files. Raises HTTPException 429 above the rate limit, and the errors of ``submissions.submit``."""
     submissions.sending(context.service, actor, course_id, request.assignment)
     context.limits.submissions.spend(str(actor.person_id))
     return submissions.submit(context.service, actor, course_id, request)
 
 
 def start_test_run(context: WebContext, actor: Actor, course_id: int, assignment: str, sent: Sequence[SentFile]) -> str:
-    """Start a test run. Raises HTTPException 429 where they come too often, and as ``test_runs.start`` does."""
+    """Start a test run. Raises HTTPException 429 above the rate limit, and the errors of ``test_runs.start``."""
     submissions.sending(context.service, actor, course_id, assignment)
     context.limits.tryouts.spend(str(actor.person_id))
     return test_runs.start(context.service, actor, course_id, assignment, sent)

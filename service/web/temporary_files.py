@@ -1,4 +1,4 @@
-"""The folder in which one web server keeps uploads while it reads them: removed at its end, or at the next start."""
+"""The temporary folder of one web server. It is removed when the server stops, or at the next start."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from pathlib import Path
 from responders.sandbox.private_folders import locked_folder, remove_left_overs
 
 _PREFIX = "robomark-web-"
-#: Folders of earlier versions and of commands, which have no lock: only their age says that nobody uses them.
+#: Folders of earlier versions and of commands. They have no lock, so they are removed by age.
 _UNLOCKED = ("robomark-upload-", "robomark-batch-", "robomark-assignment-", "robomark-people-")
 _OLD_SECONDS = 24 * 3600
 
 
 @contextlib.contextmanager
 def own_temporary_folder() -> Iterator[Path]:
-    """Let everything temporary of this process lie in a folder of its own; remove those that others left over."""
+    """Use a separate folder for all temporary files of this process, and remove folders left by other processes."""
     remove_left_overs(_PREFIX)
     _remove_old()
     before = tempfile.gettempdir()
@@ -37,7 +37,7 @@ def own_temporary_folder() -> Iterator[Path]:
 def _remove_old() -> None:
     for prefix in _UNLOCKED:
         for folder in Path(tempfile.gettempdir()).glob(f"{prefix}*"):
-            # Another server may be doing the same at this moment.
+            # Another server may be removing the same folder.
             with contextlib.suppress(OSError):
                 about = folder.lstat()
                 if about.st_uid == os.getuid() and about.st_mtime < time.time() - _OLD_SECONDS:

@@ -1,1 +1,1 @@
-"""What programs are answered, below ``/api/v1``: a module a subject, each with a ``router``."""
+"""The API below ``/api/v1``: one module for each subject, each with a ``router``."""

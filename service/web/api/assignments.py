@@ -1,4 +1,4 @@
-"""What a course has for its students: assignments taken from the catalogue or sent, previewed, opened and closed."""
+"""API of a course's assignments: add them from the catalogue, upload, preview, open and close them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Batches of a course: handed over, watched, held and let go on, their submissions and what these got."""
+"""API of a course's batches: submit, follow, pause and resume them, and list their submissions and grades."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The token's owner's sessions and tokens: listed, and ended one by one."""
+"""API of the sessions and tokens of a token's owner: list them and end them one by one."""
 
 from __future__ import annotations
 

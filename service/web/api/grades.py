@@ -1,4 +1,4 @@
-"""One grade as staff see it: as data, as the report, and what its replay plays; and its submission."""
+"""API of one grade for staff: data, report, replay and submission."""
 
 from __future__ import annotations
 
@@ -70,16 +70,16 @@ def files(here: Reads, context: Context, submission_id: RowNumber) -> Response:
 
 
 def grade_answer(request: Request, job_id: str, view: View) -> Response:
-    """A view as data."""
+    """Return a grade as JSON."""
     shape = GradeShape.model_validate({"job": job_id, "withheld": view.withheld, **json_document(view)})
     return tagged(request, shape.model_dump_json(by_alias=True).encode(), "application/json")
 
 
 def report_answer(request: Request, report: str) -> Response:
-    """A report as a page; caches keep one for each language."""
+    """Return a report as a page. It varies by language, so caches store one for each."""
     return tagged(request, report.encode(), "text/html; charset=utf-8", vary="accept-language")
 
 
 def replay_answer(request: Request, document: Mapping[str, Any]) -> Response:
-    """What a replay plays, as JSON."""
+    """Return the data of a replay as JSON."""
     return tagged(request, json.dumps(document, allow_nan=False).encode(), "application/json")

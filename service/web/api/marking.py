@@ -1,4 +1,4 @@
-"""What instructors set by hand, comments, and second looks: what students ask again, and the answers."""
+"""API of marking: adjusted marks, comments, appeals and their answers."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _owning(here: StudentSubmits, context: Context, submission_id: RowNumber) ->
     return here
 
 
-#: Known before a body is read, so that nobody else is told what is wrong with theirs.
+#: Checked before the body is read, so that only the submission's owner gets errors about the body.
 Owns = Annotated[CallerInCourse, Depends(_owning)]
 GRADE = "/courses/{course_id}/grades/{job_id}"
 

@@ -1,4 +1,4 @@
-"""Whose token it is, and the courses that they have a role in."""
+"""API of the token's owner and the courses in which they have a role."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A student's own: what is open, submitting, and what came of it, as far as they may see it now."""
+"""API for students: open assignments, submitting, and their own results as far as they may see them."""
 
 from __future__ import annotations
 

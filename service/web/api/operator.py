@@ -1,4 +1,4 @@
-"""What whoever runs the installation asks: how much waits, who works, what could not be graded."""
+"""API for operators: queues, workers, failed jobs and courses."""
 
 from __future__ import annotations
 

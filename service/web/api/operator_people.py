@@ -1,4 +1,4 @@
-"""One person, for operators: their courses, what they sign in with, signing them out, and joining two persons."""
+"""API of one person for operators: courses, credentials, signing out, and joining two persons."""
 
 from __future__ import annotations
 

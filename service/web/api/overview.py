@@ -1,4 +1,4 @@
-"""A batch at a glance for programs: what would be taken in of one, what came of it, and what publishing it would do."""
+"""API of a batch's overview: a check before submitting, the results, and a preview of publishing."""
 
 from __future__ import annotations
 

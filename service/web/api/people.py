@@ -1,4 +1,4 @@
-"""Who is in a course, and what students may do when; links that sign them in are told elsewhere."""
+"""API of a course's people, policies and extensions. ``sign_in_links.py`` contains their sign-in links."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Learning platforms: registered by whoever runs the installation; members fetched and marks sent by instructors."""
+"""API of learning platforms. Operators register them; instructors fetch members and send marks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One student's data, on request: all of it as a zip, or all of it removed."""
+"""API of one student's data: download all of it as a zip, or delete it."""
 
 from __future__ import annotations
 

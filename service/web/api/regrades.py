@@ -1,4 +1,4 @@
-"""Grading a batch again, what that changes, letting grades stand and releasing them; and writing them out."""
+"""API of regrades: grade a batch again, compare, publish and export the grades."""
 
 from __future__ import annotations
 

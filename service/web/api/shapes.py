@@ -1,6 +1,6 @@
-"""What the answers of the API are made of, as their description tells it; each is read off what the store gives.
+"""Models of API responses that several subjects share. Their values come from the store's objects.
 
-What only one subject answers is told in its module.
+The other modules define the models that only one subject uses.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from service.operations.types import BatchState, JobState, Role, Standing
 
 
 class Shape(BaseModel):
-    """Read off an object of the store that has fields of these names."""
+    """Base of the models. They are read from objects whose attributes have the same names."""
 
     model_config = ConfigDict(from_attributes=True)
 
 
 def like(**example: Any) -> ConfigDict:
-    """A shape with an example."""
+    """Return the configuration of a model with an example."""
     return ConfigDict(from_attributes=True, json_schema_extra={"examples": [example]})
 
 
@@ -43,7 +43,7 @@ BATCH_EXAMPLE: Mapping[str, Any] = MappingProxyType(
 
 
 def example_of(shape: type[Shape]) -> Any:
-    """The example that a shape has."""
+    """Return the example of a model."""
     extra: Any = shape.model_config["json_schema_extra"]
     return extra["examples"][0]
 

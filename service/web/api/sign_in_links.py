@@ -1,4 +1,4 @@
-"""Links that sign students in once, for whoever instructs their course: for one of them, or for all."""
+"""API of sign-in links for students, for instructors of the course: for one student or for all."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def link(here: Manages, context: Context, enrolment_id: RowNumber) -> LinkShape:
 
 
 def link_shape(context: WebContext, secret: str) -> LinkShape:
-    """How a link is told."""
+    """Return a sign-in link as the response model."""
     path, public = f"/sign-in/{secret}", context.settings.public_url
     return LinkShape(path=path, url=f"{public}{path}" if public else None)
 

@@ -1,6 +1,6 @@
-"""Whose work for the assignments of a batch is alike, for programs of those who instruct the course.
+"""API of similar submissions in a batch, for instructors of the course.
 
-What is alike is ``service.similarity``'s to say; it proves nothing, and no mark has anything of it.
+``service.similarity`` compares the submissions. Similarity is no proof, and it never changes marks.
 """
 
 from __future__ import annotations

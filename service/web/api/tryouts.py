@@ -1,4 +1,4 @@
-"""Trying a program without submitting it: asked for, waited for, and what it said. It leaves no marks."""
+"""API of test runs: start one, follow its progress and read its output. A test run has no marks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Webhooks of a course: where it is told of what happens in it, and what became of what it was told."""
+"""API of a course's webhooks and their deliveries."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What people see: a module for each thing that they do, each with a ``router``. Who may see it says ``access.py``."""
+"""The pages: one module for each subject, each with a ``router``. ``access.py`` checks the readers' permissions."""

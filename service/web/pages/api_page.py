@@ -1,4 +1,4 @@
-"""The routes of the API as a page, from the description that programs read."""
+"""A page that documents the API, generated from the OpenAPI document."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ router = APIRouter()
 
 @router.get("/api")
 def api_page(request: Request, reader: MaybeReader) -> Response:
-    """What programs can ask, by subject."""
+    """Show the routes of the API by subject."""
     subjects: dict[str, list[tuple[str, str, str]]] = {}
     for path, operations in request.app.openapi()["paths"].items():
         for method, operation in operations.items():

@@ -1,4 +1,4 @@
-"""A student asks for a second look at a submission; an instructor sees what is asked, and answers."""
+"""Appeals: students ask about a grade, and instructors read the appeals and answer them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def asked(
     after: RowNumberAfter = 0,
     answered_after: Annotated[str, Query(max_length=100)] = "",
 ) -> Response:
-    """What students ask, the open ones first, a page of each."""
+    """Show the appeals to instructors in pages, open ones first."""
     where, most = (context.service, here.acting, here.course_id), _A_PAGE + 1
     still_open = appeals.list_open(*where, limit=most, after=after)
     answered = appeals.list_answered(*where, limit=most, after=_place(answered_after))
@@ -46,7 +46,7 @@ def asked(
 
 
 def _place(written: str) -> tuple[datetime, int] | None:
-    """Where the page before ended; None for the first, and for what is no such place."""
+    """Return the time and id at which the previous page ended, or None for the first page or invalid text."""
     at, _, last = written.partition(" ")
     try:
         found = datetime.fromisoformat(at).astimezone(UTC)
@@ -57,20 +57,20 @@ def _place(written: str) -> tuple[datetime, int] | None:
 
 @router.post("/appeals/{appeal_id}/answer")
 def answer(here: Instructing, context: Context, appeal_id: RowNumber, text: Text = "") -> Response:
-    """Answer one, which closes it."""
+    """Answer an appeal and close it."""
     appeals.answer(context.service, here.acting, here.course_id, appeal_id, text)
     return RedirectResponse(f"/courses/{here.course_id}/appeals", 303)
 
 
 @router.get("/mine/submissions/{submission_id}/appeal")
 def appeal(request: Request, here: Studying, context: Context, submission_id: RowNumber) -> Response:
-    """What one asked of a submission, the answers, and a form where one may ask."""
+    """Show a student's appeals about a submission, the answers, and the form if they may appeal."""
     found = appeals.show_own(context.service, here.acting, here.course_id, submission_id)
     return page(request, here.reader, "appeal.html", here=here, found=found, longest=LONGEST_TEXT)
 
 
 @router.post("/mine/submissions/{submission_id}/appeal")
 def ask(here: Studying, context: Context, submission_id: RowNumber, text: Text = "") -> Response:
-    """Ask for a second look."""
+    """Submit an appeal."""
     appeals.ask(context.service, here.acting, here.course_id, submission_id, text)
     return RedirectResponse(f"/courses/{here.course_id}/mine/submissions/{submission_id}/appeal", 303)

@@ -1,4 +1,4 @@
-"""The assignments of a course for its instructors: added from the catalogue or uploaded, previewed, opened, closed."""
+"""A course's assignments for its instructors: add, upload, preview, open and close them."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ AssignmentId = Annotated[str, InPath(pattern="^[a-z0-9][a-z0-9_-]*$", max_length
 
 @router.get("/assignments")
 def list_assignments(request: Request, here: Instructing, context: Context, done: Done = "") -> Response:
-    """What the course has prepared and opened, and two ways to another."""
+    """Show the assignments of the course and the ways to add one."""
     return _list(request, here, context, done=done)
 
 
 @router.post("/assignments")
 def prepare(here: Instructing, context: Context, assignment: Annotated[str, Form(max_length=100)]) -> Response:
-    """Take an assignment from the catalogue, as it is now."""
+    """Add an assignment from the catalogue in its current version."""
     return _to(
         here, assignment_uploads.prepare_from_catalogue(context.service, here.acting, here.course_id, assignment)
     )
@@ -59,7 +59,7 @@ def upload(
     file: Annotated[UploadFile, File()],
     replace: Annotated[bool, Form()] = False,
 ) -> Response:
-    """Take an assignment of one's own from a zip of its folder; its reference solution is graded as a preview."""
+    """Add an assignment from an uploaded zip of its folder, and grade its reference solution as a preview."""
     sent = SentFile(file.filename or "", file.file)
     try:
         if not sent.flat_name.lower().endswith(".zip"):
@@ -77,13 +77,13 @@ def upload(
 
 @router.get("/assignments/uploads")
 def to_list(here: Instructing) -> Response:
-    """Nothing but the way back, for whoever comes to the address that takes uploads."""
+    """Redirect to the list, for readers who open the upload address in the browser."""
     return RedirectResponse(_path(here, ""), 303)
 
 
 @router.get("/assignments/uploads/my-assignment.zip")
 def commented_example(here: Instructing) -> Response:
-    """The folder of an assignment with comments in it, to be changed and uploaded."""
+    """Return the folder of a commented example assignment as a zip."""
     with tempfile.TemporaryDirectory(prefix="robomark-assignment-") as folder:
         write_new(Path(folder) / "zip" / "my-assignment")
         zipped = shutil.make_archive(f"{folder}/made", "zip", f"{folder}/zip")
@@ -92,7 +92,7 @@ def commented_example(here: Instructing) -> Response:
 
 @router.get("/assignments/{assignment}")
 def show(request: Request, here: Instructing, context: Context, assignment: AssignmentId, done: Done = "") -> Response:
-    """What an assignment asks for, whether it is open, and what holds for it."""
+    """Show an assignment with its task, its state and its policy."""
     view = assignment_views.show(context.service, here.acting, here.course_id, assignment)
     return page(
         request,
@@ -113,19 +113,19 @@ def show(request: Request, here: Instructing, context: Context, assignment: Assi
 
 @router.post("/assignments/{assignment}/open")
 def open_one(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
-    """Let students see it and submit to it."""
+    """Open an assignment: students see it and can submit to it."""
     return _to(here, assignments.open_for_students(context.service, here.acting, here.course_id, assignment))
 
 
 @router.post("/assignments/{assignment}/close")
 def close_one(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
-    """Let nobody submit to it any more."""
+    """Close an assignment: students can no longer submit to it."""
     return _to(here, assignments.close(context.service, here.acting, here.course_id, assignment))
 
 
 @router.post("/assignments/{assignment}/remove")
 def remove(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
-    """Let the course have it no more, as long as no student has been shown it."""
+    """Remove an assignment that no student has seen from the course."""
     assignments.remove(context.service, here.acting, here.course_id, assignment)
     return RedirectResponse(_path(here, ""), 303)
 
@@ -134,13 +134,13 @@ def remove(here: Instructing, context: Context, assignment: AssignmentId) -> Res
 def hide_names(
     here: Instructing, context: Context, assignment: AssignmentId, hidden: Annotated[bool, Form()] = False
 ) -> Response:
-    """Hide or show whose work it is, for all who instruct the course."""
+    """Hide or show the students' names for all instructors of the course."""
     return _to(here, assignments.hide_names(context.service, here.acting, here.course_id, assignment, hidden=hidden))
 
 
 @router.post("/assignments/{assignment}/preview")
 def preview(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
-    """Grade the catalogue's reference solution as a submission of one's own."""
+    """Grade the catalogue's reference solution as the instructor's own submission."""
     job_id = assignment_uploads.preview(context.service, here.acting, here.course_id, assignment)
     return RedirectResponse(f"/courses/{here.course_id}/grades/{job_id}", 303)
 
@@ -155,7 +155,7 @@ def set_policy(
     attempts: Annotated[str, Form(pattern="^[0-9]{0,4}$")] = "",
     cool_down: Annotated[float, Form(ge=0, le=10_000)] = 0.0,
 ) -> Response:
-    """Say when and how often students may submit, to one assignment or to all that have no policy of their own."""
+    """Set deadline and attempts for one assignment, or the default for assignments without a policy."""
     allowed = PolicyLimits(written_moment(due), late_days, int(attempts) if attempts else None, cool_down * 60)
     policies.set_policy(context.service, here.acting, here.course_id, assignment, allowed)
     return RedirectResponse(f"{_path(here, assignment)}?done=policy", 303)
@@ -163,7 +163,7 @@ def set_policy(
 
 @router.post("/assignments/{assignment}/no-policy")
 def drop_policy(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
-    """Let the assignment have what holds for all, in place of a policy of its own."""
+    """Delete an assignment's own policy, so that the course's default applies."""
     policies.drop_policy(context.service, here.acting, here.course_id, assignment)
     return RedirectResponse(f"{_path(here, assignment)}?done=policy", 303)
 

@@ -1,6 +1,6 @@
-"""One batch for its instructors: how far it is, its table, what came of it, what a regrade changes, and what is done.
+"""One batch for instructors: progress, table, results, changes by a regrade, and actions.
 
-Each thing that is done to a batch is a command's too, by the same operation.
+Each action has a command that uses the same operation.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _COLUMNS = {
     "state": translatable("State"),
     "seconds": translatable("Seconds"),
 }
-#: What somebody did, by the word for it in the audit.
+#: Descriptions of actions, by their names in the activity log.
 _ACTIONS = {
     "submit": translatable("submitted"),
     "pause": translatable("paused"),
@@ -77,7 +77,7 @@ def submissions(
     number: Annotated[int, Query(alias="page", ge=1, le=10_000)] = 1,
     done: Annotated[str, Query(max_length=20)] = "",
 ) -> Response:
-    """The submissions of a batch: sorted, filtered, searched, in pages."""
+    """Show the submissions of a batch. The table can be sorted, filtered, searched and paged."""
     column = sort.removeprefix("-")
     asked = TableAsked(
         state if state in STATES else "", q, column if column in SORTS else "student", sort.startswith("-"), number
@@ -101,7 +101,10 @@ def submissions(
 
 @router.get("/progress")
 def progress(request: Request, here: Instructing, context: Context, batch_id: RowName) -> Response:
-    """How far a batch is: the part of its pages that is asked for again and again, until there is no more to come."""
+    """Return the part of the page that shows the progress.
+
+    The page requests it repeatedly until the batch is finished.
+    """
     far = _far(here, views.show_progress(context.service, here.acting, here.course_id, batch_id))
     answer = page(request, here.reader, "batch_progress.html", **far)
     if not far["goes_on"]:
@@ -117,7 +120,7 @@ def show_overview(
     batch_id: RowName,
     at_least: Annotated[int, Query(alias="pass", ge=0, le=100)] = int(PASS_SHARE * 100),
 ) -> Response:
-    """What came of a batch: marks, criteria, causes, who is missing, and whom to look at."""
+    """Show the results of a batch: marks, criteria, causes, students to review and missing students."""
     table, shown = _batch(here, context, batch_id)
     found = views.show_overview_of(context.service, here.acting, here.course_id, table, Decimal(at_least) / 100)
     lines = found.lines
@@ -143,7 +146,7 @@ def show_changes(
     batch_id: RowName,
     number: Annotated[int, Query(alias="page", ge=1, le=10_000)] = 1,
 ) -> Response:
-    """What a regrade changes, and why."""
+    """Show the changes by a regrade, with reasons."""
     _, shown = _batch(here, context, batch_id)
     found = views.changes_page(context.service, here.acting, here.course_id, batch_id, number)
     return page(request, here.reader, "batch_changes.html", **shown, found=found, changes=found.changes)
@@ -151,35 +154,35 @@ def show_changes(
 
 @router.post("/pause")
 def pause(here: Instructing, context: Context, batch_id: RowName) -> Response:
-    """Begin no more of a batch."""
+    """Pause a batch."""
     operations.pause(context.service, here.acting, here.course_id, batch_id)
     return _back(here, batch_id, "pause")
 
 
 @router.post("/resume")
 def resume(here: Instructing, context: Context, batch_id: RowName) -> Response:
-    """Let a paused batch go on."""
+    """Resume a paused batch."""
     operations.resume(context.service, here.acting, here.course_id, batch_id)
     return _back(here, batch_id, "resume")
 
 
 @router.post("/cancel")
 def cancel(here: Instructing, context: Context, batch_id: RowName) -> Response:
-    """End what of a batch is not graded yet."""
+    """Cancel the jobs of a batch that are not finished."""
     operations.cancel(context.service, here.acting, here.course_id, batch_id)
     return _back(here, batch_id, "cancel")
 
 
 @router.post("/retry")
 def retry(here: Instructing, context: Context, batch_id: RowName) -> Response:
-    """Queue again what of a batch could not be graded."""
+    """Requeue the failed jobs of a batch."""
     operations.retry(context.service, here.acting, here.course_id, batch_id)
     return _back(here, batch_id, "retry")
 
 
 @router.get("/publish")
 def before_publishing(request: Request, here: Instructing, context: Context, batch_id: RowName) -> Response:
-    """What publishing would release to how many, and what it would hold back."""
+    """Show how many grades publishing would release and hold back."""
     _, shown = _batch(here, context, batch_id)
     publication = regrade_operations.preview(context.service, here.acting, here.course_id, batch_id)
     return page(request, here.reader, "batch_publish.html", **shown, publication=publication)
@@ -189,7 +192,7 @@ def before_publishing(request: Request, here: Instructing, context: Context, bat
 def publish(
     here: Instructing, context: Context, batch_id: RowName, anyway: Annotated[bool, Form()] = False
 ) -> Response:
-    """Let the newest grades of a batch stand, and release them to the students."""
+    """Make the newest grades of a batch the current grades, and release them to the students."""
     regrade_operations.publish(context.service, here.acting, here.course_id, batch_id, anyway=anyway)
     return _back(here, batch_id, "publish")
 
@@ -201,7 +204,7 @@ def regrade(
     batch_id: RowName,
     assignment: Annotated[str, Form(max_length=100)] = "",
 ) -> Response:
-    """Grade a batch again, against an assignment as the course has it now or as each was graded before."""
+    """Regrade a batch, against the course's current assignment or the one used before."""
     made = regrade_operations.regrade_batch(context.service, here.acting, here.course_id, batch_id, assignment)
     return RedirectResponse(f"/courses/{here.course_id}/batches/{made.batch_id}/changes", 303)
 
@@ -211,7 +214,7 @@ def _back(here: InCourse, batch_id: str, done: str) -> Response:
 
 
 def _batch(here: InCourse, context: WebContext, batch_id: str) -> tuple[TableView, dict[str, Any]]:
-    """What all pages of a batch show."""
+    """Return the table of a batch and the template variables that all its pages need."""
     found = views.show_table(context.service, here.acting, here.course_id, batch_id)
     graded = [each for each in found.lines if views.is_graded(each)]
     return found, {
@@ -248,7 +251,7 @@ def _far(here: InCourse, view: BatchView) -> dict[str, Any]:
 
 
 def _columns(lines: Sequence[TableLine]) -> dict[str, str]:
-    """The columns that tell something of this batch, by what they are sorted by."""
+    """Return the titles of the columns with useful data, by sort key."""
     several = len({line.assignment for line in lines}) > 1
     named = any(line.name not in ("", line.student) for line in lines)
     dropped = ({"assignment"} if not several else set()) | ({"name"} if not named else set())

@@ -1,6 +1,6 @@
-"""The grades of a batch as a file that the browser keeps: every format of the command line.
+"""Downloads of a batch's grades, in every format of the command line.
 
-What a format writes is ``service.reports``'; hidden names are hidden in files, too.
+``service.reports`` writes the formats. Hidden names are hidden in files, too.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def export(
     form: Annotated[str, Query(alias="format", max_length=40)] = "csv",
     published: Annotated[bool, Query()] = False,
 ) -> Response:
-    """The grades that stand, in one of the formats."""
+    """Return the current grades in the requested format."""
     return _file(here, context, batch_id, ExportRequest(form, published))
 
 
@@ -46,7 +46,7 @@ def worksheet(
     file: Annotated[UploadFile, File()],
     published: Annotated[bool, Form()] = False,
 ) -> Response:
-    """Moodle's grading worksheet with the grades filled in."""
+    """Return Moodle's grading worksheet with the grades filled in."""
     try:
         given = file.file.read().decode("utf-8")
     except UnicodeDecodeError:
@@ -56,6 +56,6 @@ def worksheet(
 
 def _file(here: InCourse, context: WebContext, batch_id: str, asked: ExportRequest) -> Response:
     made = download(context.service, here.acting, here.course_id, batch_id, asked)
-    # Excel takes a table for UTF-8 only where it begins so; Moodle has its own.
+    # Excel recognises UTF-8 only by a byte order mark. Moodle's worksheet stays as Moodle wrote it.
     mark = codecs.BOM_UTF8 if asked.form in _TABLES else b""
     return attachment(mark + made.data, made.name, made.media_type)

@@ -1,6 +1,6 @@
-"""Whose work for the assignments of a batch is alike, among all students of the course: for who instructs it alone.
+"""Similar submissions for a batch's assignments among all students of the course. Only instructors can see this page.
 
-What is alike is ``service.similarity``'s to say. It takes seconds, so it is a page of its own, and of few enough.
+``service.similarity`` compares the submissions. The comparison takes seconds, so it has its own page.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _MOST_SHOWN = 30
 
 @router.get("/similar")
 def similar(request: Request, here: Instructing, context: Context, batch_id: RowName) -> Response:
-    """Pairs of students whose newest submissions are alike, with the evidence side by side."""
+    """Show pairs of students with similar newest submissions, and the evidence side by side."""
     found = show_similar(context.service, here.acting, here.course_id, batch_id)
     body = None
     if found.found is not None:

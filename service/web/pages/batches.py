@@ -1,6 +1,6 @@
-"""The batches of a course for its instructors, and the way to a new one: an upload, what would come of it, and yes.
+"""A course's batches for its instructors, and submitting a new one: upload, check and confirm.
 
-What is done with one batch is ``batch.py``'s; what an upload may hold is ``submissions.batch_folder``'s to say.
+``batch.py`` contains the pages of one batch. ``submissions.batch_folder`` defines the allowed uploads.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from submissions.submission import PART_FILES
 
 router = APIRouter(prefix="/courses/{course_id}/batches")
 _ARCHIVES = (".zip",)
-#: What a student's submission may be where each is a file of its own; what is in it is looked at later.
+#: Suffixes of one student's submission in an upload of single files. The contents are checked later.
 _SINGLE = (".zip", ".py", ".ipynb")
 
 
 @router.get("")
 def list_batches(request: Request, here: Instructing, context: Context, after: RowNameAfter = "") -> Response:
-    """The batches of the course, the newest first, and a form for another."""
+    """Show the batches of the course, newest first, and a form for a new one."""
     return _list(request, here, context, after=after)
 
 
@@ -56,7 +56,7 @@ def upload(
     people: Annotated[UploadFile | None, File()] = None,
     assignment: Annotated[str, Form(max_length=100)] = "",
 ) -> Response:
-    """Keep what was sent and look what would be taken in of it."""
+    """Save the uploaded files and determine which submissions would be accepted."""
     kept_uploads = KeptUploads(context.settings.home)
     begun = kept_uploads.begin(here.reader.identity.person_id, here.course_id, assignment)
     try:
@@ -72,7 +72,7 @@ def upload(
 
 @router.get("/uploads/{upload_id}")
 def look_first(request: Request, here: Instructing, context: Context, upload_id: RowName) -> Response:
-    """What of an upload would be taken in, and what not and why."""
+    """Show the accepted and rejected submissions of an upload, before it is confirmed."""
     found = _find(context, here, upload_id)
     missing: dict[str, list[str]] = {}
     for each in found.expected:
@@ -100,7 +100,7 @@ def confirm(
     upload_id: RowName,
     again: Annotated[bool, Form()] = False,
 ) -> Response:
-    """Make a batch of an upload."""
+    """Create a batch from an upload."""
     found = _find(context, here, upload_id)
     asked = SubmitRequest(found.name, _read(context, here, found), again)
     done = operations.submit(context.service, here.acting, here.course_id, asked)
@@ -113,7 +113,7 @@ def confirm(
 
 @router.post("/uploads/{upload_id}/discard")
 def discard(here: Instructing, context: Context, upload_id: RowName) -> Response:
-    """Take nothing in of an upload."""
+    """Discard an upload."""
     KeptUploads(context.settings.home).remove(_find(context, here, upload_id))
     return RedirectResponse(f"/courses/{here.course_id}/batches", 303)
 
@@ -161,12 +161,12 @@ def _expected(foreseen: Sequence[ForeseenSubmission]) -> tuple[ExpectedSubmissio
 
 
 def _sent(files: list[UploadFile]) -> list[SentFile]:
-    """The files of a field; an empty field sends one without a name."""
+    """Return the files of a form field. Browsers send an empty field as a file without a name, which is skipped."""
     return [SentFile(file.filename, file.file) for file in files if file.filename]
 
 
 def _laid(kept_uploads: KeptUploads, begun: KeptUpload, files: list[SentFile], people: list[SentFile]) -> KeptUpload:
-    """The upload with its files where they are read from."""
+    """Store the files in the upload and return it with their names. Raises UsageError for unsuitable files."""
     if not files:
         raise UsageError("nothing was sent, expected a .zip, or a file for each student")
     suffixes = {Path(file.flat_name).suffix.lower() for file in files}

@@ -1,4 +1,4 @@
-"""The catalogue for instructors: looked through by topic and by words, to take assignments from. Takes none itself."""
+"""The catalogue for instructors, searchable by topic and words. ``assignments.py`` adds assignments to a course."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def look_through(
     q: Annotated[str, Query(max_length=100)] = "",
     topic: Annotated[str, Query(max_length=10)] = "",
 ) -> Response:
-    """What comes with Robomark, as far as it is of the topic and has all words that are looked for."""
+    """Show the catalogue's assignments that have the topic and contain all searched words."""
     taken = assignment_views.list_prepared(context.service, here.acting, here.course_id)
     everything = [overview(assignment_folder(each)) for each in catalogue()]
     found = [each for each in everything if each.says(q) and topic in ("", each.topic or "none")]
@@ -49,7 +49,7 @@ def look_through(
 def read(
     request: Request, here: Instructing, context: Context, assignment: Annotated[str, InPath(max_length=100)]
 ) -> Response:
-    """What an assignment of the catalogue asks for, before it is taken into the course."""
+    """Show the task of a catalogue assignment before it is added to the course."""
     found = find_in_catalogue(assignment)
     prepared = assignment_views.list_prepared(context.service, here.acting, here.course_id)
     taken = found.id in {each.assignment for each in prepared}

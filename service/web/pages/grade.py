@@ -1,6 +1,6 @@
-"""One grade for staff: its report with every trial, the one before and the one after, publishing and grading it again.
+"""One grade for staff: the report with every trial, links to neighbouring grades, publishing and regrading.
 
-What a report says is ``service.reports``'; what is set by hand has pages of its own.
+``service.reports`` writes the report. ``marking.py`` contains the page for adjusting marks.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ router = APIRouter(prefix="/courses/{course_id}/grades/{job_id}")
 
 @router.get("")
 def grade(request: Request, here: Instructing, context: Context, job_id: RowName, done: str = "") -> Response:
-    """The report of one submission; while it is graded, how far that is."""
+    """Show the report of one submission, or the progress while it is being graded."""
     asked = (context.service, here.acting, here.course_id, job_id)
     if wants_part(request) and grade_views.show_state(*asked).ended:
         return Response(headers={"hx-refresh": "true"})
@@ -48,7 +48,7 @@ def grade(request: Request, here: Instructing, context: Context, job_id: RowName
 
 @router.post("/publish")
 def publish(here: Instructing, context: Context, job_id: RowName, anyway: Annotated[bool, Form()] = False) -> Response:
-    """Let the newest grade of this submission stand, and release it to its student."""
+    """Make the newest grade of this submission the current grade, and release it to the student."""
     regrades.publish_one(context.service, here.acting, here.course_id, job_id, anyway=anyway)
     return RedirectResponse(f"/courses/{here.course_id}/grades/{job_id}?done=publish", 303)
 
@@ -57,13 +57,13 @@ def publish(here: Instructing, context: Context, job_id: RowName, anyway: Annota
 def regrade(
     here: Instructing, context: Context, job_id: RowName, assignment: Annotated[str, Form(max_length=100)] = ""
 ) -> Response:
-    """Grade this submission again, against the assignment as it is now or as it was."""
+    """Regrade this submission, against the assignment's current version or the one used before."""
     made = regrades.regrade_one(context.service, here.acting, here.course_id, job_id, assignment)
     return RedirectResponse(f"/courses/{here.course_id}/grades/{made}", 303)
 
 
 @router.post("/grade-over-limit")
 def grade_over_limit(here: Instructing, context: Context, job_id: RowName) -> Response:
-    """Grade a submission that was put aside because it is over a limit."""
+    """Grade a submission that was not graded because it exceeds a limit."""
     regrades.grade_over_limit(context.service, here.acting, here.course_id, job_id)
     return RedirectResponse(f"/courses/{here.course_id}/grades/{job_id}", 303)

@@ -1,4 +1,4 @@
-"""The first page with a person's courses, and their account: sessions and tokens."""
+"""The home page with a person's courses, and the account page with their sessions and tokens."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from service.web.rendering import page
 
 router = APIRouter()
 
-#: The word in an address that a token was made of; empty where none is shown.
+#: The word in the page's address that the new token is derived from; empty if no token is shown.
 MadeWord = Annotated[str, Query(max_length=64)]
 
 
 @router.get("/")
 def home(request: Request, reader: SignedIn, context: Context) -> Response:
-    """One's courses; where there is but one thing to see, that."""
+    """Show the reader's courses, or redirect to the only one."""
     own = sorted(courses.list_own(context.service, reader.acting), key=lambda each: each.name)
     if len(own) == 1 and not reader.identity.operator:
         return RedirectResponse(course_path(own[0].id, own[0].role), 303)
@@ -36,7 +36,7 @@ def home(request: Request, reader: SignedIn, context: Context) -> Response:
 
 @router.get("/account")
 def account(request: Request, reader: SignedIn, context: Context, made: MadeWord = "") -> Response:
-    """One's name, sessions and tokens; a new token can be copied until it is used."""
+    """Show the reader's name, sessions and tokens. A new token can be copied until its first use."""
     identity = reader.identity
     listed = own_credentials.list_credentials(context.service, reader.acting)
     word = secret_word(reader, made)
@@ -62,7 +62,7 @@ def make_token(
     days: Annotated[int, Form(ge=1, le=366)] = 90,
     scopes: Annotated[tuple[str, ...], Form()] = (),
 ) -> Response:
-    """A new token; the form sent twice makes one."""
+    """Create a token. Sending the same form twice creates only one."""
     asked = TokenRequest(name, frozenset(scopes), days, secret_word(reader, word))
     own_credentials.make_token(context.service, reader.acting, asked)
     return RedirectResponse(f"/account?made={quote(word)}", 303)
@@ -70,25 +70,25 @@ def make_token(
 
 @router.post("/account/tokens/{token_id}/revoke")
 def revoke_token(reader: SignedIn, context: Context, token_id: RowName) -> Response:
-    """End one of one's tokens."""
+    """Revoke one of the reader's tokens."""
     own_credentials.end_credential(context.service, reader.acting, token_id)
     return RedirectResponse("/account", 303)
 
 
 @router.post("/account/sessions/{session_id}/end")
 def end_session(reader: SignedIn, context: Context, session_id: RowName) -> Response:
-    """End one of one's sessions."""
+    """End one of the reader's sessions."""
     own_credentials.end_credential(context.service, reader.acting, session_id)
     return RedirectResponse("/account", 303)
 
 
 @router.post("/account/end-others")
 def end_others(reader: SignedIn, context: Context) -> Response:
-    """End all one's links, sessions and tokens except this session."""
+    """End all links, sessions and tokens of the reader except this session."""
     own_credentials.end_other_credentials(context.service, reader.acting)
     return RedirectResponse("/account", 303)
 
 
 def course_path(course_id: int, role: Role) -> str:
-    """Where somebody's course begins."""
+    """Return the path of a course's first page for this role."""
     return f"/courses/{course_id}/batches" if role is Role.INSTRUCTOR else f"/courses/{course_id}/mine"

@@ -1,7 +1,7 @@
-"""Launches from learning platforms: their login, their word of who comes, and the keys that they know us by.
+"""LTI launches from learning platforms: login, launch, and this installation's public keys.
 
-Platforms post here from their own pages, so no form's word is asked for: a launch counts by its state, its nonce and
-the platform's signature.
+Platforms post from their own sites, so these routes check no CSRF token. The state, the nonce and the platform's
+signature protect a launch.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from service.web.pages.sign_in import inside, set_session
 from sim.errors import UsageError
 
 cross_site_router = APIRouter()
-#: Binds a launch to the browser that began it. Platforms post from their own site, so it has to go along from there.
+#: Binds a launch to the browser that started it. The cookie is also sent on the platform's cross-site request.
 _STATE_COOKIE = "robomark_launch"
 _LONGEST = 4000
 
@@ -29,7 +29,7 @@ Text = Annotated[str, Form(max_length=_LONGEST)]
 
 @cross_site_router.get("/lti/keys")
 def keys(context: Context) -> dict[str, Any]:
-    """The public halves of our keys."""
+    """Return the public keys of this installation."""
     return launches.list_keys(context.service)
 
 
@@ -43,7 +43,7 @@ def login_by_link(
     lti_message_hint: Annotated[str, Query(max_length=_LONGEST)] = "",
     client_id: Annotated[str, Query(max_length=_LONGEST)] = "",
 ) -> Response:
-    """Where a platform begins a launch."""
+    """Start a launch from a link."""
     return _begin(request, context, iss, login_hint, target_link_uri, lti_message_hint, client_id)
 
 
@@ -57,7 +57,7 @@ def login(
     lti_message_hint: Text = "",
     client_id: Text = "",
 ) -> Response:
-    """Where a platform begins a launch, by a form."""
+    """Start a launch from a form."""
     return _begin(request, context, iss, login_hint, target_link_uri, lti_message_hint, client_id)
 
 
@@ -70,7 +70,7 @@ def end_launch(
     error: Text = "",
     error_description: Text = "",
 ) -> Response:
-    """Where a platform's word of who comes arrives; whoever comes is signed in and led to their course."""
+    """Complete a launch: sign the user in and redirect to their course."""
     if error:
         raise UsageError(f"the platform refused the launch: {(error_description or error)[:200]}")
     began_here = request.cookies.get(_STATE_COOKIE, "")
@@ -94,7 +94,7 @@ def _begin(
     client_id: str,
 ) -> Response:
     start = context.settings.public_url or str(request.base_url).rstrip("/")
-    # Only a path of ours: whoever makes the link does not choose another site.
+    # Accept only local paths, so that the link's author cannot redirect to another site.
     path = inside(target.removeprefix(start)) if target.startswith(f"{start}/") else "/"
     try:
         begun = launches.begin(context.service, LaunchRequest(issuer, client_id, login_hint, message_hint, start, path))

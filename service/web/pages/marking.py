@@ -1,4 +1,4 @@
-"""The page on which instructors set marks by hand, excuse criteria and write comments, with its history."""
+"""The page where instructors adjust marks, excuse criteria and write comments, with the activity log."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from service.web.rendering import page
 router = APIRouter(prefix="/courses/{course_id}/grades/{job_id}/marking")
 Criterion = Annotated[str, Form(max_length=200)]
 Reason = Annotated[str, Form()]
-#: What was set by hand when the form was shown; 0 where nothing was.
+#: Number of the last adjustment when the form was shown; 0 if there was none.
 Seen = Annotated[int | None, Form(ge=0, le=HIGHEST_NUMBER)]
 
 
 @router.get("")
 def marking(request: Request, here: Instructing, context: Context, job_id: RowName) -> Response:
-    """The criteria of a grade with forms for each, the comments, and the history."""
+    """Show the criteria of a grade with their forms, the comments and the activity log."""
     found = grades.show_marking(context.service, here.acting, here.course_id, job_id)
     return page(
         request,
@@ -46,7 +46,7 @@ def set_marks(
     marks: Annotated[str, Form(max_length=20)] = "",
     seen: Seen = None,
 ) -> Response:
-    """Set the marks of a criterion, unless somebody else did since the form was shown."""
+    """Set the marks of a criterion. Fails if somebody else changed them since the form was shown."""
     asked = MarksRequest(criterion, marks, reason, seen)
     grades.set_marks(context.service, here.acting, here.course_id, job_id, asked)
     return _to_marking(here, job_id)
@@ -56,7 +56,7 @@ def set_marks(
 def excuse(
     here: Instructing, context: Context, job_id: RowName, criterion: Criterion, reason: Reason = "", seen: Seen = None
 ) -> Response:
-    """Let a criterion not count, unless somebody else changed it since the form was shown."""
+    """Excuse a criterion. Fails if somebody else changed it since the form was shown."""
     asked = MarksRequest(criterion, None, reason, seen)
     grades.set_marks(context.service, here.acting, here.course_id, job_id, asked)
     return _to_marking(here, job_id)
@@ -64,7 +64,7 @@ def excuse(
 
 @router.post("/withdraw")
 def withdraw(here: Instructing, context: Context, job_id: RowName, criterion: Criterion, seen: Seen = None) -> Response:
-    """Let the grader's marks of a criterion count again, unless somebody else changed them since the form was shown."""
+    """Restore the grader's marks of a criterion. Fails if somebody else changed them since the form was shown."""
     grades.withdraw(context.service, here.acting, here.course_id, job_id, criterion, seen)
     return _to_marking(here, job_id)
 

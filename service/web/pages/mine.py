@@ -1,6 +1,6 @@
-"""A student's own work in a course: what is open, what one assignment asks for, and submitting to it.
+"""A student's own work in a course: the open assignments, the task of one, and submitting to it.
 
-What came of a submission is ``own_submission.py``'s.
+``own_submission.py`` shows the results of a submission.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ from submissions.raw_files import SentFile
 
 router = APIRouter()
 
-#: Files that a form carries, and the texts that were typed in their place, in the order of the files asked for.
+#: The files of a form, and the texts typed instead of them, in the order of the requested files.
 Files = Annotated[tuple[UploadFile, ...], File()]
 Texts = Annotated[tuple[str, ...], Form()]
 
 
 @dataclass(frozen=True, slots=True)
 class _Refused:
-    """Why nothing was taken in, and what had been typed."""
+    """The reason why a submission was rejected, and the texts that the student typed."""
 
     sentence: str
     status: int
@@ -54,14 +54,14 @@ class _Refused:
 
 @router.get("/courses/{course_id}/mine")
 def mine(request: Request, here: Studying, context: Context) -> Response:
-    """What is open, and what was submitted."""
+    """Show the open assignments and the student's submissions."""
     lines = own_views.list_assignments(context.service, here.acting, here.course_id)
     return page(request, here.reader, "mine.html", here=here, lines=lines)
 
 
 @router.get("/courses/{course_id}/mine/{assignment}")
 def own_assignment(request: Request, here: Studying, context: Context, assignment: str) -> Response:
-    """What an assignment asks for, the form to submit to it, and earlier attempts."""
+    """Show an assignment's task, the form to submit to it, and earlier attempts."""
     return _shown(request, here, context, assignment, None)
 
 
@@ -76,7 +76,7 @@ def submit_own(
     texts: Texts = (),
     even_in_part: Annotated[bool, Form()] = False,
 ) -> Response:
-    """Take in what was chosen and typed, and go where it is waited for."""
+    """Submit the chosen files and typed texts, and redirect to the submission's page."""
     sheet = own_views.show_sheet(context.service, here.acting, here.course_id, assignment)
     try:
         asked = SendRequest(assignment, sent_files(sheet, files, texts), even_in_part)
@@ -98,14 +98,15 @@ def submit_own(
 
 @router.get("/courses/{course_id}/mine/{assignment}/given/{file}")
 def given_file(here: Studying, context: Context, assignment: str, file: str) -> Response:
-    """A file that the assignment gives its students."""
+    """Return a file that the assignment provides to students."""
     return attachment(own_views.show_given_file(context.service, here.acting, here.course_id, assignment, file), file)
 
 
 def sent_files(sheet: TaskSheet, files: Sequence[UploadFile], texts: Sequence[str]) -> list[SentFile]:
-    """What a form carried: the files chosen, and each text under the name of the file that it stands for.
+    """Return the submitted files of a form: the chosen files, and each typed text under the name of its file.
 
-    Raises UsageError where one was chosen and typed.
+    Raises:
+        UsageError: A file was both chosen and typed.
     """
     chosen = [SentFile(each.filename, each.file) for each in files if each.filename]
     typed = [
@@ -121,7 +122,7 @@ def sent_files(sheet: TaskSheet, files: Sequence[UploadFile], texts: Sequence[st
 
 
 def curve(attempts: Sequence[OwnSubmission]) -> list[tuple[float, float]]:
-    """How the marks moved, as points of a drawing of 100 by 24, from the first attempt to the newest."""
+    """Return the marks of all attempts, oldest first, as points in a drawing of 100 by 24 units."""
     shares = [
         float(each.marks / each.max_marks) for each in reversed(attempts) if each.marks is not None and each.max_marks
     ]

@@ -1,6 +1,6 @@
-"""What whoever runs the installation sees: lanes, workers, what could not be graded, courses, and learning platforms.
+"""The operator's pages: queues, workers, failed jobs, courses and instructors.
 
-Nothing of a grade is shown here.
+They show no contents of grades.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _TRYOUTS = translatable("tryouts: programs that are run and not marked")
 
 @router.get("/operator")
 def operation(request: Request, reader: Operating, context: Context) -> Response:
-    """How the service is: what waits, who works, what could not be graded."""
+    """Show the system status: queues, workers and failed jobs."""
     view = system.show(context.service, reader.acting)
     lanes = [
         (
@@ -59,7 +59,7 @@ def operation(request: Request, reader: Operating, context: Context) -> Response
 
 @router.post("/operator/retry")
 def retry(reader: Operating, context: Context, batch_id: SentRowName = "") -> Response:
-    """Queue again what could not be graded, of one batch or of all."""
+    """Requeue the failed jobs of one batch or of all batches."""
     batches.retry_dead(context.service, reader.acting, batch_id or None)
     return RedirectResponse("/operator", 303)
 
@@ -72,7 +72,7 @@ def courses(
     link: LinkWord = "",
     added: RowNumberAfter = 0,
 ) -> Response:
-    """The courses, a form for an instructor of one, and the link that was made for the newest."""
+    """Show the courses, a form to add an instructor, and the link of the newly added one."""
     actor, made = reader.acting, made_link(request, context, reader, link)
     listed = course_operations.list_courses(context.service, actor)
     elsewhere = people.show(context.service, actor, added).elsewhere if added else ()
@@ -88,7 +88,7 @@ def add_instructor(
     who: Annotated[str, Form(min_length=1, max_length=100)],
     name: Annotated[str, Form(max_length=200)] = "",
 ) -> Response:
-    """Make an instructor, and the course where there is none of that name; their link is shown to whoever made it."""
+    """Add an instructor, create the course if it does not exist, and show the operator a sign-in link."""
     word = new_word()
     asked = MemberRequest(course, who, name, word=secret_word(reader, word))
     member = course_operations.add_member(context.service, reader.acting, asked).member

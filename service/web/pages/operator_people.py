@@ -1,4 +1,4 @@
-"""One person, for operators: their courses, what they sign in with, and other persons to join them with."""
+"""One person for operators: courses, credentials, and joining with another person."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Id = Annotated[str, Query(max_length=200)]
 
 @router.get("")
 def find(request: Request, reader: Operating, context: Context, course: CourseName = "", who: Id = "") -> Response:
-    """A form that finds somebody by course and id."""
+    """Show a form that finds a person by course and id."""
     if not course or not who:
         return page(request, reader, "operator_people.html")
     found = people.find(context.service, reader.acting, course.strip(), who.strip())
@@ -38,7 +38,7 @@ def show(
     who: Id = "",
     ended: Annotated[int | None, Query(ge=0, le=1_000_000)] = None,
 ) -> Response:
-    """A person; with a course and an id also the other person whom these would be joined with."""
+    """Show a person. With a course and an id, also show the person to join them with."""
     actor = reader.acting
     view = people.show(context.service, actor, member_id)
     other = None
@@ -65,6 +65,6 @@ def join(
     other_id: SentRowNumber,
     from_platform: Annotated[bool, Form()] = False,
 ) -> Response:
-    """Make one person of two, whom the page has shown."""
+    """Join the two persons that the page shows."""
     people.join(context.service, reader.acting, JoinRequest(member_id, other_id, from_platform))
     return RedirectResponse(f"/operator/people/{member_id}", 303)

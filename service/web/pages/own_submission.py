@@ -1,6 +1,6 @@
-"""One submission of a student's own: where it is in the queue, its report as it comes, the attempts beside it.
+"""One of a student's own submissions: place in the queue, report, and other attempts.
 
-A second look at it is asked for elsewhere; what of a grade is shown is ``reports/view.py``'s.
+``appeals.py`` contains the page for appeals. ``reports/view.py`` decides which parts of a grade are shown.
 """
 
 from __future__ import annotations
@@ -21,7 +21,10 @@ router = APIRouter()
 
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}")
 def own_submission(request: Request, here: Studying, context: Context, submission_id: RowNumber) -> Response:
-    """How far it is, or its report; htmx is given how far it is alone, and told to load the page when that is over."""
+    """Show the progress or the report of a submission.
+
+    Requests from htmx get only the progress, or an instruction to reload the page when grading has ended.
+    """
     asked = (context.service, here.acting, here.course_id, submission_id)
     if wants_part(request):
         part = own_views.show_submission(*asked)
@@ -48,6 +51,6 @@ def own_submission(request: Request, here: Studying, context: Context, submissio
 
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}/files")
 def own_files(here: Studying, context: Context, submission_id: RowNumber) -> Response:
-    """What was submitted, as a .zip that can be submitted again."""
+    """Return the submitted files as a zip that can be submitted again."""
     found = own_views.show_files(context.service, here.acting, here.course_id, submission_id)
     return attachment(found.data, found.name, "application/zip")

@@ -1,6 +1,6 @@
-"""Who is in a course, for its instructors: students let in, links that sign them in, and what they are allowed beyond.
+"""A course's people for its instructors: enrolling students, sign-in links and extensions.
 
-Instructors are made by whoever runs the installation.
+Operators add instructors.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def list_people(
     enrolled: Annotated[int, Query(ge=0, le=1_000_000)] = 0,
     removed: Annotated[str, Query(max_length=_LONGEST)] = "",
 ) -> Response:
-    """Everybody in the course, and ways to let more in."""
+    """Show everybody in the course, and forms to enrol students."""
     return _list(request, here, context, text=q, number=number, enrolled=enrolled, removed=removed)
 
 
@@ -60,7 +60,7 @@ def add(
     name: Annotated[str, Form(max_length=_LONGEST)] = "",
     email: Annotated[str, Form(max_length=_LONGEST)] = "",
 ) -> Response:
-    """Enrol one student; whoever is there stays as they are."""
+    """Enrol one student. An existing student stays unchanged."""
     try:
         enrolment_id = people.enrol_new(context.service, here.acting, here.course_id, Student(who, name, email))
     except Conflict as error:
@@ -71,7 +71,7 @@ def add(
 @router.post("/table")
 @takes_upload(LARGEST_TABLE, Role.INSTRUCTOR)
 def add_table(request: Request, here: Instructing, context: Context, file: Annotated[UploadFile, File()]) -> Response:
-    """Enrol all students of a table."""
+    """Enrol all students of an uploaded table."""
     with tempfile.TemporaryDirectory(prefix="robomark-people-") as folder:
         path = Path(folder) / file_name(SentFile(file.filename or "people.csv", file.file))
         with path.open("xb") as sink:
@@ -86,7 +86,7 @@ def add_table(request: Request, here: Instructing, context: Context, file: Annot
 
 @router.get("/table")
 def to_list(here: Instructing) -> Response:
-    """Nothing but the way back, for whoever comes to the address that takes tables."""
+    """Redirect to the list, for readers who open the upload address in the browser."""
     return RedirectResponse(f"/courses/{here.course_id}/people", 303)
 
 
@@ -97,7 +97,7 @@ def links(
     context: Context,
     days: Annotated[int, Form(ge=1, le=sign_in_links.MOST_DAYS)] = sign_in_links.DAYS,
 ) -> Response:
-    """A table with a new link for each student, for whoever sends them on."""
+    """Return a table with a new sign-in link for each student, to be sent to them."""
     made = sign_in_links.make_links(context.service, here.acting, here.course_id, days)
     rows = [["id", "name", "email", "link", "expires", "reason"]]
     for each in made:
@@ -111,7 +111,7 @@ def links(
 def show(
     request: Request, here: Instructing, context: Context, enrolment_id: RowNumber, link: LinkWord = ""
 ) -> Response:
-    """One student: what they submitted, what they are allowed, and a link that was made for them."""
+    """Show a student's submissions and extensions, and a newly created sign-in link."""
     view = people_views.show_student(context.service, here.acting, here.course_id, enrolment_id)
     made = made_link(request, context, here.reader, link)
     return page(
@@ -133,13 +133,13 @@ def show(
 
 @router.get("/{enrolment_id}/link")
 def to_student(here: Instructing, enrolment_id: RowNumber) -> Response:
-    """Nothing but the way back, for whoever comes to the address that makes links."""
+    """Redirect to the student's page, for readers who open the address that creates links."""
     return RedirectResponse(f"/courses/{here.course_id}/people/{enrolment_id}", 303)
 
 
 @router.post("/{enrolment_id}/link")
 def link(here: Instructing, context: Context, enrolment_id: RowNumber) -> Response:
-    """A new link that signs the student in once, which the student's page shows to whoever made it."""
+    """Create a sign-in link for a student. The student's page shows it to its creator."""
     word, actor = new_word(), here.acting
     made_of = secret_word(here.reader, word)
     sign_in_links.make_students_link(context.service, actor, here.course_id, enrolment_id, word=made_of)
@@ -148,7 +148,7 @@ def link(here: Instructing, context: Context, enrolment_id: RowNumber) -> Respon
 
 @router.post("/{enrolment_id}/remove")
 def remove(here: Instructing, context: Context, enrolment_id: RowNumber) -> Response:
-    """Take a student out of the course who has submitted nothing."""
+    """Remove a student who has submitted nothing from the course."""
     who = people.remove(context.service, here.acting, here.course_id, enrolment_id)
     return RedirectResponse(f"/courses/{here.course_id}/people?{urlencode({'removed': who[:_LONGEST]})}", 303)
 
@@ -162,7 +162,7 @@ def extend(
     due: Annotated[str, Form(max_length=40)] = "",
     more_attempts: Annotated[int, Form(ge=0, le=1000)] = 0,
 ) -> Response:
-    """Allow one student more time or attempts, in place of what they were allowed before for the same."""
+    """Give a student more time or attempts. This replaces an earlier extension for the same assignment."""
     asked = ExtensionRequest(assignment, written_moment(due), more_attempts)
     policies.extend(context.service, here.acting, here.course_id, enrolment_id, asked)
     return RedirectResponse(f"/courses/{here.course_id}/people/{enrolment_id}", 303)

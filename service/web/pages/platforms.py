@@ -1,4 +1,4 @@
-"""Learning platforms: registered by whoever runs the installation; members fetched and marks sent by instructors."""
+"""Learning platforms. Operators register them; instructors fetch members and send marks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Registered = Annotated[str, Form(min_length=1, max_length=operations.LONGEST_REG
 
 @router.get("/operator/platforms")
 def platforms(request: Request, reader: Operating, context: Context) -> Response:
-    """What is registered, what a platform's administrator has to be told, and a form for another."""
+    """Show the registered platforms, the values for a platform's administrator, and a form to register one."""
     registered = operations.list_platforms(context.service, reader.acting)
     start = context.settings.public_url or str(request.base_url).rstrip("/")
     return page(request, reader, "platforms.html", platforms=registered, start=start)
@@ -39,7 +39,7 @@ def register(
     keys_url: Address,
     service_origins: Annotated[str, Form(max_length=1000)] = "",
 ) -> Response:
-    """Register a platform, or change one of the same issuer and client."""
+    """Register a platform, or change the one with the same issuer and client id."""
     listed, origins = (each.replace(",", " ").split() for each in (deployments, service_origins))
     addresses = (authorization_url, token_url, keys_url)
     asked = Registration(name, issuer, client_id, tuple(listed), *addresses, tuple(origins))
@@ -49,13 +49,13 @@ def register(
 
 @router.get("/courses/{course_id}/platform")
 def course_platform(request: Request, here: Instructing, context: Context) -> Response:
-    """The platform that the course is launched from, and what can be fetched from it and sent to it."""
+    """Show the course's platform, with buttons to fetch members and send marks."""
     return _course_page(request, here, context, "")
 
 
 @router.post("/courses/{course_id}/platform/members")
 def fetch_members(request: Request, here: Instructing, context: Context) -> Response:
-    """Enrol everybody whom the platform has in the course."""
+    """Enrol all members of the course on the platform."""
     enrolled = operations.enrol_members(context.service, here.acting, here.course_id)
     told = f"{enrolled.members} of the platform's members are in the course."
     refused = enrolled.refused

@@ -1,4 +1,4 @@
-"""Signing in by a personal link or a token, and out."""
+"""Signing in with a personal link or a token, signing out, and choosing the language."""
 
 from __future__ import annotations
 
@@ -24,16 +24,19 @@ _SIGNED_IN = translatable("This link does not count, or not any more; but you ar
 
 @router.get("/sign-in")
 def sign_in_page(request: Request, reader: MaybeReader, target: Annotated[str, Query(alias="next")] = "/") -> Response:
-    """Where a link or a token is asked for."""
+    """Show the form for a sign-in link or a token."""
     return page(request, reader, "sign_in.html", target=inside(target), refused="")
 
 
 @router.get("/sign-in/{link}")
 def link_page(request: Request, reader: MaybeReader, context: Context, link: str) -> Response:
-    """Where a personal link leads; it counts only when the button is pressed, for mail programs look into links."""
+    """Show the button that signs in with a personal link.
+
+    Opening the page does not use up the link, because mail programs open links to check them.
+    """
     owner = operations.show_link(context.service, link)
     if owner is None:
-        # Only what fails is counted: a right link counts, however many wrong ones came from the same address.
+        # Count only failures: a valid link always works, even after many failures from the same address.
         context.limits.failed_sign_ins.spend(_address(request))
         refused = _REFUSED if reader is None else _SIGNED_IN
         return page(request, reader, "sign_in.html", status_code=410, target="/", refused=refused)
@@ -48,8 +51,8 @@ def sign_in(
     secret: Annotated[str, Form(max_length=200)],
     target: Annotated[str, Form(alias="next")] = "/",
 ) -> Response:
-    """Exchange a link's secret, or a token, for a session of this browser."""
-    # A whole link may have been pasted.
+    """Exchange a link's secret or a token for a session of this browser."""
+    # Users may paste the whole link.
     secret = secret.strip().rstrip("/").rpartition("/")[2]
     started = operations.sign_in(context.service, None if reader is None else reader.acting, secret)
     if started is None:
@@ -73,7 +76,7 @@ def sign_out(reader: SignedIn, context: Context) -> Response:
 def choose_language(
     code: Annotated[str, Form(max_length=20)], context: Context, target: Annotated[str, Form(alias="next")] = "/"
 ) -> Response:
-    """Show the pages in this language from now on, in this browser."""
+    """Set the language of pages in this browser."""
     if code not in languages():
         raise HTTPException(422, translatable("There are no pages in this language."))
     answer = RedirectResponse(inside(target), 303)
@@ -84,7 +87,7 @@ def choose_language(
 
 
 def set_session(answer: Response, context: WebContext, started: NewSession) -> None:
-    """Sign a browser in with the answer, for as long as the session lasts."""
+    """Set the session cookie of the response, for the lifetime of the session."""
     seconds, secure = int(started.lifetime.total_seconds()), _secure(context)
     answer.set_cookie(
         SESSION_COOKIE, started.secret, max_age=seconds, path="/", httponly=True, samesite="lax", secure=secure
@@ -100,7 +103,10 @@ def _address(request: Request) -> str:
 
 
 def inside(target: str) -> str:
-    """Where to go after, if that is a path of ours; browsers take a backslash for a slash, and forget line ends."""
+    """Return the redirect target if it is a local path, otherwise ``/``.
+
+    Rejects backslashes and control characters, which browsers normalise.
+    """
     parts = urlsplit(target)
     is_ours = target.startswith("/") and not target.startswith("//") and not parts.netloc and not parts.scheme
     return target if is_ours and "\\" not in target and target.isprintable() else "/"

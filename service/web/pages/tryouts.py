@@ -1,4 +1,4 @@
-"""Trying a program without submitting it: the form, the wait, what it said, and its replay. It leaves no marks."""
+"""Test runs: the form, the progress, the output and the replay. A test run has no marks."""
 
 from __future__ import annotations
 
@@ -31,7 +31,10 @@ router = APIRouter()
 
 @router.get("/courses/{course_id}/mine/{assignment}/try")
 def newest_tryout(request: Request, here: Studying, context: Context, assignment: str) -> Response:
-    """What was tried last, with the program in the form to be changed; htmx is told to load it when it is through."""
+    """Show the newest test run, with its program in the form for the next one.
+
+    Requests from htmx get only the progress, or an instruction to reload the page when the run has ended.
+    """
     if not wants_part(request):
         return _shown(request, here, context, assignment)
     line = test_runs.find_newest(context.service, here.acting, here.course_id, assignment)
@@ -45,7 +48,7 @@ def newest_tryout(request: Request, here: Studying, context: Context, assignment
 def try_own(
     request: Request, here: Studying, context: Context, assignment: str, files: Files = (), texts: Texts = ()
 ) -> Response:
-    """Let what was chosen and typed be run."""
+    """Start a test run of the chosen files and typed texts."""
     sheet = own_views.show_sheet(context.service, here.acting, here.course_id, assignment)
     try:
         start_test_run(context, here.acting, here.course_id, assignment, sent_files(sheet, files, texts))
@@ -90,7 +93,10 @@ def _shown(
 
 
 def _texts(sheet: TaskSheet, tried: Submission) -> list[str]:
-    """What was tried, by the files that are asked for; empty for what is no text."""
+    """Return the texts of the test run's files, in the order of the requested files.
+
+    A missing file gives an empty text.
+    """
     parts = {PART_FILES["program"]: tried.program, PART_FILES["responder"]: tried.responder}
     found = []
     for name in sheet.asked:

@@ -1,5 +1,5 @@
 "use strict";
-// Buttons that copy what a field has; without this the field can be selected.
+// Copy buttons. Without JavaScript, users select the field's text themselves.
 for (const button of document.querySelectorAll("[data-copies]")) {
   const field = document.getElementById(button.dataset.copies);
   button.hidden = false;
@@ -13,12 +13,12 @@ for (const button of document.querySelectorAll("[data-copies]")) {
     button.textContent = button.dataset.copied;
   });
 }
-// The way back to a form keeps what was typed; without this the browser's own does.
+// Back buttons. They keep the typed text. Without JavaScript, the browser's own back button does the same.
 for (const back of document.querySelectorAll("[data-back]")) {
   back.hidden = history.length < 2;
   back.addEventListener("click", () => history.back());
 }
-// Files that are dropped on an upload's place become the ones of its field; without this the field itself works.
+// Drop zones: dropped files are set as the files of the zone's file field. Without JavaScript, the field itself works.
 for (const place of document.querySelectorAll(".drop")) {
   const field = place.querySelector("input[type=file]");
   for (const name of ["dragenter", "dragover"]) {
@@ -32,7 +32,7 @@ for (const place of document.querySelectorAll(".drop")) {
     field.dispatchEvent(new Event("change", { bubbles: true }));
   });
 }
-// Moments are in the zone of whoever reads, with the server's as their title; without this they stay in the server's.
+// Show times in the reader's time zone, with the server's time as tooltip. Without JavaScript, the server's time stays.
 function inOwnZone(part) {
   for (const shown of part.querySelectorAll("time[datetime]")) {
     const moment = new Date(shown.dateTime);
