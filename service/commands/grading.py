@@ -125,7 +125,7 @@ def _with_run(submission: Submission, run: str | None) -> Submission:
 def _on_channel(asked: Assignment, given: Mapping[str, object]) -> Assignment:
     """Return the assignment with the channel flags applied to every scenario.
 
-    The result has a version of its own, because its marks differ.
+    The result gets a different version, because its grades differ.
     """
     if not given:
         return asked

@@ -29,8 +29,7 @@ def operating() -> Iterator[tuple[Service, Actor]]:
 class _LateNotifier:
     """A notifier for the workers that loads the queue only when needed.
 
-    It notifies nobody if no broker is configured and no service runs in the home folder. Workers that start later find
-    the
+    It does nothing if no broker is configured and no service runs in the home folder. Workers that start later find the
     waiting jobs themselves.
     """
 

@@ -136,7 +136,7 @@ def _run_program(
 
 
 def _other_program(path: Path) -> ProgramFile:
-    """Read a program that runs in the first program's world. Any magic line of its own is ignored."""
+    """Read a program that runs in the first program's world. Its ``%%sim_magic`` line is ignored."""
     read = read_runnable(path)
     if not isinstance(read, ProgramFile):
         raise UsageError(f"--over {path.name} is a notebook, expected a robot program")
@@ -176,7 +176,7 @@ def _write(path: Path, data: bytes) -> None:
 
 
 def _show(recording: Recording) -> None:
-    """Print the messages of a run in order, and the outcome."""
+    """Print the output, speech and messages of a run in order, and the outcome."""
     for t, text in transcript(recording):
         tell(f"{t:8.2f} s  {readable(text, 400)}")
     for which, own in robots_of(recording):

@@ -32,7 +32,7 @@ def read_upload(
         people: Table of names and email addresses.
 
     Raises:
-        UsageError: The upload cannot be read at all.
+        UsageError: The upload cannot be read.
         HTTPException: 503 if another upload is being read.
     """
     asked = assignment_for(context.service, actor, course_id, assignment)

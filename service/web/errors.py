@@ -34,7 +34,7 @@ _OF_THE_ROUTER = {
     ),
 }
 _OURS = Sentence("Something went wrong here, not with you; it is written down. Try again in a minute.")
-#: HTTP status of each kind of error; all others give 422.
+#: HTTP status of each kind of UsageError; all others give 422.
 _STATUS: dict[type[UsageError], int] = {NotFound: 404, Forbidden: 403, Conflict: 409}
 _NO_DATABASE = Sentence("The database does not answer. Try again in a minute.")
 #: The change may be saved even if the database failed afterwards.

@@ -1,7 +1,7 @@
-"""Sign-in links that a user created for somebody else. They are shown to their creator until they are used or expire.
+"""Sign-in links that a user created for another user. The creator sees a link until it is used or expires.
 
-A link is derived from the creator's session and a word in the page's address. It is not stored, and nobody else can
-derive it from the address.
+A link is derived from the creator's session and a word in the page's address. It is not stored, and the address alone
+does not reveal it.
 """
 
 from __future__ import annotations

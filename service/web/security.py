@@ -62,7 +62,7 @@ class Guarded:
     def _answers_to(self, host: str, path: str) -> bool:
         if not path.startswith(_PROBES):
             return host in self._names
-        # DNS rebinding uses a name of the attacker's site. A browser cannot omit the Host header.
+        # In DNS rebinding, the browser sends the attacker's host name. It cannot omit the Host header.
         return not host or _is_address(host) or host in self._probe_names
 
     def _headed(self, send: Send) -> Send:

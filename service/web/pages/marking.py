@@ -16,7 +16,7 @@ from service.web.rendering import page
 router = APIRouter(prefix="/courses/{course_id}/grades/{job_id}/marking")
 Criterion = Annotated[str, Form(max_length=200)]
 Reason = Annotated[str, Form()]
-#: Number of the last adjustment when the form was shown; 0 if there was none.
+#: Id of the criterion's override when the form was shown; 0 if there was none.
 Seen = Annotated[int | None, Form(ge=0, le=HIGHEST_NUMBER)]
 
 
@@ -46,7 +46,7 @@ def set_marks(
     marks: Annotated[str, Form(max_length=20)] = "",
     seen: Seen = None,
 ) -> Response:
-    """Set the marks of a criterion. Fails if somebody else changed them since the form was shown."""
+    """Set the marks of a criterion. Fails if another person changed them since the form was shown."""
     asked = MarksRequest(criterion, marks, reason, seen)
     grades.set_marks(context.service, here.acting, here.course_id, job_id, asked)
     return _to_marking(here, job_id)
@@ -56,7 +56,7 @@ def set_marks(
 def excuse(
     here: Instructing, context: Context, job_id: RowName, criterion: Criterion, reason: Reason = "", seen: Seen = None
 ) -> Response:
-    """Excuse a criterion. Fails if somebody else changed it since the form was shown."""
+    """Excuse a criterion. Fails if another person changed it since the form was shown."""
     asked = MarksRequest(criterion, None, reason, seen)
     grades.set_marks(context.service, here.acting, here.course_id, job_id, asked)
     return _to_marking(here, job_id)
@@ -64,7 +64,7 @@ def excuse(
 
 @router.post("/withdraw")
 def withdraw(here: Instructing, context: Context, job_id: RowName, criterion: Criterion, seen: Seen = None) -> Response:
-    """Restore the grader's marks of a criterion. Fails if somebody else changed them since the form was shown."""
+    """Restore the grader's marks of a criterion. Fails if another person changed them since the form was shown."""
     grades.withdraw(context.service, here.acting, here.course_id, job_id, criterion, seen)
     return _to_marking(here, job_id)
 
