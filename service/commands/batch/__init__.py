@@ -1,1 +1,1 @@
-"""``robomark batch``: one module for each kind of command. ``app.py`` combines them."""
+"""``robomark batch``: one module for each kind of command. ``service/command_table.py`` lists them."""

@@ -86,7 +86,9 @@ def _read(worksheet: Path) -> str:
 def _is_for_files(chosen: Format, output: Path) -> bool:
     """Return whether to write one file for each submission into the folder ``output``.
 
-    This is the case if ``output`` is a folder, or if it does not exist and has no suffix.
+    The format must have a document for one grade. If it also has a table, ``output`` must be a folder, or must neither
+    exist
+    nor have a suffix.
     """
     if chosen.document is None:
         return False

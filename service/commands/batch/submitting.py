@@ -132,7 +132,10 @@ def _submit(service: Service, actor: Actor, asked: BatchToSubmit) -> SubmittedBa
 
 
 def _assignment(service: Service, actor: Actor, course_id: int, name: str | None) -> Assignment | None:
-    """Return the assignment: from a folder on this machine, from the course, or from the catalogue, in this order."""
+    """Return the assignment from a folder on this machine, the course or the catalogue, in this order.
+
+    Return None if no name is given.
+    """
     if name is None:
         return None
     if Path(name).exists() and name not in catalogue():

@@ -122,7 +122,7 @@ def sent_files(sheet: TaskSheet, files: Sequence[UploadFile], texts: Sequence[st
 
 
 def curve(attempts: Sequence[OwnSubmission]) -> list[tuple[float, float]]:
-    """Return the marks of all attempts, oldest first, as points in a drawing of 100 by 24 units."""
+    """Return the marks of the graded attempts, oldest first, as points in a drawing of 100 by 24 units."""
     shares = [
         float(each.marks / each.max_marks) for each in reversed(attempts) if each.marks is not None and each.max_marks
     ]
