@@ -1,6 +1,6 @@
 """A folder that Gradescope takes as its autograder: the two scripts that it runs, the assignment, and the secret.
 
-What the scripts print for Gradescope is ``robomark grade --format gradescope``'s.
+The scripts print the output of ``robomark grade --format gradescope``.
 """
 
 from __future__ import annotations

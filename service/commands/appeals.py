@@ -39,7 +39,7 @@ def answer(
     text: Annotated[str, typer.Argument(help="What the student reads.")],
     course: Course = DEFAULT_COURSE,
 ) -> None:
-    """Answer an appeal, which closes it."""
+    """Answer and close an appeal."""
     with operating() as (service, actor):
         appeals.answer(service, actor, courses.find(service, actor, course), number, text)
     document(appeal=number)

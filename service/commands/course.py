@@ -43,7 +43,7 @@ def policy(
     drop: Annotated[bool, typer.Option("--drop", help="Let it have nothing of its own: what holds for all.")] = False,
     course: InCourse = DEFAULT_COURSE,
 ) -> None:
-    """Set what holds from now on, in place of what held; without options show what holds."""
+    """Set the policy, which replaces the earlier one; without options, show it."""
     allowed = PolicyLimits(_due(due), late_days, attempts, cool_down * 60)
     if drop and allowed != PolicyLimits():
         raise UsageError("--drop takes away what was set, expected no other limits beside it")
@@ -63,9 +63,9 @@ def extend(
     more_attempts: Annotated[int, typer.Option(min=0, max=1000, help="Attempts beyond the policy's.")] = 0,
     course: InCourse = DEFAULT_COURSE,
 ) -> None:
-    """Allow one student more time or attempts, in place of what they were allowed before.
+    """Allow one student more time or attempts. Replaces an earlier extension.
 
-    Who has not submitted anything yet is enrolled first.
+    Students who have not submitted yet are enrolled first.
     """
     due_at = _due(due)
     with operating() as (service, actor):
@@ -84,7 +84,7 @@ def enrol(
     people: Annotated[Path, typer.Argument(help="A .csv with id, name, email; Moodle's grading worksheet is one.")],
     course: InCourse = DEFAULT_COURSE,
 ) -> None:
-    """Enrol students before they submit, or give those who have an id alone their names and addresses."""
+    """Enrol students before they submit, or add names and addresses to enrolled ids."""
     listed = students_of(read_people(people))
     with operating() as (service, actor):
         people_operations.enrol(service, actor, courses.find(service, actor, course), listed)
@@ -96,7 +96,7 @@ def prepare(
     assignment: Annotated[str, typer.Argument(help="An id of the catalogue, or a folder.")],
     course: InCourse = DEFAULT_COURSE,
 ) -> None:
-    """Put an assignment into a course, not yet open; again, to mark by what it says now."""
+    """Add an assignment to a course without opening it; run it again to use the current version."""
     # This import loads all kinds of criteria, which other commands do not need.
     from submissions.assignment.reader import find_assignment
 
@@ -114,7 +114,7 @@ def open_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
 
 
 def close_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
-    """Let nobody submit to an assignment on the web any more; what was submitted stays."""
+    """Stop web submissions to an assignment; existing submissions stay."""
     with operating() as (service, actor):
         made = assignments.close(service, actor, courses.find(service, actor, course), assignment)
     _tell_state(made)

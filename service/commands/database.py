@@ -27,14 +27,14 @@ def upgrade_tables() -> None:
 
 
 def backup_database(file: Annotated[Path, typer.Argument(help="The copy to make; it must not exist.")]) -> None:
-    """Copy the database while it is in use: a SQLite file that can be opened as it is, and is for you alone."""
+    """Back up the database while it is in use, to a SQLite file that only you can read."""
     size = database.back_up(load_settings(), file)
     document(file=file, bytes=size)
     tell(f"{file}: {size} bytes")
 
 
 def restore_database(file: Annotated[Path, typer.Argument(help="What db backup made.")]) -> None:
-    """Bring a backup into a database in which nothing was submitted yet, SQLite or PostgreSQL."""
+    """Restore a backup into a database without submissions, SQLite or PostgreSQL."""
     with operating() as (service, actor):
         where = database.restore(service, actor, file)
     document(database=where, file=file)
@@ -46,9 +46,9 @@ def purge_database(
     archive: Annotated[Path | None, typer.Option(help="Back the whole database up into this file first.")] = None,
     for_good: Annotated[bool, typer.Option("--for-good", help="Keep no copy.")] = False,
 ) -> None:
-    """Remove what was submitted before a date, with grades, recordings and students who have nothing left.
+    """Remove submissions before a date, with their grades and recordings, and students without other submissions.
 
-    Without --archive or --for-good it says how much would go.
+    Without --archive or --for-good, show how much would be removed.
     """
     try:
         earliest_kept = moment(before)

@@ -13,7 +13,7 @@ _ASSIGNMENT = "shape-recognition"
 def demo(
     output: Annotated[Path, typer.Option("-o", "--output", help="Where the reports go.")] = Path("robomark-demo"),
 ) -> None:
-    """Grade the example submissions of one assignment through a real worker, and say where the report is."""
+    """Grade the example submissions of one assignment through a real worker, and print the path of the report."""
     from service.commands.batch.submit import submit_and_wait
     from submissions.assignment.examples import examples
 

@@ -37,9 +37,9 @@ def grade(
         bool, typer.Option("--unsafe-no-sandbox", help="Let submissions do anything on this machine; for development.")
     ] = False,
 ) -> None:
-    """Grade submissions now; exit status 0 when all were graded, whatever the marks.
+    """Grade submissions now. Exit status 0 if all were graded, whatever the marks.
 
-    Several are one document in every format but text, also those that could not be graded, with the reason.
+    In every format except text, several submissions form one document, including failed ones with the reason.
     """
     from service.commands.grading import grade_all
 

@@ -35,7 +35,7 @@ def set_marks(
     reason: Reason,
     seen: Seen = None,
 ) -> None:
-    """Set the marks of a criterion in place of the grader's, for this submission and all its grades."""
+    """Set the marks of a criterion for this submission and all its grades. They replace the grader's marks."""
     from service.operations import batches, grades
 
     with operating() as (service, actor):
@@ -80,7 +80,7 @@ def comment(
 def uncomment(
     grade: GradeId, number: Annotated[int, typer.Argument(help="The comment's, as robomark mark history says.")]
 ) -> None:
-    """Withdraw a comment."""
+    """Remove a comment."""
     from service.operations import batches, grades
 
     with operating() as (service, actor):

@@ -27,7 +27,7 @@ def add(
         typer.Option("--service", help="Another address of its services; give it once for each."),
     ] = None,
 ) -> None:
-    """Register a learning platform, or change the one of the same issuer and client id."""
+    """Register a learning platform, or update the one with the same issuer and client id."""
     from service.operations import platforms
 
     origins = tuple(service_origins or ())

@@ -24,7 +24,7 @@ Who = Annotated[str, typer.Argument(help="The student's name, as submitted.")]
 def export_student(
     student: Who, output: Annotated[Path, typer.Option("-o", "--output", help="The zip to write.")]
 ) -> None:
-    """Write all there is of a student, as they may see it: who they are, what they submitted, and what came of it."""
+    """Export all data of a student that the student may see: identity, submissions and results."""
     from service.home import for_the_user
 
     with operating() as (service, actor):
@@ -43,9 +43,9 @@ def delete_student(
     student: Who,
     for_good: Annotated[bool, typer.Option("--for-good", help="Really; nothing of it comes back.")] = False,
 ) -> None:
-    """Remove all there is of a student: submissions, grades, recordings, and who they are.
+    """Delete all data of a student: submissions, grades, recordings and identity.
 
-    The audit keeps that it was done, without the name. Backups that were made before still have it.
+    The audit log keeps an entry without the name. Earlier backups still contain the data.
     """
     if not for_good:
         raise UsageError("this cannot be undone; say --for-good, after export-student if a copy is wanted")
@@ -61,9 +61,9 @@ def purge_course(
     archive: Annotated[Path | None, typer.Option(help="Back the whole database up into this file first.")] = None,
     for_good: Annotated[bool, typer.Option("--for-good", help="Keep no copy.")] = False,
 ) -> None:
-    """Remove what was submitted so long ago, with grades, recordings and students who have nothing left.
+    """Remove old submissions, with their grades and recordings, and students without other submissions.
 
-    Without --archive or --for-good it says how much would go.
+    Without --archive or --for-good, show how much would be removed.
     """
     if archive is not None and for_good:
         raise UsageError("--archive keeps a copy and --for-good keeps none; name one of them")

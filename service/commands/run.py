@@ -140,7 +140,7 @@ def run(
         bool, typer.Option("--unsafe-no-sandbox", help="Let programs do anything on this machine; for development.")
     ] = False,
 ) -> None:
-    """Run a robot program or a notebook in the simulator, set up by the flags of %sim_magic; print what is said."""
+    """Run a robot program or a notebook in the simulator, with the flags of %sim_magic, and print its output."""
     kept.check()
     from service.commands.running import run_file
 

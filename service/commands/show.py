@@ -46,7 +46,7 @@ def show(
         int | None, typer.Option(help="Which trial the film shows, as the replay numbers them; else its first.")
     ] = None,
 ) -> None:
-    """A grade that is stored: its marks and what they rest on."""
+    """Show a stored grade: its marks and the evidence for them."""
     if over is not None and output is None and replay is None:
         raise UsageError("--over lays trials over those of a replay; expected --replay or --output too")
     if trial is not None and film is None:

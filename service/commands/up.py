@@ -23,7 +23,7 @@ def up(
     host: Host = "127.0.0.1",
     port: Port = 8470,
 ) -> None:
-    """Bring up broker, workers and web server, and keep them up until Ctrl-C; jobs in flight then go back."""
+    """Start broker, workers and web server, and keep them running until Ctrl-C. Unfinished jobs return to the queue."""
     from service.commands.serving import bring_up
 
     bring_up(workers, host, port, serve=serve)

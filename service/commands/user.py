@@ -30,7 +30,7 @@ def add(
     operator: Annotated[bool, typer.Option("--operator", help="Lets them run the installation, too.")] = False,
     student: Annotated[bool, typer.Option("--student", help="Enrols a student and no instructor.")] = False,
 ) -> None:
-    """Add an instructor to a course, or a student, and print a link that signs them in once."""
+    """Add an instructor or a student to a course, and print a sign-in link, which works once."""
     if student and operator:
         raise UsageError("a student does not run the installation: say --student or --operator")
     role = Role.STUDENT if student else Role.INSTRUCTOR
@@ -46,7 +46,7 @@ def add(
 
 
 def link(who: Id, course: Course = DEFAULT_COURSE) -> None:
-    """Print a new link that signs somebody in once."""
+    """Print a new sign-in link, which works once."""
     with operating() as (service, actor):
         member, secret = sign_in_links.make_members_link(service, actor, course, who)
     _tell_link(service.settings, member.id, secret)
@@ -58,7 +58,7 @@ def links(
         int, typer.Option(min=1, max=sign_in_links.MOST_DAYS, help="The links expire after so many days.")
     ] = sign_in_links.DAYS,
 ) -> None:
-    """Print a new sign-in link for each student of a course, in place of earlier ones."""
+    """Print a new sign-in link for each student of a course. Earlier links expire."""
     with operating() as (service, actor):
         made = sign_in_links.make_links(service, actor, courses.find(service, actor, course), days)
     public = service.settings.public_url
@@ -94,7 +94,7 @@ def token(
     course: Course = DEFAULT_COURSE,
     days: Annotated[int, typer.Option(min=1, max=366, help="It ends after so many.")] = 90,
 ) -> None:
-    """Print a token for programs that counts in one course."""
+    """Print a token for programs, valid in one course."""
     from service.operations.scopes import SCOPES
 
     for scope in scopes:
@@ -124,7 +124,7 @@ def sign_out(
 
 
 def remove(who: Id, course: Course = DEFAULT_COURSE) -> None:
-    """Remove somebody from a course who has submitted nothing to it."""
+    """Remove a person without submissions from a course."""
     with operating() as (service, actor):
         member = people.find(service, actor, course, who)
         people.remove(service, actor, member.course_id, member.enrolment_id)
@@ -141,7 +141,7 @@ def join(
         bool, typer.Option("--from-platform", help="Also if a learning platform signs one of them in.")
     ] = False,
 ) -> None:
-    """Make one person of two in different courses, and sign both out."""
+    """Join the accounts of one person in different courses, and sign both out."""
     with operating() as (service, actor):
         member = people.find(service, actor, course, who)
         other = people.find(service, actor, of, same_as)

@@ -10,7 +10,7 @@ import typer
 def verify(
     grade: Annotated[str, typer.Argument(help="The grade's id, or the beginning of it.")],
 ) -> None:
-    """Run a stored grading again, every trial of it, and compare; exit status 3 if anything differs that must not."""
+    """Repeat every trial of a stored grading and compare. Exit status 3 if a result differs that must not."""
     from service.commands.verifying import verify_grade
 
     verify_grade(grade)

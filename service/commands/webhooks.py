@@ -30,7 +30,7 @@ def add(
     ],
     course: Course = DEFAULT_COURSE,
 ) -> None:
-    """Add a webhook to a course, and print the secret that its deliveries are signed with."""
+    """Add a webhook to a course, and print the secret that signs its deliveries."""
     from service.operations import webhooks
 
     chosen = _events(events)
@@ -62,7 +62,7 @@ def remove(
     webhook: Annotated[str, typer.Argument(help="The webhook's id, as robomark webhook list shows it.")],
     course: Course = DEFAULT_COURSE,
 ) -> None:
-    """Remove a webhook, with the deliveries that wait for it."""
+    """Remove a webhook and its pending deliveries."""
     from service.operations import webhooks
 
     with operating() as (service, actor):

@@ -14,7 +14,7 @@ def worker(
         bool, typer.Option("--unsafe-no-sandbox", help="Let submissions do anything on this machine; for development.")
     ] = False,
 ) -> None:
-    """Grade what is queued until told to stop; starts the bundled broker if no other is named and none runs."""
+    """Start a worker, which grades queued jobs. Starts the bundled broker if no other is configured or running."""
     from responders.sandbox import control_group
     from service.commands.unsafe import warn_of_no_sandbox
     from service.queue.broker import EmbeddedBroker

@@ -16,7 +16,7 @@ def check(
         bool, typer.Option("--write-expected", help="Note what examples got of which expected.toml says nothing yet.")
     ] = False,
 ) -> None:
-    """Find every mistake in an assignment's files, and grade its examples: do they get what they must?"""
+    """Find the mistakes in an assignment's files, grade its examples, and compare their marks as expected."""
     if everything == (assignment is not None):
         raise UsageError("name one assignment to check, or give --all for the whole catalogue")
     if everything and write_expected:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def show(assignment: Which) -> None:
-    """What an assignment asks for, and how it is marked."""
+    """Show the task of an assignment and its marking scheme."""
     from rich.text import Text
 
     from service.reports.readable import flowing, one_line, readable

@@ -20,7 +20,7 @@ def new(
         str | None, typer.Option(help="Begin with a copy of this assignment instead of the commented example.")
     ] = None,
 ) -> None:
-    """Make the folder of a new assignment, with a reference solution, ready to be changed."""
+    """Create the folder of a new assignment with a reference solution, as a template to edit."""
     from submissions.assignment.export import write_new
 
     with for_the_user():
@@ -36,7 +36,7 @@ def export(
         bool, typer.Option("--student", help="What students get: the task, the starter, the given files.")
     ] = False,
 ) -> None:
-    """Write an assignment out: whole, or with --student what students may see of it."""
+    """Export an assignment: all of it, or with --student the part that students may see."""
     from submissions.assignment.export import export_for_students, export_whole
 
     with for_the_user():
@@ -49,7 +49,7 @@ def autograder(
     assignment: Which,
     output: Annotated[Path, typer.Option("-o", "--output", help="The folder to make.")],
 ) -> None:
-    """Make the folder that Gradescope takes as an autograder; it has this installation's secret in it."""
+    """Create the folder of a Gradescope autograder. It contains this installation's secret."""
     from service.autograder import write_autograder
     from service.home_secret import secret_here
     from service.settings import load_settings

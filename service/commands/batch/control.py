@@ -26,7 +26,7 @@ def pause(batch: BatchId) -> None:
 
 
 def resume(batch: BatchId) -> None:
-    """Let a paused batch go on."""
+    """Resume a paused batch."""
     from service.operations import batches as operations
 
     with operating() as (service, actor):
@@ -55,7 +55,7 @@ def retry(
     batch: Annotated[str | None, typer.Argument(help="The batch's id, or the beginning of it.")] = None,
     every: Annotated[bool, typer.Option("--all", help="The dead of all batches.")] = False,
 ) -> None:
-    """Queue again what could not be graded."""
+    """Queue failed jobs again."""
     from service.operations import batches as operations
 
     if (batch is not None) == every:

@@ -25,9 +25,9 @@ def export(
         Path | None, typer.Option(help="Moodle's grading worksheet, which --format moodle-worksheet fills in.")
     ] = None,
 ) -> None:
-    """The marks of a batch for a spreadsheet, Moodle, Gradescope or a test page, or as JSON.
+    """Export the marks of a batch for a spreadsheet, Moodle, Gradescope or a test page, or as JSON.
 
-    Everybody has a row, also who was refused or has no grade yet, with the reason.
+    Every student has a row. Rejected submissions and those without a grade have the reason.
     """
     from service.commands.batch.exporting import export_batch
 

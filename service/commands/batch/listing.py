@@ -14,7 +14,7 @@ from service.commands.shown import document, show, table
 def list_batches(
     course: Annotated[str | None, typer.Option(help="Of this course only; else of all.")] = None,
 ) -> None:
-    """The newest batches."""
+    """List the newest batches."""
     from service.operations.batch_views import list_newest
 
     with operating() as (service, actor):

@@ -29,7 +29,7 @@ def show_overview(
         int, typer.Option("--pass", min=0, max=100, help="The pass mark, per cent of all marks.")
     ] = int(PASS_SHARE * 100),
 ) -> None:
-    """Marks and their distribution, criteria, causes, whom to look at, and who has not submitted."""
+    """Show marks and their distribution, criteria, causes, students who need attention, and missing submissions."""
     from service.operations import batch_views, batches
 
     with operating() as (service, actor):

@@ -27,7 +27,7 @@ def regrade(
     ] = None,
     wait: Annotated[bool, typer.Option("--wait", help="Wait for the new grades and show what they change.")] = False,
 ) -> None:
-    """Grade a batch again after its assignment or the grader changed; the old grades stand until you publish."""
+    """Grade a batch again after its assignment or the grader changed; the old grades stay valid until you publish."""
     # The queue loads slowly, and publishing does not need it.
     from service.commands.batch.awaited import NotifiedLater, awaited
     from service.operations import batches
@@ -66,7 +66,7 @@ def publish(
         bool, typer.Option("--anyway", help="Also where a criterion could not be judged: it gives no marks.")
     ] = False,
 ) -> None:
-    """Let the newest grades of a batch stand, and release them to the students."""
+    """Publish the newest grades of a batch: they replace older grades, and students see them."""
     from service.operations import batches
     from service.operations import regrades as operations
 
@@ -83,7 +83,7 @@ def publish_one(
         bool, typer.Option("--anyway", help="Also where a criterion could not be judged: it gives no marks.")
     ] = False,
 ) -> None:
-    """Let the newest grade of one submission stand, and release it to its student."""
+    """Publish the newest grade of one submission: it replaces older grades, and the student sees it."""
     from service.operations import batches
     from service.operations import regrades as operations
 
@@ -100,7 +100,7 @@ def regrade_one(
         str | None, typer.Option("-a", "--assignment", help="The changed assignment: its id or its folder.")
     ] = None,
 ) -> None:
-    """Grade the submission of one grade again; the old grade stands until you publish."""
+    """Grade the submission of one grade again; the old grade stays valid until you publish."""
     from service.operations import batches
     from service.operations import regrades as operations
 

@@ -19,9 +19,9 @@ def similar(
         Path | None, typer.Option("-o", "--output", help="A folder for a page with the evidence side by side.")
     ] = None,
 ) -> None:
-    """Whose submissions of a batch are alike, in what is written and in what their robots did; for staff only.
+    """List similar submissions of a batch, by their code and by their robots' behaviour; for staff only.
 
-    It is a reason to look and to ask, and proves nothing. No marks change, and no student is shown any of it.
+    Similarity is a reason to look closer, not a proof. It changes no marks, and students never see it.
     """
     from service.commands.batch.finding_similar import find_similar
 

@@ -30,14 +30,14 @@ def submit(
     ] = None,
     course: Annotated[str | None, typer.Option(help="The course, where there are several.")] = None,
 ) -> None:
-    """Queue a submission for each student; bad ones are named and stop no other.
+    """Queue a submission for each student. Invalid submissions are listed and do not affect the others.
 
-    Downloads of Moodle, Gradescope and nbgrader are taken as they are. A roster has the columns student (or id), file
+    Downloads from Moodle, Gradescope and nbgrader work unchanged. A roster has the columns student (or id), file
     and, where it has them, name, email, assignment; files lie below it. A student's newest submission replaces one
     that still waits, and the same one again changes nothing.
 
-    Exit status 0 when all were taken in (and, with --wait, graded), 2 when some were refused, 3 when some could
-    not be graded.
+    Exit status 0 if all were accepted (and, with --wait, graded), 2 if some were rejected, 3 if some could not be
+    graded.
     """
     if wait or output is not None:
         refused = submit_and_wait(

@@ -36,7 +36,7 @@ def compare(
     ],
     output: Output = None,
 ) -> None:
-    """What the cards of classifiers say, side by side: how often each is right, with the 95 % intervals."""
+    """Compare the cards of classifiers: the accuracy of each, with 95 % intervals."""
     with for_the_user():
         about = [card(name) for name in chosen]
         if len({each.classes for each in about}) > 1 or len(set(chosen)) < 2:

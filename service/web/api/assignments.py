@@ -89,7 +89,7 @@ class AssignmentShape(Shape):
 
 
 class AssignmentAsked(BaseModel):
-    """Which assignment of the catalogue to prepare."""
+    """The assignment of the catalogue to prepare."""
 
     assignment: str = Field(min_length=1, max_length=100, examples=["shape-recognition"])
 
@@ -155,7 +155,7 @@ class PreviewShape(Shape):
 
 
 class NamesAsked(BaseModel):
-    """Whether whoever marks sees whose work it is."""
+    """Whether names are visible during marking."""
 
     names_hidden: bool
 
@@ -177,13 +177,13 @@ def list_catalogue(
 
 @router.get("/courses/{course_id}/catalogue/{assignment}")
 def one_of_catalogue(_here: Reads, assignment: AssignmentId) -> AskedShape:
-    """What an assignment of the catalogue asks for, as a course would have it."""
+    """Return the task of an assignment of the catalogue, as a course would get it."""
     return AskedShape(**_asked(find_in_catalogue(assignment)))
 
 
 @router.get("/courses/{course_id}/assignments")
 def list_assignments(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[AssignmentShape]:
-    """What the course has prepared and opened, by id."""
+    """List the course's prepared and open assignments, by id."""
     place = place_after(after, str)
     found = assignment_views.list_prepared(context.service, here.acting, here.course_id)
     left = [AssignmentShape.model_validate(each) for each in found if place is None or each.assignment > place[0]]
@@ -205,9 +205,9 @@ def upload(
     sent: Uploaded,
     replace: Annotated[bool, Query(description="Also in place of another that students have been shown.")] = True,
 ) -> AssignmentShape:
-    """Take an assignment of one's own from a zip of its folder; its reference solution is graded as a preview.
+    """Upload an assignment as a zip of its folder; its reference solution is graded as a preview.
 
-    It takes the place of one of the same id. Without `replace`, 409 where students have been shown that one.
+    It replaces an assignment with the same id. Without `replace`, the answer is 409 if students have seen that one.
     """
     made = assignment_uploads.upload(context.service, here.acting, here.course_id, UploadRequest(sent, replace))
     return AssignmentShape.model_validate(made)
@@ -215,7 +215,7 @@ def upload(
 
 @router.get("/courses/{course_id}/assignments/{assignment}")
 def one_assignment(here: Reads, context: Context, assignment: AssignmentId) -> WholeAssignmentShape:
-    """What an assignment of the course asks for, and whether it is open."""
+    """Return the task of an assignment of the course, and whether it is open."""
     line, found = assignment_views.load(context.service, here.acting, here.course_id, assignment)
     return WholeAssignmentShape(
         **_asked(found),
@@ -241,7 +241,7 @@ def open_one(here: Manages, context: Context, assignment: AssignmentId) -> Assig
 
 @router.post("/courses/{course_id}/assignments/{assignment}/close")
 def close_one(here: Manages, context: Context, assignment: AssignmentId) -> AssignmentShape:
-    """Let nobody submit to it any more; what was submitted stays."""
+    """Close an assignment: no more submissions. Existing submissions stay."""
     changed = assignments.close(context.service, here.acting, here.course_id, assignment)
     return AssignmentShape.model_validate(changed)
 

@@ -43,7 +43,7 @@ class PaceShape(Shape):
 
 
 class CriterionStatisticsShape(Shape):
-    """What a class got of one criterion."""
+    """The results of a class for one criterion."""
 
     id: str
     title: str
@@ -52,14 +52,14 @@ class CriterionStatisticsShape(Shape):
 
 
 class CauseShape(Shape):
-    """What cost these students marks."""
+    """The cause of lost marks of these students."""
 
     sentence: str
     students: list[str]
 
 
 class StatisticsShape(Shape):
-    """What a class got for one assignment."""
+    """The results of a class for one assignment."""
 
     assignment: str
     n: int
@@ -107,7 +107,7 @@ class ForStaffShape(Shape):
 
 
 class TakenShape(Shape):
-    """What was taken in of an upload, and what was not."""
+    """The accepted and rejected submissions of an upload."""
 
     batch: str | None = Field(description="None where nothing was new.")
     queued: int
@@ -212,14 +212,14 @@ def batch_grades(
 
 @router.post("/courses/{course_id}/batches/{batch_id}/pause")
 def pause(here: Submits, context: Context, batch_id: RowName) -> ControlledShape:
-    """Begin no more of a batch; what runs goes on."""
+    """Pause a batch: start no more jobs. Running jobs continue."""
     done = operations.pause(context.service, here.acting, here.course_id, batch_id)
     return ControlledShape.model_validate(done)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/resume")
 def resume(here: Submits, context: Context, batch_id: RowName) -> ControlledShape:
-    """Let a paused batch go on."""
+    """Resume a paused batch."""
     done = operations.resume(context.service, here.acting, here.course_id, batch_id)
     return ControlledShape.model_validate(done)
 

@@ -58,13 +58,13 @@ def report(request: Request, here: Reads, context: Context, job_id: RowName) -> 
 
 @router.get("/courses/{course_id}/grades/{job_id}/replay", responses=REPLAY, response_class=Response)
 def replay(request: Request, here: Reads, context: Context, job_id: RowName) -> Response:
-    """What a replay of the grade's trials plays."""
+    """Return the data of a replay of the grade's trials."""
     return replay_answer(request, grade_views.show_replay(context.service, here.acting, here.course_id, job_id))
 
 
 @router.get("/courses/{course_id}/submissions/{submission_id}/files", responses=ZIP, response_class=Response)
 def files(here: Reads, context: Context, submission_id: RowNumber) -> Response:
-    """What was submitted, as a zip that can be submitted again."""
+    """Return the submitted files, as a zip that can be submitted again."""
     found = grade_views.show_files(context.service, here.acting, here.course_id, submission_id)
     return attachment(found.data, found.name, "application/zip")
 

@@ -39,7 +39,7 @@ GRADE = "/courses/{course_id}/grades/{job_id}"
 
 
 class OverrideShape(Shape):
-    """What holds in place of the grader's marks; null for marks excuses the criterion."""
+    """Marks that replace the grader's marks; null excuses the criterion."""
 
     id: int = Field(description="To be sent as `seen` with the next change, so that a change in between is noticed.")
     marks: float | None
@@ -61,7 +61,7 @@ class CriterionMarksShape(Shape):
 
 
 class CommentShape(Shape):
-    """What an instructor wrote to the student."""
+    """A comment of an instructor to the student."""
 
     id: int
     criterion: str = Field(description="Empty: for all of the submission.")
@@ -71,7 +71,7 @@ class CommentShape(Shape):
 
 
 class MarkingStepShape(Shape):
-    """One thing that somebody did by hand; empty is what does not apply."""
+    """One manual change of marks or comments. Fields that don't apply are empty."""
 
     at: datetime
     actor: str
@@ -121,7 +121,7 @@ class MarksAsked(BaseModel):
 
 
 class CommentAsked(BaseModel):
-    """What to write to the student."""
+    """The comment to the student."""
 
     criterion: str = Field("", max_length=200)
     text: str = Field(min_length=1, max_length=LONGEST_COMMENT, examples=["Well named!"])
@@ -200,7 +200,7 @@ def comment(here: Marks, context: Context, job_id: RowName, asked: CommentAsked)
 
 @router.delete(GRADE + "/comments/{comment_id}")
 def uncomment(here: Marks, context: Context, job_id: RowName, comment_id: RowNumber) -> MarkingShape:
-    """Show a comment to nobody any more."""
+    """Remove a comment."""
     changed = grades.withdraw_comment(context.service, here.acting, here.course_id, job_id, comment_id)
     return MarkingShape.model_validate(changed)
 
@@ -213,7 +213,7 @@ def list_appeals(
     limit: Limit = 100,
     after: After = "",
 ) -> Listed[AppealShape]:
-    """What students ask again: the open ones, the longest waiting first, or the newest answered ones."""
+    """List appeals: the open ones, oldest first, or the answered ones, newest first."""
     where = (context.service, here.acting, here.course_id)
     if answered:
         last = place_after(after, datetime, int)
@@ -234,7 +234,7 @@ def answer(here: Marks, context: Context, appeal_id: RowNumber, asked: TextAsked
 
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}/appeals")
 def own_appeals(here: StudentReads, context: Context, submission_id: RowNumber) -> Listed[AppealShape]:
-    """What the token's owner asked of a submission, and the answers, the newest first."""
+    """List the appeals of the token's owner for a submission, with answers, newest first."""
     return _own(context, here, submission_id)
 
 

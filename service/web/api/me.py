@@ -34,7 +34,7 @@ class MeShape(Shape):
 
 @router.get("/me")
 def me(caller: Called, context: Context) -> MeShape:
-    """Whose token this is, and what it may do."""
+    """Return the owner of the token, and its permissions."""
     identity = caller.identity
     return MeShape(
         name=identity.name,

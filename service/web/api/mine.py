@@ -117,7 +117,7 @@ class CriterionAskedShape(Shape):
 
 
 class TaskSheetShape(Shape):
-    """What an assignment asks of students; `more_marks` are for what is marked and not told."""
+    """The task of an assignment, for students; `more_marks` are the marks of hidden criteria."""
 
     id: str
     title: str
@@ -150,7 +150,7 @@ class TaskSheetShape(Shape):
 
 @router.get(PREFIX + "/assignments")
 def list_open(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[OpenShape]:
-    """What the course shows its students, by id."""
+    """List the assignments that the course shows to students, by id."""
     place = place_after(after, str)
     found = own_views.list_opened(
         context.service, here.acting, here.course_id, limit=limit + 1, after=place[0] if place else ""
@@ -172,7 +172,7 @@ def list_open(here: Reads, context: Context, limit: Limit = 50, after: After = "
 
 @router.get(PREFIX + "/assignments/{assignment}")
 def one_assignment(here: Reads, context: Context, assignment: AssignmentId) -> TaskSheetShape:
-    """What an assignment asks for, of those that were opened or that the token's owner has submitted to."""
+    """Return the task of an assignment that is open or has a submission of the token's owner."""
     sheet = own_views.show_sheet(context.service, here.acting, here.course_id, assignment)
     criteria = [CriterionAskedShape(title=title, marks=float(marks)) for title, marks in sheet.criteria]
     told = {field.name: getattr(sheet, field.name) for field in fields(sheet)}
@@ -200,7 +200,7 @@ def submit_one(
 
 @router.get(PREFIX + "/submissions")
 def list_submissions(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[SubmissionShape]:
-    """What the token's owner submitted in the course, the newest first."""
+    """List the submissions of the token's owner in the course, newest first."""
     place = place_after(after, int)
     found = own_views.list_submissions(
         context.service, here.acting, here.course_id, limit=limit + 1, before=place[0] if place else None
@@ -230,13 +230,13 @@ def report(request: Request, here: Reads, context: Context, submission_id: RowNu
 
 @router.get(PREFIX + "/submissions/{submission_id}/replay", responses=REPLAY, response_class=Response)
 def replay(request: Request, here: Reads, context: Context, submission_id: RowNumber) -> Response:
-    """What a replay plays of the trials that the student may see now."""
+    """Return the data of a replay of the trials that the student may see now."""
     return replay_answer(request, own_views.show_replay(context.service, here.acting, here.course_id, submission_id))
 
 
 @router.get(PREFIX + "/submissions/{submission_id}/files", responses=ZIP, response_class=Response)
 def files(here: Reads, context: Context, submission_id: RowNumber) -> Response:
-    """What was submitted, as a zip that can be submitted again."""
+    """Return the submitted files, as a zip that can be submitted again."""
     found = own_views.show_files(context.service, here.acting, here.course_id, submission_id)
     return attachment(found.data, found.name, "application/zip")
 

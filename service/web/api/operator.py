@@ -125,7 +125,7 @@ class DeadShape(Shape):
 
 
 class RetryAsked(BaseModel):
-    """Which dead jobs to queue again."""
+    """The dead jobs to queue again."""
 
     batch_id: str | None = Field(None, max_length=32, pattern="^[0-9a-z]+$", description="None: of all batches.")
 
@@ -142,7 +142,7 @@ class NamedCourseShape(Shape):
 
 
 class InstructorAsked(BaseModel):
-    """Somebody who is to instruct a course, which is made where there is none of the name."""
+    """A new instructor of a course. A missing course is created."""
 
     course: str = Field(min_length=1, max_length=100, pattern=r"\S", examples=["TM129"])
     id: str = Field(min_length=1, max_length=100, pattern=r"\S", examples=["grace"])
@@ -160,7 +160,7 @@ class SameIdShape(Shape):
 
 
 class NewInstructorShape(Shape):
-    """An instructor, and the link that signs them in; it is told this once."""
+    """An instructor, and their sign-in link, which is returned only once."""
 
     id: str
     course: int

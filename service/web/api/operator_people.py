@@ -23,7 +23,7 @@ Manages = Annotated[Caller, Depends(operating("manage"))]
 
 
 class PersonEnrolmentShape(Shape):
-    """What a person is in one course."""
+    """The role of a person in one course."""
 
     enrolment: int
     course: str
@@ -47,7 +47,7 @@ class PersonShape(Shape):
 
 
 class SignOutAsked(BaseModel):
-    """How to sign somebody out."""
+    """Options for signing a person out."""
 
     release: bool = Field(False, description="A student's next launch with this id may take this account.")
 

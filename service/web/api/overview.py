@@ -42,7 +42,7 @@ class ExpectedShape(Shape):
 
 
 class PreflightShape(Shape):
-    """What would be taken in of a zip, and what not and why."""
+    """The submissions of a zip that would be accepted or rejected, with reasons."""
 
     submissions: list[ExpectedShape]
     refusals: list[RefusalShape]
@@ -79,14 +79,14 @@ class OutlierShape(Shape):
 
 
 class MissingShape(Shape):
-    """Somebody in the course who has submitted nothing for the assignment."""
+    """A student of the course without a submission for the assignment."""
 
     id: str
     name: str
 
 
 class ClassShape(Shape):
-    """What came of a batch for one assignment."""
+    """The results of a batch for one assignment."""
 
     statistics: StatisticsShape
     distribution: list[BinShape]
@@ -97,7 +97,7 @@ class ClassShape(Shape):
 
 
 class OverviewShape(Shape):
-    """What came of a batch, by assignment; empty until something is graded."""
+    """The results of a batch, by assignment; empty until the first grade."""
 
     classes: list[ClassShape]
 
@@ -105,7 +105,7 @@ class OverviewShape(Shape):
 
 
 class PublicationShape(Shape):
-    """What publishing a batch would do now, and of how many students grades would be released."""
+    """The effect of publishing a batch now, with the number of students whose grades would be released."""
 
     counts: PublishedShape
     students: int
@@ -123,7 +123,7 @@ def look_first(
         str, Query(max_length=100, description="An assignment of the course or catalogue; else each names its own.")
     ] = "",
 ) -> PreflightShape:
-    """What would be taken in of a zip with a submission for each student; nothing is."""
+    """Check a zip with a submission for each student, without submitting it."""
     checked = read_upload(context, here.acting, here.course_id, upload, assignment)
     return PreflightShape(
         submissions=[
@@ -168,6 +168,6 @@ def show_overview(
 
 @router.get("/courses/{course_id}/batches/{batch_id}/publish")
 def would_publish(here: Reads, context: Context, batch_id: RowName) -> PublicationShape:
-    """What publishing the batch would do now; it does nothing."""
+    """Return the effect of publishing the batch now, without publishing it."""
     found = regrades.preview(context.service, here.acting, here.course_id, batch_id)
     return PublicationShape.model_validate(found)

@@ -35,7 +35,7 @@ Moment = Annotated[AwareDatetime, AfterValidator(_of_these_times)]
 
 
 class MemberShape(Shape):
-    """Somebody in a course."""
+    """A member of a course."""
 
     enrolment: int = Field(validation_alias="enrolment_id", description="What paths call them by.")
     id: str = Field(description="What the course knows them by.")
@@ -60,7 +60,7 @@ class GradingShape(Shape):
 
 
 class ExtensionShape(Shape):
-    """What a student is allowed beyond the policy."""
+    """An extension of the policy for one student."""
 
     assignment: str = Field(description="Empty: every one.")
     due_at: datetime | None
@@ -111,7 +111,7 @@ class EnrolledShape(Shape):
 
 
 class PolicyShape(Shape):
-    """What holds for an assignment, or with an empty one for all that have none of their own."""
+    """The policy of an assignment, or, with an empty assignment, the default policy of the course."""
 
     assignment: str = ""
     due_at: Moment | None = Field(None, description="Later it is late.")
@@ -129,7 +129,7 @@ class PolicyAsked(PolicyShape):
 
 
 class ExtensionAsked(BaseModel):
-    """What one student is allowed beyond the policy, in place of what they were allowed before."""
+    """An extension for one student, which replaces an earlier one."""
 
     assignment: str = Field("", max_length=100, description="Empty: every one.")
     due_at: Moment | None = Field(None, examples=["2026-12-07T17:00:00Z"])
@@ -137,7 +137,7 @@ class ExtensionAsked(BaseModel):
 
 
 class LimitsShape(Shape):
-    """What one student may do now."""
+    """The limits that apply to one student now."""
 
     due_at: datetime | None
     closed_at: datetime | None = Field(description="After this moment a submission is over the limit.")
@@ -184,7 +184,7 @@ def limits(
     enrolment_id: RowNumber,
     assignment: Annotated[str, Path(min_length=1, max_length=100)],
 ) -> LimitsShape:
-    """What one student may do for an assignment: the policy, and what they are allowed beyond it."""
+    """Return the limits of one student for an assignment: the policy with the student's extension."""
     found = policies.show_limits(context.service, here.acting, here.course_id, enrolment_id, assignment)
     return LimitsShape.model_validate(found)
 
@@ -218,7 +218,7 @@ def set_policy(here: Manages, context: Context, asked: PolicyAsked) -> PolicySha
 def drop_policy(
     here: Manages, context: Context, assignment: Annotated[str, Query(min_length=1, max_length=100)]
 ) -> None:
-    """Let an assignment have what holds for all, in place of a policy of its own."""
+    """Remove the policy of an assignment; the course's default policy applies."""
     policies.drop_policy(context.service, here.acting, here.course_id, assignment)
 
 

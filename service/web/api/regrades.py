@@ -37,7 +37,7 @@ Published = Annotated[bool, Query(description="Only grades that are published.")
 
 
 class RegradeAsked(BaseModel):
-    """What to grade a batch again by."""
+    """Options for grading a batch again."""
 
     assignment: str = Field(
         "",
@@ -128,7 +128,7 @@ class PublishedShape(Shape):
 
 @router.post("/courses/{course_id}/batches/{batch_id}/regrades", status_code=201)
 def regrade(here: Marks, context: Context, batch_id: RowName, asked: RegradeAsked | None = None) -> RegradedShape:
-    """Grade a batch again; the old grades stand until somebody publishes."""
+    """Grade a batch again; the old grades stay valid until you publish."""
     name = "" if asked is None else asked.assignment
     made = operations.regrade_batch(context.service, here.acting, here.course_id, batch_id, name)
     return RegradedShape.model_validate(made)
@@ -138,7 +138,7 @@ def regrade(here: Marks, context: Context, batch_id: RowName, asked: RegradeAske
 def changes(
     here: Reads, context: Context, batch_id: RowName, limit: Limit = 50, after: After = ""
 ) -> Listed[ChangeShape]:
-    """What a batch of regrades changes, by student; nothing for a batch that is none."""
+    """List the changes of a batch of regrades, by student; empty for other batches."""
     place = place_after(after, str)
     found = operations.list_changes(context.service, here.acting, here.course_id, batch_id)
     ids = [each.job_id for each in found]
@@ -165,7 +165,7 @@ def publish_one(here: Marks, context: Context, job_id: RowName, asked: PublishAs
 
 @router.post("/courses/{course_id}/grades/{job_id}/regrades", status_code=201)
 def regrade_one(here: Marks, context: Context, job_id: RowName, asked: RegradeAsked | None = None) -> RegradedOneShape:
-    """Grade this submission again; the old grade stands until somebody publishes."""
+    """Grade this submission again; the old grade stays valid until you publish."""
     name = "" if asked is None else asked.assignment
     return RegradedOneShape(job=operations.regrade_one(context.service, here.acting, here.course_id, job_id, name))
 

@@ -59,7 +59,7 @@ class CourseShape(Shape):
 
 
 class RefusalShape(Shape):
-    """What was not taken in of a batch, and why."""
+    """A rejected submission of a batch, and the reason."""
 
     source: str = Field(description="The name that it came under.")
     sentence: str

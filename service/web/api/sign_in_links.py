@@ -23,7 +23,7 @@ _WHERE = "Where ROBOMARK_PUBLIC_URL says how browsers reach the server."
 
 
 class LinkShape(Shape):
-    """A link that signs somebody in once; it is told this once."""
+    """A sign-in link, which works once and is returned only once."""
 
     path: str
     url: str | None = Field(description=_WHERE)
@@ -81,7 +81,7 @@ def links(here: Manages, context: Context, asked: LinksAsked | None = None) -> S
 
 @router.post("/courses/{course_id}/people/{enrolment_id}/link", status_code=201, openapi_extra=dict(NO_KEY))
 def link(here: Manages, context: Context, enrolment_id: RowNumber) -> LinkShape:
-    """A new link that signs a student of the course in; instructors have theirs from whoever runs it all."""
+    """Create a sign-in link for a student of the course. Instructors get theirs from an operator."""
     secret = sign_in_links.make_students_link(context.service, here.acting, here.course_id, enrolment_id)
     return link_shape(context, secret)
 

@@ -39,7 +39,7 @@ class AlikeSourcesShape(Shape):
 
 
 class TrialNameShape(Shape):
-    """Which trial it is, of those of a scenario."""
+    """The trial, by scenario and number."""
 
     scenario: str
     index: int
@@ -65,7 +65,7 @@ class SimilarPairShape(Shape):
 
 
 class SimilarityShape(Shape):
-    """What is alike for one assignment, the most similar pair first."""
+    """The similar submissions of one assignment, the most similar pair first."""
 
     assignment: str
     students: int
@@ -77,7 +77,7 @@ class SimilarityShape(Shape):
 
 
 class SimilaritiesShape(Shape):
-    """What is alike, by assignment."""
+    """The similar submissions, by assignment."""
 
     assignments: list[SimilarityShape]
 

@@ -75,7 +75,7 @@ def one_tryout(here: Reads, context: Context, tryout_id: RowName) -> TryoutShape
 
 @router.get(PREFIX + "/{tryout_id}/replay", responses=REPLAY, response_class=Response)
 def replay(request: Request, here: Reads, context: Context, tryout_id: RowName) -> Response:
-    """What a replay of it plays; 404 until there is something."""
+    """Return the data of a replay of the test run; 404 until it is available."""
     kept = test_runs.show_replay(context.service, here.acting, here.course_id, tryout_id)
     return tagged(request, zlib.decompress(kept), "application/json")
 

@@ -23,7 +23,7 @@ Manages = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "manage")
 
 
 class WebhookShape(Shape):
-    """Where somebody is told of what happens."""
+    """A webhook: an address that receives events."""
 
     id: str
     url: str
@@ -53,7 +53,7 @@ class NewWebhookShape(WebhookShape):
 
 
 class WebhookAsked(BaseModel):
-    """Where to tell what."""
+    """The address and events of a new webhook."""
 
     url: str = Field(max_length=webhooks.LONGEST_URL, examples=["https://hooks.example.org/robomark"])
     events: list[WebhookEvent] = Field(min_length=1, max_length=20)
@@ -92,7 +92,7 @@ def list_webhooks(here: Manages, context: Context) -> Listed[WebhookShape]:
 
 @router.post("/courses/{course_id}/webhooks", status_code=201, openapi_extra=dict(NO_KEY))
 def create(here: Manages, context: Context, asked: WebhookAsked) -> NewWebhookShape:
-    """Be told at this address. Its secret is told this once, so the request is not answered again by its key."""
+    """Create a webhook. Its secret is returned only once, so the request is not repeated by its key."""
     line, secret = webhooks.create(context.service, here.acting, here.course_id, asked.url, asked.events)
     return NewWebhookShape(**WebhookShape.model_validate(line).model_dump(), secret=secret)
 
@@ -105,7 +105,7 @@ def revoke(here: Manages, context: Context, webhook_id: RowName) -> None:
 
 @router.get("/courses/{course_id}/deliveries")
 def list_deliveries(here: Manages, context: Context, limit: Limit = 50, after: After = "") -> Listed[DeliveryShape]:
-    """What was told to the course's webhooks lately, or is to be, the newest first."""
+    """List recent and pending deliveries to the course's webhooks, newest first."""
     place = place_after(after, datetime, str)
     after_that = (place[0], place[1]) if place else None
     found = webhooks.list_deliveries(context.service, here.acting, here.course_id, limit + 1, after_that)
