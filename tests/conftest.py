@@ -1,4 +1,4 @@
-"""What every test may use: one warm runner and one home a test process."""
+"""Fixtures for every test: one warm runner and one home per test process."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from service.grading.trial_runner import TrialRunner
 from service.settings import Settings
 from service.store.engine import Store
 
-# Two cores are shared with whatever else runs: how long an example takes says nothing. And one checkout has one answer;
-# what has not been tried yet is for whoever searches.
+# No deadline: other processes share the two cores, so the duration of an example means nothing. Examples are
+# derandomized, so that a checkout always gives the same result. The profile "search" looks for new ones.
 _PATIENT = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("robomark", _PATIENT, derandomize=True)
 settings.register_profile("search", _PATIENT, max_examples=1000)
 settings.load_profile("robomark")
 
-# To find thousands of tests throws little away, and to look through them again and again is a third of what it costs.
+# Collecting tests creates little garbage, but garbage collection takes a third of the collection time.
 gc.disable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What takes longest begins first: begun last, all would wait for it while a processor is idle."""
+    """Start the longest tests first. If they started last, one processor would be idle while all wait for them."""
     items.sort(key=lambda item: item.get_closest_marker("longest") is None)
 
 
 def pytest_collection_finish() -> None:
-    """Garbage is looked for in what tests make, where much of it is to be had, and no longer among the tests."""
+    """Enable garbage collection for the objects that tests create, but not for the collected tests themselves."""
     gc.freeze()
     gc.set_threshold(10_000)
     gc.enable()
@@ -41,9 +41,9 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def _own_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Commands that tests run keep nothing in the home of whoever runs the tests, and do not go by their settings.
+    """Keep commands under test away from the user's home and settings.
 
-    A worker of theirs has one process to grade with: each loads for seconds, and few have much to grade.
+    Their workers have one process for grading, because each process takes seconds to load and has little to grade.
     """
     with pytest.MonkeyPatch.context() as patched:
         for name in [name for name in os.environ if name.startswith("ROBOMARK_")]:
@@ -67,7 +67,7 @@ def postgresql() -> Iterator[str]:
 
 @pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.long)])
 def service_settings(request: pytest.FixtureRequest, tmp_path: Path) -> Settings:
-    """Settings with an empty database of each kind."""
+    """Return settings with an empty database, for each kind of database."""
     if request.param == "sqlite":
         return settings_in(tmp_path)
     return settings_in(tmp_path, database_url=fresh_database(request.getfixturevalue("postgresql")))
@@ -75,6 +75,6 @@ def service_settings(request: pytest.FixtureRequest, tmp_path: Path) -> Settings
 
 @pytest.fixture
 def store(service_settings: Settings) -> Iterator[Store]:
-    """The tables in an empty database of each kind."""
+    """Return the tables in an empty database, for each kind of database."""
     with opened(service_settings) as empty:
         yield empty

@@ -1,4 +1,4 @@
-"""Every request that the document of the API shows is one that there is, and its signature is the one that is sent."""
+"""Every request in the API documentation matches a route, and the documented signature is the one that is sent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What CONTRIBUTING.md shows can be added so: each example is applied to a copy of the tree and tried there."""
+"""The examples in CONTRIBUTING.md work: each one is applied to a copy of the tree and tested there."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ROOMS = ("sim", "models", "responders", "submissions", "service")
 DIFFS = dict(
     re.findall(r"^### An? ([a-z, ]+):.*?\n```diff\n(.*?)```", (ROOT / "CONTRIBUTING.md").read_text(), re.M | re.S)
 )
-#: What holds in the tree that has it, by what is added.
+#: Assertions that hold after each addition.
 TRIED = {
     "criterion": """
 from service.grading.judging.judge import judge_one
@@ -107,7 +107,7 @@ os.environ["ROBOMARK_WEBHOOK_SECONDS"] = "2.5"
 assert load_settings().webhook_seconds == 2.5
 """,
 }
-#: The migration of the example, and the one before it; the tree may have more of them.
+#: The migration of the example and the one before it. The tree may have newer ones.
 _NEXT, _NEWEST = "0018", "0017"
 
 
@@ -140,6 +140,6 @@ def test_an_example_can_be_added_so(added: str, tmp_path: Path) -> None:
 
 
 def _renumbered(diff: str) -> str:
-    """The diff with its migration after the newest one of the tree."""
+    """Return the diff with its migration after the newest one in the tree."""
     newest = newest_revision()
     return diff.replace(_NEXT, f"{int(newest) + 1:04d}").replace(_NEWEST, newest)

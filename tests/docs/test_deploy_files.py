@@ -1,4 +1,4 @@
-"""The files in deploy/ name only what there is: settings, commands and their options, programs, volumes and secrets."""
+"""The files in deploy/ use existing names only: settings, commands, options, programs, volumes and secrets."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SETTINGS = {f"ROBOMARK_{each.name.upper()}" for each in fields(Settings)}
 
 
 def _containers() -> Iterator[tuple[str, dict[str, Any], dict[str, Any]]]:
-    """Name, pod and container of everything that the manifests run."""
+    """Yield name, pod and container of everything that the manifests run."""
     for manifest in MANIFESTS:
         if manifest["kind"] == "Deployment":
             pod = manifest["spec"]["template"]["spec"]
@@ -38,7 +38,7 @@ def _containers() -> Iterator[tuple[str, dict[str, Any], dict[str, Any]]]:
 
 
 def _commands() -> Iterator[list[str]]:
-    """Every command of ours."""
+    """Yield every robomark command."""
     (command,) = re.findall(r"^CMD (\[.*\])$", (DEPLOY / "Dockerfile").read_text(), re.MULTILINE)
     yield yaml.safe_load(command)
     yield from (each["command"] for each in COMPOSE["services"].values() if each["image"] == "robomark")
@@ -59,7 +59,7 @@ def test_every_variable_is_a_setting(file: Path) -> None:
 def test_every_command_is_one_with_these_options() -> None:
     for command in sorted({tuple(words) for words in _commands()}):
         assert command[0] == "robomark"
-        # It is read to the end before the help is shown.
+        # Options are all parsed before the help is shown.
         shown = robomark(*command[1:], "--help")
         assert shown.returncode == 0, (command, shown.stderr)
         assert f"robomark {command[1]}" in shown.stdout
@@ -93,9 +93,9 @@ def test_what_compose_names_is_there() -> None:
         assert set(service.get("depends_on", {})) <= services.keys(), name
         volumes = {volume.partition(":")[0] for volume in service.get("volumes", ())}
         assert volumes <= COMPOSE["volumes"].keys(), name
-        # The image of Robomark has a check, for what serves pages.
+        # The Robomark image has a health check for containers that serve pages.
         assert "healthcheck" in service or service["command"][:2] == ["robomark", "serve"], name
-    # Student code runs in workers: they reach no other network.
+    # Workers run student code, so they reach no other network.
     assert services["worker"]["networks"] == ["inside"]
     assert COMPOSE["networks"]["inside"]["internal"] is True
 
@@ -118,7 +118,7 @@ def test_what_the_manifests_name_is_there() -> None:
 @pytest.mark.parametrize("unit", UNITS, ids=lambda unit: unit.name)
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="this machine has no systemd")
 def test_systemd_takes_every_unit(unit: Path, tmp_path: Path) -> None:
-    # The program and its user are there only where Robomark is installed so.
+    # The program and its user exist only where Robomark is installed this way.
     text = unit.read_text().replace("/opt/robomark/bin/robomark", sys.executable).replace("User=robomark\n", "")
     file = tmp_path / unit.name.replace("@.", "@1.")
     file.write_text(text)

@@ -1,4 +1,4 @@
-"""What the documents show works: every command is run, and every list is complete."""
+"""The documentation is correct: every command runs, and every list is complete."""
 
 from __future__ import annotations
 
@@ -45,12 +45,12 @@ DOCUMENTS = sorted((ROOT / "docs").glob("*.md"))
 SECTIONS = dict(
     re.findall(r"^### (\w+)\n(.*?)(?=^##|\Z)", (ROOT / "docs" / "criteria.md").read_text(), re.DOTALL | re.MULTILINE)
 )
-#: Kinds whose settings are explained with another kind.
+#: Kinds with settings that are documented under another kind.
 SHARES = dict.fromkeys(("says", "messages", "replies", "resends", "in_reach"), ("prints",))
 
 
 def commands(document: Path) -> Iterator[list[str]]:
-    """The robomark commands in the console blocks of a document."""
+    """Yield the robomark commands in the console blocks of a document."""
     for block in re.findall(r"```console\n(.*?)```", document.read_text(), re.DOTALL):
         for line in block.splitlines():
             words = shlex.split(line.removeprefix("$ "), comments=True)
@@ -59,7 +59,7 @@ def commands(document: Path) -> Iterator[list[str]]:
 
 
 def files_shown(document: Path) -> list[tuple[str, str]]:
-    """The files that are to be copied from a document: a name, then what is in it."""
+    """Return the files in a document that readers copy: name and content."""
     return re.findall(r"^`(\w+\.py)`:\n\n```python\n(.*?)```", document.read_text(), re.DOTALL | re.MULTILINE)
 
 
@@ -98,10 +98,10 @@ def test_every_command_shown_runs(document: Path, tmp_path: Path) -> None:
 
 
 def _download_from_moodle(folder: Path) -> None:
-    """One student's folder in a zip, and the worksheet that goes with it."""
+    """Write one student's folder in a zip, and the matching worksheet."""
     with zipfile.ZipFile(folder / "CS101-Robots.zip", "w") as archive:
         for file in EXAMPLE.iterdir():
-            # Not the very same as in the folder: that would be nothing new.
+            # Different from the file in the folder, which would not count as new.
             archive.writestr(f"Ada Lovelace_500000_assignsubmission_file_/{file.name}", file.read_bytes() + b"\n# 2\n")
     (folder / "people.csv").write_text("id,name,email\nada,Ada Lovelace,ada@example.org\n")
     (folder / "Grades-CS101.csv").write_text(

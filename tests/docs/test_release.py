@@ -1,4 +1,4 @@
-"""A release is refused until everything is as it should be, and a dry run leaves nothing but the built files."""
+"""A release is refused until all conditions are met, and a dry run leaves only the built files."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _git(folder: Path, *words: str) -> str:
 
 @pytest.fixture
 def tree(tmp_path: Path) -> Path:
-    """A checkout of a small distribution that can be released."""
+    """Return a checkout of a small distribution that can be released."""
     folder = tmp_path / "tree"
     (folder / "robomark").mkdir(parents=True)
     (folder / "robomark" / "__init__.py").write_text('"""Grades."""\n')

@@ -1,4 +1,4 @@
-"""What holds of the tests themselves."""
+"""Rules for the tests themselves."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from naming import is_named
 from paths import TESTS
 from service.store.ids import ALPHABET
 
-#: Of so few letters a text is now and then in an id, a secret or a hash by chance.
+#: A text of so few letters occasionally occurs in an id, a secret or a hash by chance.
 _BY_CHANCE = re.compile(rf"[{ALPHABET}]{{1,4}}")
-#: Without ids and secrets: the same grade is read and written there each time.
+#: Folders of tests without ids and secrets: they use the same grade each time.
 _WITHOUT_IDS = {"grading", "reports"}
 _WITH_IDS = sorted(file for file in (TESTS / "service").rglob("*.py") if file.parent.name not in _WITHOUT_IDS)
 
 
 @pytest.mark.parametrize("file", _WITH_IDS, ids=lambda file: file.stem)
 def test_no_random_id_can_break_a_test(file: Path) -> None:
-    """That a short text is not in an answer is asked by ``naming.is_named``, which ids do not answer by chance."""
+    """Tests that a short text is absent must use ``naming.is_named``, which random ids cannot match by chance."""
     found = [
         f"{file.name}:{node.lineno}: {node.left.value!r} not in {ast.unparse(node.comparators[0])}"
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))

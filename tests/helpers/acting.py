@@ -1,4 +1,4 @@
-"""Operations on a store as an operator of its machine does them, without workers to notify."""
+"""Operations on a store, called as an operator on the server calls them, without workers to notify."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from submissions.assignment.definition import Assignment
 
 @dataclass(frozen=True, slots=True)
 class Notices:
-    """Keeps what workers would be notified of: the queue and how many jobs."""
+    """Records the notifications meant for workers: the queue and the number of jobs."""
 
     sent: list[tuple[str, int]] = field(default_factory=list)
 

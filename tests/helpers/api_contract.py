@@ -1,6 +1,6 @@
-"""What programs rely on in the API: what each route takes and gives, without the words of its description.
+"""The part of the API that programs rely on: the parameters and results of each route, without descriptions.
 
-``python tests/helpers/api_contract.py`` records the contract of the code as it is, for the next release.
+Run ``python tests/helpers/api_contract.py`` to record the contract of the current code for the next release.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from typing import Any
 from paths import DATA
 
 RECORDED = DATA / "api_contract.json"
-#: From a place in a request or an answer to its types, and ``?`` where it may be left out.
+#: Maps a place in a request or response to its types. A ``?`` marks an optional value.
 Shape = Mapping[str, str]
 Contract = Mapping[str, Mapping[str, Shape]]
 _METHODS = ("get", "post", "put", "patch", "delete")
-#: What the operations of a route have in common.
+#: Keys that all operations of a route share.
 _ERRORS = {"400", "401", "403", "404", "409", "413", "415", "422", "429", "503"}
 
 
 def contract_of(description: Mapping[str, Any]) -> Contract:
-    """The contract that an OpenAPI description makes."""
+    """Return the contract for an OpenAPI description."""
     schemas = description.get("components", {}).get("schemas", {})
     return {
         f"{method.upper()} {path}": {
@@ -37,7 +37,7 @@ def contract_of(description: Mapping[str, Any]) -> Contract:
 
 
 def breaking_changes(before: Contract, now: Contract) -> list[str]:
-    """What a program that was written for the one contract cannot rely on any more."""
+    """Return the parts of contract ``before`` that a program can no longer rely on in contract ``now``."""
     found = [f"{route} is gone" for route in before if route not in now]
     for route in before.keys() & now.keys():
         found += [f"{route} {change}" for change in _stricter(before[route]["takes"], now[route]["takes"])]
@@ -97,7 +97,7 @@ def _given(operation: Mapping[str, Any], schemas: Mapping[str, Any]) -> Iterator
 def _places(
     schema: Mapping[str, Any], schemas: Mapping[str, Any], where: str, optional: str, inside: tuple[str, ...] = ()
 ) -> Iterator[tuple[str, str]]:
-    """Each value below a schema, by where it is; what holds itself is followed once."""
+    """Yield each value below a schema with its place. A recursive schema is followed once."""
     if "$ref" in schema:
         name = schema["$ref"].rpartition("/")[2]
         if name not in inside:
@@ -131,7 +131,7 @@ def _kind(schema: Mapping[str, Any], schemas: Mapping[str, Any]) -> str:
 
 
 def current() -> Contract:
-    """The contract of the code as it is."""
+    """Return the contract of the current code."""
     from web import web_in
 
     with tempfile.TemporaryDirectory() as folder, web_in(Path(folder)) as web:

@@ -1,4 +1,4 @@
-"""``robomark`` run in a home of its own, at a terminal so wide that no table is broken."""
+"""``robomark`` in a separate home, at a terminal so wide that no table is wrapped."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Ended:
 
 
 def robomark(home: Path, *arguments: str | Path, **environment: Any) -> Ended:
-    """Run the command with its home in ``home``; a traceback is never an answer."""
+    """Run the command with its home in ``home``. Fails on a traceback."""
     ended = command.robomark(*arguments, ROBOMARK_HOME=str(home), **{"COLUMNS": "200", **environment})
     assert "Traceback" not in ended.stderr
     return Ended(ended.returncode, ended.stdout, ended.stderr)

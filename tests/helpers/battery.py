@@ -1,6 +1,6 @@
-"""Runs attacks inside a child, against decoys made for each: files, a process and servers that nobody needs.
+"""Runs attacks inside a child, against decoys made for each attack: files, a process and servers.
 
-What an attack says of itself is one half of the evidence; the decoys, looked at afterwards from outside, the other.
+The evidence has two parts: the attack's own report, and an inspection of the decoys from outside afterwards.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from sim.recording import TICK, Verdict
 GROUPS = (files, file_changes, metadata, processes, signals, programs, network, kernel, memory)
 LIMITS = ChildLimits(4.0, 256 << 20)
 
-#: The settings in which an attack must get through, by what stops it: otherwise its test would prove nothing.
+#: The settings in which an attack must succeed, by the layer that stops it. Otherwise its test would prove nothing.
 GETS_THROUGH = {
     tools.LANDLOCK: frozenset({"none", "seccomp"}),
     tools.SECCOMP: frozenset({"none", "landlock", "landlock-1"}),
@@ -66,19 +66,19 @@ SETTINGS = {
     "seccomp": Isolation(landlock=0, doorkeeper=False, bubblewrap=False),
     "no-doorkeeper": Isolation(doorkeeper=False, bubblewrap=False),
 }
-#: An interpreter that every user can read, where the machine has one.
+#: An interpreter that every user can read, if the machine has one.
 SYSTEM_PYTHON = "/usr/bin/python3.11"
-#: In the worker's environment and memory while attacks run.
+#: A secret in the worker's environment and memory while attacks run.
 SECRET = "decoy-of-the-worker-51c9"
 SCHEMAS = {"robot": wire.ROBOT, "responder": wire.RESPONDER}
 _TOOLS = Path(tools.__file__).read_text()
 _NUMBERS = {name: number for number, name, _ in listed()}
 
-#: What is left in turn by the first half of an attack that remembers.
+#: The bits that the first half of a two-part attack leaves, in order.
 _BITS = (1, 0, 0, 1, 1, 0, 1, 0, 0, 0, 1, 1)
 _OLD = 1_500_000_000
 
-#: The first lines of the student's file: this file's ``tools`` under their own name, then the group and the attack.
+#: The first lines of the student's file: this module's ``tools`` under their usual name, then the group and the attack.
 _FRAME = """
 import sys, types
 def module(name, text):
@@ -98,13 +98,13 @@ def responder(text): return text
 
 @dataclass(frozen=True)
 class Attack:
-    """One attack: its group, its name, and which layer stops it."""
+    """An attack: its group, its name, and the layer that stops it."""
 
     group: str
     name: str
     stopped_by: str
     text: str = field(repr=False)
-    at_once: bool = False  # of one that remembers: whether its halves run at the same time
+    at_once: bool = False  # two-part attacks: whether both halves run together
 
     @property
     def id(self) -> str:
@@ -112,7 +112,7 @@ class Attack:
 
 
 def attacks() -> list[Attack]:
-    """All of them, in the order of their files."""
+    """Return all one-part attacks, in the order of their files."""
     return [
         Attack(group.__name__.rpartition(".")[2], name, value.stopped_by, Path(group.__file__ or "").read_text())
         for group in GROUPS
@@ -122,7 +122,7 @@ def attacks() -> list[Attack]:
 
 
 def memories() -> list[Attack]:
-    """Those in two halves, of which the first leaves a bit for the second."""
+    """Return the two-part attacks: the first half leaves a bit for the second."""
     text = Path(remembering.__file__).read_text()
     return [
         Attack("remembering", name, value.kept_by, text, value.at_once)
@@ -132,13 +132,13 @@ def memories() -> list[Attack]:
 
 
 class Victim:
-    """A process that sleeps with a secret; started again when something has happened to it."""
+    """A sleeping process with a secret. It is restarted after an attack has affected it."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
 
     def fresh(self) -> subprocess.Popen[bytes]:
-        """It, alive and as it was made."""
+        """Return the process, alive and unchanged."""
         process = self._process
         if process is not None and process.poll() is None and os.getpriority(os.PRIO_PROCESS, process.pid) == 0:
             return process
@@ -159,7 +159,7 @@ class Victim:
 
 
 class Decoys:
-    """A folder with secrets, a process, and servers: all that attacks are aimed at."""
+    """The targets of attacks: a folder with secrets, a process, and servers."""
 
     def __init__(self, home: Path, victim: Victim) -> None:
         self.folder = Path(tempfile.mkdtemp(prefix="secrets-", dir=home))
@@ -198,7 +198,7 @@ class Decoys:
         }
 
     def harm(self) -> list[str]:
-        """What has changed since they were made, as sentences."""
+        """Return the changes since the decoys were made, as sentences."""
         found = [f"{name} is now {after}" for name, after in self._look().items() if self._before[name] != after]
         return found + [f"{server.getsockname()!r} was reached" for server in self._servers if _reached(server)]
 
@@ -223,7 +223,7 @@ class Decoys:
 
 
 def readable_tree(folder: Path) -> Path:
-    """Package folders like the own ones, with more files, folders and links in them, and links beside them."""
+    """Create copies of our package folders with additional files, folders and links in them, and links beside them."""
     folder.chmod(0o755)
     here = Path(manager.__file__).parents[2]
     for name in ("sim/brick", "responders/kit"):
@@ -244,7 +244,7 @@ def readable_tree(folder: Path) -> Path:
 
 
 def unread(folder: Path) -> None:
-    """As if nobody had looked at what is in a readable tree, and memory were needed for something else."""
+    """Reset a readable tree: no recorded accesses, and no pages in memory."""
     for path in (*folder.glob("*/*/more/*"), *folder.glob("links/*")):
         os.utime(path, (_OLD, _OLD), follow_symlinks=False)
         if path.name.startswith("pages"):
@@ -253,7 +253,7 @@ def unread(folder: Path) -> None:
 
 
 def attack_text(attack: Attack, targets: dict[str, Any]) -> str:
-    """A student's file that runs an attack and prints what came of it."""
+    """Return a student's file that runs an attack and prints its result."""
     return _text(f"tools.report(group.{attack.name})", attack, targets)
 
 
@@ -262,12 +262,12 @@ def _text(line: str, attack: Attack, targets: dict[str, Any]) -> str:
 
 
 def scrambled(*secrets: str) -> list[str]:
-    """Secrets in a form that does not hold them, for an attack that looks for them."""
+    """Return the secrets in scrambled form, for an attack that searches for them."""
     return [bytes(byte ^ 0x5A for byte in secret.encode()).hex() for secret in secrets]
 
 
 def run(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any]) -> str:
-    """What came of an attack in a folder of its own: ``LEAK ...``, or how it was blocked."""
+    """Run an attack in a new folder and return its result: ``LEAK ...``, or how it was blocked."""
     with sandboxes.private_folder() as folder:
         said, stop = run_text(sandboxes, role, attack_text(attack, targets), folder)
     leaks = [line for line in said if line.startswith("LEAK")]
@@ -281,7 +281,7 @@ def run(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any
 
 
 def remembered(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any]) -> str:
-    """What came of an attack in two halves: ``LEAK ...`` if the second could tell all bits that the first left."""
+    """Run a two-part attack and return its result: ``LEAK ...`` if the second half read all the bits of the first."""
     found: list[int] = []
     for turn, bit in enumerate(_BITS):
         told = _one_bit(sandboxes, role, attack, targets | {"since": time.time()}, turn, bit)
@@ -294,7 +294,7 @@ def remembered(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[s
 
 
 def _one_bit(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any], turn: int, bit: int) -> str:
-    """What the second half said, or the first if it came to nothing."""
+    """Return the output of the second half, or that of the first half if it failed."""
     leave, find = (
         f"tools.tell(lambda: group.{call})" for call in (f"{attack.name}({turn}, {bit})", f"{attack.name}.find({turn})")
     )
@@ -314,7 +314,7 @@ def _one_bit(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str
 
 
 def run_text(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> tuple[list[str], ChildStopped | None]:
-    """Run a student's file; the texts it printed, and how it was stopped if it was."""
+    """Run a student's file; return the texts it printed, and how it was stopped, if it was."""
     with _running(sandboxes, role, text, folder) as child:
         return _heard(child, role)
 
@@ -338,7 +338,7 @@ def _running(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> Itera
 
 
 def _heard(child: ServedChild, role: Role, until: str | None = None) -> tuple[list[str], ChildStopped | None]:
-    """What a child prints, to its end or to a text that begins with ``until``."""
+    """Return the texts that a child prints, up to its end or to a text that begins with ``until``."""
     said: list[str] = []
     try:
         while True:
@@ -367,7 +367,7 @@ def decoys(home: Path, victim: Victim) -> Iterator[Decoys]:
 
 
 def _without_powers() -> None:
-    """As weak as the child, so that only the sandbox keeps the one from the other."""
+    """Drop all privileges, as in the child, so that only the sandbox separates the two."""
     lockdown.forbid_new_privileges()
     lockdown.drop_capabilities()
 

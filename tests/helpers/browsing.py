@@ -1,4 +1,4 @@
-"""Chromium without a screen, which opens pages from files and tells what went wrong in them."""
+"""Headless Chromium that opens pages from files and reports their errors."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ DESKTOP: dict[str, Any] = {"viewport": {"width": 1280, "height": 900}}
 
 @contextmanager
 def chromium() -> Iterator[Browser]:
-    """The machine's browser; a test that needs it is skipped where there is none."""
+    """Yield the machine's browser. Tests that need it are skipped if there is none."""
     found = next((path for name in _NAMES if (path := shutil.which(name))), None)
     if found is None:
         pytest.skip("there is no Chromium here")
-    # Root has no sandbox of Chromium's; the pages are our own.
+    # Chromium's own sandbox does not work for root; the pages are our own.
     flags = ["--no-sandbox"] if os.geteuid() == 0 else []
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=found, args=flags)
@@ -35,7 +35,7 @@ def chromium() -> Iterator[Browser]:
 
 @dataclass(frozen=True, slots=True)
 class OpenPage:
-    """A page, what it asked of the network, and what it complained of."""
+    """A page, its network requests and its error messages."""
 
     page: Page
     asked: list[str] = field(default_factory=list)
@@ -44,7 +44,7 @@ class OpenPage:
 
 @contextmanager
 def opened(browser: Browser, file: Path, after: str = "", **context: Any) -> Iterator[OpenPage]:
-    """The page in a file, without a network, when its replay is ready."""
+    """Open the page in a file, without a network, and wait until its replay is ready."""
     within = browser.new_context(**context)
     within.set_offline(True)
     found = OpenPage(within.new_page())
@@ -65,13 +65,13 @@ def opened(browser: Browser, file: Path, after: str = "", **context: Any) -> Ite
 
 
 def follow(link: Locator) -> None:
-    """Click, and wait until the page that it leads to is there: `click` itself returns while the old one still goes."""
+    """Click a link and wait until its target has loaded; `click` itself returns while the old page is still active."""
     with link.page.expect_navigation():
         link.click()
 
 
 def assert_in_order(page: Page) -> None:
-    """No fault that axe finds, and nothing has to be pushed sideways."""
+    """Check that axe finds no fault, and that the page needs no horizontal scrolling."""
     found = Axe().run(page).response["violations"]
     assert not found, (page.url, [(each["id"], [node["html"][:200] for node in each["nodes"]]) for each in found])
     assert page.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth"), page.url

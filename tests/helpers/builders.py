@@ -1,4 +1,4 @@
-"""What tests of the store and the queue start from: a database of their own, submissions, grades made alike."""
+"""Fixtures for tests of the store and the queue: a database for each test, submissions, and uniform grades."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PROGRAM = "from ev3dev2.sound import Sound\nprint('hello')\n"
 
 
 def settings_in(folder: Path, **changes: Any) -> Settings:
-    """Settings with their home in ``folder``, and waits short enough for a test."""
+    """Return settings with their home in ``folder``, and waiting times short enough for a test."""
     values: dict[str, Any] = {
         "home": folder,
         "lease_seconds": 5.0,
@@ -46,7 +46,7 @@ def settings_in(folder: Path, **changes: Any) -> Settings:
 
 @contextmanager
 def opened(settings: Settings) -> Iterator[Store]:
-    """The tables in a database of these settings; an empty one is copied where the migrations would make the same."""
+    """Open a database with these settings. An empty one gets a copy of migrated tables, without running migrations."""
     file = settings.home / "robomark.db"
     if settings.database == f"sqlite:///{file}" and not file.exists():
         settings.home.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -58,16 +58,16 @@ def opened(settings: Settings) -> Iterator[Store]:
 
 
 def upgraded_by_newer_release(store: Store, oldest_compatible: str) -> None:
-    """Mark the tables as those of a newer release, which code from ``oldest_compatible`` on can use."""
+    """Mark the tables as those of a newer release that is compatible with code from ``oldest_compatible`` on."""
     with store.transaction() as session:
         session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
         session.execute(update(SchemaCompatibility).values(oldest_compatible=oldest_compatible))
 
 
 def asked_already(home: Path) -> Path:
-    """A home in which workers begin at once: that this build grades rightly here stands there as if it had been asked.
+    """Prepare a home where workers start at once: the self-test of this build is recorded there as passed.
 
-    That it is asked where it does not is for the tests of the self-test, of ``up`` and of ``batch submit``.
+    The self-test itself is covered by its own tests and by those of ``up`` and ``batch submit``.
     """
     run = home / "run"
     run.mkdir(mode=0o700, parents=True)
@@ -77,7 +77,7 @@ def asked_already(home: Path) -> Path:
 
 @cache
 def _migrated() -> tuple[bytes, bytes]:
-    """What the migrations make of nothing, and the secret in it."""
+    """Return a freshly migrated database and the secret in it."""
     with TemporaryDirectory() as folder:
         settings = settings_in(Path(folder))
         with open_store(settings) as store:
@@ -92,7 +92,7 @@ def echo() -> Assignment:
 def grading_request(
     student: str = "ada", program: str = PROGRAM, assignment: Assignment | None = None
 ) -> GradingRequest:
-    """A small submission for the echo assignment."""
+    """Return a small submission for the echo assignment."""
     responder = Code("responder.py", "def responder(msg):\n    return msg\n")
     submission = Submission(student, Code("robot.py", program), responder)
     return GradingRequest(submission, assignment or echo(), f"{student}.zip")
@@ -103,10 +103,10 @@ def accept_one(store: Store, student: str = "ada", *, lane: Lane = Lane.INTERACT
 
 
 def comparable(grade: Grade) -> tuple[Grade, list[bytes]]:
-    """A grade in two parts that can be compared: all but the recordings, and every bit of the recordings."""
+    """Split a grade into two comparable parts: everything but the recordings, and every bit of the recordings."""
     return replace(grade, trials=()), [_canonical(trial.recording) for trial in grade.trials]
 
 
 def _canonical(recording: Recording) -> bytes:
-    # A builder's 560 and a stored 560.0 are the same number written differently.
+    # A builder's 560 and a stored 560.0 are the same number, written differently.
     return recordings.to_bytes(recordings.from_bytes(recordings.to_bytes(recording)))

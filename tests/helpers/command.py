@@ -1,7 +1,7 @@
-"""Running the ``robomark`` command as a user does, each time in a process of its own.
+"""Runs the ``robomark`` command as a user does, in a separate process each time.
 
-Most are forked from one that has loaded what commands need, which would take each of them seconds; what is decided
-before that is tried in a process begun anew.
+Most processes are forked from one that has already loaded the modules, because loading takes seconds. Tests of the
+steps before loading start a new process.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 COMMAND = [sys.executable, "-c", "from service.cli import main; main()"]
-#: Processes of its context have the modules of the store, the grader and the reports from the beginning.
+#: Processes of this context start with the modules of the store, the grader and the reports already loaded.
 FORKING = multiprocessing.get_context("forkserver")
 FORKING.set_forkserver_preload(
     [
@@ -32,7 +32,7 @@ _PATIENCE = 240
 def robomark(
     *arguments: str | Path, folder: Path | None = None, umask: int | None = None, **environment: str
 ) -> subprocess.CompletedProcess[str]:
-    """The command with files in place of a terminal, forked; run in ``folder``, with ``environment`` beside ours."""
+    """Run the forked command in ``folder``, with files instead of a terminal, and ``environment`` added to ours."""
     words = [str(argument) for argument in arguments]
     with tempfile.TemporaryDirectory() as made:
         out, err = Path(made) / "out", Path(made) / "err"
@@ -51,7 +51,7 @@ def robomark(
 def robomark_anew(
     *arguments: str | Path, out: int = subprocess.PIPE, **environment: str
 ) -> subprocess.CompletedProcess[str]:
-    """The command in a process that is begun for it, as a shell does."""
+    """Run the command in a new process, as a shell does."""
     return subprocess.run(
         [*COMMAND, *map(str, arguments)],
         env=os.environ | environment,

@@ -1,4 +1,4 @@
-"""More of everything that the pages of ``web_world`` list. Rows are copied, which takes no time."""
+"""Many more rows of everything that the pages of ``web_world`` list. Copying rows takes almost no time."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _AT = datetime.now(UTC)
 
 
 def crowd(web: Web, world: World, numbers: Iterable[int]) -> None:
-    """Add for each number an attempt, a student, a batch, an assignment, a course, an appeal, and so on."""
+    """Add an attempt, a student, a batch, an assignment, a course, an appeal and so on for each number."""
     with web.store.transaction() as session:
         copies = _Copies(session, world)
         for number in numbers:
@@ -54,7 +54,7 @@ def crowd(web: Web, world: World, numbers: Iterable[int]) -> None:
 
 
 class _Copies:
-    """Adds rows that are like the world's own in all that is not given."""
+    """Copies rows of the world. Values that are not given stay the same."""
 
     def __init__(self, session: Session, world: World) -> None:
         self._session, self._world = session, world
@@ -80,7 +80,7 @@ class _Copies:
         self._add_others(number)
 
     def _grade(self, enrolment_id: int, batch_id: str, attempt: int, number: int) -> None:
-        """A graded attempt with a regrade, an appeal, a comment, and marks set by hand."""
+        """Add a graded attempt with a regrade, an appeal, a comment, and adjusted marks."""
         submission_id, job_id = self._submit(enrolment_id, batch_id, attempt)
         regrade = {"regrade_of": job_id, "standing": Standing.PROPOSED, "submission_id": submission_id}
         self._job(enrolment_id, self._regrade, **regrade)
@@ -114,12 +114,12 @@ class _Copies:
         return job_id
 
     def add_rows_of_jobs(self) -> None:
-        """Trials, criteria and files of all the jobs that were added."""
+        """Add trials, criteria and files of all added jobs."""
         for kind, rows in self._rows_of_jobs.items():
             self._session.execute(insert(kind), rows)
 
     def _open_task(self, task: str) -> None:
-        """An assignment that Ada has submitted to, with a policy and an extension."""
+        """Add an assignment that Ada has submitted to, with a policy and an extension."""
         ada = self._world.ada.enrolment_id
         version = self._copy(
             AssignmentVersion, AssignmentVersion.id == 1, assignment=task, title=task.title(), sha256=new_id()
@@ -145,7 +145,7 @@ class _Copies:
         return enrolment_id
 
     def _add_others(self, number: int) -> None:
-        """A platform, a worker, a webhook with a delivery, a comment, and a session for all who sign in."""
+        """Add a platform, a worker, a webhook with a delivery, a comment, and a session for each person."""
         address = f"https://p{number}.example.org"
         urls = dict.fromkeys(("issuer", "authorization_url", "token_url", "keys_url"), address)
         self._add(LtiPlatform, name=f"platform {number}", client_id="client", created_at=_AT, **urls)
@@ -160,7 +160,7 @@ class _Copies:
             self._add(Credential, id=new_id(), person_id=member.person_id, sha256=new_id(), **lasting)
 
     def _copy(self, kind: type[Base], which: ColumnElement[bool], **changes: Any) -> Any:
-        """Copy the row that is meant, which is the same for all of a kind. Returns the copy's key."""
+        """Copy the selected row, which is the same for all rows of a kind. Return the key of the copy."""
         (row,) = self._read(kind, which)
         return self._add(kind, **(row | changes))
 

@@ -1,4 +1,4 @@
-"""Recordings made by hand from moves, for tests of what is judged about motion and paths."""
+"""Recordings built from moves, for tests of how motion and paths are judged."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from service.grading.grade import CriterionResult, Measure
 from sim.recording import Pose, Recording, Ticks, Verdict
 from submissions.criteria import Criterion
 
-#: mm and degrees of each tick, and how many ticks.
+#: Millimetres and degrees for each tick, and the number of ticks.
 Move = tuple[float, float, int]
 
 
@@ -31,7 +31,7 @@ def rest(ticks: int = 4) -> Move:
 
 
 def driven(*moves: Move, start: Pose = START, rgb: Sequence[Sequence[float]] = (), **parts: Any) -> Recording:
-    """A run of these moves, integrated as the course does; ``rgb`` is what the left sensor sees, one row a tick."""
+    """Integrate these moves as the course does; ``rgb`` is the left sensor's reading, one row a tick."""
     steps = [(ahead, turned) for ahead, turned, count in moves for _ in range(count)]
     x, y, heading = [start.x], [start.y], [start.heading]
     for ahead, turned in steps:
@@ -42,7 +42,7 @@ def driven(*moves: Move, start: Pose = START, rgb: Sequence[Sequence[float]] = (
 
 
 def along(points: np.ndarray, heading: np.ndarray, rgb: Sequence[Sequence[float]] = (), **parts: Any) -> Recording:
-    """A run through these points, (n + 1, 2), the first being the start."""
+    """Return a run through these points, shape (n + 1, 2), beginning with the start."""
     count = len(points) - 1
     white = np.full((count, 3), 255 * 305, dtype=np.int64)
     left = np.array(rgb, dtype=np.int64).reshape(-1, 3) * 305 if len(rgb) else white
@@ -64,13 +64,13 @@ def along(points: np.ndarray, heading: np.ndarray, rgb: Sequence[Sequence[float]
 
 
 def passes(asked: Criterion, recording: Recording) -> bool:
-    """Whether the recording gets all marks."""
+    """Return whether the recording gets full marks."""
     result = judged(asked, recording)
     assert result.evidence[0].passed == (result.marks == Decimal(4)), result.message
     return result.evidence[0].passed
 
 
 def measured(result: CriterionResult, name: str) -> float:
-    """The figure of this name in the first trial."""
+    """Return the measure of this name in the first trial."""
     found: Measure = next(measure for measure in result.evidence[0].measures if measure.name == name)
     return found.value

@@ -1,6 +1,6 @@
-"""A worker that grades rightly until a file appears, and from then on with a robot that speeds up too quickly.
+"""A worker that grades correctly until a file appears. From then on its robot accelerates too quickly.
 
-Run as a program, like ``service.queue.worker``; the pool children import it again and do the same.
+Run it as a program, like ``service.queue.worker``. The pool children import it again and do the same.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def _become_false(path: Path) -> None:
     sim.robot.ACCELERATION = 6000.0
 
 
-# A spawned pool child has the main module again under another name; a test that imports this one stays true.
+# A spawned pool child loads the main module under another name. A test that imports this module is not affected.
 if __name__ in ("__main__", "__mp_main__"):
     Thread(target=_become_false, args=(Path(os.environ[VARIABLE]),), daemon=True).start()
 

@@ -1,4 +1,4 @@
-"""Runs a seccomp filter as the kernel does, and says what it decides about a system call."""
+"""Runs a seccomp filter as the kernel does, and returns its decision for a system call."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from collections.abc import Iterator, Sequence
 from paths import DATA
 
 X86_64, I386, AARCH64 = 0xC000003E, 0x40000003, 0xC00000B7
-#: The golden list: number, name and what is decided, one call a line.
+#: The golden list: number, name and decision, one call a line.
 LIST = DATA / "expected" / "system-calls.txt"
 
 
 def decide(program: bytes, number: int, arguments: Sequence[int] = (), architecture: int = X86_64) -> str:
-    """``allow``, ``kill``, ``ask``, or the name of the error. ``arguments`` are whole 64-bit registers."""
+    """Return ``allow``, ``kill``, ``ask`` or the name of the error. ``arguments`` are whole 64-bit registers."""
     full = [*arguments, *[0] * (6 - len(arguments))]
     data = struct.pack("=IIQ6Q", number & 0xFFFFFFFF, architecture, 0x7F0000001234, *full)
     code = list(struct.iter_unpack("=HBBI", program))
@@ -54,7 +54,7 @@ def _named(value: int) -> str:
 
 
 def listed() -> Iterator[tuple[int, str, str]]:
-    """Number, name and decision of each call of the golden list."""
+    """Yield number, name and decision of each call in the golden list."""
     for line in LIST.read_text().splitlines():
         if line and not line.startswith("#"):
             number, name, decision = line.split(maxsplit=2)

@@ -1,7 +1,7 @@
-"""Databases as earlier releases left them, with data: kept as SQLite's SQL, laid out on either engine.
+"""Databases of earlier releases with data, stored as SQLite SQL and restored on either engine.
 
-Each was made by the release itself. Of the first one's five jobs two have a grade, one was superseded, one is dead and
-one waits. That of 0.2.0 also has published grades, a batch of regrades, a policy and an extension.
+Each was made by the release itself. The first has five jobs: two with a grade, one superseded, one dead, one waiting.
+The one of 0.2.0 also has published grades, a batch of regrades, a policy and an extension.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from service.store.engine import open_engine
 from service.store.migrate import configuration
 from service.store.web_tables import METADATA
 
-#: The file and the revision of each.
+#: The file and the revision of each database.
 _FIRST, _SECOND = ("first_release.sql", "0002"), ("release_0_2_0.sql", "0008")
-#: What columns of then are called today.
+#: New names of renamed columns.
 _TODAY = {"nudged_at": "notified_at", "walls": "sandbox", "sights": "predictions", "problems": "refusals"}
-#: What columns that are gone kept.
+#: Former content of removed columns.
 _GONE = {"name": SafeText(), "email": SafeText()}
 
 
 def lay_first_release(url: str, folder: Path) -> Engine:
-    """The tables and rows of the first release in the empty database at ``url``; ``folder`` is for a copy."""
+    """Restore the first release in the empty database at ``url``; ``folder`` receives a copy."""
     return _lay(url, folder, *_FIRST)
 
 
 def lay_release_0_2_0(url: str, folder: Path) -> Engine:
-    """The same of release 0.2.0."""
+    """Restore release 0.2.0 in the same way."""
     return _lay(url, folder, *_SECOND)
 
 
@@ -56,14 +56,14 @@ def _copy(file: Path, engine: Engine, revision: str) -> None:
         for today in METADATA.sorted_tables:
             if today.name not in names:
                 continue
-            # The columns of then, with today's types, which read what SQLite has and write what PostgreSQL wants.
+            # The columns of that release with today's types, which read SQLite's values and write PostgreSQL's.
             then = [column["name"] for column in inspect(source).get_columns(today.name)]
             kinds = _GONE | {column.name: column.type for column in today.c}
             columns = [Column(name, kinds[_TODAY.get(name, name)]) for name in then]
             table = Table(today.name, MetaData(), *columns)
             rows = [dict(row._mapping) for row in old.execute(select(table))]
             if rows:
-                # The migrations make the row of the installation.
+                # The migrations create the row of the installation.
                 new.execute(delete(table))
                 new.execute(insert(table), rows)
             if rows and isinstance(today.c["id"].type, Integer):

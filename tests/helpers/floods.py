@@ -1,6 +1,6 @@
-"""Submissions that send without end, one for each kind of thing that a worker might keep of a child.
+"""Submissions that send endlessly, one for each kind of data that a worker might keep for a child.
 
-What becomes of one alone is ``test_metering.py``'s, what of many among honest ones ``test_crowd.py``'s.
+``test_metering.py`` tests each one alone, ``test_crowd.py`` tests many among honest submissions.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ BIG = "x" * 60_000
 
 
 def long(frame: str, length: int = len(BIG)) -> str:
-    """A frame with its ``@`` as long as that."""
+    """Return a frame with its ``@`` replaced by text of this length."""
     return frame.replace("@", "x" * length)
 
 
@@ -26,7 +26,7 @@ DEEP_LIST = "JSON::[" + "[]," * 15_000 + "[]]"
 
 @dataclass(frozen=True)
 class Flood:
-    """A submission that sends without end, and how that ends."""
+    """A submission that sends endlessly, and its expected end."""
 
     name: str
     program: str
@@ -35,7 +35,7 @@ class Flood:
 
 
 _POLARITY = '{"do":"polarity","port":"outB","polarity":"@"}'
-#: Texts that fill a frame of which nothing is kept, and that are costly to read.
+#: Texts that fill a frame from which nothing is kept, and that are expensive to parse.
 _LONG_TEXTS = {"half characters": r"\ud800" * 10_800, "escapes": r"\n" * 32_000, "pairs": r"\ud83d\ude00" * 5_400}
 _ENDLESS = (Verdict.CPU_LIMIT, Verdict.STALLED)
 

@@ -1,4 +1,4 @@
-"""Notebooks of a few cells that are graded at once, and what their marked run recorded."""
+"""Notebooks of a few cells, graded at once, and the recording of their marked run."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""A worker of which a pool child hangs for good, deaf to exceptions, when it begins to grade the student ``HANGS``.
+"""A worker with a pool child that hangs forever and ignores exceptions when it grades the student ``HANGS``.
 
-Run as a program, like ``service.queue.worker``; the pool children import it again and do the same.
+Run it as a program, like ``service.queue.worker``. The pool children import it again and do the same.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def _hang_or_finish_from_cache(store: Store, claim: Claim) -> bool:
     return _finish_from_cache(store, claim)
 
 
-# A spawned pool child has the main module again under another name; a test that imports this one stays as it is.
+# A spawned pool child loads the main module under another name. A test that imports this module is not affected.
 if __name__ in ("__main__", "__mp_main__"):
     celery_app.GRACE_SECONDS = (1, 2)
     jobs.finish_from_cache = _hang_or_finish_from_cache

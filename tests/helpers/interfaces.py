@@ -1,4 +1,4 @@
-"""Runs one operation by page, API and command, each from the same database, and tells what each left behind.
+"""Runs one operation by page, API and command, each on the same database, and compares the effects.
 
 A row of the table in ``operation_table/`` is an operation with a request for each interface.
 """
@@ -30,7 +30,7 @@ from web import Web, csrf, web_in
 Prepare = Callable[[Web], dict[str, str]]
 
 INTERFACES = ("page", "api", "command")
-#: Of rows: who did it, secrets, and the size of what is packed, in which times are.
+#: Columns left out of the comparison: the actor, secrets, and the size of compressed data that contains times.
 _UNEQUAL = frozenset({"actor", "published_by", "sha256", "secret", "size"})
 _TIME = re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d:\d\d(\.\d+)?(\+00:00)?")
 _ID = re.compile(rf"(?<![A-Za-z0-9])[{ALPHABET}]{{{LENGTH}}}(?![A-Za-z0-9])")
@@ -40,10 +40,10 @@ _ID = re.compile(rf"(?<![A-Za-z0-9])[{ALPHABET}]{{{LENGTH}}}(?![A-Za-z0-9])")
 class Row:
     """One request by each interface that has the operation.
 
-    ``page`` is a path and a form (of a row that ``says`` something, a query), ``api`` a method, a path and what is
-    sent, ``command`` a line. ``{names}`` in them are those of the ``state`` that the request begins with. ``alone``
-    says why an interface is missing. ``refused`` is the status of HTTP and a sentence that each interface says, empty
-    where one of them refuses to read the value and says so in its own words.
+    ``page`` is a path and a form (a query, if the row has ``says``), ``api`` a method, a path and a body, ``command`` a
+    line. ``{names}`` in them come from the ``state`` before the request. ``alone`` gives the reason for a missing
+    interface. ``refused`` is the HTTP status and a sentence that each interface reports. The sentence is empty if an
+    interface rejects the value while parsing, with its own message.
     """
 
     operation: Callable[..., object]
@@ -55,18 +55,18 @@ class Row:
     state: str = "course"
     refused: tuple[int, str] | None = None
     files: Mapping[str, str | bytes] = field(default_factory=dict)
-    then: str = ""  # what of the page that answers is posted to
-    says: tuple[str, ...] = ()  # what each interface answers, of operations that only read
+    then: str = ""  # target of a second form, on the page of the answer
+    says: tuple[str, ...] = ()  # read-only operations: texts in every answer
 
     @property
     def interfaces(self) -> tuple[str, ...]:
-        """Those that have the operation."""
+        """Return the interfaces that have the operation."""
         return tuple(each for each in INTERFACES if getattr(self, each))
 
 
 @dataclass(frozen=True, slots=True)
 class Left:
-    """What an operation leaves behind by one interface, without times, new ids, secrets and who asked."""
+    """The effects of an operation by one interface, without times, new ids, secrets and the actor."""
 
     accepted: bool
     rows: tuple[str, ...]
@@ -75,20 +75,20 @@ class Left:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What the interface answers: the status of HTTP, 0 or 2 of commands, and the text."""
+    """The answer of an interface: the HTTP status (0 or 2 for commands) and the text."""
 
     status: int
     text: str
 
     @property
     def is_accepted(self) -> bool:
-        """Whether the operation was carried out."""
+        """Return whether the operation was carried out."""
         return self.status in (0, 200, 201, 204, 303)
 
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """A database as requests find it, the names of what is in it, and its rows."""
+    """A database in the state before a request, with the names of its objects and its rows."""
 
     data: bytes
     values: Mapping[str, str]
@@ -99,7 +99,7 @@ class Snapshot:
 
 @dataclass(frozen=True, slots=True)
 class Installation:
-    """One web server with its home, and the databases that it is given."""
+    """A web server with its home, and the databases that it uses."""
 
     web: Web
     notices: Notices
@@ -165,7 +165,7 @@ class Installation:
         return snapshot
 
     def _changed(self, snapshot: Snapshot) -> tuple[str, ...]:
-        """Rows that are new, or gone, each beside its table; those that differ in times alone left out."""
+        """Return new and removed rows with their tables, except rows that differ only in times."""
         after, lines = _rows(self.web), dict[str, int]()
         for table, rows in after.items():
             columns = snapshot.columns[table]
@@ -180,7 +180,7 @@ class Installation:
 def installation_in(
     folder: Path, members: Callable[[Web], dict[str, Any]], prepares: Mapping[str, Prepare]
 ) -> Iterator[Installation]:
-    """An installation; ``members`` makes the state "course" and gives its people, and further names by ``values``."""
+    """Create an installation. ``members`` builds the state "course", and returns its people and more ``values``."""
     notices = Notices()
     with pytest.MonkeyPatch.context() as patch, web_in(folder / "home") as web:
         patch.setenv("ROBOMARK_HOME", str(web.settings.home))
@@ -226,7 +226,7 @@ def _columns(web: Web, tables: Iterable[str]) -> dict[str, list[str]]:
 
 
 def _plain(row: dict[str, Any], known: frozenset[str]) -> str:
-    """A row without what differs from one request to the next."""
+    """Return a row without the values that differ between requests."""
 
     def plain(value: Any) -> Any:
         if isinstance(value, bytes):
@@ -239,12 +239,12 @@ def _plain(row: dict[str, Any], known: frozenset[str]) -> str:
 
 
 def _here(prefix: str, path: str) -> str:
-    """The address of a path, which is one of course 1 if it begins without a slash."""
+    """Return the address of a path. A path without a leading slash belongs to course 1."""
     return f"{prefix}{path}" if path.startswith("/") else f"{prefix}/courses/1/{path}"
 
 
 def _parts(files: Mapping[str, str | bytes]) -> list[tuple[str, tuple[str, io.BytesIO]]]:
-    """Files by ``field:name`` as a browser sends them."""
+    """Return files by ``field:name``, as a browser sends them."""
     parts = []
     for label, content in files.items():
         name, _, file = label.partition(":")
@@ -253,7 +253,7 @@ def _parts(files: Mapping[str, str | bytes]) -> list[tuple[str, tuple[str, io.By
 
 
 def _filled(request: Any, values: Mapping[str, str]) -> Any:
-    """The request with its placeholders replaced."""
+    """Return the request with its placeholders replaced."""
     if isinstance(request, str):
         return request.format(**values) if "{" in request else request
     if isinstance(request, tuple):

@@ -1,4 +1,4 @@
-"""Criteria, recordings of nothing in particular, and what the judge makes of them, for tests of what is judged."""
+"""Criteria, generic recordings, and calls of the judge, for tests of judging."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ START = Pose(100, 800, 0)
 
 
 def criterion(check: str, **keys: Any) -> Criterion:
-    """One of this kind, as a table of an assignment gives it."""
+    """Return a criterion of this kind, as read from an assignment table."""
     made = SCHEMAS[check].model_validate({"id": "c", "title": "C", "marks": "4", "check": check, **keys})
     assert isinstance(made, Criterion)
     return made
 
 
 def recorded(**parts: Any) -> Recording:
-    """A run of three seconds along x at 30 mm a second."""
+    """Return a run of three seconds along x at 30 mm/s."""
     count = 90
     zeros, sums = np.zeros(count), np.zeros((count, 3), dtype=np.int64)
     x = 100 + np.arange(1, count + 1.0)
@@ -41,7 +41,7 @@ def recorded(**parts: Any) -> Recording:
 
 
 def talk(*exchanges: tuple[str, str | None], arrives: bool = True) -> tuple[Message, ...]:
-    """Each robot's text a second after the last, and its answer a tenth later."""
+    """Return messages of the robot, a second apart, each with an answer a tenth of a second later."""
     messages: list[Message] = []
     for t, (text, answer) in enumerate(exchanges):
         asked = len(messages)
@@ -53,7 +53,7 @@ def talk(*exchanges: tuple[str, str | None], arrives: bool = True) -> tuple[Mess
 
 
 def lines(*texts: str) -> tuple[Line, ...]:
-    """A line a second."""
+    """Return one line per second."""
     return tuple(Line(float(t), text) for t, text in enumerate(texts))
 
 
@@ -64,7 +64,7 @@ def judged(
     poses: Sequence[Pose] = (START,),
     motor_noise: float = 0.0,
 ) -> CriterionResult:
-    """What a criterion gives for these recordings, as many trials from each pose as there are for it."""
+    """Judge these recordings by a criterion, with as many trials from each pose as there are recordings."""
     scenario = Scenario("s", tuple(poses), trials=max(len(recordings) // len(poses), 1))
     world = WorldSpec(recordings[0].background) if recordings else WorldSpec()
     assignment = Assignment("a", "A", world, Parts(), (scenario,), (asked,))
@@ -74,6 +74,6 @@ def judged(
     )
     (result,) = judge(assignment, trials)
     assert 0 <= result.marks <= result.max_marks
-    # One that looks at what was swept says nothing of a trial in which nothing was.
+    # A criterion about sweeps has no result for a trial without a sweep.
     assert len(result.evidence) == (0 if asked.check == "robustness" else len(recordings))
     return result

@@ -1,4 +1,4 @@
-"""A learning platform as LTI 1.3 describes it: it signs launches, gives tokens, lists members and takes marks."""
+"""An LTI 1.3 learning platform: it signs launches, issues tokens, lists members and accepts marks."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _ADMINISTRATOR = "http://purl.imsglobal.org/vocab/lis/v2/institution/person#Admi
 
 @dataclass
 class LearningPlatform:
-    """What the platform holds, and what it was told."""
+    """The data of the platform, and the requests it received."""
 
     url: str = ""
     key: rsa.RSAPrivateKey = _KEY
@@ -68,7 +68,7 @@ class LearningPlatform:
         return jwt.encode(claims, key or self.key, algorithm="RS256", headers={"kid": "k1", **header})
 
     def answer(self, method: str, path: str, query: dict[str, list[str]], body: bytes, token: str) -> tuple[int, Any]:
-        """What is answered: a status and JSON."""
+        """Return the answer: a status and JSON."""
         if path == "/keys":
             public = json.loads(RSAAlgorithm.to_jwk(self.key.public_key()))
             return 200, {"keys": [{**public, "kid": "k1", "alg": "RS256", "use": "sig"}]}
@@ -105,7 +105,7 @@ class LearningPlatform:
 
 @contextmanager
 def learning_platform() -> Iterator[LearningPlatform]:
-    """One that answers on this machine."""
+    """Run a platform on this machine."""
     platform = LearningPlatform()
 
     class Handler(BaseHTTPRequestHandler):

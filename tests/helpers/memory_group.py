@@ -1,4 +1,4 @@
-"""A control group with little memory for a process under test, where this user may make one: version 2 or version 1."""
+"""A control group with little memory for a process under test, version 2 or 1, if this user may create one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _ROOT = Path("/sys/fs/cgroup")
 
 @dataclass(frozen=True)
 class MemoryGroup:
-    """Its folder and the names of its files."""
+    """The folder of the group and the names of its files."""
 
     folder: Path
     limit: str
@@ -22,7 +22,7 @@ class MemoryGroup:
     events: str
 
     def enter(self) -> None:
-        """Called in the process that is to be inside, before it becomes another program."""
+        """Called in the process to be limited, before it executes another program."""
         (self.folder / "cgroup.procs").write_text(str(os.getpid()))
 
     @property
@@ -31,14 +31,14 @@ class MemoryGroup:
 
     @property
     def killed(self) -> int:
-        """How many processes the kernel has killed in it for want of memory."""
+        """Return the number of processes that the kernel's out-of-memory killer ended in the group."""
         lines = dict(line.split() for line in (self.folder / self.events).read_text().splitlines())
         return int(lines["oom_kill"])
 
 
 @contextmanager
 def memory_group(size: int) -> Iterator[MemoryGroup | None]:
-    """A group of ``size`` bytes; None where none can be made."""
+    """Yield a group of ``size`` bytes, or None if none can be created."""
     made = _made(size)
     try:
         yield made

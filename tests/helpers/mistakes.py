@@ -1,6 +1,6 @@
-"""Submissions with a mistake in them, from tables of mistakes, and the first screen that their students see.
+"""Submissions with one mistake each, from tables of mistakes, and the first screen that their students see.
 
-A case changes the reference of an assignment, or has whole texts, cells of a notebook or a single file.
+A case changes the reference of an assignment, or has complete texts, notebook cells or a single file.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from submissions.assignment.examples import examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 
-#: How a cell that is no code cell begins in a table.
+#: The first characters of a non-code cell in a table.
 _TYPES = {"markdown": "# markdown\n", "raw": "# raw\n"}
 _PARTS = ("robot.py", "responder.py")
 
 
 def assignment_of(case: Mapping[str, Any]) -> Assignment:
-    """The assignment of a case."""
+    """Return the assignment of a case."""
     return find_assignment(case["assignment"])
 
 
 def write_submission(case: Mapping[str, Any], folder: Path) -> Path:
-    """Write the submission of a case below ``folder``, and return where it is."""
+    """Write the submission of a case below ``folder``, and return its path."""
     if "upload" in case:
         path = folder / str(case["upload"])
         path.write_text(case["content"], "utf-8")
@@ -55,7 +55,7 @@ def write_submission(case: Mapping[str, Any], folder: Path) -> Path:
 
 
 def first_screen(case: Mapping[str, Any], folder: Path, runner: TrialRunner) -> str:
-    """The cause and the next step that the student of a case reads, or why the submission is refused."""
+    """Return the cause and the next step in the report of a case, or the reason why the submission is refused."""
     asked = assignment_of(case)
     try:
         submission = read_submission(write_submission(case, folder), asked=asked.parts)

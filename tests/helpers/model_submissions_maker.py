@@ -1,7 +1,7 @@
-"""Makes the folders in ``model_submissions``: responders that bring models, good and bad. Run it to make them again.
+"""Creates the folders in ``model_submissions``: responders with model files, good and bad. Run it to recreate them.
 
-Grading them is ``test_student_models.py``'s. Their models are small, and made from the packaged shape network or from
-nothing; ``convolution/shapes.onnx`` alone needs the package onnx, and is left as it is without.
+``test_student_models.py`` grades them. The models are small, made from the packaged shape network or from scratch.
+Only ``convolution/shapes.onnx`` needs the package onnx. Without it, the file stays unchanged.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from models.perceptrons import read
 from paths import DATA
 
 FOLDER = DATA / "model_submissions"
-#: What the hostile pickle would make, if it could.
+#: The file that the hostile pickle would create if it succeeded.
 TRACE = "/tmp/robomark-hostile-pickle-was-here"
 
 RESPONDER = """import json
@@ -79,7 +79,7 @@ def _npz(**arrays: Any) -> bytes:
 
 
 def _older(network: MLPClassifier) -> bytes:
-    """As scikit-learn 0.23.2 would have written it; only the number differs."""
+    """Return the network as scikit-learn 0.23.2 would have written it; only the version number differs."""
     version = sklearn.base.__version__
     sklearn.base.__version__ = "0.23.2"
     try:
@@ -89,7 +89,7 @@ def _older(network: MLPClassifier) -> bytes:
 
 
 def _plain(network: MLPClassifier, without: int = 0) -> dict[str, Any]:
-    """The arrays of a file of plain weights, the first layer with so many outputs less."""
+    """Return the arrays of a file of plain weights, with ``without`` fewer outputs in the first layer."""
     first = network.coefs_[0].shape[1] - without
     return {
         "activation": network.activation,
@@ -102,7 +102,7 @@ def _plain(network: MLPClassifier, without: int = 0) -> dict[str, Any]:
 
 
 def _small(kind: type[Any], inputs: int) -> bytes:
-    """A network of ``kind`` that has seen one image of each class."""
+    """Return a network of ``kind``, trained on one image of each class."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         network = kind(hidden_layer_sizes=(2,), max_iter=1, random_state=1)
@@ -111,7 +111,7 @@ def _small(kind: type[Any], inputs: int) -> bytes:
 
 
 def _huge() -> bytes:
-    """Plain weights whose first layer says that it has 2 GB, and has next to nothing."""
+    """Return plain weights with a header that claims 2 GB for the first layer, and almost no data."""
     header = io.BytesIO()
     np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (250_000_000,)})
     file = io.BytesIO()
@@ -121,12 +121,12 @@ def _huge() -> bytes:
 
 
 def _torch_pickle() -> bytes:
-    """What ``joblib.dump`` makes of a layer of PyTorch, as far as its first word."""
+    """Return the beginning of a ``joblib.dump`` of a PyTorch layer."""
     return b"\x80\x04ctorch.nn.modules.linear\nLinear\n)R."
 
 
 def _convolution() -> bytes:
-    """Random filters of 3 x 3, half-wave, largest of 2 x 2, and a fitted last layer, in ONNX's format."""
+    """Return a network in ONNX format: random 3 x 3 filters, ReLU, 2 x 2 max pooling, and a fitted last layer."""
     from onnx import TensorProto, helper, numpy_helper
 
     images, labels = TASK.examples()
@@ -155,7 +155,7 @@ def _convolution() -> bytes:
 
 
 def grading_requests() -> dict[str, dict[str, bytes]]:
-    """Every folder by name: its files and their bytes."""
+    """Return every folder by name, with its files and their bytes."""
     network = read(weights_bytes("shapes"))
 
     def brings(data: bytes, ask: str = KIT, load: str = FROM_JOBLIB) -> dict[str, bytes]:

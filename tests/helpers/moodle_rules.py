@@ -1,4 +1,4 @@
-"""What Moodle makes of files that are given back to it, by its own rules, written down again for the tests."""
+"""Moodle's rules for files that are uploaded to it, implemented again for the tests."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from decimal import Decimal
 
 
 def imported_by_moodle(text: str) -> dict[str, tuple[Decimal | None, str]]:
-    """Moodle's rules for a worksheet: found by Identifier, taken where the grade column has a number in range."""
+    """Apply Moodle's worksheet rules: rows are found by Identifier, and need a grade that is a number in range."""
     lines = list(csv.reader(io.StringIO(text.removeprefix("\ufeff"))))
     places = {name: lines[0].index(name) for name in ("Identifier", "Grade", "Last modified (grade)")}
     feedback = lines[0].index("Feedback comments")
@@ -26,7 +26,7 @@ def imported_by_moodle(text: str) -> dict[str, tuple[Decimal | None, str]]:
 
 
 def feedback_taken_by_moodle(archive: zipfile.ZipFile) -> dict[str, str]:
-    """Moodle's rules for a feedback zip: a part of the path says whose it is, and the rest is the file's name."""
+    """Apply Moodle's rules for a feedback zip: a part of the path identifies the student, the rest is the file name."""
     found = {}
     for path in archive.namelist():
         for part in path.split("/"):

@@ -1,4 +1,4 @@
-"""A course that is marked with names hidden, in which everything that instructors can look at has happened."""
+"""A course marked with names hidden, with an example of everything that instructors can see."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from submissions.student_identity import Refusal, Student
 from web import COURSE, Web
 
 ASSIGNMENT = "echo-responder"
-#: Long enough that no random id has one in it.
+#: Long enough not to occur in a random id.
 STUDENTS = ("ada-lovelace", "bea-arthur", "cyd-charisse", "dot-matrix")
-#: Submits only where names are shown.
+#: A student who submits only where names are shown.
 IDLE = "zoe-never-submits"
 #: The same task, marked with names shown.
 NAMED = "echo-with-names"
@@ -41,16 +41,16 @@ NAMED = "echo-with-names"
 
 @dataclass(frozen=True, slots=True)
 class NamelessCourse:
-    """What paths call each thing of the course, several of a kind, and who instructs it."""
+    """The path values of everything in the course, several of each kind, and its instructor."""
 
     grace: Member
     values: Mapping[str, tuple[str, ...]]
 
 
 def make_nameless_course(web: Web) -> NamelessCourse:
-    """A batch, a regrade, attempts on the web, marks by hand, comments and appeals of students with hidden names.
+    """Add a batch, a regrade, web attempts, adjusted marks, comments and appeals of students with hidden names.
 
-    The batch enrols its students, and one enrols by submitting on the web.
+    The batch enrols its students; one student is enrolled by submitting on the web.
     """
     grace = web.instructor("grace-hopper")
     with web.store.transaction() as session:
@@ -89,7 +89,7 @@ def make_nameless_course(web: Web) -> NamelessCourse:
 
 
 def rename_students(session: Session, names: Mapping[str, str]) -> None:
-    """Give each student another one's id, name, address and file names; nothing else changes."""
+    """Give each student the id, name, address and file names of another student. Nothing else changes."""
     rows = {row.student: row for row in session.scalars(select(Enrolment).where(Enrolment.student.in_(names)))}
     for row in rows.values():
         row.student = f"moving {row.student}"
@@ -103,7 +103,7 @@ def rename_students(session: Session, names: Mapping[str, str]) -> None:
 
 
 def names_of(who: str) -> tuple[str, ...]:
-    """All that a student is called: id, name, address."""
+    """Return every name of a student: id, name, address."""
     person = _person(who)
     return person.id, person.name, person.email
 
@@ -152,7 +152,7 @@ def _values(web: Web, appeal: str) -> dict[str, tuple[str, ...]]:
 
 
 def _grade_all(web: Web, dead: int = 0) -> None:
-    """Grade what waits, by chance's order, with different marks; the first ``dead`` jobs cannot be graded."""
+    """Grade the waiting jobs in random order with different marks. The first ``dead`` jobs fail."""
     for number in itertools.count():
         claim = jobs.claim(web.store, "worker", 60)
         if claim is None:

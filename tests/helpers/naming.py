@@ -1,4 +1,4 @@
-"""Whether a text names somebody. An id or a secret is made of chance letters, among which a short name can be."""
+"""Search a text for a name. Random ids and secrets can contain a short name by chance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Notebooks made of the sources of their cells, for tests."""
+"""Builds notebooks from the sources of their cells, for tests."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Any
 from paths import DATA
 
 NOTEBOOKS = DATA / "notebooks"
-#: The course's notebook on messaging, its magics included, and what nbconvert makes of it.
+#: The course's notebook on messaging with its magics, and its conversion by nbconvert.
 MESSAGING = NOTEBOOKS / "messaging.ipynb"
 MESSAGING_SCRIPT = NOTEBOOKS / "messaging.nbconvert.txt"
 
 
 def document(cells: Sequence[str], tags: Mapping[int, Sequence[str]] | None = None) -> dict[str, Any]:
-    """The JSON of a notebook; ``tags`` by the number of the cell, from 1."""
+    """Return the JSON of a notebook; ``tags`` by the number of the cell, from 1."""
     return {
         "cells": [
             {
@@ -35,6 +35,6 @@ def document(cells: Sequence[str], tags: Mapping[int, Sequence[str]] | None = No
 
 
 def notebook(path: Path, cells: Sequence[str], tags: Mapping[int, Sequence[str]] | None = None) -> Path:
-    """A notebook on disk."""
+    """Write a notebook to disk."""
     path.write_text(json.dumps(document(cells, tags)))
     return path

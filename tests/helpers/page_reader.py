@@ -1,10 +1,10 @@
-"""Pages read as browsers do: which tags, attributes and text are in them."""
+"""Reads pages as browsers do, and lists their tags, attributes and text."""
 
 from __future__ import annotations
 
 from html.parser import HTMLParser
 
-#: All that the templates write; anything else came from somewhere it should not.
+#: All tags that the templates write. Any other tag is a fault.
 TAGS = {
     "html", "head", "meta", "title", "style", "body", "main", "header", "section", "footer", "div", "span", "p", "b",
     "i", "h1", "h2", "h3", "table", "thead", "tbody", "tfoot", "tr", "th", "td", "pre", "ol", "li", "dl", "dt", "dd",
@@ -19,7 +19,7 @@ VOID = {"meta", "img", "rect", "wbr"}
 
 
 class Reader(HTMLParser):
-    """Collects tags, attributes and text, and checks that tags nest."""
+    """Collects tags, attributes and text, and checks that tags are nested correctly."""
 
     def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)

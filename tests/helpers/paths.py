@@ -1,4 +1,4 @@
-"""Where the tests and what they read lie; nothing is read here."""
+"""Paths of the tests and their data; nothing is read here."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Processes that tests start, watch and kill: the command line in the background, and all that hangs on a process."""
+"""Processes that tests start, watch and kill: the command line in the background, and all descendants of a process."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ COMMAND = [sys.executable, "-c", "from service.cli import main; main()"]
 
 
 def until(look: Callable[[], Found | None], what: str = "it does not come") -> Found:
-    """The first thing that ``look`` finds which is true."""
+    """Return the first true result of ``look``."""
     begun = time.monotonic()
     while not (found := look()):
         assert time.monotonic() - begun < PATIENCE, what
@@ -26,7 +26,7 @@ def until(look: Callable[[], Found | None], what: str = "it does not come") -> F
 
 
 def alive(pid: int) -> bool:
-    """Whether the process runs; one that has ended and is not yet collected does not."""
+    """Return whether the process runs. A zombie does not count."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
     except (FileNotFoundError, ProcessLookupError):
@@ -35,7 +35,7 @@ def alive(pid: int) -> bool:
 
 @contextmanager
 def robomark(*arguments: str | Path, **environment: str) -> Iterator[subprocess.Popen[str]]:
-    """A command that runs meanwhile, with its output in pipes; killed at the end if it still runs."""
+    """Run a command in the background, with its output in pipes. It is killed at the end if it still runs."""
     with subprocess.Popen(
         [*COMMAND, *map(str, arguments)],
         env=os.environ | environment,

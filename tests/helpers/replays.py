@@ -1,4 +1,4 @@
-"""Replays for tests: their data read as the page reads it, long recordings, and what comes of hostile data."""
+"""Replays for tests: their data as the page reads it, long recordings, and copies with hostile texts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from report_builders import line_follower_grade, line_follower_recording
 from service.grading.grade import Grade, TrialResult
 from sim.recording import COLUMNS, Image, Line, Pose, Recording, Ticks
 
-#: What is no student's text, in a replay's data and in a grade.
+#: Texts in a replay's data and in a grade that do not come from students.
 _NO_TEXTS = {
     "format", "image", "left", "right", "unit", "background", "robot", "sender", "who", "lost", "visibility",
     "missing", "note",
@@ -25,18 +25,18 @@ _NO_TEXTS = {
 
 
 def island_of(page: str) -> dict[str, Any]:
-    """What a page hands to the replay's script."""
+    """Return the data that a page passes to the replay's script."""
     (island,) = re.findall(r'<script type="application/json">(.*?)</script>', page)
     return dict(json.loads(island))
 
 
 def data_of(page: str) -> dict[str, Any]:
-    """The data in a page."""
+    """Return the data in a page."""
     return dict(json.loads(zlib.decompress(base64.b64decode(island_of(page)["deflated"]))))
 
 
 def values_of(column: dict[str, Any]) -> np.ndarray:
-    """A column as numbers, one row a tick."""
+    """Return a column as numbers, one row a tick."""
     parts = []
     for added in column["added"]:
         total, values = 0, []
@@ -48,7 +48,7 @@ def values_of(column: dict[str, Any]) -> np.ndarray:
 
 
 def long_recording(ticks: int, images: int = 0) -> Recording:
-    """A recording so long, with so many images that nothing makes smaller."""
+    """Return a very long recording with many images that do not compress."""
     one = line_follower_recording(150)
     times = -(-ticks // 150)
     chance = np.random.default_rng(0)
@@ -66,7 +66,7 @@ def long_recording(ticks: int, images: int = 0) -> Recording:
 
 
 def poisoned(told: Any, text: str, key: str = "") -> Any:
-    """The same data with another text in the place of each."""
+    """Return the same data with every text replaced by ``text``."""
     if dataclasses.is_dataclass(told) and not isinstance(told, type):
         changed = {each.name: poisoned(getattr(told, each.name), text, each.name) for each in dataclasses.fields(told)}
         return replace(told, **changed)
@@ -78,7 +78,7 @@ def poisoned(told: Any, text: str, key: str = "") -> Any:
 
 
 def parting_grade(after: int = 90) -> Grade:
-    """The line follower's grade as another attempt would have it: from that tick on it goes straight on for 12 s."""
+    """Return the line follower's grade for another attempt: after tick ``after`` it drives straight on for 12 s."""
     grade = line_follower_grade()
 
     def other(trial: TrialResult) -> TrialResult:

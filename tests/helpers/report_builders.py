@@ -1,6 +1,6 @@
 """Grades built by hand for the report tests: a line follower, shape recognition, and hostile text.
 
-Nothing is simulated by the project's own code here, so a report test fails for the report's reasons only.
+Our own code simulates nothing here, so a report test fails only because of the report.
 """
 
 from __future__ import annotations
@@ -63,12 +63,12 @@ MASK = (ROWS - 10) ** 2 + (COLUMNS - 10) ** 2 < 100
 
 
 def row_of(grade: Grade) -> TableRow[Grade]:
-    """The row of one grade in a table."""
+    """Return the table row of one grade."""
     return TableRow(Student(grade.student), f"{grade.student}.zip", grade.assignment, grade)
 
 
 def line_follower_recording(count: int = 300, background: str = "Lollipop", start: Pose | None = None) -> Recording:
-    """A robot that follows the left edge of a black line for ``count`` ticks, speaking and printing as it goes."""
+    """Return a robot that follows the left edge of a black line for ``count`` ticks, and speaks and prints."""
     plan = floor(background)
     pose = start or plan.default_pose
     x, y, heading = pose.x, pose.y, pose.heading
@@ -140,7 +140,7 @@ def line_follower_grade(count: int = 300, **changes: object) -> Grade:
 
 
 def shape_grade(wrong: int = 4, **changes: object) -> Grade:
-    """Six trials, one a shape; the shape at index ``wrong`` is answered as a diamond."""
+    """Return six trials, one per shape. The shape at index ``wrong`` is answered as a diamond."""
     trials = tuple(_shape_trial(index, wrong) for index in range(6))
     predictions = tuple(
         Prediction(trial.recording.images[0], SHAPES[index], "diamond" if index == wrong else SHAPES[index],
@@ -171,7 +171,7 @@ def shape_grade(wrong: int = 4, **changes: object) -> Grade:
 
 
 def swept_grade() -> Grade:
-    """A shape grade whose trials were swept over light noise, with all that recognition measures."""
+    """Return a shape grade with trials swept over light noise, and all measures of recognition."""
     grade = shape_grade()
     trials = tuple(
         replace(trial, sweep=(("light_noise", float(32 * index)),), light_noise=32.0 * index)
@@ -185,7 +185,7 @@ def swept_grade() -> Grade:
     return replace(grade, trials=trials, criteria=(result, *grade.criteria[1:]))
 
 
-#: What a channel can do to messages.
+#: The possible effects of a channel on messages.
 ASTRAY = (
     Message(0.1, "robot", "PY::0", None, None, "lost", "chance"),
     Message(0.2, "robot", "PY::0", None, None, "lost", "out of range", 1600.2, 3.0),
@@ -197,7 +197,7 @@ ASTRAY = (
 
 
 def faulty_grade() -> Grade:
-    """The program fails in line 3, after one message whose answer is lost and one that nobody answers."""
+    """Return a grade of a program that fails in line 3, after two messages: one answer is lost, one is never sent."""
     recording = line_follower_recording(45)
     faults = (
         Fault(0.4, Verdict.RESPONDER_ERROR, "responder", "NameError: name 'pasrer' is not defined", 2,
@@ -228,7 +228,7 @@ def faulty_grade() -> Grade:
 
 
 def astray_grade() -> Grade:
-    """As the faulty one, but for what the channel did."""
+    """Return the faulty grade with every possible effect of a channel on its messages."""
     grade = faulty_grade()
     talk = [replace(trial, recording=replace(trial.recording, messages=ASTRAY)) for trial in grade.trials[1:2]]
     return replace(grade, trials=(grade.trials[0], *talk))
@@ -243,7 +243,7 @@ def faulty_submission() -> Submission:
 
 
 def hidden_grade() -> Grade:
-    """A shape grade whose last two trials and one of whose criteria the student must not see."""
+    """Return a shape grade with two trials, the last ones, and one criterion hidden from the student."""
     grade = shape_grade()
     secret = CriterionResult(
         "secret-check", "SECRETCRITERION", Decimal(1), Decimal(3), "SECRETMESSAGE", "hidden", (Evidence(0, False, ""),)
@@ -260,7 +260,7 @@ def hidden_grade() -> Grade:
 
 
 def hostile_grade() -> Grade:
-    """Every text that a student can influence is hostile, and some are very long."""
+    """Return a grade in which every text that a student can influence is hostile, and some texts are very long."""
     grade = shape_grade()
     recording = grade.trials[0].recording
     endless = "W" * 200_000
@@ -345,7 +345,7 @@ def _shape_trial(index: int, wrong: int) -> TrialResult:
 
 
 def _sensor(pixels: np.ndarray, pose: Pose, offset: float) -> np.ndarray:
-    """The 20 x 20 pixels under a light sensor ``offset`` mm to the right of the middle, 30 mm in front."""
+    """Return the 20 x 20 pixels under a light sensor ``offset`` mm to the right of the middle and 30 mm in front."""
     angle = math.radians(pose.heading - 90)
     x = pose.x + math.cos(angle) * offset - math.sin(angle) * 30
     y = pose.y + math.sin(angle) * offset + math.cos(angle) * 30

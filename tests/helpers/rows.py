@@ -1,4 +1,4 @@
-"""Rows of a table of cases that each take seconds: the first few are tested every time, all with the long tests."""
+"""Tables of slow test cases: the first few rows are always tested, all rows with the long tests."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ from _pytest.mark.structures import ParameterSet
 
 
 def quick_first(names: Iterable[Any], quick: int = 1) -> list[ParameterSet]:
-    """The rows that ``parametrize`` takes; all but the first ``quick`` are long."""
+    """Return the rows for ``parametrize``; all but the first ``quick`` are marked long."""
     return [pytest.param(name, marks=[pytest.mark.long] * (at >= quick)) for at, name in enumerate(names)]

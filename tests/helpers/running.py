@@ -1,4 +1,4 @@
-"""Running one program, with or without a responder, the way a trial does."""
+"""Runs one program as a trial does, with or without a responder."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ RESPONDER_LIMITS = ChildLimits(3.0, 512 << 20)
 
 
 def agent_spec(name: str, text: str, files: Mapping[str, bytes] | None, output_bytes: int) -> AgentSpec:
-    """A student's agent."""
+    """Return a student's agent."""
     return AgentSpec(Code(f"{name}.py", text), files or {}, RESPONDER_LIMITS, output_bytes)
 
 
@@ -51,9 +51,9 @@ def run_program(
     program_limits: ChildLimits | None = None,
     child_seed: int | None = None,
 ) -> Recording:
-    """One trial; the start is the background's own unless given. With a ``second`` program there are two robots.
+    """Run one trial. The start is the background's own unless given; with a ``second`` program there are two robots.
 
-    ``given`` is whether the assignment brings that one.
+    ``given`` says whether the assignment provides the second program.
     """
     ground = floor(background)
     partner = None

@@ -1,4 +1,4 @@
-"""A web application on a port of this machine, for a browser."""
+"""Serves a web application on a local port, for a browser."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fastapi import FastAPI
 
 @contextmanager
 def served(app: FastAPI) -> Iterator[str]:
-    """Where the application is found, as long as the ``with`` lasts."""
+    """Yield the address of the application. The server runs until the ``with`` block ends."""
     with socket.socket() as listening:
         listening.bind(("127.0.0.1", 0))
         listening.listen()

@@ -1,4 +1,4 @@
-"""All that a student is answered: every route of the application that answers students, by pages and by the API."""
+"""All answers to a student: every route that students can use, on the pages and in the API."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from service.store.people.membership import Member
 from web import Web, csrf
 
 _PREFIX = "/api/v1"
-#: What is tried has one trial, which is shown.
+#: Test runs have one trial, which is visible.
 _OF_TRYOUTS = "tryouts/{tryout_id}"
 
 
 class StudentReader:
-    """A student's browser and program; ``word`` is what the forms of the browser carry."""
+    """A student's browser and program; ``word`` is the CSRF token of the browser's forms."""
 
     def __init__(self, web: Web, member: Member, values: Mapping[str, str]) -> None:
         self._browser, self._program = web.browser(member), web.browser()
@@ -31,7 +31,7 @@ class StudentReader:
         self._values = {"course_id": "1", "file": "none", **values}
 
     def everything(self, when: str = "") -> dict[str, object]:
-        """The answer of each path, and what it is to a script that asks for a part; a zip by its files."""
+        """Return the answer of each path, also as a partial page for htmx. A zip is returned as its files."""
         found: dict[str, object] = {}
         for route, part in itertools.product(self._routes, ({}, {"hx-request": "true"})):
             if part and route.startswith(_PREFIX):

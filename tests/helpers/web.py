@@ -1,4 +1,4 @@
-"""A web application with a database of its own, and browsers and programs that are signed in to it."""
+"""A web application with a separate database, and browsers and programs that are signed in to it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Web:
     app: FastAPI
 
     def browser(self, member: Member | None = None, **options: Any) -> TestClient:
-        """A browser on this machine, signed in as somebody or nobody."""
+        """Return a browser on this machine, signed in as ``member``, or not signed in."""
         client = TestClient(self.app, base_url="http://localhost", follow_redirects=False, **options)
         if member is not None:
             answer = client.post("/sign-in", data={"secret": self.link(member)})
@@ -56,7 +56,7 @@ class Web:
             return credentials.issue(session, member.person_id, CredentialKind.LINK, timedelta(hours=1))
 
     def token(self, member: Member, *scopes: str) -> dict[str, str]:
-        """The header of a program that may do this."""
+        """Return the authorization header of a program with this member's rights."""
         with self.store.transaction() as session:
             secret = credentials.issue(
                 session,
@@ -77,7 +77,7 @@ class Web:
             return membership.make_student(session, course, Student(who, who.capitalize()))
 
     def join(self, member: Member, other: Member, *, from_platform: bool = False) -> None:
-        """Two members become one person, as an operator decides it."""
+        """Merge two members into one person, as an operator does."""
         service = self.app.state.context.service
         asked = JoinRequest(member.enrolment_id, other.enrolment_id, from_platform)
         operations.join(service, Actor("operator", operator=True), asked)
@@ -91,7 +91,7 @@ class Web:
 
 @contextmanager
 def web_in(folder: Path, **changes: Any) -> Iterator[Web]:
-    """An application whose home is ``folder``."""
+    """Yield an application with its home in ``folder``."""
     settings = settings_in(folder, **changes)
     if not settings.broker_url:
         settings = settings.with_broker(broker_url(settings))
@@ -100,25 +100,25 @@ def web_in(folder: Path, **changes: Any) -> Iterator[Web]:
 
 
 def csrf(answer: Response) -> str:
-    """The word that the forms of a page carry."""
+    """Return the CSRF token in the forms of a page."""
     found = re.search(r'name="csrf" value="([0-9a-f]+)"', answer.text)
     assert found, answer.text[:2000]
     return unescape(found[1])
 
 
 def submit(client: TestClient, path: str, data: dict[str, Any] | None = None, **options: Any) -> Response:
-    """Post a form as the page it stands on would."""
+    """Post a form as its page would."""
     word = csrf(client.get("/account"))
     return client.post(path, data={**(data or {}), "csrf": word}, **options)
 
 
 def words(html: str) -> str:
-    """What a page says."""
+    """Return the text of a page."""
     body = html[html.find("<main") :]
     return " ".join(unescape(re.sub(r"<[^>]+>", " ", body)).split())
 
 
 def grade_all(web: Web, grade: Grade) -> None:
-    """What waits gets this grade at once, without a worker."""
+    """Give all waiting jobs this grade at once, without a worker."""
     while claim := jobs.claim(web.store, "worker", 60):
         jobs.finish(web.store, claim, results.prepare(grade), datetime.now(UTC))

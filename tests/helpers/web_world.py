@@ -1,4 +1,4 @@
-"""A course with one of everything, made once for tests that go through all routes."""
+"""A course with one object of every kind, made once for the tests that visit all routes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from web import COURSE, Web
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """Ada's submission in Grace's course, and what paths call each thing there is."""
+    """Ada's submission in Grace's course, and the path values of all objects."""
 
     ada: Member
     grace: Member
@@ -35,7 +35,7 @@ class World:
 
 
 def make_world(web: Web) -> World:
-    """One of everything."""
+    """Create one object of every kind."""
     ada, grace = web.student("ada"), web.instructor("grace")
     batch = intake.accept_batch(web.store, "week one", [grading_request("ada")], (), course=COURSE, max_attempts=3)
     _grade_all(web)
@@ -77,7 +77,7 @@ def make_world(web: Web) -> World:
 
 
 def _tryout(web: Web, member: Member) -> str:
-    """A tryout that has something to play."""
+    """Create a test run that has a replay."""
     packed = pack_submission(grading_request("ada").submission)
     with web.store.transaction() as session:
         version_id = open_assignments.find(session, 1, "echo-responder").version_id
@@ -91,7 +91,7 @@ def _tryout(web: Web, member: Member) -> str:
 
 
 def _upload(web: Web, member: Member) -> str:
-    """An upload of which nothing can be taken in."""
+    """Create an upload in which every submission is rejected."""
     kept_uploads = KeptUploads(web.settings.home)
     begun = kept_uploads.begin(member.person_id, 1, "echo-responder")
     kept_uploads.lay(begun, [SentFile("ada.zip", io.BytesIO(b""))], "batch")
@@ -99,11 +99,11 @@ def _upload(web: Web, member: Member) -> str:
 
 
 def filled(path: str, values: dict[str, str]) -> str:
-    """A route's path with the names in it replaced by what there is."""
+    """Return a route's path with its parameters filled in."""
     return re.sub(r"\{(\w+)(:\w+)?\}", lambda found: values[found[1]], path)
 
 
 def _grade_all(web: Web) -> None:
-    """What waits is graded at once, by hand."""
+    """Grade all waiting jobs at once, without a worker."""
     while claim := jobs.claim(web.store, "worker", 60):
         jobs.finish(web.store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))

@@ -1,4 +1,4 @@
-"""Zips made in memory, as tests send them."""
+"""Zips built in memory, for tests that upload them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 
 def zipped(files: Mapping[str, str | bytes]) -> bytes:
-    """A zip of these files, by their names in it."""
+    """Return a zip of these files, by their names in it."""
     sink = io.BytesIO()
     with zipfile.ZipFile(sink, "w") as archive:
         for name, content in files.items():

@@ -1,4 +1,4 @@
-"""The convolutional network that is fitted here: its slopes, its file, and the same bytes each time."""
+"""The convolutional network that is fitted here: its gradients, its file, and its reproducible bytes."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_what_is_forgotten_is_made_up_for_by_the_rest() -> None:
 
 
 def bars() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Upright and level bars, each somewhere in 12 x 12 pixels."""
+    """Return vertical and horizontal bars at random places in 12 x 12 pixels."""
     images = np.zeros((400, 12, 12))
     for number, image in enumerate(images):
         row = CHANCE.integers(12)
@@ -100,7 +100,7 @@ def bars() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 )
 def test_fitting_again_gives_the_same_bytes_and_what_is_fitted_has_learnt(file: str, plan: Plan) -> None:
     images, labels = bars()
-    # As training has it; many threads wait longer for each other than so small a network takes.
+    # One thread, as in training. For so small a network, threads mostly wait for each other.
     with threadpool_limits(1):
         data = plan.fit(images, labels)
         assert plan.fit(images, labels) == data

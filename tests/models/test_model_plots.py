@@ -1,4 +1,4 @@
-"""The plots and tables of a classifier's evaluation show what was measured, and come out the same each time."""
+"""The plots and tables of a classifier's evaluation show the measured values and are reproducible."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.fast
 
 @pytest.fixture(scope="module")
 def evaluation() -> Evaluation:
-    """Each shape seen three times; two squares and a diamond are taken for something else."""
+    """Return an evaluation with each shape seen three times; two squares and a diamond are misclassified."""
     read = [[0, 5, 5], [1] * 3, [2] * 3, [3] * 3, [4] * 3, [5, 5, 1]]
     with Photographer() as photographer:
         seen = [
@@ -44,7 +44,7 @@ def evaluation() -> Evaluation:
 
 
 def texts(figure: Figure) -> list[str]:
-    """Each on one line, however it is broken."""
+    """Return the texts of a figure, each on one line."""
     holders: tuple[Figure | Axes, ...] = (figure, *figure.axes)
     return [" ".join(text.get_text().split()) for holder in holders for text in holder.texts]
 

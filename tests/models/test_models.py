@@ -1,4 +1,4 @@
-"""The classifiers that Robomark brings: their bytes can be made again, and they are as good as their card says."""
+"""The packaged classifiers: their bytes are reproducible, and they are as accurate as their model card claims."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from sim.floors import floor
 from sim.floors.digits import sheet_digits
 from sim.recording import Pose
 
-#: One of each kind of file, as it is read here; what training measures of all of them is compared with their cards.
+#: One model of each file format is measured here. The cards of all models are compared with training's measurements.
 MEASURED = ["shapes", pytest.param("digits-cnn", marks=pytest.mark.long)]
 
 
 @pytest.fixture(scope="module")
 def handwriting() -> tuple[np.ndarray, np.ndarray]:
-    """All 5000 images, shape (5000, 28, 28), and what they are."""
+    """Return all 5000 images, shape (5000, 28, 28), and their labels."""
     images, labels = mnist_data()
     return images.reshape(-1, 28, 28).astype(np.uint8), labels
 
@@ -204,7 +204,7 @@ def test_what_a_network_is_shown_of_a_image() -> None:
 def test_places_are_where_the_floor_has_the_label() -> None:
     for place in (*shapes.places(), *digits.places("MNIST_Digits", 4)[::37]):
         ground = floor(place.background, seed=place.sheet)
-        # The left light sensor is 20 mm to the left of the robot's middle and 30 mm before it.
+        # The left light sensor is 20 mm to the left of the robot's middle and 30 mm in front of it.
         x, y = (30, 20) if place.pose.heading == 0 else (-20, 30)
         label = ground.label_at(place.pose.x + x, place.pose.y + y)
         classes = shapes.TASK.classes if place.background == "Simple_Shapes" else digits.CLASSES

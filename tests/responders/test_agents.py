@@ -1,4 +1,4 @@
-"""Agents in processes of their own: what they tell one another, and that none of them can harm the others."""
+"""Agents in separate processes: the messages they exchange, and their isolation from each other."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def logger(text, response):
     open("logger.txt", "a").write(f"{text} {response}\\n")
     return logged
 """
-#: Answers whatever the agents do, and tells the logger.
+#: Answers every message of the agents and informs the logger.
 RESPONDER = """
 def responder(text):
     try:
@@ -278,7 +278,7 @@ def test_a_flood_between_agents_ends_at_the_budget(
         output_bytes=1 << 30,
         meter=meter,
     )
-    # One that takes no answers stands still, once no more of them fit into its socket.
+    # An agent that reads no answers blocks once its socket is full.
     expected = {Verdict.OUTPUT_LIMIT, *([Verdict.STALLED] if name == "forged questions" else [])}
     assert expected & {fault.verdict for fault in recording.faults}, recording.faults[:2]
     assert len(pickle.dumps(recording)) < 2 * BUDGET
@@ -341,7 +341,7 @@ def test_no_agent_reaches_another(runner: TrialRunner) -> None:
         files={"given.txt": b"for all"},
     )
     answers = eval(replies(recording)[0])
-    assert answers.pop("descriptors") <= 5  # the null device on 0 to 2, and the wire's two ends
+    assert answers.pop("descriptors") <= 5  # null device on 0 to 2, and the wire's two ends
     assert answers.pop("own files") == ["given.txt"]
     errors = {"PermissionError", "FileNotFoundError", "OSError", "ModuleNotFoundError", "ProcessLookupError"}
     assert answers.items() >= {"its end": "PermissionError", "its text": "ModuleNotFoundError"}.items()

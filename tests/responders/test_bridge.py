@@ -1,4 +1,4 @@
-"""The conversation between program and responder: what is passed on, when it arrives, and what goes wrong."""
+"""The conversation between program and responder: forwarded messages, arrival times, and failures."""
 
 from __future__ import annotations
 

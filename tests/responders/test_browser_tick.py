@@ -1,4 +1,4 @@
-"""Ticks of 33 ms, as the original's browser has them: more of them in a second, and each moves as far as ever."""
+"""Ticks of 33 ms, as in the original's browser: slightly more per second, with the same distance per tick."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_the_clock_counts_ticks_and_the_robot_gets_farther(runner: TrialRunner) 
 def test_program_and_world_agree_on_when_a_value_is_new(runner: TrialRunner) -> None:
     program = "seen = []\nwhile get_clock() < 3:\n    seen.append(gyro.angle_and_rate[0])\nprint(len(seen))\n"
     recording = run(runner, f"tank_turn.on(100, 20)\n{program}")
-    # 90 ticks of 33 ms, a reading every 10 ms; the last one ends with the tick.
+    # 90 ticks of 33 ms, a reading every 10 ms; the last reading ends with the tick.
     assert recording.printed[0].text == "297"
     assert recording.end_t == pytest.approx(2.97)
     assert recording.sha256 == run(runner, f"tank_turn.on(100, 20)\n{program}").sha256
@@ -52,7 +52,7 @@ def test_program_and_world_agree_on_when_a_value_is_new(runner: TrialRunner) -> 
 def test_no_read_ends_after_the_time_limit(
     runner: TrialRunner, tick: int, seconds: float, reads: int, deed: str
 ) -> None:
-    """A read that is answered between two ticks takes its time, and the limit is held against it."""
+    """A read that ends between two ticks costs its time, and the time limit applies to it."""
     allowed = {count: run_until(runner, count, deed, tick, seconds) for count in (10, reads)}
     assert (allowed[10].verdict, allowed[reads].verdict) == (Verdict.FINISHED, Verdict.TIME_LIMIT)
     assert allowed[reads].end_t == pytest.approx(seconds)

@@ -1,4 +1,4 @@
-"""What IPython takes and Python does not: magics, shell lines and questions, found only where a statement begins."""
+"""Syntax of IPython that Python lacks: magics, shell lines and questions, found only at the start of a statement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A conversation in simulated time: what arrives when, without any process."""
+"""A conversation in simulated time: arrival order and times, without any process."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def test_the_chain_tells_deliveries_apart() -> None:
     ],
 )
 def test_what_chance_does_over_a_cable_never_changes(channel: dict[str, Any], digest: str) -> None:
-    """Recordings made before there was another link would have other hashes."""
+    """Otherwise, recordings made before the second kind of link would get other hashes."""
     chain = Chain()
     talk = Conversation(Channel(**channel), 5, chain, Cable())
     for number in range(200):

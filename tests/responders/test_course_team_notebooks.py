@@ -1,6 +1,6 @@
-"""Notebooks as a course team writes them, each from top to bottom: what they print, say, and could not do.
+"""Notebooks in the style of a course team, run from top to bottom: their output, speech and errors.
 
-Each is a folder in ``data/notebooks/course_team`` with what lies beside it and what is expected of it.
+Each is a folder in ``data/notebooks/course_team`` with its extra files and the expected result.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def executed(folder: Path, seconds: float, runner: TrialRunner) -> ExecutedNoteb
 
 
 def in_order(wanted: list[str], text: str) -> list[str]:
-    """Those that do not come after the ones before them."""
+    """Return the texts that are missing or out of order."""
     missing, at = [], 0
     for each in wanted:
         found = text.find(each, at)
@@ -67,7 +67,7 @@ def test_it_runs_from_top_to_bottom(folder: Path, runner: TrialRunner) -> None:
     notes = expected.get("notes", [])
     assert [note for note in notebook.notes if not note.startswith(tuple(notes))] == []
     assert [note for note in notes if not any(told.startswith(note) for told in notebook.notes)] == []
-    # Nothing leads to where this machine keeps its modules.
+    # No path to this machine's modules is shown.
     told = "\n".join([notebook.output, *notebook.notes, *(fault.message for fault in notebook.raised)])
     assert re.findall(r"\S*(?:site-packages|/responders/|/lib/python)\S*", told) == []
 

@@ -1,6 +1,6 @@
-"""How a child's end is read: what it did itself is the submission's, what was done to it is not.
+"""How the end of a child is attributed: its own actions to the submission, outside causes to the host.
 
-A child that is killed from outside is run again, alone; what our own code stumbles over is a verdict and a sentence.
+A child that is killed from outside is run again, alone. An exception in our own code becomes a verdict and a sentence.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ sleep(1)
 print(len(pyState()['messages']))
 """
 _STOPPING = {signal.SIGSTOP, signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU}
-#: What some signals come to; any other ends the program with an error, or does nothing to it.
+#: The effect of some signals. All others end the program with an error, or have no effect.
 _VERDICTS: dict[int, Verdict] = {signal.SIGXCPU: Verdict.CPU_LIMIT, signal.SIGSYS: Verdict.SANDBOX_VIOLATION}
 
 
@@ -74,7 +74,7 @@ def test_a_responder_that_ends_itself_is_at_fault(responder: str, runner: TrialR
 
 
 class _Killer:
-    """Kills the newest child of the zygotes, so often at most."""
+    """Kills the newest child of the zygotes, up to a given number of times."""
 
     def __init__(self, times: int) -> None:
         self.left = times
@@ -91,7 +91,7 @@ class _Killer:
 
 @pytest.fixture
 def plain_runner() -> Iterator[TrialRunner]:
-    """Without bubblewrap, in which a child's number is another."""
+    """Yield a runner without bubblewrap, which would change the child's process id."""
     from responders.sandbox.zygote import Isolation
 
     with TrialRunner(Sandboxes(Isolation(bubblewrap=False))) as made:
@@ -165,7 +165,7 @@ def _raising(error: Exception) -> Callable[..., Any]:
     return raise_it
 
 
-#: Where our own code may stumble while something of a child's is in its hands, and a program that leads there.
+#: Code of ours that may raise an exception while it handles a child's data, and a program that reaches it.
 _STUMBLES = [
     pytest.param(Bridge, "_act", "left_motor = tank_drive.on(5, 5)", None, id="a frame of the program's"),
     pytest.param(Bridge, "_say", "from ev3dev2.sound import Sound\nSound().speak('x')", None, id="an utterance"),
@@ -269,7 +269,7 @@ def test_a_grade_has_what_its_trials_cost_and_is_compared_without(runner: TrialR
     assert cost.spent is not None
     assert cost.limits.cpu_seconds == asked.limits.all_cpu_of(len(first.trials))
     assert cost.limits.sleep_seconds == asked.limits.all_sleep
-    # The nap, but for the half second of each process that is free.
+    # The sleep, minus the free half second of each process.
     assert 0.3 * len(first.trials) < cost.spent.sleep_seconds < cost.limits.sleep_seconds
     assert 0 < cost.spent.cpu_seconds < cost.limits.cpu_seconds
     assert 256 < cost.spent.kept_bytes < cost.limits.kept_bytes

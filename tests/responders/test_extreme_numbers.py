@@ -1,6 +1,6 @@
-"""Every call of the brick with numbers that no robot can use ends as its program's fault or at the time limit.
+"""Every call of the brick with extreme numbers ends as a program error or at the time limit.
 
-None of them may look like a forged frame, which is a violation of the sandbox.
+None of them may be mistaken for a forged frame, which is a sandbox violation.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""No sequence of frames, of whatever kind and number, makes the worker keep more than its budget, hang, or raise.
+"""No sequence of frames, of any kind or number, makes the worker exceed its budget, hang, or raise.
 
-The frames are written by a process that is no child of a zygote: it may say anything at all.
+The frames come from a process that is not a child of a zygote, so it can send anything.
 """
 
 from __future__ import annotations
@@ -68,10 +68,10 @@ def _one_of(*words: str) -> st.SearchStrategy[str]:
     return st.sampled_from(words)
 
 
-#: After these nothing more is heard.
+#: No more frames are read after these.
 _LAST = {"busy", "ready", "end", "stuck", "executed"}
 _ERROR = st.fixed_dictionaries({"type": _texts(), "text": _texts(), "line": st.none(), "file": st.none()})
-#: What fields hold that a schema allows; texts, where a field is not named here.
+#: Valid values of fields by schema; fields that are not listed contain texts.
 _NAMED = {
     "line": _maybe(st.integers(0, 99)),
     "file": _maybe(_one_of("helper.py")),
@@ -97,7 +97,7 @@ _acts = st.one_of(
 
 @st.composite
 def _packets(draw: st.DrawFn) -> bytes:
-    """A packet of acts, mostly good ones, with room for its number."""
+    """Draw a packet of acts, mostly valid ones, with space for its number."""
     acts = [struct.pack("<BBBBd", *act) for act in draw(st.lists(_acts, max_size=6))] * draw(
         st.sampled_from([1, 1, 300])
     )
@@ -108,7 +108,7 @@ def _packets(draw: st.DrawFn) -> bytes:
 
 @st.composite
 def _frames(draw: st.DrawFn, schema: wire.Schema) -> bytes:
-    """One frame: mostly what the schema allows, sometimes anything, sometimes no frame at all."""
+    """Draw a frame: mostly a valid one, sometimes an invalid one, sometimes no frame at all."""
     how = draw(st.integers(0, 39))
     if how == 0:
         return draw(st.binary(max_size=100))
@@ -126,14 +126,14 @@ def _frames(draw: st.DrawFn, schema: wire.Schema) -> bytes:
 
 
 def _sequences(schema: wire.Schema) -> st.SearchStrategy[list[bytes]]:
-    """Frames, each of them so often in a row."""
+    """Return frames, each repeated a number of times."""
     repeated = st.tuples(_frames(schema), st.sampled_from([1, 1, 2, 40, 400]))
     return st.lists(repeated, min_size=1, max_size=12).map(lambda runs: [frame for frame, n in runs for _ in range(n)])
 
 
 @contextmanager
 def _child(frames: list[bytes], folder: Path, meter: JobMeter) -> Iterator[Child]:
-    """A process that writes these frames, numbered as is due, and listens to nothing."""
+    """Start a process that writes these frames with correct numbers and reads nothing."""
     reading, their_writing = os.pipe()
     their_reading, writing = os.pipe()
     with tempfile.TemporaryFile() as file:
@@ -141,7 +141,7 @@ def _child(frames: list[bytes], folder: Path, meter: JobMeter) -> Iterator[Child
             file.write(_numbered(frame, number))
         file.seek(0)
         process = subprocess.Popen(["cat"], stdin=file, stdout=their_writing)
-    # It hears nothing, and does not end.
+    # It reads nothing and does not end.
     ears = subprocess.Popen(["cat"], stdin=their_reading, stdout=subprocess.DEVNULL, pass_fds=[their_writing])
     for fd in (their_writing, their_reading):
         os.close(fd)
@@ -175,7 +175,7 @@ def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class _Sandboxes:
-    """Hands out the processes that a test has made."""
+    """Returns the processes that a test has created."""
 
     def __init__(self, folder: Path, *children: Child) -> None:
         self._folder, self._children = folder, list(children)
@@ -234,7 +234,7 @@ def test_of_a_responder(frames: list[bytes], tmp_path_factory: pytest.TempPathFa
 
 
 class _NoRuns:
-    """Nothing that a notebook calls starts a robot."""
+    """A notebook environment in which no call starts a robot."""
 
     def standing(self) -> PlannedRun:
         return PlannedRun(_spec())

@@ -1,4 +1,4 @@
-"""Python files beside a submission: imported by each part, told by their names, and read by the rules about code."""
+"""Python files beside a submission: imported by each part, reported by name, and checked by the rules about code."""
 
 from __future__ import annotations
 

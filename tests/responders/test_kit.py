@@ -1,4 +1,4 @@
-"""What responders import: the course's helpers for sensor data and networks, on what a sensor really sees."""
+"""Modules for responders: the course's helpers for sensor data and networks, applied to real sensor images."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Kit(NamedTuple):
 
 @pytest.fixture
 def kit(monkeypatch: pytest.MonkeyPatch) -> Iterator[Kit]:
-    """The kit as a path root, fresh, and forgotten afterwards."""
+    """Yield the kit as a path root, freshly imported, and removed afterwards."""
     monkeypatch.syspath_prepend(str(KIT))
     widget, data, views = (importlib.import_module(name) for name in KIT_MODULES)
     yield Kit(widget.roboSim, data, views)
@@ -56,7 +56,7 @@ def kit(monkeypatch: pytest.MonkeyPatch) -> Iterator[Kit]:
 
 
 def raw(column: int, row: int) -> str:
-    """The numbers of a 20 x 20 sensor with its upper left pixel at (column, row), as the robot sends them."""
+    """Return the numbers of a 20 x 20 sensor with its upper left pixel at (column, row), as the robot sends them."""
     window = floors.floor("Simple_Shapes").pixels[row : row + 20, column : column + 20]
     rows, columns = np.mgrid[0:20, 0:20]
     seen = (rows - 10) ** 2 + (columns - 10) ** 2 < 100
@@ -66,7 +66,7 @@ def raw(column: int, row: int) -> str:
 
 
 def log_shapes(kit: Kit, codes: range = range(6)) -> pd.DataFrame:
-    """The data frame of both sensors over the shapes, in the course's poses."""
+    """Return the data frame of both sensors over the shapes, in the course's poses."""
     kit.robo_sim.clear_datalog()
     for code in codes:
         kit.robo_sim.raw_image_data.append(f"left {raw(220 + 80 * code, 213)} {10 * code}")
@@ -106,7 +106,7 @@ def test_each_logged_image_is_taken_apart_once(kit: Kit, monkeypatch: pytest.Mon
     assert len(taken_apart) == 550
     assert kit.robo_sim.image_data()["vals"].tolist() == [f"{image % 256},0,0" for image in range(550)]
     assert kit.robo_sim.image_data(mode="greyscale")["vals"].tolist()[-1] == str(549 % 256)
-    # The list is the notebook's, too.
+    # Notebooks can change the list directly.
     del kit.robo_sim.raw_image_data[1:]
     assert kit.robo_sim.image_data()["clock"].tolist() == ["0"]
 
@@ -214,7 +214,7 @@ def test_trim_and_pad(kit: Kit) -> None:
     assert kit.data.trim_image(image).size == (5, 4)
     assert kit.data.trim_image(kit.data.df_from_image(image)).shape == (4, 5)
     padded = grey(kit.data.crop_and_pad_to_fit(image))
-    assert (padded == grey(block(slice(5, 9), slice(4, 9)))).all()  # 9 columns to spare: 4 left, 5 right
+    assert (padded == grey(block(slice(5, 9), slice(4, 9)))).all()  # 9 columns left over: 4 left, 5 right
     white_on_black = block(slice(0, 7), slice(0, 7), 0, 255)
     assert (grey(kit.data.crop_and_zoom_to_fit(white_on_black)) == 255).all()
 
@@ -241,7 +241,7 @@ def test_images_arrays_and_frames_lead_back(kit: Kit) -> None:
     assert (colours.shape, colours.dtype) == ((2, 2, 3), np.uint8)
 
 
-#: First parameters as the original nn_tools names them; cells of the course call some of them by keyword.
+#: First parameters as in the original nn_tools; the course calls some of them by keyword.
 ORIGINAL_PARAMETERS = {
     "get_sensor_image_pair": ["image_data", "index", "mode", "threshold"],
     "predict_from_image": ["MLP", "_image_image"],
@@ -305,7 +305,7 @@ def test_signature_counts_a_row(kit: Kit) -> None:
 
 
 class Network:
-    """Remembers what it is asked."""
+    """Records its inputs."""
 
     def __init__(self) -> None:
         self.rows: list[Any] = []
@@ -406,7 +406,7 @@ def test_what_only_shows_does_nothing(kit: Kit, name: str) -> None:
 
 @pytest.fixture
 def cnn(kit: Kit) -> Any:
-    """A small network of digits in TensorFlow Lite's format."""
+    """Return a small network of digits in TensorFlow Lite's format."""
     return kit.views.cnn_load(LITE / "digits.tflite", LITE / "labels.txt")
 
 
@@ -428,7 +428,7 @@ def test_tensorflow_lite_networks_read_digits_that_the_sensor_sees(kit: Kit, fil
     right = 0
     for number, label in enumerate(sheet.labels[:55]):
         row, column = divmod(number, 20)
-        # The focus of the left light sensor where the course stands the robot, in the floor's image.
+        # The focus of the left light sensor at the course's pose, in the floor's image.
         top, left = 56 + 100 * row, 73 + 100 * column
         image = Image.fromarray(sheet.pixels[top : top + 14, left : left + 14]).convert("L")
         results = kit.views.cnn_test_with_image(network, image, retval=True)

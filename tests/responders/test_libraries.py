@@ -1,4 +1,4 @@
-"""Libraries, dates and warnings in student code: alike in robot programs, responders and notebooks."""
+"""Libraries, dates and warnings in student code: the same in robot programs, responders and notebooks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which responders need libraries, and that those which are run without have the same done as with them."""
+"""Finds the responders that need libraries. Responders run without libraries give the same results as with them."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ MAY_NEED = {
     "a magic": "%sim_data",
 }
 FILES = {"helper.py": b"def double(x):\n    return 2 * x\n", "numbers.csv": b"1,2\n"}
-#: What is imported is written only when it is run.
+#: The import is assembled at run time.
 LATE = """
 print(sorted(word for word in ("a", "b")))
 with open("helper.py", "w") as file:

@@ -1,4 +1,4 @@
-"""The infrared link: where the robot may stand and how it may face, against a hand-written rule and the ray itself."""
+"""The infrared link: allowed positions and headings of the robot, compared with a hand-written rule and the ray."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from sim.recording import SECOND, Pose
 from sim.world import Chain
 
 BEACON = (1200.0, 600.0)
-POST: Rectangle = (1000, 500, 40, 200)  # between the beacon and what is left of it
+POST: Rectangle = (1000, 500, 40, 200)  # between the beacon and the area to its left
 INFRARED: dict[str, Any] = {"link": "infrared", "beacon": BEACON, "range": 600, "facing": 90}
 
 
@@ -43,7 +43,7 @@ def fate(arena: Arena, pose: Pose, **changes: Any) -> str:
 @pytest.mark.parametrize(
     ("x", "y", "heading", "becomes"),
     [
-        # below the beacon, where nothing stands between; upwards is 90
+        # below the beacon, with a free path; 90 is up
         (1200, 300, 90, "arrives"),
         (1200, 300, 45.1, "arrives"),
         (1200, 300, 134.9, "arrives"),
@@ -66,7 +66,7 @@ def fate(arena: Arena, pose: Pose, **changes: Any) -> str:
         (900, 600, 180, "facing away"),
         (900, 900, -45, "arrives"),
         (900, 700, -18.4, "blocked"),
-        (1020, 600, 0, "blocked"),  # in the post: nothing stops a robot without solid = true
+        (1020, 600, 0, "blocked"),  # inside the post: nothing stops a robot without solid = true
         (1041, 600, 0, "arrives"),
         (500, 600, 0, "out of range"),
         # beyond a wall
@@ -94,7 +94,7 @@ def test_what_the_keys_change(arena: Arena, pose: Pose, changes: dict[str, Any],
 
 
 def crosses(a: tuple[float, float], b: tuple[float, float], box: Rectangle) -> bool:
-    """Whether the stretch from a to b has a point in the box (the slabs of Kay and Kajiya)."""
+    """Return whether the segment from a to b has a point in the box (the slab method of Kay and Kajiya)."""
     first, last = 0.0, 1.0
     for start, end, low, size in zip(a, b, box[:2], box[2:], strict=True):
         if start == end:
@@ -107,7 +107,7 @@ def crosses(a: tuple[float, float], b: tuple[float, float], box: Rectangle) -> b
 
 
 def by_hand(pose: Pose) -> str:
-    """The rule once more, without sine, cosine or ray."""
+    """Evaluate the rule independently, without sine, cosine or ray."""
     away = complex(BEACON[0] - pose.x, BEACON[1] - pose.y)
     if abs(away) > 600:
         return "out of range"
@@ -119,7 +119,7 @@ def by_hand(pose: Pose) -> str:
 
 
 def undecided(pose: Pose) -> bool:
-    """Within a tenth of a mm or degree of where the rule changes its mind."""
+    """Return whether the pose is within a tenth of a mm or degree of the rule's boundary."""
     steps = (0.1, -0.1, 0)
     near = {by_hand(Pose(pose.x + dx, pose.y + dy, pose.heading + dh)) for dx in steps for dy in steps for dh in steps}
     return len(near) > 1
@@ -147,7 +147,7 @@ def grown(box: Rectangle, by: float) -> Rectangle:
 
 @given(st.floats(650, 1750), st.floats(1, HEIGHT - 1))
 def test_what_blocks_is_what_a_ray_of_bullets_hits(arena: Arena, blocks: Client, x: float, y: float) -> None:
-    """A ray through whole blocks, in a world of its own, misses what it enters by up to 0.7 mm; ours meets sheets."""
+    """In a separate world with whole blocks, a ray misses its entry point by up to 0.7 mm; our world uses sheets."""
     assume(not crosses((x, y), (x, y), grown(POST, 0.1)))
     hits = {any(crosses((x, y), BEACON, grown(box, by)) for box in (POST, *walls().values())) for by in (-1, 1)}
     assume(len(hits) == 1)

@@ -1,4 +1,4 @@
-"""Texts that are too long for the wire are cut, whichever call sends them: no program is accused of a long sentence."""
+"""Texts too long for the wire are cut in every call. No program gets a violation for a long sentence."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from service.grading.trial_runner import TrialRunner
 from sim.recording import Recording, Verdict
 
 ECHO = "def responder(text): return text\n"
-#: Texts of about 66,000 bytes and more on the wire, where a character takes 1, 6 or 12 of them.
+#: Texts of about 66,000 bytes and more on the wire, where a character takes 1, 6 or 12 bytes.
 TEXTS = ("'x' * 66_000", "'\\x00' * 12_000", "'é' * 12_000", "'\\U0001f600' * 6_000", "'\\ud800' * 12_000")
 #: Each call of a robot program that takes a text, and the verdict of the trial.
 PROGRAM_CALLS = {
@@ -27,7 +27,7 @@ PROGRAM_CALLS = {
     "raise type(TEXT, (Exception,), {})(TEXT)": Verdict.PROGRAM_ERROR,
     "__import__(TEXT)": Verdict.PROGRAM_ERROR,
 }
-#: The same of a responder; how the trial ends is another matter (an answer is never cut).
+#: The same for a responder, without verdicts (an answer is never cut).
 RESPONDER_CALLS = (
     "print(TEXT)",
     "return TEXT",

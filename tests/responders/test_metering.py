@@ -1,6 +1,6 @@
-"""Nothing that a child sends is kept for free: floods of every kind of frame end at the job's budget.
+"""No data of a child is kept without charge: floods of every kind of frame end at the job's budget.
 
-Each flood is one submission; what the worker holds of it afterwards is measured, not asked for.
+Each flood is one submission. The memory that the worker keeps for it afterwards is measured.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ BUDGET = 2 << 20
 
 @pytest.fixture(autouse=True)
 def _limits(monkeypatch: pytest.MonkeyPatch) -> None:
-    """So much output is allowed a trial that only the job's budget is in the way."""
+    """Allow a trial enough output that only the job's budget applies."""
     monkeypatch.setattr(running, "PROGRAM_LIMITS", ChildLimits(1.5, 128 << 20))
     monkeypatch.setattr(running, "RESPONDER_LIMITS", ChildLimits(3.0, 256 << 20))
 
@@ -43,7 +43,7 @@ def test_a_flood_ends_at_the_budget(each: Flood, runner: TrialRunner) -> None:
     recording = run_program(runner, each.program, responder=collaborative, output_bytes=1 << 30, meter=meter)
     own_seconds = time.process_time() - before
     assert {fault.verdict for fault in recording.faults} & set(each.verdicts), recording.faults[:3]
-    # The worker's own time is bounded by what is charged: for computing and frames, and for what is kept.
+    # Charges limit the worker's own time: for computing and frames, and for stored data.
     assert own_seconds < 3 * meter.spent.cpu_seconds + 0.3 * (meter.spent.kept_bytes >> 20) + 0.5
     assert _held(recording) < 2 * BUDGET
     assert meter.spent.kept_bytes < BUDGET + (1 << 17)
@@ -106,7 +106,7 @@ def test_what_honest_programs_send_in_thousands_costs_nothing(runner: TrialRunne
 
 
 class _NoRuns:
-    """Nothing that a notebook calls starts a robot."""
+    """A notebook environment in which no call starts a robot."""
 
     def call(self, call: object) -> PlannedRun:
         return PlannedRun()
@@ -122,7 +122,7 @@ class _NoRuns:
 
 
 def _held(kept: Recording | ExecutedNotebook | tuple[object, ...]) -> int:
-    """Bytes of everything that hangs on it."""
+    """Return the bytes of all objects reachable from ``kept``."""
     return len(pickle.dumps(kept))
 
 

@@ -82,7 +82,7 @@ def deeply(depth: int) -> list[Any]:
     return nested
 
 
-#: What is done to the document; each gives a new one, or changes the one that it is given and gives None.
+#: Changes to the document. Each returns a new document, or changes its argument and returns None.
 CHANGES: tuple[Change, ...] = (
     lambda whole, chance: cells_of(whole).pop(chance.randrange(len(cells_of(whole)))) and None,
     lambda whole, chance: chance.shuffle(cells_of(whole)),
@@ -133,7 +133,7 @@ CHANGES: tuple[Change, ...] = (
 
 
 def text_mutations(text: str, chance: random.Random) -> bytes:
-    """The document's text, damaged or in another encoding."""
+    """Return the document's text, damaged or in another encoding."""
     data = text.encode("utf-8", "surrogatepass")
     match chance.randrange(11):
         case 0:
@@ -165,13 +165,13 @@ def text_mutations(text: str, chance: random.Random) -> bytes:
 
 
 def mutant(number: int) -> bytes:
-    """One of the notebooks; the same number gives the same bytes."""
+    """Return one of the notebooks. The same number gives the same bytes."""
     chance = random.Random(number)
     whole = document(CELLS) if number % 10 else json.loads(MESSAGING.read_text())
     if number % 4 == 3:
         return text_mutations(json.dumps(whole, indent=1), chance)
     for _ in range(1 + number % 2):
-        # Every change has its turn, and now and then a second one.
+        # Every change is used in turn, sometimes with a second one.
         change = CHANGES[number % len(CHANGES)] if _ == 0 else chance.choice(CHANGES)
         if isinstance(whole.get("cells"), list) and cells_of(whole):
             changed = change(whole, chance)
@@ -187,7 +187,7 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> Assignment:
 
 
 def handled(path: Path, asked: Assignment, runner: TrialRunner) -> str:
-    """``graded``, or the sentence of the refusal."""
+    """Return ``graded``, or the sentence of the refusal."""
     try:
         submission = read_submission(path, asked=asked.parts)
     except UsageError as refusal:

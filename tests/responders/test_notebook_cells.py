@@ -1,4 +1,4 @@
-"""What the cells of a notebook can do: data between runs, magics, files, faults with their lines, limits and an end."""
+"""Features of notebook cells: data between runs, magics, files, errors with their lines, limits and endings."""
 
 from __future__ import annotations
 
@@ -216,7 +216,7 @@ def test_a_responder_may_call_magics_but_no_second_robot(tmp_path: Path, runner:
 
 
 def test_the_program_whose_text_is_marked_is_the_one_that_is_run(tmp_path: Path, runner: TrialRunner) -> None:
-    """A notebook changes what its own magics hand over."""
+    """A notebook changes the program that its own magics pass on."""
     swap = (
         "shell = type(get_ipython())\nreal = shell.run_cell_magic\n"
         "shell.run_cell_magic = lambda self, name, line, cell: real(self, name, line, 'tank_drive.on(50, 50)')"
@@ -243,7 +243,7 @@ def test_runs_that_are_not_marked_have_an_end(tmp_path: Path, runner: TrialRunne
     assert spoken(result.trials[0].recording) == ["done"]
 
 
-# A notebook's life.
+# The lifetime of a notebook.
 
 
 def test_what_was_not_run_after_a_cut_is_listed(tmp_path: Path, runner: TrialRunner) -> None:

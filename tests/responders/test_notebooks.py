@@ -1,4 +1,4 @@
-"""Notebooks as submissions: executed from top to bottom, with one run marked, and everything else told as a note."""
+"""Notebooks as submissions: executed from top to bottom, with one run marked, and all other runs noted."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from submissions.packed import pack_submission, unpack_submission
 
 @pytest.fixture(params=["ipynb", "py"])
 def messaging(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
-    """The course's notebook with its network beside it, as .ipynb and as nbconvert's .py."""
+    """Return the course's notebook with its network, as .ipynb and as nbconvert's .py."""
     folder = tmp_path / "ada"
     folder.mkdir()
     shutil.copy(MESSAGING if request.param == "ipynb" else MESSAGING_SCRIPT, folder / f"messaging.{request.param}")
@@ -92,7 +92,7 @@ def test_run_shows_every_robot_of_the_course_notebook(tmp_path: Path) -> None:
     ]
     assert "(says) all done" in done.stdout
     assert "(says) Is that a upwards facing triangle" in done.stdout
-    # The flags of the command line are those of the last run.
+    # Flags of the command line apply to the last run.
     assert done.stdout.count("(says) Is that a left facing triangle") == 1
     images = [tmp_path / "p.png", *(tmp_path / "d" / f"cell-{number}.png" for number in (2, 7, 15, 27))]
     assert all(image.read_bytes().startswith(b"\x89PNG") for image in images)
@@ -137,7 +137,7 @@ def test_a_robot_program_draws_no_diagrams(tmp_path: Path) -> None:
     assert "robot.py is not a notebook and draws no diagrams; leave --diagrams out" in done.stderr
 
 
-# Which run is marked.
+# Selection of the marked run.
 
 
 def test_the_scenario_places_the_marked_run_and_the_others_keep_their_flags(
@@ -294,4 +294,4 @@ def test_what_the_database_keeps_is_the_same_submission(tmp_path: Path) -> None:
     assert fit_parts(kept, Parts()).notebook == submission.notebook
 
 
-# What cells do.
+# Features of cells.

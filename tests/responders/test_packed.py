@@ -1,4 +1,4 @@
-"""Packed acts of a robot program: whatever bytes arrive, the worker reads acts that there are or refuses."""
+"""Packed acts of a robot program: for any bytes, the worker reads valid acts or refuses."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_any_bytes_are_acts_or_refused(data: bytes) -> None:
 
 
 def test_a_motor_is_told_whatever_can_be_told(runner: TrialRunner) -> None:
-    """Every set point and command of the brick, there and back: what it reads afterwards is what it has set."""
+    """Every set point and command of the brick, both ways: the robot reads back the values that it has set."""
     program = """
 motor = tank_drive.left_motor
 motor.position_sp = 123

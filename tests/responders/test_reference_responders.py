@@ -1,4 +1,4 @@
-"""The reference responders inside the sandbox: they answer by the course's protocol, and take hostile text calmly."""
+"""The reference responders inside the sandbox: they follow the course's protocol, and survive hostile text."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def converse(runner: TrialRunner, name: str, texts: list[str], **options: Any) -
 
 
 def answers(recording: Recording) -> list[Any]:
-    """What the responder answered, unwrapped where it is JSON."""
+    """Return the responder's answers, unwrapped if they are JSON."""
     texts = [message.text for message in recording.messages if message.sender == "responder"]
     return [json.loads(text[6:])["message"] if text.startswith("JSON::") else text for text in texts]
 

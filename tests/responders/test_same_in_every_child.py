@@ -1,4 +1,4 @@
-"""Every kind of child hashes, orders, draws and places its objects as the same child of any other worker does."""
+"""Children of every kind have the same hashes, order, random numbers and addresses on every worker."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from sim.recording import Recording
 from submissions.assignment.reader import read_assignment
 from submissions.submission import Submission
 
-#: What a child says of itself: first what follows from hashes, seeds and clocks, then what follows from addresses.
+#: Values that a child reports: first those that follow from hashes, seeds and clocks, then those from addresses.
 TOLD = """
 def told():
     import gc, os, random, sys, tempfile, time, timeit, uuid
@@ -117,9 +117,9 @@ KINDS: dict[str, Callable[[TrialRunner, Path], str]] = {
 
 @pytest.fixture(scope="module")
 def said(tmp_path_factory: pytest.TempPathFactory) -> tuple[bool, dict[str, list[list[Any]]]]:
-    """Whether addresses are fixed here, and what children of each kind said of themselves.
+    """Return whether addresses are fixed here, and the reports of children of each kind.
 
-    Two of each come from zygotes that have done other things before, in a process with other files open.
+    The two children of each kind come from zygotes with different histories, in a process with other open files.
     """
     found: dict[str, list[list[Any]]] = {kind: [] for kind in KINDS}
     for kinds, files in ((list(KINDS), 0), (list(reversed(KINDS)), 100)):
@@ -139,5 +139,5 @@ def test_it_is_the_same_in_two_fresh_zygotes_and_in_the_next_child(
     fixed, found = said
     texts, places = zip(*found[kind], strict=True)
     assert all(each == texts[0] for each in texts)
-    # Where the machine lets no process fix its addresses, a grade says so by not naming it among the layers.
+    # If the machine cannot fix addresses, the grade does not list this layer.
     assert not fixed or all(each == places[0] for each in places)

@@ -1,4 +1,4 @@
-"""The same submission, assignment and seed give the same chain anywhere, any time, beside anything."""
+"""The same submission, assignment and seed give the same chain on any machine, at any time and load."""
 
 from __future__ import annotations
 
@@ -82,9 +82,9 @@ INFRARED = Channel(0.2, 0.3, 0.1, 0.1, 0.1, 0.2, "infrared", (1500.0, 571.0), 60
 
 
 def chain(name: str, runner: TrialRunner) -> str:
-    """The hash of one run: a follower of 60 s, a talk of 20 images, one by infrared, three agents, or two robots.
+    """Return the hash of one run: a 60 s follower, 20 images, an infrared link, three agents, or two robots.
 
-    The two bump into each other, ask one responder, and draw chance of their own.
+    The two robots collide, use one responder, and draw their own random numbers.
     """
     if name == "pair":
         recording = run_program(

@@ -1,4 +1,4 @@
-"""The course notebook on messaging: each system in it behaves as its text says, run from its own cells, unchanged.
+"""The course notebook on messaging: each system behaves as the text describes, run from its own unchanged cells.
 
 The systems, with the sections of the notebook that they come from:
 
@@ -9,13 +9,13 @@ The systems, with the sections of the notebook that they come from:
 5. an agent with a multi-layer perceptron (5.2.1)
 6. a robot that acts on the agent's answer (5.2.1)
 7. shapes at random places (5.2.1)
-8. rules in place of the network (5.3)
+8. rules instead of the network (5.3)
 9. a block diagram of the architecture (5.1.1)
 10. sequence diagrams of the protocol (5.1.2, 5.1.3, 5.1.5)
 11. messages that get lost out of range or facing the wrong way (5.1)
-12. a convolutional network in place of the perceptron (5)
+12. a convolutional network instead of the perceptron (5)
 
-Of the last two the notebook has only the words, and no program; the tests are numbered as the systems are.
+The notebook describes the last two only in words, without a program. The tests have the numbers of the systems.
 """
 
 from __future__ import annotations
@@ -56,12 +56,12 @@ DIAGRAMS = {cell.cell: cell.diagram for cell in diagrams_in(NOTEBOOK).cells}
 
 @pytest.fixture(scope="module")
 def executed(runner: TrialRunner) -> ExecutedNotebook:
-    """The whole notebook, from top to bottom."""
+    """Execute the whole notebook from top to bottom."""
     return run_notebook(NOTEBOOK, NETWORK, RunOptions(), runner)
 
 
 def run(executed: ExecutedNotebook, cell: int) -> Recording:
-    """The run that a cell starts."""
+    """Return the run that a cell starts."""
     (recording,) = (each.recording for each in executed.runs if each.cell == cell)
     assert recording.verdict is Verdict.FINISHED
     return recording
@@ -82,7 +82,7 @@ def compared(diagram: Diagram, recording: Recording) -> str:
 
 
 def driven(runner: TrialRunner, start: Pose, responder: str = "") -> Recording:
-    """The last program of the notebook, from another place, with its own responder or another."""
+    """Run the last program of the notebook from another start, with its own responder or another one."""
     folder = examples("shape-recognition") / "seed"
     flags, text = split_program((folder / "robot.py").read_text())
     return run_program(
@@ -198,7 +198,7 @@ def test_9_block_diagram(executed: ExecutedNotebook) -> None:
     ("cell", "described", "words"),
     [
         (7, 12, "It shows what happened."),
-        # The text has the agent call the parser; its program calls the one with what the other gave.
+        # In the text the agent calls the parser. In the program, the parser's result is passed to the agent.
         (15, 20, "agent → parser and parser → agent did not happen. responder → parser happened and is not drawn."),
         (27, 33, "agent → parser and parser → agent did not happen. responder → parser happened and is not drawn."),
     ],
@@ -232,7 +232,7 @@ def test_11_messages_are_lost_out_of_range_or_facing_the_wrong_way(
 
 
 def test_12_a_convolutional_network_in_place_of_the_perceptron(runner: TrialRunner) -> None:
-    """The image parser's own message, shown to both kinds of network."""
+    """The image parser's own message, classified by both kinds of network."""
     folder = examples("mlp-against-cnn") / "reference"
     networks = {
         "mlp_digits_14x14.joblib": weights_bytes("digits"),

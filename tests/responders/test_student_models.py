@@ -1,4 +1,4 @@
-"""Models that submissions bring: good ones are marked, bad ones get a verdict and a sentence and touch nothing."""
+"""Models in submissions: good ones are marked, bad ones get a verdict and a sentence and affect nothing else."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ def test_a_hostile_pickle_touches_nothing_outside(deed: str, runner: TrialRunner
         with pytest.raises(TimeoutError):
             listening.accept()
     assert recording.verdict is Verdict.RESPONDER_ERROR
-    # Where bubblewrap works too, the file is not even there.
+    # Where bubblewrap works too, the file does not even exist in the child.
     words = recording.faults[0].message
     assert "model.joblib was stopped while it was loaded" in words or "No such file" in words
     assert recording.faults[0].line == 2
@@ -193,7 +193,7 @@ def test_large_models_that_may_be_submitted_can_be_used(runner: TrialRunner) -> 
 
 @pytest.fixture
 def weights(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
-    """The kit's module as responders import it, forgotten afterwards."""
+    """Yield the kit's module as responders import it, removed afterwards."""
     monkeypatch.syspath_prepend(str(KIT))
     yield importlib.import_module("nn_tools.weights")
     for name in [name for name in sys.modules if name.split(".")[0] == "nn_tools"]:

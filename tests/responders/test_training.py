@@ -1,4 +1,4 @@
-"""Submissions that collect data or train a model on it, run for real; what goes wrong gets a verdict and a sentence."""
+"""Submissions that collect data or train a model on it, with real runs; mistakes get a verdict and a sentence."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def train(images, labels):
 
 @pytest.fixture(scope="module")
 def training() -> Assignment:
-    """The catalogue's, with one trial a scenario and little to use."""
+    """Return the catalogue's assignment with one trial per scenario and a small budget."""
     asked = find_assignment("train-a-recogniser")
     scenarios = tuple(
         replace(scenario, trials=1, light_noise=(0.0,))
@@ -133,7 +133,7 @@ def test_what_goes_wrong_in_training_is_told(
 
 
 def test_the_labels_of_unseen_images_are_nowhere_in_the_child(runner: TrialRunner, training: Assignment) -> None:
-    """Everything that a submission can find: its folder, and its process's memory while it names unseen images."""
+    """Searches everything a submission can reach: its folder, and its process's memory while it labels images."""
     text = """
 import gc, os, numpy
 def train(images, labels):
@@ -152,7 +152,7 @@ class Model:
 
 
 def test_unseen_images_do_not_come_in_the_order_of_the_track(runner: TrialRunner, training: Assignment) -> None:
-    """Else a model could name a whole stretch by the clearest image in it."""
+    """Otherwise a model could label a whole stretch by its clearest image."""
     result = trained(runner, training, ROWS.format("return [str(place) for place in range(len(rows))]"))
     messages = result.trials[1].recording.messages
     places = [int(message.text) for message in messages if message.sender == "responder"][:100]
@@ -179,7 +179,7 @@ def test_pairs_of_the_log_know_what_they_show(runner: TrialRunner) -> None:
     assert pairs(recording, "sent") == []
     usable = Counter(pair.label for pair in found if pair.label is not None)
     assert len(usable) == 6
-    # Where a patch can be decoded at all it tells the truth, or the sensor is beside the shape.
+    # A patch that can be decoded is correct, or the sensor is beside the shape.
     assert all(pair.truth in (None, pair.decoded) for pair in found if pair.decoded is not None)
     assert sum(usable.values()) < len(found)
 

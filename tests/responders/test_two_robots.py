@@ -1,4 +1,4 @@
-"""Two robots in one world: one time, messages in their order, and neither can stop, see into or hold up the other."""
+"""Two robots in one world: shared time and message order, and neither can stop, inspect or delay the other."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_a_text_is_heard_by_the_other_robot_as_late_as_the_channel_says(runner: 
     due = 17 / 30  # the first tick from 0.25 + 0.3 on
     assert listener.messages == (Message(0.25, "partner", "PY::hello", due),)
     assert printed(listener) == ["hello"]
-    # The teller's program has ended long before.
+    # The sender's program ended long before.
     assert teller.messages == (Message(0.25, "robot", "PY::hello", due, to_partner=True),)
 
 
@@ -178,7 +178,7 @@ def test_a_responders_own_sender_is_left_alone(runner: TrialRunner) -> None:
 
 
 def test_a_responder_hears_both_in_the_order_in_which_they_spoke(runner: TrialRunner) -> None:
-    # Both speak several times between two ticks; the first robot's program is served first.
+    # Both speak several times between two ticks. The first robot's program is served first.
     speak = "import time\nfor i in range(20):\n    time.sleep({})\n    print('PY::', {})\n"
     responder = "said = []\ndef responder(text):\n    said.append(text)\n    return str(len(said))"
     first, second = run_both(runner, speak.format(0.013, 1), speak.format(0.007, 2), responder=responder)
@@ -307,7 +307,7 @@ def test_a_given_program_may_run_on_and_has_the_same_chance_for_all(runner: Tria
 
 
 class Beats:
-    """A heartbeat that ends the job after so many."""
+    """A heartbeat that cancels the job after a number of calls."""
 
     def __init__(self, most: int) -> None:
         self.left = most

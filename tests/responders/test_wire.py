@@ -1,4 +1,4 @@
-"""Frames from a child: whatever bytes arrive, the worker reads one of the agreed frames or refuses."""
+"""Frames from a child: for any bytes, the worker reads a valid frame or refuses."""
 
 from __future__ import annotations
 

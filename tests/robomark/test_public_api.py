@@ -1,4 +1,4 @@
-"""The public Python API: what it exports, that it grades as the command does, and that the documented scripts run."""
+"""The public Python API: its exports, its agreement with the command's grades, and the documented scripts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PROGRAM = "%%sim_magic_preloaded -b Simple_Shapes\ntank_drive.on_for_seconds(50,
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """With what the documented scripts read."""
+    """Return a folder with the input of the documented scripts."""
     for name in ("reference", "flawed"):
         shutil.copytree(examples("echo-responder") / name, tmp_path / "my-work" / name)
     (tmp_path / "robot.py").write_text(PROGRAM)

@@ -1,4 +1,4 @@
-"""No code reads texts that are meant for people: it goes by values, codes and classes of errors."""
+"""No code reads texts that are meant for people. It uses values, codes and exception classes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from paths import TESTS
 
 _ROOT = TESTS.parent
 _PACKAGES = ("models", "responders", "robomark", "service", "sim", "submissions")
-#: Programs of students and of the course, and migrations, which read what earlier releases stored.
+#: Programs of students and of the course, and migrations, which read the data of earlier releases.
 _LEFT_OUT = ("catalogue", "examples", "known_answer", "library", "template", "versions")
 _FIELDS = {"error", "hint", "message", "reason", "sentence", "staff_only"}
 _NAMES = _FIELDS | {"note"}
@@ -23,7 +23,7 @@ _OF_PYTHON = "what Python says of a student's mistake is a text, also in the rec
 _OF_CRITERIA = "a hint reads what the criterion's message says; results of criteria have no state of their own yet"
 _BOTH = f"{_OF_PYTHON}; {_OF_CRITERIA}"
 _OF_REPORTS = "finds the hint, the fault and the evidence that say the same, so as to say it once"
-#: File: how many such places it has, and why.
+#: For each file, the number of such places and the reason.
 _ALLOWED: dict[str, tuple[int, str]] = {
     "responders/faults.py": (1, "reads, in one place, the sentence of a stored fault that it makes itself"),
     "responders/notebook_executor.py": (1, "a fault names the function that is missing in its sentence alone"),
@@ -76,7 +76,7 @@ def _text(node: ast.expr) -> bool:
 
 
 def _words(node: ast.expr) -> bool:
-    """Return whether an expression is, as far as it can be seen, a text with letters."""
+    """Return whether an expression is recognisably a text with letters."""
     match node:
         case ast.Constant(value=str(text)):
             return any(map(str.isalpha, text))

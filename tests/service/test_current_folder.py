@@ -1,4 +1,4 @@
-"""A command that is started in a folder of hostile files runs none of them, and gives the same marks."""
+"""A command that starts in a folder of hostile files runs none of them, and gives the same marks."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 
 from paths import ROOT
 
-#: What Python, our own code, Celery and others would import or read if the current folder were on their way.
+#: Files that Python, our code, Celery and others would import or read from a current folder on their path.
 MODULES = (
     *("numpy", "sim", "service", "models", "responders", "submissions", "celery", "celeryconfig", "redis", "kombu"),
     *("sitecustomize", "usercustomize", "json", "random", "typing", "structlog", "sqlalchemy", "billiard", "fastapi"),
@@ -28,7 +28,7 @@ SETTINGS = "text.usetex: True\nfigure.facecolor: red\nfont.family: cursive\nsave
 
 @pytest.fixture
 def hostile(tmp_path: Path) -> Path:
-    """A folder with a submission, and files that write down that they were run."""
+    """Return a folder with a submission, and with files that record that they were executed."""
     folder = tmp_path / "downloads"
     folder.mkdir()
     noting = (
@@ -83,7 +83,7 @@ COMMANDS = {
 }
 
 
-#: Of commands that start no service and differ only in what they import.
+#: Long tests: commands that start no service and differ only in their imports.
 _LONG = ("check an assignment", "floors", "list batches")
 MARKED = ("grade", "grade with a report", "submit and wait")
 
@@ -104,7 +104,7 @@ _OTHERS = (pytest.param({"PYTHONPATH": path}, id=path, marks=pytest.mark.long) f
 @pytest.mark.parametrize("environment", [pytest.param({"PYTHONPATH": ""}, id="empty"), *_OTHERS])
 def test_services_take_no_python_settings_of_the_users(hostile: Path, environment: dict[str, str]) -> None:
     starter = (sys.executable, "-P", "-c", "from service.cli import main; main()")
-    # What Python reads before our first line is the user's own doing; all that we start is not.
+    # Files that Python reads before our first line are the user's responsibility. All processes we start are covered.
     for name in ("sitecustomize", "usercustomize", "encodings"):
         (hostile / f"{name}.py").unlink()
     shutil.rmtree(hostile / "service")
@@ -122,7 +122,7 @@ def test_settings_for_plots_in_the_current_folder_change_no_plot(hostile: Path) 
     assert (hostile / "with.png").read_bytes() == (hostile / "without.png").read_bytes()
 
 
-#: Where processes are started: everything else calls ``sim/processes.py``; the sandbox starts its own with nothing.
+#: Places that start processes. All other code calls ``sim/processes.py``; the sandbox starts its own with no options.
 STARTERS = {
     "sim/processes.py",
     "responders/sandbox/zygote.py",

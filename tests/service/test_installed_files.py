@@ -1,4 +1,4 @@
-"""``doctor`` notices a file of ours that another distribution has replaced."""
+"""``doctor`` notices one of our files that another distribution has replaced."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from service.settings import Settings
 
 @pytest.fixture
 def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An installation of two files with a record, as a wheel leaves it."""
+    """Return an installation of two files with a record, as a wheel leaves it."""
     lines = []
     for name, data in (("models/__init__.py", b"ours\n"), ("sim/world.py", b"ours as well\n")):
         path = tmp_path / name

@@ -1,4 +1,4 @@
-"""The languages of the pages: every catalogue has all that pages say, and each reader gets the one they asked for."""
+"""The languages of the pages: every catalogue is complete, and each reader gets the chosen language."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Addresses that are asked: public ones and those of networks that may be reached, once, within a time and a length."""
+"""Requests to outside addresses: public or permitted networks only, once, with limits on time and length."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from service.outside import ALL_OTHERS, NO_OTHERS, NotReached, ask, is_public
 
 @contextmanager
 def answering(answer: bytes) -> Iterator[str]:
-    """Where somebody answers the first request with these bytes."""
+    """Serve these bytes for the first request; yield the address."""
     with socket.create_server(("127.0.0.1", 0)) as listening:
 
         def serve() -> None:

@@ -1,4 +1,4 @@
-"""What the files made of a stored grade show of another one, and to whom."""
+"""Files made from a stored grade: which data of another grade they contain, and for whom."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from sim.errors import UsageError
 
 
 def stored(store: Store, student: str, program: int, grade: Grade) -> tuple[JobLine, str]:
-    """The grade as that of a student's submission, and its batch."""
+    """Store the grade for a student's submission; return its job and its batch."""
     taken = accept_batch(store, "class", [grading_request(student, f"print({program})\n")], [], max_attempts=3)
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None
@@ -43,7 +43,7 @@ def line_of(store: Store, job_id: str) -> JobLine:
 
 
 def replay_over(store: Store, line: JobLine, over: JobLine, folder: Path) -> dict[str, object]:
-    """The first trial's other one in the replay of one grade with another over it."""
+    """Return the other trial beside the first one, in the replay of one grade compared with another."""
     with store.reading() as session:
         grade = results.load(session, line.id)
     write_grade_replay(store, line, grade, folder / "replay.json", over)

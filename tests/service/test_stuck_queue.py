@@ -1,4 +1,4 @@
-"""A queue that stands still is said not to be well, also where everything that could grade lives."""
+"""A queue without progress is reported as a problem, even if all components are running."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def test_nothing_is_claimed_from_tables_that_need_newer_code(store: Store) -> No
         tryouts.ask(session, job.enrolment_id, job.assignment_version_id, b"")
     upgraded_by_newer_release(store, "9998")
     assert [name for name, take in claims.items() if take() is not None] == []
-    # What was begun is finished.
+    # Running jobs are finished.
     jobs.heartbeat(store, running, 60, 0.5)
     jobs.finish(store, running, prepared, datetime.now(UTC))
     upgraded_by_newer_release(store, newest_revision())

@@ -1,4 +1,4 @@
-"""Programs that are tried: in one trial that students may know all of, with limits of their own, and told."""
+"""Test runs: one trial that is fully visible to students, with separate limits, and a report."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def _with_hidden(asked: Assignment) -> Assignment:
 def _tried(
     store: Store, runner: TrialRunner, program: str, asked: Assignment | None = None, *, alone: bool = False
 ) -> TryoutLine:
-    """What a student is told of a program that a worker was notified of; ``alone``, without a responder."""
+    """Return the student's view of a test run after a worker was notified; with ``alone``, without a responder."""
     submission = grading_request("ada", program).submission
     packed = pack_submission(replace(submission, responder=None) if alone else submission)
     frozen = freeze(asked or _with_hidden(echo()))

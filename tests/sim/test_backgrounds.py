@@ -1,4 +1,4 @@
-"""The floors: bit for bit, the original's where its check sums are known; by its measured readings elsewhere."""
+"""The floors, bit for bit: compared with the original's check sums where known, otherwise with its readings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sim.errors import UsageError
 
 pytestmark = pytest.mark.fast
 
-#: Known of the original.
+#: Known values of the original.
 ORIGINAL = {
     "Coloured_bands": "616569809051c5cd",
     "Rainbow_bands": "bbe70a1cdb29200c",
@@ -27,7 +27,7 @@ ORIGINAL = {
     "Radial_red": "9cc7e643c608aa7e",
     "Simple_Shapes": "379af070c54069ed",
 }
-#: As they were drawn when they were added.
+#: The floors as they were first drawn.
 OWN = {
     "Empty_Map": "af88c703b719accc",
     "Loop": "94bc0f2623f91e9b",
@@ -51,7 +51,7 @@ OWN = {
 
 
 def sensor_mean(floor: str, pose: tuple[float, float, float], sideways: float) -> NDArray[np.float64]:
-    """Mean colour of the 305 pixels that a light sensor ``sideways`` mm right of the middle sees."""
+    """Return the mean colour of the 305 pixels seen by a light sensor ``sideways`` mm right of the middle."""
     x, y, heading = pose
     turn = math.radians(heading) - math.pi / 2
     cosine, sine = math.cos(turn), math.sin(turn)

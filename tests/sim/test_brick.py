@@ -1,4 +1,4 @@
-"""What a robot program can import and call, and what it gets back."""
+"""The functions and classes available to robot programs, and their results."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sim.recording import Pose, Verdict
 
 pytestmark = pytest.mark.fast
 
-#: An expression, and what printing it shows, for a robot at (520, 900) over Simple_Shapes unless noted.
+#: An expression, and its printed value, for a robot at (520, 900) over Simple_Shapes unless noted.
 VALUES = [
     ("get_clock()", "0"),
     ("colorLeft.reflected_light_intensity", "204"),

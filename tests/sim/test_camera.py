@@ -1,4 +1,4 @@
-"""What the light sensors see is the printed floor, pixel for pixel, off the floor included."""
+"""The light sensors see the printed floor pixel for pixel, including the area outside the floor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A marked digit sheet: the same for everybody, or a new one each trial, and drawn in reports as it lay there."""
+"""A marked digit sheet: the same for all students, or a new one each trial, and shown in reports as it was."""
 
 from __future__ import annotations
 
@@ -57,13 +57,13 @@ def graded(folder: Path, sheet: str, runner: TrialRunner, labels: str = "false")
 
 
 def shown(image: Image) -> bytes:
-    """The 14 x 14 grey levels in the middle of the left sensor's image."""
+    """Return the 14 x 14 grey levels in the middle of the left sensor's image."""
     rgba = np.frombuffer(image.left, np.uint8).reshape(SENSOR_SIDE, SENSOR_SIDE, 4)
     return rgba[3:17, 3:17, 0].tobytes()
 
 
 def on_sheet(seed: int) -> bytes:
-    """The digit that the robot at (400, 50, 90) has under its left sensor on sheet ``seed``."""
+    """Return the digit under the left sensor of a robot at (400, 50, 90) on sheet ``seed``."""
     return floor("MNIST_Digits", seed=seed).pixels[56 + 1000 : 70 + 1000, 73 + 300 : 87 + 300, 0].tobytes()
 
 
@@ -93,7 +93,7 @@ def test_a_report_draws_the_sheet_that_lay_there_with_its_patches_or_without(
     recording = bare.trials[0].recording
     assert (recording.sheet, recording.label_patches) == (bare.trials[0].seed, False)
     assert from_bytes(to_bytes(recording)).sheet == recording.sheet
-    # Of a robot that stands still nothing is drawn.
+    # A robot that does not move has no drawing.
     moved = replace(recording, images=(), messages=(), ticks=replace(recording.ticks, x=recording.ticks.x + 1.0))
     images = set()
     for change in ({}, {"sheet": 0}, {"label_patches": True}):

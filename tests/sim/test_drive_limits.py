@@ -1,4 +1,4 @@
-"""No frame that a robot program can send makes a motor do more than a motor does."""
+"""No frame from a robot program makes a motor exceed a real motor's limits."""
 
 from __future__ import annotations
 

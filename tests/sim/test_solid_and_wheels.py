@@ -1,4 +1,4 @@
-"""Worlds that an assignment may ask for: walls and obstacles that stop the robot, and wheels that roll in Bullet."""
+"""Optional worlds of an assignment: walls and obstacles that stop the robot, and wheels that roll in Bullet."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_what_ran_before_leaves_no_trace(physics: Physics, runner: TrialRunner) 
 
 
 def random_drive(seed: int) -> Iterator[tuple[float, float]]:
-    """Wheel degrees per second, new targets each half second for a minute, ramped as the course's motors are."""
+    """Yield wheel speeds in degrees per second, with new targets each half second for a minute, and the course's ramps."""
     chance = random.Random(seed)
     speeds, targets = [0.0, 0.0], [0.0, 0.0]
     for tick in range(1800):

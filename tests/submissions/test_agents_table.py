@@ -1,4 +1,4 @@
-"""The [agents] of an assignment and the files of agents in a submission: what is taken, and what is refused."""
+"""The [agents] table of an assignment and the agents' files in a submission: accepted and refused values."""
 
 from __future__ import annotations
 

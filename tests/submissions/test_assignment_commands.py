@@ -1,4 +1,4 @@
-"""``robomark assignments``: a new one, its check, and what students get of it."""
+"""``robomark assignments``: creation, its check, and the students' copy."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def test_the_check_of_a_reference_that_fails_says_with_what(tmp_path: Path, runn
 
 
 def test_an_assignment_whose_own_check_fails_on_an_example_is_not_in_order(tmp_path: Path, runner: TrialRunner) -> None:
-    """Even where it costs no marks."""
+    """Even if this costs no marks."""
     write_new(tmp_path / "task")
     file = tmp_path / "task" / "assignment.toml"
     own = '\n[[criterion]]\nid = "own"\ntitle = "O"\nmarks = 0\ncheck = "python"\nfile = "check.py"\n'
@@ -207,7 +207,7 @@ def test_what_new_examples_got_is_noted_and_nothing_that_stands_there_is_changed
 
 
 def test_marks_that_are_wrong_are_not_noted(tmp_path: Path, runner: TrialRunner) -> None:
-    """A reference without full marks is a mistake, and what a table says is never overwritten."""
+    """A reference without full marks is a mistake, and the values in a table are never overwritten."""
     write_new(tmp_path / "task")
     (tmp_path / "task" / "expected.toml").write_text('[stops-short]\nmarks = "1"\n')
     (tmp_path / "task" / "examples" / "reference" / "robot.py").write_text("say('red')\n")

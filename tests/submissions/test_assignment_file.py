@@ -1,4 +1,4 @@
-"""Assignment files: what they become, and every mistake named with its line."""
+"""Assignment files: the result of reading them, and every mistake reported with its line."""
 
 from __future__ import annotations
 

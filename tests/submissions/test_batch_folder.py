@@ -1,4 +1,4 @@
-"""Folders and zips of submissions: every bad row is named, and stops no other."""
+"""Folders and zips of submissions: every bad row is reported, and the others are not affected."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _student(folder: Path, name: str, *, responder: bool = True, toml: str = "")
 
 @pytest.fixture
 def class_folder(tmp_path: Path) -> Path:
-    """A class with two good submissions and one of everything that goes wrong."""
+    """Return a class with two good submissions and one of every fault."""
     folder = tmp_path / "class"
     _student(folder, "ada")
     _student(folder, "Zoë 🤖")

@@ -1,4 +1,4 @@
-"""CSV rosters: every row that cannot be used is named with its line, and stops no other."""
+"""CSV rosters: every unusable row is reported with its line, and the others are not affected."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RESPONDER = "def responder(msg):\n    return msg\n"
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A roster's folder with good submissions a, b and sub/c, a broken zip, and one outside it."""
+    """Return a roster's folder with good submissions a, b and sub/c, a broken zip, and a file outside the folder."""
     own = tmp_path / "class"
     for name in ("class/a", "class/b", "class/sub/c", "outside"):
         (tmp_path / name).mkdir(parents=True)

@@ -1,4 +1,4 @@
-"""Submissions in every form they come in, and archives that were made to do harm."""
+"""Submissions in every form, and malicious archives."""
 
 from __future__ import annotations
 
@@ -307,7 +307,7 @@ def test_encrypted_zip_is_refused(tmp_path: Path) -> None:
 
 
 def test_zip_bombs_are_stopped_while_they_unpack(tmp_path: Path) -> None:
-    # 40 MB of zeros that the directory claims to be 10 bytes; then one that says what it is.
+    # 40 MB of zeros with a declared size of 10 bytes, then a file with the right size.
     zeros = b"\0" * (40 * 1024 * 1024)
     honest = zipped(tmp_path / "honest.zip", {**BOTH, "zeros.bin": zeros})
     assert "16 MB a file" in refusal(honest)

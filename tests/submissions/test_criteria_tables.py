@@ -1,4 +1,4 @@
-"""Mistakes in the tables of criteria about motion and paths are named with what was expected."""
+"""Mistakes in the tables of criteria about motion and paths are reported with the expected value."""
 
 from __future__ import annotations
 

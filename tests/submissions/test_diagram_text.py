@@ -1,4 +1,4 @@
-"""The language of %%blockdiag and %%seqdiag cells: what it means, and that nothing else comes of any text."""
+"""The language of %%blockdiag and %%seqdiag cells: its meaning, and that no text has other effects."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from submissions.submission import Cell, Notebook
 
 
 def told(diagram: Diagram) -> list[str]:
-    """The steps as a line each."""
+    """Return the steps, one per line."""
     return [
         f"--- {step.text}"
         if isinstance(step, Divider)

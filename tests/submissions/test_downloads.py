@@ -1,4 +1,4 @@
-"""Downloads of Moodle, Gradescope and nbgrader as they come: whose files are whose, and nobody is lost or misnamed."""
+"""Original downloads of Moodle, Gradescope and nbgrader: the owner of each file; no student is lost or misnamed."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def people(tmp_path: Path, text: str = PEOPLE) -> People:
 
 
 def taken(contents: BatchContents) -> dict[str, str]:
-    """Name by id of whoever was taken in."""
+    """Return name by id of all accepted students."""
     return {request.submission.student: request.student.name for request in contents.grading_requests}
 
 
@@ -114,8 +114,8 @@ def test_blind_marking_knows_numbers_alone(tmp_path: Path) -> None:
 
 def test_nobody_is_taken_for_another(tmp_path: Path) -> None:
     files = {
-        **under("Alan Turing_500000_assignsubmission_file_/"),  # Ada's number: the table of another assignment
-        **under("Ada Lovelace_9_assignsubmission_file_/"),  # no number of the table, and two of that name
+        **under("Alan Turing_500000_assignsubmission_file_/"),  # Ada's number: the table belongs to another assignment
+        **under("Ada Lovelace_9_assignsubmission_file_/"),  # a number not in the table, and two students of that name
         **under("Alan Turin_8_assignsubmission_file_/"),
         "Eve Adams_7_assignsubmission_onlinetext/onlinetext.html": "<p>print('hello')</p>",
     }
@@ -232,7 +232,7 @@ def test_nbgraders_folder_goes_by_student_and_assignment(tmp_path: Path) -> None
     assert list(refused(each)) == ["s3"]
     first, second = read_batch(folder, ASSIGNMENT).grading_requests
     assert (str(first.submitted_at), second.submitted_at) == ("2026-11-19 16:03:18+00:00", None)
-    # When it was submitted is no part of what was submitted.
+    # The time of submission is not part of the submission.
     assert first.submission.sha256 == second.submission.sha256
     with pytest.raises(UsageError, match=r"has submissions for .*, expected for rule-set"):
         read_batch(folder, "rule-set")

@@ -1,4 +1,4 @@
-"""Every example and every failing submission, graded for real: marks, verdict and what the student is told."""
+"""Every example and every failing submission, graded for real: marks, verdict and the student's messages."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from submissions.criteria.texts import TextSequence
 from submissions.packed import pack_submission, unpack_submission
 from submissions.submission import Submission
 
-#: Their examples take four fifths of the time of all: dozens of trials, minutes on the track, or training.
+#: Their examples take four fifths of the total time: dozens of trials, minutes on the track, or training.
 _LONG = frozenset(
     {
         "braitenberg-avoid",
@@ -91,7 +91,7 @@ def assert_as_expected(result: Grade, wanted: Expectation) -> None:
 
 
 def rules_that_prove() -> Iterator[Rule]:
-    """The rules that must say nothing of a right program, whatever marks are lost."""
+    """Return the rules that must report nothing for a correct program, even if marks are lost."""
     modules = (
         hint_answers,
         hint_braces,
@@ -194,7 +194,7 @@ def test_seed_names_all_six_shapes_and_says_so(runner: TrialRunner) -> None:
 
 
 def sought(criterion: Criterion) -> bool:
-    """Whether it looks for something in particular: not only that something comes, and not at the last text alone."""
+    """Return whether the criterion searches for a particular item, other than any item or the last text."""
     if not isinstance(criterion, AmongMany) or (isinstance(criterion, Datalog) and criterion.measured is None):
         return False
     if not isinstance(criterion, TextSequence):

@@ -1,4 +1,4 @@
-"""Files that are no program: the error message names the kind and what to submit instead."""
+"""Files that are not programs: the error message names the file type and the right file to submit."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Archives that lie about themselves and notebooks that are bombs: each is read within the caps, or refused in a word.
+"""Archives with false sizes and notebook bombs: each is read within the limits, or refused with a short message.
 
-Ordinary broken and forbidden archives are ``test_bundle.py``'s.
+``test_bundle.py`` covers ordinary broken and forbidden archives.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def _patched(data: bytes, at: int, form: str, value: int) -> bytes:
 
 
 def _says_it_is_smaller() -> bytes:
-    """Both headers claim ten bytes; a megabyte comes."""
+    """Both headers claim ten bytes for a megabyte of data."""
     data = _archive({"robot.py": b"#" * (1 << 20)})
     data = _patched(data, 22, "<I", 10)
     return _patched(data, _directory(data) + 24, "<I", 10)
@@ -53,7 +53,7 @@ def _says_it_is_enormous() -> bytes:
 
 
 def _sizes_in_a_field_that_is_not_there() -> bytes:
-    """All ones mean: look into the zip64 field."""
+    """All bits set refer to the zip64 field, which is missing."""
     data = _archive()
     return _patched(data, _directory(data) + 24, "<I", 0xFFFFFFFF)
 
@@ -188,7 +188,7 @@ def test_no_archive_of_any_making_raises_anything_else(
     try:
         data = bytearray(_archive(files))
     except (UnicodeEncodeError, ValueError, UserWarning):
-        # Python does not make every archive: not two files of one name, for one.
+        # Python cannot write every archive, for example one with two files of the same name.
         return
     for place, new in damage:
         at = place % len(data)
@@ -198,7 +198,7 @@ def test_no_archive_of_any_making_raises_anything_else(
 
 
 def _unzipped(data: bytes) -> tuple[dict[str, bytes] | None, str]:
-    """The files, or why there are none."""
+    """Return the files, or the reason for the refusal."""
     try:
         return unzip(data, "x.zip").files, ""
     except UsageError as error:

@@ -1,4 +1,4 @@
-"""Assignment files that are small and ask for much: refused before trials are made or names compared."""
+"""Small assignment files with large demands: refused before trials are created or names compared."""
 
 from __future__ import annotations
 

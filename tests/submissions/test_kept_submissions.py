@@ -1,4 +1,4 @@
-"""Whatever intake accepts is read back as it was; what could not be read back is refused at once."""
+"""Every accepted submission is read back unchanged. One that could not be read back is refused at once."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ WAYS = {"folder": _of_folder, "zip": _of_zip, "sent": _sent}
 
 
 def _filled(total: int) -> dict[str, bytes]:
-    """The parts and files beside them, of ``total`` bytes together."""
+    """Return the parts and extra files, of ``total`` bytes together."""
     files, left = dict(PARTS), total - sum(map(len, PARTS.values()))
     while left:
         files[f"data-{len(files)}.bin"] = bytes(min(left, MAX_FILE_BYTES))
@@ -79,7 +79,7 @@ def test_names_that_cannot_be_kept_are_refused_with_what_to_do(name: str) -> Non
 
 
 def test_many_notes_are_read_back(tmp_path: Path) -> None:
-    """A folder may have thousands of links, of which each is noted."""
+    """A folder can have thousands of links, with a note for each."""
     for name, data in PARTS.items():
         (tmp_path / name).write_bytes(data)
     for number in range(2000):

@@ -1,4 +1,4 @@
-"""The magics' flags: clamps, spec and side effects are the original's, and surprises are pointed out."""
+"""The magics' flags: ranges, spec and side effects are the original's, and surprising ones are reported."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from submissions.magics import Flags, Setup, Simulator, parse_flags, parse_magic
 
 pytestmark = pytest.mark.fast
 
-#: Every flag of the original's magics (robolab section 8), but for --help and --previewcode.
+#: Every flag of the original's magics (robolab section 8), except --help and --previewcode.
 LETTERS = {
     "s": "sim",
     "b": "background",
@@ -168,7 +168,7 @@ def test_a_blank_between_the_percent_signs_is_what_is_told() -> None:
 
 
 def pages(*lines: str) -> list[Setup]:
-    """What one simulator shows after each of several magics."""
+    """Return the state of one simulator after each of several magics."""
     simulator = Simulator()
     return [simulator.apply(parse_flags("sim_magic", line)) for line in lines]
 
@@ -178,7 +178,7 @@ def test_what_a_flag_sets_stays_and_switches_do_not() -> None:
     assert (first.pen_down, first.collaborative) == (True, True)
     assert (second.pen_down, second.collaborative, second.background) == (False, False, "Loop")
     assert (second.light_noise, second.motor_noise, second.obstacles) == (10, 20, ((1500, 200, 200, 800),))
-    # Choosing a floor clears the obstacles, and not the noise.
+    # Choosing a floor clears the obstacles, but not the noise.
     assert (third.obstacles, third.light_noise) == ((), 10)
 
 
@@ -222,7 +222,7 @@ def test_a_robot_that_was_left_somewhere_stays_there_until_it_is_placed() -> Non
     simulator = Simulator()
     simulator.leave_at(Pose(321.5, 234.49, -45.25))
     assert simulator.apply(Flags()).pose == Pose(321.5, 234.49, -45.25)
-    # The sliders follow the robot in whole numbers; that of the angle does not follow.
+    # The sliders follow the robot in whole numbers, except the one of the angle.
     assert simulator.apply(parse_flags("sim_magic", "-y 5")).pose == Pose(322, 5, 0)
 
 

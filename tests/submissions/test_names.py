@@ -1,4 +1,4 @@
-"""Names of students: whoever can pass for another is refused and named, wherever names come in or files go out."""
+"""Students' names: a name that can be mistaken for another is refused and reported, in all input and output."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from submissions.student_identity import Student
 ASSIGNMENT = "echo-responder"
 RESPONDER = "def responder(msg):\n    return msg\n"
 
-#: Ada's name, and how somebody else may be called who wants to be taken for her.
+#: Ada's name, and imitations of it by another student.
 ATTACKS = {
     "a leading space": ("ada", " ada"),
     "a trailing space": ("ada", "ada "),
@@ -119,7 +119,7 @@ def test_in_a_batch_neither_of_two_who_are_alike_is_taken_in(
 
 @PAIRS
 def test_nobody_takes_the_place_of_who_is_in_the_course(tmp_path: Path, store: Store, ada: str, eve: str) -> None:
-    """Refused in a later batch; but for what one normal form makes the same name, it can only be written otherwise."""
+    """Refused in a later batch, except spellings that normalise to the same name."""
     batches = [read_batch(_folder(tmp_path / str(number), name), ASSIGNMENT) for number, name in enumerate((ada, eve))]
     first, later = (
         intake.accept_new(store, "b", each.grading_requests, each.refusals, max_attempts=3) for each in batches
@@ -127,7 +127,7 @@ def test_nobody_takes_the_place_of_who_is_in_the_course(tmp_path: Path, store: S
     assert first.batch is not None
     assert first.refused == ()
     if shown_name(ada) == shown_name(eve) and eve == "Zoe\u0308":
-        assert later.batch is not None  # the same letters, whatever machine wrote them
+        assert later.batch is not None  # the same letters, written on any machine
         return
     assert later.batch is None
     (refusal,) = later.refused
@@ -266,7 +266,7 @@ def test_only_who_is_there_is_found(store: Store) -> None:
 
 
 def test_students_of_an_older_database_go_on_under_their_names(store: Store) -> None:
-    """Two whom today's rules would not tell apart, and one enrolled with blanks by an extension."""
+    """Two students that today's rules would not distinguish, and one enrolled with blanks by an extension."""
     with store.transaction() as session:
         at = now(session)
         course_id = course_of(session, "default", at)

@@ -1,4 +1,4 @@
-"""The plain Python of a notebook: lines keep their places, magics that run no Python are left out, work is bounded."""
+"""The plain Python of a notebook: lines keep their numbers, magics without Python are removed, work is bounded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which run of a notebook is marked: the last that fits the assignment, or the one that was asked for."""
+"""The marked run of a notebook: the last one that fits the assignment, or the selected one."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def chosen(submission: Submission, responder: str = "student", cell: str = "last
         ([ANSWER, SHAPES, DRIVES], "none", 3),
         ([ANSWER, DRIVES, SENSOR], "none", 2),
         ([ANSWER, DRIVES, BROKEN], "none", 3),
-        # A floor stays until another is chosen, also by a line that starts nothing.
+        # A floor stays until another one is selected, also by a line that starts no run.
         ([ANSWER, SHAPES, "%sim_magic -b Loop", "%sim_magic -R"], "student", 2),
         ([ANSWER, LOOP, "%sim_magic -b Simple_Shapes -R"], "student", 3),
-        # What follows from running is not known, and not held against a run.
+        # Values known only after execution do not count against a run.
         ([ANSWER, SHAPES, "%sim_magic -R -b $floor"], "student", 3),
-        # None fits: the one that misses least.
+        # If none fits, the run with the fewest differences.
         ([ANSWER, LOOP, SENSOR.replace("preloaded", "preloaded -b Loop")], "student", 2),
         ([ANSWER, SENSOR], "student", 2),
     ],

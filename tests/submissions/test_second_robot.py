@@ -1,4 +1,4 @@
-"""What an assignment with two robots says, and what is refused of it; which programs a submission has to bring."""
+"""Assignments with two robots: valid and refused tables, and the programs that a submission must contain."""
 
 from __future__ import annotations
 

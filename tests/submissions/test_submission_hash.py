@@ -1,4 +1,4 @@
-"""The hash of a submission: what goes into it can be read back, so no two submissions have the same."""
+"""The hash of a submission: its input can be decoded, so different submissions have different hashes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from responders.code import Code
 from submissions.submission import Cell, Notebook, Submission
 
-#: Pairs that are told apart; each had one hash when names and lengths were not told before what they belong to.
+#: Pairs with different hashes. They were equal when names and lengths did not precede their content.
 APART = {
     "a file's name that holds another file": (
         Submission("a", files={"a:XXfile:2:b": b"YY"}),
@@ -48,7 +48,7 @@ def test_different_submissions_have_different_hashes(one: Submission, other: Sub
 
 
 def _read_back(data: bytes) -> list[list[bytes]]:
-    """The records of fields that ``Submission.hashed`` wrote, read without knowing what they mean."""
+    """Return the records of fields that ``Submission.hashed`` wrote, decoded without knowledge of their meaning."""
     rest = memoryview(data)
 
     def number(word: bytes) -> int:

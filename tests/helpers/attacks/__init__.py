@@ -1,4 +1,4 @@
-"""What students may try: each function is one attack, run inside a child as a student's code.
+"""Attacks by students: each function is one attack, run as student code inside a sandboxed child.
 
-An attack returns something true when it got through; an error, nothing, or its own death mean that it did not.
+An attack returns a true value when it succeeds. An exception, an empty result or the end of its process is a failure.
 """

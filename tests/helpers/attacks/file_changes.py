@@ -1,4 +1,4 @@
-"""Files and folders that are not the student's: changing, replacing, creating and removing them, and mounts."""
+"""Attacks on files and folders outside the student's own: change, replace, create, remove, and mount over them."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def empty_the_key_by_opening_it_for_writing():
 
 @attack(NEWER)
 def empty_the_key_by_opening_it_for_neither():
-    """With both access bits set a file is opened for neither reading nor writing, and O_TRUNC empties it."""
+    """With both access bits set, a file is opened for neither reading nor writing, but O_TRUNC still empties it."""
     return call("open", targets.key.encode(), O_NEITHER | os.O_TRUNC, 0) > 0
 
 
@@ -201,7 +201,7 @@ def write_into_the_brick():
 
 
 def _create(path):
-    """A file that was not there; gone again at once."""
+    """Create a new file and remove it at once."""
     fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL)
     os.unlink(path)
     return fd > 0

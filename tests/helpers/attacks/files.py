@@ -1,4 +1,4 @@
-"""Files that are not the student's: reading and listing them, by every way round a path."""
+"""Attacks that read or list files outside the student's folder, through every indirect path."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def read_the_key_with_dots():
 
 @attack(LANDLOCK)
 def read_the_key_through_a_path_descriptor():
-    """O_PATH needs no right; opening it again through /proc does."""
+    """O_PATH needs no permission, and the descriptor can be opened again through /proc."""
     fd = os.open(targets.key, os.O_PATH)
     return contents(f"/proc/self/fd/{fd}")
 

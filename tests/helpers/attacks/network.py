@@ -1,4 +1,4 @@
-"""The network, and the sockets of this machine: each kind by itself, since layers differ in what they know."""
+"""Attacks on the network and on local sockets: each address family separately, because the layers differ."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def listen_with_tcp():
 
 @attack(SECCOMP)
 def listen_without_binding():
-    """listen() on an unbound socket takes a port without bind()."""
+    """listen() on an unbound socket opens a port without bind()."""
     with socket.socket() as server:
         server.listen()
         return server.getsockname()[1]
@@ -59,7 +59,7 @@ def send_with_tcp_fast_open():
         try:
             return client.sendto(b"stolen", 0x20000000, (LOCAL, targets.tcp))
         except BlockingIOError:
-            return True  # it is under way
+            return True  # the connection is in progress
 
 
 @attack(SECCOMP)
@@ -103,7 +103,7 @@ def make_a_pair_of_sockets():
 
 @attack(UNTRIED)
 def pass_a_descriptor_on_the_wire():
-    """Nothing but bytes goes through a pipe."""
+    """A pipe transfers only bytes."""
     with socket.socket(fileno=os.dup(3)) as wire:
         rights = array.array("i", [1]).tobytes()
         return wire.sendmsg([b"\n"], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, rights)])

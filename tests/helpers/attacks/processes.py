@@ -1,4 +1,4 @@
-"""Other processes: their environment, their memory, their descriptors."""
+"""Attacks on other processes: their environment, memory and descriptors."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def write_the_memory_of_another():
 
 
 def _reaches_memory(function):
-    """At an address that means nothing to anybody: a bad address is said only to those who have the right."""
+    """Use an invalid address: only callers with permission get the error for it."""
 
     class Vector(ctypes.Structure):
         _fields_ = (("base", ctypes.c_void_p), ("length", ctypes.c_size_t))
@@ -198,7 +198,7 @@ def make_namespaces_with_clone():
 
 @attack(DOORKEEPER)
 def count_the_files_of_another():
-    """How many it has open is the size of a folder that may not even be listed."""
+    """The size of a folder that must not be listed is the number of open files."""
     return os.stat(f"/proc/{targets.victim}/fd").st_size
 
 
@@ -244,7 +244,7 @@ def read_the_session_of_another():
 
 @attack(SECCOMP)
 def read_the_lowest_priority_of_all_own():
-    """Of a user: every process of whoever runs this one."""
+    """Return the lowest priority of all processes of this user."""
     return call("getpriority", 2, 0) > 0
 
 

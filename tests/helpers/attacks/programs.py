@@ -1,4 +1,4 @@
-"""Starting something: other programs, other processes, other threads, other code."""
+"""Attacks that start something: programs, processes, threads and foreign code."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HIGH = 1 << 32
 
 
 def _only_here(child):
-    """Ends the new process at once; in the old one, whether there was a new one."""
+    """End the new process at once; in the parent, return whether the process was created."""
     if child == 0:
         os._exit(0)
     return child > 0
@@ -149,7 +149,7 @@ def become_a_shell_through_a_descriptor():
 
 @attack(EITHER)
 def become_a_program_of_another_user():
-    """A set-uid program says its version, which is no frame, on the wire."""
+    """A set-uid program prints its version on the wire. The version is not a valid frame."""
     os.dup2(3, 1)
     os.execv("/bin/su", ["su", "--version"])
 
@@ -176,7 +176,7 @@ def become_a_file_in_memory():
 
 @attack(EITHER)
 def start_a_program_with_the_loader():
-    """The loader is readable, and runs programs without execute rights; starting it needs them."""
+    """The loader is readable and runs programs without execute permission. Starting the loader itself needs it."""
     loader = "/lib64/ld-linux-x86-64.so.2"
     os.execv(loader, [loader, "/bin/sh", *says_leak("true")[1:]])
 
@@ -195,13 +195,13 @@ def open_a_terminal():
 
 @attack(REMAINS)
 def run_machine_code():
-    """Code of one's own is as confined as Python is."""
+    """The student's own machine code is confined in the same way as Python."""
     return machine_code(b"\xb8\x2a\x00\x00\x00\xc3") == 42
 
 
 @attack(REMAINS)
 def load_a_library_of_ones_own():
-    """So is a library."""
+    """A library that the student brings is confined as well."""
     extension = min(glob.glob(os.path.join(os.path.dirname(_json.__file__), "_*.so")))
     shutil.copyfile(extension, "mine.so")
     return ctypes.PyDLL("./mine.so")
@@ -209,7 +209,7 @@ def load_a_library_of_ones_own():
 
 @attack(REMAINS)
 def switch_off_pythons_refusals():
-    """They are a courtesy; this module has switched them off, and hears the kernel's own words."""
+    """Python's own refusals are only a courtesy. This module disables them to see the kernel's errors."""
     try:
         return os.system("exit 0") is not None
     except OSError as error:

@@ -1,6 +1,6 @@
-"""What one trial may leave for another, of the same student or of an accomplice: a bit, again and again.
+"""Attacks that pass a bit from one trial to another, of the same student or of an accomplice, repeatedly.
 
-The first half of an attack leaves it, the second looks for it in a child of its own, later or at the same time.
+The first half of an attack leaves the bit. The second half looks for it in another child, later or at the same time.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ KEY = 0x726D0000
 
 
 def stay():
-    """Say that the bit is there, and keep it until somebody ends this."""
+    """Signal that the bit is set, and keep it set until this process is ended."""
     sys.stdout.write(f"ready {os.getpid()}")
     while True:
         select.select([], [], [])
 
 
 def touched(status):
-    """Whether a file was read or written since the first half of the attack began."""
+    """Return whether a file was read or written since the first half of the attack began."""
     return max(status.st_atime, status.st_mtime) > targets.since
 
 
@@ -97,7 +97,7 @@ def find_time_of_following_a_link(turn):
 
 @leaves(DOORKEEPER)
 def time_of_following_a_link_elsewhere(turn, bit):
-    """Anywhere on the machine: a link need not be readable to be followed."""
+    """Follow a link to any place on the machine. A link can be followed without being readable."""
     if bit:
         os.path.exists(f"{targets.links}/link-{turn}")
 
@@ -109,7 +109,7 @@ def find_time_of_following_a_link_elsewhere(turn):
 
 @leaves(DOORKEEPER)
 def time_of_being_refused_behind_a_link(turn, bit):
-    """The way to a file is walked before Landlock is asked."""
+    """The kernel resolves the path to a file before it asks Landlock."""
     if bit:
         with contextlib.suppress(OSError):
             os.open(f"{targets.links}/link-{turn}/nothing", os.O_RDONLY)
@@ -128,7 +128,7 @@ def time_of_reading_a_link(turn, bit):
 
 @time_of_reading_a_link.finds
 def find_time_of_reading_a_link(turn):
-    """By a call that shows times and is not the usual one."""
+    """Read the time with a less common system call that reports times."""
     found = space(256)
     call("statx", -100, f"{targets.links}/link-{turn}".encode(), 0x100, 0x7FF, found)
     seconds, nanoseconds = struct.unpack_from("=qI", found, 64)
@@ -149,7 +149,7 @@ def find_time_of_using_a_device(turn):
 
 
 def resident(turn):
-    """Whether the page is in memory, for whomever."""
+    """Return whether the page is in memory, for any process."""
     pages = mmap.mmap(os.open(f"{targets.readable}/pages-{turn}", os.O_RDONLY), 4096, prot=mmap.PROT_READ, flags=1)
     told = space(1)
     call("mincore", _address(pages), 4096, told)
@@ -157,7 +157,7 @@ def resident(turn):
 
 
 def _address(mapping):
-    """Where a mapping lies that may not be written."""
+    """Return the address of a read-only mapping."""
     buffer = space(80)
     ctypes.pythonapi.PyObject_GetBuffer(ctypes.py_object(mapping), buffer, 0)
     return struct.unpack_from("=Q", buffer)[0]
@@ -176,7 +176,7 @@ def find_page_in_memory(turn):
 
 @leaves(SECCOMP)
 def page_counted_when_fetched(turn, bit):
-    """Without a clock: the kernel counts for everybody what had to come from the disk."""
+    """Needs no clock: the kernel's count of pages read from disk is visible to all processes."""
     if bit:
         contents(f"{targets.readable}/pages-{turn}")
 
@@ -217,7 +217,7 @@ def find_page_advised_out(turn):
 
 @leaves(NOWHERE)
 def the_zygotes_variables(turn, bit):
-    """How the child before ended is what the zygote asked last, and its frames are below ours."""
+    """The zygote's last call returned how the previous child ended, and its frames are below ours on the stack."""
     os._exit(2 + bit)
 
 
@@ -239,7 +239,7 @@ def the_zygotes_freed_memory(turn, bit):
 
 @the_zygotes_freed_memory.finds
 def find_the_zygotes_freed_memory(turn):
-    """A number that no frame names any more, in a form that this one does not make again."""
+    """Find a number that no frame refers to any more, in a byte pattern that this search does not create itself."""
     number = re.compile(
         re.escape(struct.pack("=Q", id(int))) + b"[\1]\0{8}[\\x%02x]" % (11 + 2 * turn) + b"\0\0", re.DOTALL
     )
@@ -247,7 +247,7 @@ def find_the_zygotes_freed_memory(turn):
 
 
 def _memory_of_objects():
-    """Every page that Python objects may lie in, and the heap; one that is not there is refused, and not the end."""
+    """Yield the heap and every page that may contain Python objects. Unmapped pages are skipped without an error."""
     arenas = {id(each) >> 20 << 20 for each in gc.get_objects()}
     end = libc.sbrk(0)
     pages = {arena + step for arena in arenas for step in range(0, 1 << 20, 4096)} | set(
@@ -278,7 +278,7 @@ def find_number_of_an_own_file(turn):
 
 @leaves(NOWHERE)
 def number_of_own_files(turn, bit):
-    """Made and removed until the number is the one that is wanted, where files are numbered on and on."""
+    """Create and remove files until the inode number has the wanted value, where inode numbers keep increasing."""
     for _ in range(600):
         fd = os.open("own", os.O_WRONLY | os.O_CREAT)
         number = os.fstat(fd).st_ino & 255
@@ -295,7 +295,7 @@ def find_number_of_own_files(turn):
 
 
 def _on_the_first_processor():
-    """Where the counter of numbers for files without a place is the same for both."""
+    """Move to the first processor, where both halves share the counter for inode numbers of anonymous files."""
     try:
         os.sched_setaffinity(0, {0})
     except OSError:
@@ -324,7 +324,7 @@ def find_number_of_a_pipe(turn):
 
 @leaves(DOORKEEPER)
 def number_of_what_the_kernel_shows(turn, bit):
-    """What is asked about in /proc for the first time gets the next number of the same counter."""
+    """The first lookup of an entry in /proc takes the next number of the same counter."""
     _on_the_first_processor()
     pages = mmap.mmap(-1, 1 << 23)
     start = ctypes.addressof(ctypes.c_char.from_buffer(pages))
@@ -380,7 +380,7 @@ def key_in_the_kernel(turn, bit):
 
 @key_in_the_kernel.finds
 def find_key_in_the_kernel(turn):
-    """Found where the first one put it: the keys of a user, which outlive all its processes."""
+    """Find the key in the user's keyring, which outlives all processes of the user."""
     try:
         key = call("keyctl", 10, -4, b"user", f"robomark-{turn}".encode(), 0)
     except OSError as error:
@@ -424,7 +424,7 @@ def find_lock_on_a_part_of_a_file(turn):
 
 @leaves(SECCOMP, at_once=True)
 def waiting_at_a_place_of_a_file(turn, bit):
-    """Two who map the same file can wait for each other at a place in it, though neither may write it."""
+    """Processes that map the same file can wait for each other at an offset, even if neither may write it."""
     pages = mmap.mmap(os.open(f"{targets.readable}/pages-{turn}", os.O_RDONLY), 4096, prot=mmap.PROT_READ, flags=1)
     sys.stdout.write(f"ready {os.getpid()}")
     if bit:
@@ -447,7 +447,7 @@ def find_waiting_at_a_place_of_a_file(turn):
 
 @leaves(NOWHERE, at_once=True)
 def signals_that_wait(turn, bit):
-    """How many may wait is counted for a user, not for a process."""
+    """The number of pending signals is counted per user, not per process."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {40})
     for _ in range(5000 * bit):
         call("kill", os.getpid(), 40)
@@ -456,7 +456,7 @@ def signals_that_wait(turn, bit):
 
 @signals_that_wait.finds
 def find_signals_that_wait(turn):
-    """Those beyond the limit are delivered once at most: count what comes of as many as a process may have."""
+    """Signals beyond the limit are delivered at most once: count the deliveries for as many as a process may have."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {40})
     most = resource.getrlimit(resource.RLIMIT_SIGPENDING)[0]
     sent = min(most, 200_000)

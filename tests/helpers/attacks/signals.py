@@ -1,4 +1,4 @@
-"""Signals to others, their priorities and limits, and the own ones that the worker relies on."""
+"""Attacks with signals to other processes, with their priorities and limits, and with signals the worker relies on."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def signal_the_own_group():
 
 @attack(NEWER)
 def signal_another_with_a_high_half():
-    """A filter that looked at all 64 bits where the kernel looks at 32 would be wrong one way or the other."""
+    """A filter that compares all 64 bits where the kernel reads only 32 decides incorrectly."""
     return call("kill", targets.victim | HIGH, 0) == 0
 
 
@@ -104,7 +104,7 @@ def send_signals_by_owning_a_pipe_with_a_high_half():
 
 @attack(SECCOMP)
 def own_a_pipe_by_control():
-    """FIOSETOWN is F_SETOWN by another door, for sockets."""
+    """FIOSETOWN has the effect of F_SETOWN, but for sockets."""
     return call("ioctl", 3, 0x8901, struct.pack("=i", targets.victim)) == 0
 
 
@@ -206,14 +206,14 @@ def leave_the_session():
 
 @attack(UNTRIED)
 def time_with_signals():
-    """A timer that signals a thread of one's choice."""
+    """A timer that signals a chosen thread."""
     event = struct.pack("=QiiI", 0, signal.SIGALRM, 0, 0) + bytes(44)
     return call("timer_create", 0, event, space(8)) == 0
 
 
 @attack(SECCOMP)
 def kill_oneself():
-    """Who dies of SIGKILL and not by the worker looks like a victim of the machine's."""
+    """A process that ends by a SIGKILL from elsewhere than the worker looks as if the machine had killed it."""
     os.kill(os.getpid(), signal.SIGKILL)
     return True
 
@@ -258,7 +258,7 @@ def queue_the_signal_that_kills():
 
 @attack(SECCOMP)
 def have_the_kernel_kill_at_a_limit():
-    """The second limit of processor time is enforced with SIGKILL."""
+    """The hard limit of processor time is enforced with SIGKILL."""
     signal.signal(signal.SIGXCPU, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_CPU, (1, 1))
     while True:
@@ -285,7 +285,7 @@ def have_a_timer_kill():
 
 @attack(SECCOMP)
 def send_a_signal_that_has_no_name():
-    """One of those that are queued, and counted for all processes of a user."""
+    """Send a real-time signal. Such signals are queued and counted for all processes of a user."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {40})
     os.kill(os.getpid(), 40)
     return True

@@ -1,6 +1,6 @@
-"""What attacks use, inside the child: raw system calls, machine code, and the whereabouts of the decoys.
+"""Tools for attacks inside the child: raw system calls, machine code, and the places of the decoys.
 
-Python's own refusals are switched off first, as any student could, so that only the kernel's layers are tried.
+Python's own refusals are disabled first, as any student could do, so that only the kernel's layers are tested.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ libc = ctypes.CDLL(None, use_errno=True)
 libc.syscall.restype = ctypes.c_long
 libc.mmap.restype = ctypes.c_void_p
 
-#: Which layer stops an attack, and so in which settings it must get through: see ``GETS_THROUGH``.
+#: The layer that stops an attack. It determines the settings in which the attack must succeed: see ``GETS_THROUGH``.
 LANDLOCK, SECCOMP, EITHER, NEWER, REMAINS, UNTRIED = "landlock", "seccomp", "either", "newer", "remains", "untried"
-#: By the doorkeeper alone; by nothing, as it is nowhere to be found.
+#: Attacks that only the doorkeeper stops, and attacks with no layer to stop them because there is nothing to find.
 DOORKEEPER, NOWHERE = "doorkeeper", "nowhere"
 
-#: The numbers of system calls by name, and the decoys; filled before an attack runs.
+#: System call numbers by name, and the decoys; filled before an attack runs.
 numbers: dict[str, int] = {}
 targets = SimpleNamespace()
 
 
 def attack(stopped_by):
-    """Mark a function as an attack and say what stops it."""
+    """Mark a function as an attack that the layer ``stopped_by`` stops."""
 
     def mark(function):
         function.stopped_by = stopped_by
@@ -39,8 +39,8 @@ def attack(stopped_by):
 def leaves(stopped_by, at_once=False):
     """Mark a function as the first half of an attack: ``function(turn, bit)`` leaves a bit for a later child.
 
-    The other half is what ``function.finds`` marks: ``find(turn)``, in another child, while the first one still runs
-    if ``at_once``. What it returns is to be larger, or smaller, whenever the bit is set.
+    ``function.finds`` marks the second half: ``find(turn)`` runs in another child, together with the first half if
+    ``at_once``. Its result must be consistently larger, or consistently smaller, when the bit is set.
     """
 
     def mark(function):
@@ -55,7 +55,7 @@ def leaves(stopped_by, at_once=False):
 
 
 def system_calls(stopped_by, **calls):
-    """One attack for each call, by name: the arguments that it is made with."""
+    """Define one attack for each system call, by name, with its arguments."""
     return {
         name: attack(stopped_by)(lambda name=name, arguments=arguments: call(name, *arguments) >= 0)
         for name, arguments in calls.items()
@@ -63,7 +63,7 @@ def system_calls(stopped_by, **calls):
 
 
 def call(name, *arguments):
-    """The result of a raw system call. Raises OSError."""
+    """Return the result of a raw system call. Raises OSError."""
     number = numbers[name] if isinstance(name, str) else name
     wide = [ctypes.c_long(argument) if isinstance(argument, int) else argument for argument in arguments]
     result = libc.syscall(ctypes.c_long(number), *wide)
@@ -74,12 +74,12 @@ def call(name, *arguments):
 
 
 def space(size=256):
-    """Zeroed memory to pass to a call."""
+    """Return zeroed memory to pass to a call."""
     return ctypes.create_string_buffer(size)
 
 
 def machine_code(code):
-    """The number that a piece of x86-64 machine code returns."""
+    """Return the number that a piece of x86-64 machine code returns."""
     page = mmap.mmap(-1, 4096, prot=mmap.PROT_READ | mmap.PROT_WRITE | mmap.PROT_EXEC)
     page.write(code)
     address = ctypes.addressof(ctypes.c_char.from_buffer(page))
@@ -87,7 +87,7 @@ def machine_code(code):
 
 
 def contents(path, size=64):
-    """The start of a file, without Python's file objects."""
+    """Return the start of a file, without using Python's file objects."""
     fd = os.open(path, os.O_RDONLY)
     try:
         return os.read(fd, size)
@@ -96,13 +96,13 @@ def contents(path, size=64):
 
 
 def says_leak(program, *arguments):
-    """Arguments of a shell that runs a program and then says on the wire that it could."""
+    """Return shell arguments that run a program and report success on the wire."""
     frame = '{"do":"print","text":"LEAK it ran"}'
     return ["sh", "-c", f"{program} >/dev/null 2>&1; printf '{frame}\\n' >&3", *arguments]
 
 
 def disarm():
-    """Switch off the refusals that Python makes by itself."""
+    """Disable the refusals that Python adds by itself."""
     for found in gc.get_objects():
         if getattr(found, "__qualname__", "") == "install.<locals>.hook":
             for name, cell in zip(found.__code__.co_freevars, found.__closure__, strict=True):
@@ -112,7 +112,7 @@ def disarm():
 
 
 def tell(function):
-    """Run one half of an attack and print what it returned, or why it got no further."""
+    """Run one half of an attack and print its result, or the reason for its failure."""
     say = sys.stdout.write
     try:
         said = f"found {int(function() or 0)}"
@@ -122,7 +122,7 @@ def tell(function):
 
 
 def report(function):
-    """Run an attack and print what came of it."""
+    """Run an attack and print its result."""
     say = sys.stdout.write
     try:
         got = function()

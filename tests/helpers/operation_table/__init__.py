@@ -1,1 +1,1 @@
-"""The operations of ``service/operations`` with requests by page, API and command, a module for each subject."""
+"""The operations of ``service/operations`` with requests by page, API and command, one module for each subject."""

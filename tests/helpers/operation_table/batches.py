@@ -112,7 +112,7 @@ def _read(
     return Row(operation, (path, query), api, command, state="graded", says=says, refused=refused)
 
 
-#: Accepted, although nothing is left to change.
+#: Accepted, although there is nothing to change.
 UNCHANGED = {"pause again", "cancel nothing"}
 ROWS = {
     "pause": _control("pause", "queued"),

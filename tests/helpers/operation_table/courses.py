@@ -188,7 +188,7 @@ def _upload(files: dict[str, str | bytes], refused: tuple[int, str] | None = Non
 
 
 def _own_assignment() -> bytes:
-    """A zip of an assignment that an instructor wrote."""
+    """Return a zip of an assignment that an instructor wrote."""
     with TemporaryDirectory() as made:
         folder = Path(made) / "mine"
         write_new(folder)

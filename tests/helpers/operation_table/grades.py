@@ -1,4 +1,4 @@
-"""Operations on one grade, on appeals, and on what students submit."""
+"""Operations on a grade, on appeals, and on students' own submissions."""
 
 from __future__ import annotations
 

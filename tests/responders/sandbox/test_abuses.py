@@ -1,4 +1,4 @@
-"""Programs that want too much: each ends at its own limit with the verdict that says so, and the next one runs well."""
+"""Programs that exceed limits: each ends at the right limit with the right verdict, and the next one runs normally."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HONEST_RESPONDER = "def responder(text): return text.upper()\n"
 
 @dataclass(frozen=True)
 class Abuse:
-    """One file that wants too much, in the one role or the other, and the verdicts that are right for it."""
+    """A file that exceeds a limit in one of the roles, and its acceptable verdicts."""
 
     name: str
     text: str
@@ -191,7 +191,7 @@ def abused() -> Iterator[TrialRunner]:
 
 @pytest.fixture(autouse=True)
 def _small_limits(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tenths of seconds show what seconds would."""
+    """Use limits of tenths of seconds, which show the same as seconds would."""
     monkeypatch.setattr(running, "PROGRAM_LIMITS", ChildLimits(0.4, 64 << 20))
     monkeypatch.setattr(running, "RESPONDER_LIMITS", ChildLimits(0.6, 128 << 20))
     monkeypatch.setattr(running_child, "_STALLED_SECONDS", 1.0)
@@ -236,7 +236,7 @@ def test_an_answer_too_many_is_noticed_when_the_next_is_due(abused: TrialRunner)
 def test_frames_without_end_are_paid_for(
     frame: str, role: str, abused: TrialRunner, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Written thousands at a time they cost the child nothing, and the worker much; none of them grows it."""
+    """Thousands of frames per write cost the child almost nothing and the worker a lot. The worker must not grow."""
     monkeypatch.setattr(running_child, "_FRAME_CPU_SECONDS", 1e-4)
     flood = f"""{FIND_WIRE}
 def flood():
@@ -262,7 +262,7 @@ def test_answers_count_as_output(abused: TrialRunner) -> None:
 
 
 def test_signals_that_the_worker_ignores_end_a_program_all_the_same() -> None:
-    """As those do that a shell starts in its background."""
+    """A shell starts background programs with these signals ignored."""
     before = signal.signal(signal.SIGQUIT, signal.SIG_IGN)
     try:
         with TrialRunner() as ignoring:

@@ -1,6 +1,6 @@
-"""What students may try against the sandbox: each attack is stopped, and would get through if its layer were not there.
+"""Attacks of students on the sandbox: each is stopped, and would succeed without its layer.
 
-What the attacks are is in ``attacks/``; this says what must come of them.
+The attacks are in ``attacks/``; this module tests their results.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ ENCLOSED: list[tuple[str, Role]] = [
 ]
 OLD_KERNEL_LONG = [pytest.param(*each, marks=pytest.mark.long if each in ENCLOSED[2:] else ()) for each in ENCLOSED]
 
-#: The machine's name is one that bubblewrap makes up.
+#: Bubblewrap sets an invented machine name.
 REMAINS_INSIDE_BUBBLEWRAP = frozenset(
     {
         "list_names_of_packages",
@@ -72,7 +72,7 @@ def sandboxes() -> Iterator[dict[str, Sandboxes]]:
 
 @pytest.fixture(scope="module")
 def wrapped(sandboxes: dict[str, Sandboxes]) -> Sandboxes:
-    """With bubblewrap round the zygote, where this machine can."""
+    """Return sandboxes with bubblewrap around the zygote, if this machine supports it."""
     reason = sandboxes["bubblewrap"].why_no_bubblewrap()
     if reason is not None:
         pytest.skip(f"bubblewrap does not work here: {reason}")
@@ -88,7 +88,7 @@ def victim() -> Iterator[Victim]:
 
 @pytest.fixture(scope="module")
 def own_user() -> Iterator[Sandboxes]:
-    """As root, with an interpreter that others can read: each child is a user who owns nothing."""
+    """Return sandboxes for root with a readable interpreter: each child gets a separate user who owns nothing."""
     with Sandboxes(SETTINGS["full"]) as made:
         with pytest.MonkeyPatch.context() as patch:
             patch.setenv("ROBOMARK_SELF_TEST", SECRET)
@@ -102,7 +102,7 @@ def own_user() -> Iterator[Sandboxes]:
 def test_the_sandbox_holds(
     attack: Attack, setting: str, role: Role, sandboxes: dict[str, Sandboxes], tmp_path: Path, victim: Victim
 ) -> None:
-    """With a folder to write in, which is more than a robot program gets."""
+    """The child has a writable folder, which is more than a robot program gets."""
     with decoys(tmp_path, victim) as targets:
         outcome = run(sandboxes[setting], role, attack, targets.targets())
         assert outcome.startswith("LEAK") == (attack.stopped_by == tools.REMAINS), outcome
@@ -119,7 +119,7 @@ def test_the_sandbox_holds(
 def test_the_sandbox_holds_inside_bubblewrap(
     attack: Attack, wrapped: Sandboxes, tmp_path: Path, victim: Victim
 ) -> None:
-    """Most of what remains otherwise, names of files above all, does not remain in there."""
+    """Most remaining attacks, especially those on names of files, fail inside bubblewrap."""
     with decoys(tmp_path, victim) as targets:
         outcome = run(wrapped, "robot", attack, targets.targets())
         assert outcome.startswith("LEAK") == (attack.name in REMAINS_INSIDE_BUBBLEWRAP), outcome
@@ -133,7 +133,7 @@ def test_the_sandbox_holds_inside_bubblewrap(
 def test_the_sandbox_holds_round_a_user_of_its_own(
     attack: Attack, own_user: Sandboxes, tmp_path: Path, victim: Victim
 ) -> None:
-    """Some of what remains otherwise does not remain for a user who may not even enter the folders."""
+    """Some remaining attacks fail for a user who may not even enter the folders."""
     with decoys(tmp_path, victim) as targets:
         outcome = run(own_user, "robot", attack, targets.targets())
         assert attack.stopped_by == tools.REMAINS or not outcome.startswith("LEAK"), outcome
@@ -164,13 +164,13 @@ def test_without_its_layer_it_gets_through(
 
 @pytest.fixture(scope="module")
 def read() -> set[str]:
-    """What was read beforehand and holds for all trees: of Python and its packages."""
+    """Return the paths read beforehand that are the same for all trees: those of Python and its packages."""
     return set()
 
 
 @pytest.fixture
 def tree(monkeypatch: pytest.MonkeyPatch, read: set[str]) -> Iterator[Path]:
-    """What is readable of ours, with more in it to leave a trace on."""
+    """Return our readable files, plus more files to leave a trace on."""
 
     def read_the_rest(paths: Iterable[str], listed: Iterable[str] = ()) -> str | None:
         rest = set(paths) - read
@@ -196,7 +196,7 @@ def _remembered(attack: Attack, sandbox: Isolation, tree: Path, role: Role = "ro
 
 
 def _leaves_nothing(attack: Attack, sandbox: Isolation, tree: Path, role: Role = "robot") -> bool:
-    """Whether it comes to nothing in one of two goes: what is anybody's guess falls apart by chance once in 462."""
+    """Return whether the attack fails in one of two runs. Pure guesses fail this test by chance once in 462 runs."""
     return any(_remembered(attack, sandbox, tree, role).startswith("blocked") for _ in range(2))
 
 
@@ -245,7 +245,7 @@ def test_without_its_layer_a_trial_leaves_something(attack: Attack, setting: str
 
 
 def _assert_leaves_something(attack: Attack, sandbox: Isolation, tree: Path) -> None:
-    # Whatever else the machine reads and forgets may drown a bit; one clear reading shows that the way is open.
+    # The machine's own file accesses can hide a bit. A single clear reading proves that the channel is open.
     outcomes = []
     for _ in range(5):
         outcomes.append(_remembered(attack, sandbox, tree))
@@ -256,7 +256,7 @@ def _assert_leaves_something(attack: Attack, sandbox: Isolation, tree: Path) -> 
 
 @pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="needs a file system that numbers files on and on")
 def test_numbers_are_left_out_where_they_go_on(tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The sandbox stops nobody from making a few files; only that all trials take up as many numbers helps."""
+    """The sandbox lets everyone create a few files, so every trial has to use up the same amount of inode numbers."""
     attack = next(attack for attack in MEMORIES if attack.name == "number_of_own_files")
     monkeypatch.setattr(tempfile, "tempdir", "/dev/shm")
     assert _leaves_nothing(attack, SETTINGS["full"], tree)

@@ -1,6 +1,6 @@
-"""What has to hold before anything hidden is graded: a trial can leave nothing for the next, or none is graded here.
+"""Requirements for hidden trials: if a trial could leave data for the next one, none is graded on this machine.
 
-The channels themselves are tried in ``test_attacks.py``.
+``test_attacks.py`` tests the channels themselves.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from submissions.submission import Submission
 _SUBMISSION = Submission("ada", Code("robot.py", "pass"), Code("responder.py", "def responder(m): return m"))
 _WEEK = 7 * 86400
 
-#: Refuses filters whose questions somebody answers, as where a container has such a filter of its own; then goes on.
+#: Refuses filters with a listener, as inside a container that already has such a filter, then continues.
 _NOBODY_ANSWERS = """
 import ctypes, struct, sys
 code = [(0x20, 0, 0, 0), (0x15, 0, 3, 317), (0x20, 0, 0, 24), (0x45, 0, 1, 8)]  # seccomp with a listener
@@ -47,7 +47,7 @@ with Sandboxes() as sandboxes:
     print(sandboxes.check())
     print(sandboxes.remembers())
 """
-#: What a container has: devices where everything else is dated. No way to read one dates it.
+#: A container has devices that record access times, and no way of reading a device records one.
 _USE_A_DEVICE = """
 import os, sys
 from responders.sandbox import reading_dates
@@ -67,7 +67,7 @@ print(reading_dates.read_beforehand([sys.argv[1]]))
 
 @pytest.fixture
 def readable(tmp_path: Path) -> Path:
-    """A file, an empty one, a folder and a link, none of which was looked at for a week."""
+    """Return a folder with a file, an empty file, a folder and a link, all last accessed over a week ago."""
     folder = tmp_path / "folder"
     (folder / "inner").mkdir(parents=True)
     (folder / "file").write_text("content")
@@ -129,7 +129,7 @@ def test_a_device_is_not_dated_however_it_is_mounted(tmp_path: Path) -> None:
 
 
 def _in_a_mount(option: str, code: str, folder: Path, first: str = "true") -> str:
-    """What Python code prints about a folder that is mounted so."""
+    """Return the output of Python code about a folder with this mount option."""
     script = f"mount -t tmpfs -o {option} none {folder} && {first} && exec {sys.executable} -c '{code}' {folder}"
     ran = subprocess.run(["unshare", "--mount", "sh", "-c", script], capture_output=True, text=True, check=False)
     if any(name in ran.stderr for name in ("unshare", "mount", "mknod")):

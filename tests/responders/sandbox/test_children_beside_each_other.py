@@ -1,4 +1,4 @@
-"""A group has room for all children that live in it at once, and no more."""
+"""A group has enough memory for all children that run in it at once, and no more."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from responders.sandbox.zygote import FULL
 
 
 class Noted:
-    """Stands for a group, and notes what it was asked for."""
+    """Replaces a group and records the requests."""
 
     joining: tuple[str, ...] = ()
 
@@ -26,7 +26,7 @@ class Noted:
         return lambda: False
 
     def close(self) -> None:
-        """It holds nothing."""
+        """Do nothing: there are no resources to release."""
 
 
 def test_there_is_room_for_those_that_live_at_once() -> None:

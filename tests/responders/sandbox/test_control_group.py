@@ -1,6 +1,6 @@
-"""A control group for each slot: found where it may be had, named where not, and asked who was killed and why.
+"""A control group for each slot: used where available, reported where not, and queried for killed processes.
 
-The tests at the top have a made-up tree of files; those below run where this user may make a group that can be divided.
+The first tests use an invented file tree. The others run where this user can create a group with subgroups.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ OTHER_MOUNTS = "23 1 0:28 / / rw - ext4 /dev/vda rw\n35 31 0:32 / /sys/fs/cgroup
 
 
 class Tree:
-    """A mount of control groups, and what a process sees of itself."""
+    """A mount of control groups as a process sees it."""
 
     def __init__(self, folder: Path, own: str = "/unit", root: str = "/", before: str = "0::") -> None:
         self.proc, self.mount = folder / "proc", folder / "unified"
@@ -121,7 +121,7 @@ def test_a_process_goes_back_when_the_kernel_does_not_divide(tmp_path: Path) -> 
 
 @pytest.fixture
 def slot(tmp_path: Path) -> Path:
-    """Where the group of this process's slot would be."""
+    """Return the path of the group for this process's slot."""
     return tmp_path / f"robomark-slot-{os.getpid()}"
 
 
@@ -176,7 +176,7 @@ def test_groups_of_dead_slots_are_removed_and_no_others(slot: Path) -> None:
 
 
 def in_group(script: str, memory_bytes: int = 3 << 30, **environment: str) -> tuple[Any, str]:
-    """What a process said at its end that was started alone in a group it may divide; and its log."""
+    """Run a script alone in a group that it may divide; return its final output and its log."""
     with memory_group(memory_bytes) as group:
         ran = subprocess.run(
             [sys.executable, "-c", _BEGIN + script],
@@ -238,7 +238,7 @@ print(json.dumps([sandbox, len(inside), os.getpid() in inside, limits, slot.exis
     assert not left_over
 
 
-#: Each takes more than 300 MB, and less than the 512 MB to which its own process is limited.
+#: Each uses more than 300 MB, and less than the 512 MB limit of its process.
 HOGS = {
     "bytes": "held = [bytearray(1 << 20) for _ in range(480)]",
     "one text": "held = 'x' * (480 << 20)",
@@ -299,7 +299,7 @@ def test_a_worker_divides_its_group_and_leaves_nothing_that_grows(tmp_path: Path
         group = _of_version_2(made)
 
         def slots() -> set[Path]:
-            """Those with a zygote in them."""
+            """Return the slots that contain a zygote."""
             return {file.parent for file in group.folder.glob("robomark-slot-*/cgroup.procs") if file.read_text()}
 
         def sandbox() -> list[str]:

@@ -1,4 +1,4 @@
-"""A child finds out nothing about the folders above its own, in which other trials have theirs."""
+"""A child learns nothing about the folders above its own, which contain other trials."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is taught works inside the sandbox: learning, saved models, tables, images, ``eval``, late imports."""
+"""Course topics work inside the sandbox: learning, saved models, tables, images, ``eval``, late imports."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def empty(sandboxes: Sandboxes) -> Iterator[Path]:
 
 @pytest.fixture
 def folder(empty: Path) -> Path:
-    """What a submission brings: models saved in several ways, a table and images."""
+    """Return a submission's folder: models saved in several formats, a table and images."""
     chance = np.random.default_rng(1)
     values = chance.normal(size=(60, 4))
     model = RandomForestClassifier(5, n_jobs=2, random_state=1).fit(values, values[:, 0] > 0)
@@ -142,7 +142,7 @@ def test_it_works(text: str, said: list[str], sandboxes: Sandboxes, folder: Path
 
 @pytest.mark.parametrize("role", ["robot", "responder", "responder with libraries"])
 def test_the_standard_library_can_be_imported_late(role: Role, sandboxes: Sandboxes, empty: Path) -> None:
-    """All of it that this interpreter can import at all, but for what would draw or needs a screen."""
+    """Covers every importable module of the standard library, except those that draw or need a display."""
     left_out = {"antigravity", "this", "idlelib", "tkinter", "turtle", "turtledemo", "lib2to3", "ensurepip", "test"}
     names = sorted(sys.stdlib_module_names - left_out)
     text = f"""

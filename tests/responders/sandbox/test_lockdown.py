@@ -1,4 +1,4 @@
-"""The layers by themselves, round a bare process: what a rule gives, what root loses, and who a child is."""
+"""Each layer alone, around a bare process: the effect of a rule, the privileges root loses, the child's user."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from responders.sandbox.zygote import NONE, Isolation
 
 _SANDBOX = Path(manager.__file__).parent
 
-#: Ways to change a file that may be read; each has a file of its own.
+#: Ways to change a readable file; each has a separate file.
 _CHANGES = {
     "reading-truncating": "os.open(path, os.O_RDONLY | os.O_TRUNC)",
     "neither-truncating": "os.open(path, 3 | os.O_TRUNC)",
@@ -98,7 +98,7 @@ print(ctypes.CDLL(None).syscall(125, (0x20080522).to_bytes(8, "little"), sets), 
 @pytest.mark.skipif(not Path(SYSTEM_PYTHON).exists(), reason="needs an interpreter that others can read")
 @pytest.mark.parametrize("bubblewrap", [False, True])
 def test_root_makes_each_child_a_user_of_its_own(bubblewrap: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With an interpreter in a folder of root's own the children stay root, without its powers."""
+    """If the interpreter is in a folder of root's, the children remain root, but without root's privileges."""
     monkeypatch.setattr(sys, "executable", SYSTEM_PYTHON)
     text = """
 import os, wave

@@ -1,6 +1,6 @@
-"""A machine that lacks a layer of the sandbox: student code is refused, in a sentence that names what is missing.
+"""A machine without a layer of the sandbox refuses student code, with a message that names the missing layer.
 
-The machine is this one, behind a filter that says no as an old kernel, a switched-off module or a container would.
+A filter simulates such machines: it refuses calls as an old kernel, a disabled module or a container does.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Folders of trials: removed when their worker is surely gone, and never while it lives, in whatever name space."""
+"""Folders of trials are removed once their worker has certainly ended, and never earlier, in any namespace."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @contextmanager
 def _worker(temporary: Path, *wrapping: str) -> Iterator[tuple[subprocess.Popen[str], Path]]:
-    """A worker that is in the middle of a trial, and the trial's folder."""
+    """Start a worker in the middle of a trial; yield it and the trial's folder."""
     process = subprocess.Popen(
         [*wrapping, sys.executable, "-c", _WORKER],
         env=os.environ | {"TMPDIR": str(temporary)},
@@ -62,14 +62,14 @@ def test_the_folder_of_a_living_worker_is_left_as_it_is(tmp_path: Path) -> None:
     with _worker(tmp_path) as (process, trial):
         remove_left_overs()
         assert (trial / "weights.joblib").read_bytes() == b"hers"
-        process.communicate("")  # it ends by itself, and takes only its trial's folder with it
+        process.communicate("")  # it ends by itself and removes only its trial's folder
         assert not trial.exists()
         remove_left_overs()
         assert list(tmp_path.iterdir()) == []
 
 
 def test_a_worker_whose_process_id_says_nothing_here_keeps_its_folder(tmp_path: Path) -> None:
-    """As of a container that shares the folder for temporary files: seen from in there, ours are no processes."""
+    """A container can share the temporary folder: our process ids mean nothing inside it."""
     unshare = [shutil.which("unshare") or "", "--pid", "--fork", "--kill-child"]
     if not unshare[0] or subprocess.run([*unshare, "true"], capture_output=True, check=False).returncode:
         pytest.skip("no name space of processes can be made here")
@@ -141,7 +141,7 @@ print(*{{later - earlier for earlier, later in itertools.pairwise(numbers)}})
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount")
 def test_where_files_are_numbered_on_and_on_every_trial_takes_up_as_many_numbers(tmp_path: Path) -> None:
-    """In a file system of its own: nobody else takes numbers there."""
+    """Uses a separate file system, where no other process takes inode numbers."""
     made = [0, 299, 0, 1, 150, 299, 299, 0, 0]
     code = _GAPS.format(folder=str(tmp_path), made=made)
     script = f'mount -t tmpfs none {tmp_path} && exec {sys.executable} -c "$0"'

@@ -1,4 +1,4 @@
-"""A trial and its children keep to one processor, no two trials to the same, and afterwards all is as it was."""
+"""A trial and its children share one processor, no two trials share one, and the old state is restored afterwards."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WHERE = "import os\nprint(sorted(os.sched_getaffinity(0)))\n"
 
 
 def _where(sandboxes: Sandboxes) -> str:
-    """Where a child says that it may run."""
+    """Return the processors that a child may use."""
     with sandboxes.private_folder() as folder:
         said, _ = run_text(sandboxes, "robot", WHERE, folder)
     return said[-1]

@@ -1,4 +1,4 @@
-"""A machine is asked, before it takes student code, whether its sandbox holds."""
+"""Before a machine accepts student code, it checks whether its sandbox is effective."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_addresses_are_as_fixed_in_bubblewrap_as_without_it() -> None:
 
 
 def _number_of_the_zygote(sandboxes: Sandboxes) -> int:
-    """As its child sees it: in name spaces of its own the second process, after the doorkeeper."""
+    """Return the process id that the child sees: in a new namespace 2, after the doorkeeper."""
     with sandboxes.private_folder() as folder:
         said, stop = run_text(sandboxes, "robot", "import os; print(os.getppid())", folder)
     assert stop is None

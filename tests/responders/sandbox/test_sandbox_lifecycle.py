@@ -1,4 +1,4 @@
-"""Children and zygotes come and go: whoever is killed, nothing stays behind, and neither do hundreds of them."""
+"""Children and zygotes start and end: nothing is left behind, even after kills and hundreds of runs."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def test_nothing_outlives_what_it_hangs_on(killed: str, program: str, responder:
             until(lambda: not any(alive(pid) for pid in family))
         else:
             for zygote in zygotes:
-                # A worker that has lost one may end, and take the others along, before they are reached.
+                # A worker that has lost one zygote may end and take the others with it before this loop reaches them.
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(zygote, signal.SIGKILL)
             until(lambda: not any(alive(pid) for pid in family))
@@ -104,7 +104,7 @@ def test_a_killed_zygote_is_our_fault_so_the_trial_is_run_again(who: str) -> Non
         honest = run_program(runner, "print(1)")
         (zygote,) = _zygotes(os.getpid()) - others
         if who == "it":
-            # Inside bubblewrap, where that is used.
+            # The zygote inside bubblewrap, if bubblewrap is used.
             zygote = next(iter(_children(zygote)), zygote)
 
         def kill() -> None:
@@ -123,7 +123,7 @@ def test_a_killed_zygote_is_our_fault_so_the_trial_is_run_again(who: str) -> Non
 
 @pytest.mark.long
 def test_five_hundred_children_leave_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Measured after the first fifty, by when everything that is loaded late has been."""
+    """Measured after the first fifty, when all late imports have happened."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     program = 'print("PY::x")'
     responder = "def responder(text):\n    open('file', 'w').write(text)\n    return text"
@@ -146,7 +146,7 @@ def test_five_hundred_children_leave_nothing(tmp_path: Path, monkeypatch: pytest
 
 
 def _state(pid: int) -> tuple[int | None, list[int], int]:
-    """Open descriptors (if they may be seen), children, and bytes of memory in use."""
+    """Return the open descriptors (if visible), the children, and the bytes of memory in use."""
     try:
         descriptors = len(list(Path(f"/proc/{pid}/fd").iterdir()))
     except PermissionError:
@@ -156,7 +156,7 @@ def _state(pid: int) -> tuple[int | None, list[int], int]:
 
 
 def _zygotes(worker: int) -> set[int]:
-    """The children of ``worker`` that are zygotes, or have one inside bubblewrap."""
+    """Return the children of ``worker`` that are zygotes, or that contain one in bubblewrap."""
     return {pid for pid in _children(worker) if "inside.zygote" in command_line(pid)}
 
 

@@ -1,6 +1,6 @@
-"""Secrets put where a worker has them: none shows up in anything that comes back, and no student sees another's.
+"""Secrets in the usual places of a worker: none appears in any result, and no student sees another student's.
 
-Each search is shown to work: without the sandbox, or in the process that has the secret, it finds it.
+Each search is proved to work: without the sandbox, or in the process that has the secret, it finds it.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Recording
 
-#: A sentence that stands in one of the grader's own files.
+#: A sentence from one of the grader's own files.
 _OF_THE_PACKAGE = "Judging: from recordings to marks"
 _SECRETS = {place: f"decoy-of-the-{place}-7f3a" for place in ("environment", "memory", "file")}
 _HELD = [_SECRETS["memory"]]
 
-#: Opens with the C library, so that only the kernel can refuse, and says whatever it gets in every way there is.
+#: Opens files with the C library, so that only the kernel can refuse, and reports the content in every possible way.
 _SEARCH = """
 import ctypes, gc, os, sys
 libc = ctypes.CDLL(None)
@@ -54,7 +54,7 @@ _LAST = "decoy-of-the-last-student"
 
 
 def _search(paths: list[str], *secrets: str) -> str:
-    """A student's search for ``secrets``, which it holds scrambled, or it would find itself."""
+    """Return a student's search for ``secrets``, which are scrambled so that the search does not find itself."""
     return _SEARCH.replace("{paths!r}", repr(paths)).replace("{codes!r}", repr(scrambled(*secrets)))
 
 
@@ -64,7 +64,7 @@ def _everything(recording: Recording) -> bytes:
 
 @pytest.fixture
 def paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Where the secrets lie that are in files; the one in the environment is set before any process starts."""
+    """Return the paths of secrets in files. The secret in the environment is set before any process starts."""
     monkeypatch.setenv("ROBOMARK_SELF_TEST", _SECRETS["environment"])
     secret = tmp_path / "secret"
     secret.write_text(_SECRETS["file"])
@@ -76,7 +76,7 @@ def paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 @pytest.mark.parametrize("secret", [_SECRETS["file"], _SECRETS["environment"], _OF_THE_PACKAGE])
 def test_the_search_finds_what_no_sandbox_hides(secret: str, paths: list[str]) -> None:
-    """Run outside, as a program of its own."""
+    """Runs outside the sandbox, as an ordinary program."""
     ran = subprocess.run(
         [sys.executable, "-I", "-c", _search(paths, secret) + "\ntell()"], capture_output=True, text=True, check=False
     )
@@ -98,7 +98,7 @@ def test_no_secret_is_in_anything_that_comes_back(paths: list[str]) -> None:
 
 @pytest.mark.parametrize("role", ["program", "responder"])
 def test_the_next_student_sees_nothing_of_the_last(role: str) -> None:
-    """The first leaves its mark in memory, in modules, in built-in functions and in files."""
+    """The first student leaves a mark in memory, in modules, in built-in functions and in files."""
     leave = """
 import builtins, json, sys
 mark = "decoy-of-the-last-" + "student".lower()
@@ -139,7 +139,7 @@ tell()
 
 @pytest.mark.parametrize("name", ["walk_all_objects", "find_secrets_in_the_environment"])
 def test_forked_from_the_worker_a_child_would_find_its_secrets(name: str) -> None:
-    """What zygotes are for: the same attacks in a plain fork of a process that holds a secret."""
+    """The reason for zygotes: the same attacks succeed in a plain fork of a process that has a secret."""
     attack = next(each for each in attacks() if each.name == name)
     targets = {"scrambled": scrambled(_SECRETS["memory"], _SECRETS["environment"])}
     held = f"import os\nheld = [{_SECRETS['memory']!r}]\nif os.fork():\n    os.wait()\n    os._exit(0)\n"

@@ -1,4 +1,4 @@
-"""Ways round the rules about code, each tried as a submission: what is found, what is refused, what staff are told."""
+"""Evasions of the rules about code, each graded as a submission: findings, refusals, and messages to staff."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def assignment(part: str, rules: dict[str, Any]) -> Assignment:
 
 
 def files_of(case: dict[str, Any]) -> dict[str, bytes]:
-    """The files beside the part; those that are no text are made here."""
+    """Return the files beside the part. Files that are not text are created here."""
     files = {name: text.encode() for name, text in case.get("files", {}).items()}
     for number in range(case.get("many_files", 0)):
         files[f"part_{number}.py"] = b"run = eval\n" if number == 30 else b"x = 1\n"
@@ -73,7 +73,7 @@ def graded(case: dict[str, Any], folder: Path, runner: TrialRunner) -> Grade:
     return grade(read_submission(folder, asked=asked.parts), asked, runner=runner)
 
 
-# Those that do without the same modules are neighbours, so that they have the same zygote.
+# Cases that remove the same modules are adjacent, so that they share a zygote.
 @pytest.mark.parametrize(
     "case", [pytest.param(case, id=case["name"]) for case in sorted(CASES, key=lambda case: str(case.get("avoids")))]
 )
@@ -132,7 +132,7 @@ def test_what_was_compiled_of_a_closed_file_is_closed_too(
 ) -> None:
     source = ROOT / "responders" / "kit" / "nn_tools" / "weights.py"
     compiled = Path(py_compile.compile(str(source), doraise=True) or "")
-    # Whoever made the folder may have kept it from other users.
+    # The parent folder may be closed to other users.
     compiled.parent.chmod(0o755)
     (tmp_path / "responder.py").write_text(COMPILED.format(name=compiled.name))
     asked = assignment("responder", {"avoids": [f"import {module}"]})

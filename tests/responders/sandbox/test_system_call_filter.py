@@ -1,4 +1,4 @@
-"""The system call filter, run by an interpreter of its instructions: what it says to every call there is."""
+"""The system call filter, run by an interpreter of its instructions: its decision on every system call."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from responders.sandbox.inside.system_calls import ALLOWED, PATHS, asking, instr
 
 PID = 54321
 FILTER = program(PID)
-#: None that only others send, and none that is queued.
+#: Signals that only other processes send, and no queued ones.
 SIGNALS = set(range(32)) - {9}
 X32 = 1 << 30
 HIGH = 1 << 32
 CALLS = {number: (name, decision) for number, name, decision in listed()}
 
-#: Calls that depend on an argument: when they are allowed. Only what the kernel looks at counts: 32 bits of most.
+#: Calls with a rule for an argument: when they are allowed. Only the bits that the kernel reads count, mostly 32.
 SOME: dict[str, Callable[[Sequence[int]], bool]] = {
     "open": lambda a: _opens(a[1], a[2]),
     "openat": lambda a: _opens(a[2], a[3]),
@@ -42,7 +42,7 @@ SOME: dict[str, Callable[[Sequence[int]], bool]] = {
     "futex": lambda a: _low(a[1]) & ~256 in range(128, 142),
     "madvise": lambda a: _low(a[2]) in (4, 8, 14, 15),
 }
-#: Each is put in each place: processes, flags, requests and pointers, and what they become in 32 bits.
+#: Each value is tried in each argument: processes, flags, requests and pointers, and their lower 32 bits.
 EDGES = (
     *(0, 1, 2, 3, 4, 5, 8, 10, 15, 16, 1030, 1031, PID, PID - 1, PID + 1, -1, -PID, 1 << 31, HIGH, (1 << 64) - 1),
     *(0o1000, 0o1001, 0o1002, 0o1003, 0o101, 0o1101, 0o100000, 0o20200000, 0x5401, 0x5412, 0x5413, 0x541B, 0x541C),
@@ -67,7 +67,7 @@ def _opens(flags: int, mode: int) -> bool:
 
 
 def _arguments(everything: bool) -> list[list[int]]:
-    """Each edge in each place, plain and with its high half set; or only a few."""
+    """Return each edge value in each argument, plain and with its high half set; or only a few of them."""
     if not everything:
         return [[value] * 6 for value in (0, 1, PID, HIGH, (1 << 64) - 1)]
     values = {edge & (1 << 64) - 1 for plain in EDGES for edge in (plain, plain | HIGH)}
@@ -102,12 +102,12 @@ def test_x32_and_numbers_out_of_range_are_the_end() -> None:
 
 
 def test_the_names_beside_the_numbers_are_right() -> None:
-    """The allow-list is read by people, who trust its names."""
+    """Reviewers read the names of the allow-list and rely on them."""
     assert {name: number for number, (name, decision) in CALLS.items() if decision == "allow"} == ALLOWED
 
 
 def test_nothing_that_reaches_others_is_allowed() -> None:
-    """A second look that does not come from the list of what is allowed."""
+    """A second check that does not derive from the allow-list."""
     words = [
         "sock",
         "send",
@@ -150,7 +150,7 @@ def test_nothing_that_reaches_others_is_allowed() -> None:
 
 
 def test_whoever_names_a_path_has_to_ask() -> None:
-    """No call is let through that takes a path and is not asked about."""
+    """Every allowed call that takes a path is passed to the doorkeeper."""
     words = (
         "open",
         "stat",

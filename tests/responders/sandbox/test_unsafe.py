@@ -1,4 +1,4 @@
-"""Doing without the sandbox: only when the command line says so, said out loud, and stamped on all that comes of it."""
+"""Running without the sandbox: only with an explicit option, with a warning, and recorded in every grade."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_a_grade_without_sandbox_says_so(flags: tuple[str, ...]) -> None:
 
 @pytest.mark.long
 def test_a_worker_without_sandbox_says_so_in_every_grade(tmp_path: Path) -> None:
-    """The variable that such a setting would have changes nothing for the next worker."""
+    """The environment variable of such a setting has no effect on the next worker."""
     settings = settings_in(tmp_path)
     home: dict[str, Any] = {
         "ROBOMARK_HOME": str(settings.home),
@@ -63,5 +63,5 @@ def test_a_worker_without_sandbox_says_so_in_every_grade(tmp_path: Path) -> None
 
 
 def _grade_id(table: str) -> str:
-    """In the last column of the only line."""
+    """Return the id in the last column of the only line."""
     return next(line.split()[-1] for line in table.splitlines() if line.startswith("student") and "10 / 10" in line)

@@ -1,4 +1,4 @@
-"""``robomark batch``, ``show``, ``doctor`` and ``db`` as people run them, in processes of their own."""
+"""``robomark batch``, ``show``, ``doctor`` and ``db`` as users run them, in separate processes."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from submissions.assignment.examples import examples
 
 @pytest.fixture(scope="module")
 def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended, Path]:
-    """A home after a batch of two good submissions and a bad row; what the command said, and the reports' folder."""
+    """Return a home after a batch of two good submissions and a bad row, the output, and the reports' folder."""
     folder = tmp_path_factory.mktemp("batch") / "class"
     for name in ("reference", "flawed"):
         shutil.copytree(examples("echo-responder") / name, folder / name)
     with (folder / "reference" / "robot.py").open("a") as program:
-        # Of a robot that stands still nothing is drawn.
+        # A robot that does not move has no drawing.
         program.write("tank_drive.on_for_seconds(SpeedPercent(20), SpeedPercent(20), 0.5)\n")
     (folder / "[red]odd.txt").write_text("x")
     home = tmp_path_factory.mktemp("home")

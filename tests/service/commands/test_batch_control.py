@@ -1,4 +1,4 @@
-"""``robomark batch submit`` of a roster, again, ``pause``, ``resume``, ``cancel``, ``retry`` and ``export``."""
+"""``robomark batch submit`` of a roster, repeated, then ``pause``, ``resume``, ``cancel``, ``retry`` and ``export``."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SPIN = "while True:\n    pass\n"
 
 @pytest.fixture(scope="module")
 def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, Ended]:
-    """A home after a roster of two good rows and one of each bad kind; the roster; what the command said."""
+    """Return a home after a roster of two good rows and one of each bad kind, the roster, and the command's output."""
     folder = tmp_path_factory.mktemp("class")
     for name in ("reference", "flawed"):
         shutil.copytree(examples("echo-responder") / name, folder / name)

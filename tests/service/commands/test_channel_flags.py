@@ -1,4 +1,4 @@
-"""The channel's flags: what they change, and that a grade made with them says so and is no other's."""
+"""The channel's flags: their effects. A grade made with them says so and differs from all other grades."""
 
 from __future__ import annotations
 

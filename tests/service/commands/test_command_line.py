@@ -1,4 +1,4 @@
-"""The command line as people mistype it: one sentence, the right status, and nothing that a terminal would obey."""
+"""Mistyped command lines: one sentence, the right status, and no terminal escapes."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ _ASKING = {
 
 @pytest.mark.long
 def test_what_only_asks_imports_nothing_heavy(tmp_path: Path) -> None:
-    """Each line is run in a process of its own, forked from one that has imported nothing of ours."""
+    """Each line runs in a separate process, forked from one that has imported none of our modules."""
     with opened(Settings(home=tmp_path)) as store:
         graded = accept_one(store).job_id
         claim = jobs.claim(store, "worker", 60)
@@ -156,7 +156,7 @@ def test_what_only_asks_imports_nothing_heavy(tmp_path: Path) -> None:
     assert "sqlalchemy" in loaded["batch list"]
 
 
-#: Prints what each of the command lines it is given has imported when it ends.
+#: Prints the imported modules at the end of each command line.
 _LOADED = """
 import json, os, sys, tempfile
 found = {}

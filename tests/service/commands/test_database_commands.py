@@ -1,4 +1,4 @@
-"""A course is put away and found again by the commands that the operators' page names, on either kind of database."""
+"""The commands on the operators' page archive and restore a course, with either kind of database."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def _answer(*words: str | Path, home: Path, database: str) -> str:
 
 @pytest.fixture
 def elsewhere(service_settings: Settings, request: pytest.FixtureRequest, tmp_path: Path) -> str:
-    """Another empty database of the same kind."""
+    """Return another empty database of the same kind."""
     if service_settings.database.startswith("sqlite"):
         return f"sqlite:///{tmp_path / 'elsewhere.db'}"
     return fresh_database(request.getfixturevalue("postgresql"))
@@ -62,7 +62,7 @@ def test_a_course_is_archived_purged_and_brought_back(
     assert "removed: 2 submissions, 2 grades, 2 students" in gone
     assert archive.stat().st_mode & 0o077 == 0
     assert batch not in _answer("batch", "list", **used)
-    # The archive is a database that can be looked into, and be brought back.
+    # The archive is a database that can be inspected and restored.
     opened: dict[str, Any] = {"home": tmp_path / "reading", "database": f"sqlite:///{archive}"}
     assert _answer("batch", "export", batch, **opened) == marks
     new: dict[str, Any] = {"home": tmp_path / "new", "database": elsewhere}

@@ -1,4 +1,4 @@
-"""What holds of every command: it is listed and loads, it says the same as a document, and a pipe gets plain lines."""
+"""Properties of every command: it is listed and loads, its JSON has the same content, and a pipe gets plain lines."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _all() -> Iterator[tuple[tuple[str, ...], Command]]:
 
 
 ALL = dict(_all())
-#: Of each command that shows something, a line that runs here, and the keys of its document beside "schema".
+#: For each command with output, a line that runs here, and the keys of its document besides "schema".
 SHOWING = {
     "batch list": "batches",
     "batch status BATCH": "batch pace jobs changes ranks unpublished_regrades statistics history",
@@ -118,7 +118,7 @@ SHOWING = {
     "db backup copy.db": "file bytes",
     "db purge --before 2020-01-01": "removed archive submissions grades students",
 }
-#: As above, of commands that run student code or draw.
+#: The same for commands that run student code or draw.
 LONG = {
     "run robot.py": "run notes",
     "assignments check echo-responder": "assignments statistics",
@@ -131,8 +131,8 @@ LONG = {
     "batch submit new -a echo-responder --wait": "batch queued known refusals jobs statistics report",
     "demo -o demo": "batch queued known refusals jobs statistics report",
 }
-#: Have the format ``json`` for their document, verify what was really graded, need an empty database, a minute, or a
-#: learning platform that answers.
+#: Commands without such a row: they use the format ``json``, verify real grades, or need an empty database, a minute,
+#: or a learning platform that answers.
 _ELSEWHERE = {
     *{("grade",), ("batch", "export"), ("verify",), ("db", "restore"), ("models", "train")},
     *{("platform", "enrol"), ("platform", "send-marks")},
@@ -160,7 +160,7 @@ def test_the_table_of_keys_for_instructors_has_every_command_and_key() -> None:
             rows[name] = {word for code in re.findall("`([^`]*)`", keys) for word in code.split()}
     for line, keys in {**SHOWING, **LONG}.items():
         (name,) = (" ".join(words) for words in ALL if tuple(line.split()[: len(words)]) == words)
-        # The demonstration's are in the row of submitting.
+        # The demonstration's keys are in the row of ``submit``.
         if name != "demo":
             assert set(keys.split()) <= rows.get(name, set()), name
 
@@ -177,7 +177,7 @@ def test_every_command_that_is_listed_can_be_loaded_and_is_listed_whole() -> Non
 
 @pytest.fixture(scope="module")
 def home(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
-    """A home with a batch of two graded submissions, one that waits, and one refused; and the ids in it."""
+    """Return a home with a batch of two graded submissions, one waiting and one refused, and the ids in it."""
     folder = tmp_path_factory.mktemp("home")
     refused = [Refusal("[red]odd.txt", f"is {_LONG} and no submission", Student("eve"))]
     with open_store(Settings(home=folder)) as store:
@@ -237,11 +237,11 @@ def test_no_command_has_another_meaning_for_the_assignments_letter_or_another_na
 
 
 def _ended(folder: Path, database: Path, *words: str, **environment: Any) -> subprocess.CompletedProcess[str]:
-    """The command in a folder with what the lines name, on a copy of the database."""
+    """Run the command in a folder with the files that the lines name, on a copy of the database."""
     folder.mkdir()
     home = folder / "home"
     shutil.copytree(database, home)
-    # Doctor finds fault with what has waited for minutes, and the tests before this one can take minutes.
+    # Doctor reports jobs that have waited for minutes, and earlier tests can take minutes.
     with closing(sqlite3.connect(Settings(home=home).database.removeprefix("sqlite:///"))) as connection, connection:
         at = "strftime('%Y-%m-%d %H:%M:%f000', 'now')"
         connection.execute(f"UPDATE job SET queued_at = {at}, due_at = {at} WHERE state = 'queued'")

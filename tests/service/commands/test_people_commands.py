@@ -1,4 +1,4 @@
-"""From a platform's download to what it takes back, as people run it: everybody has a row, and the right name."""
+"""From a platform's download to the file for its upload, as users do it: one row each, with the right name."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Participant 500002,Zoë Ångström,zoe@uni.example,Submitted,,10.00,-,
 
 @pytest.fixture
 def download(tmp_path: Path) -> Path:
-    """Ada submitted all, Alan no responder, Zoë a document."""
+    """Return a download: Ada submitted all files, Alan no responder, Zoë a document."""
     path = tmp_path / "CS101-Echo-77.zip"
     robot, responder = ((REFERENCE / name).read_text() for name in ("robot.py", "responder.py"))
     with zipfile.ZipFile(path, "w") as archive:
@@ -125,7 +125,7 @@ def test_several_are_one_document_that_names_student_and_file(tmp_path: Path) ->
 
 
 def test_the_autograder_writes_what_gradescope_reads(tmp_path: Path) -> None:
-    """Laid out as Gradescope's harness does: source, submission and results below one folder, the script in it."""
+    """The folders are those of Gradescope's harness: source, submission and results below a folder with the script."""
     home, root = tmp_path / "home", tmp_path / "autograder"
     made = robomark(home, "assignments", "autograder", ECHO, "--output", root / "source")
     assert made.status == 0, made
@@ -144,7 +144,7 @@ def test_the_autograder_writes_what_gradescope_reads(tmp_path: Path) -> None:
     assert (graded["score"], sum(test["max_score"] for test in graded["tests"])) == (6, 10)
     (root / "source" / "assignment" / "assignment.toml").write_text("id = ")
     ended = _run(root)
-    # An instructor's mistake is nobody's mark.
+    # An instructor's mistake costs nobody marks.
     assert ended.returncode != 0
     assert not (root / "results" / "results.json").exists()
 

@@ -1,4 +1,4 @@
-"""``robomark batch similar``: evidence for staff of who wrote and did the same, and nothing of it for anybody else."""
+"""``robomark batch similar``: evidence for staff of similar code and behaviour, hidden from everybody else."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def source(name: str, file: str) -> Code:
 
 
 def submitted() -> list[Submission]:
-    """Ada and zebedee have the same responder, but for its looks; the others have little in common."""
+    """Return submissions: Ada and zebedee share a responder except for formatting; the others have little in common."""
     program = source("reference", "robot.py")
     ada = Submission("ada", program, source("reference", "responder.py"))
     copy = COPYISTS["all of it"](source("reference", "responder.py").text)
@@ -51,7 +51,7 @@ def submitted() -> list[Submission]:
 
 @pytest.fixture(scope="module")
 def graded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Store, str]]:
-    """A home with a graded batch, in which ada's and zebedee's robots drove the same and each other's another way."""
+    """Return a home with a graded batch. The robots of ada and zebedee drove the same way, the others differently."""
     home = tmp_path_factory.mktemp("home")
     assignment = find_assignment(ASSIGNMENT)
     requests = [GradingRequest(each, assignment, f"{each.student}.zip") for each in submitted()]

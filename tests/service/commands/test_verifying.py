@@ -1,4 +1,4 @@
-"""``verify`` tells a program that uses chance of its own from a fault of ours, by repeating what differs."""
+"""``verify`` distinguishes a program with its own random numbers from a fault of ours by repeating what differs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from submissions.submission import Submission
 
 
 def _stored_otherwise(graded: Grade) -> list[tuple[TrialResult, TrialResult]]:
-    """The trials as they would be compared if the stored recordings had had other hashes."""
+    """Return the trials to compare if the stored recordings had other hashes."""
     return [(replace(each, recording=replace(each.recording, sha256="0" * 64)), each) for each in graded.trials]
 
 
@@ -45,7 +45,7 @@ def _graded(runner: TrialRunner) -> tuple[GradingRequest, Grade]:
 
 
 def _cut(trial: TrialResult, *said: str) -> TrialResult:
-    """The trial as if a limit had ended it after it said this."""
+    """Return the trial as if a limit had ended it after this speech."""
     spoken = tuple(Line(0.0, text) for text in said)
     recording = replace(trial.recording, sha256="0" * 64, verdict=Verdict.CPU_LIMIT, spoken=spoken, faults=())
     return replace(trial, recording=recording)

@@ -1,4 +1,4 @@
-"""The built wheel works in an empty environment, for a user who owns nothing else: nothing is taken from a checkout."""
+"""The built wheel works in an empty environment, for a user who owns nothing else, without files from a checkout."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ import pytest
 from paths import ROOT
 
 _NOBODY = 65534
-#: Commands that were run in this process before may have left a stricter one.
+#: Earlier commands in this process may have left a stricter umask.
 _READABLE_FOR_OTHERS = 0o022
-#: That of the tests, and the system's.
+#: The interpreter of the tests, and the system's.
 _PYTHONS = (Path(sys.executable).resolve(), Path("/usr/bin/python3.11"))
 
 
@@ -27,8 +27,8 @@ def _open_to_others(python: Path) -> bool:
 
 @pytest.fixture(scope="module")
 def installed() -> Iterator[Path]:
-    """The command of an environment with the wheel and what it needs, as the lock has it, and no checkout."""
-    # Not in pytest's own folder: each run closes that to others, also while this one goes on.
+    """Yield the command in an environment with the wheel and its locked dependencies, without a checkout."""
+    # Not in pytest's own folder: each run closes that to other users, even while this run continues.
     with tempfile.TemporaryDirectory(prefix="robomark-wheel-") as made:
         Path(made).chmod(0o755)
         yield _install(Path(made))

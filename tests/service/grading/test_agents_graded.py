@@ -1,4 +1,4 @@
-"""Grading with agents: whose fault it is, and what criteria and reports make of what they say to each other."""
+"""Grading with agents: who is at fault, and how criteria and reports use the messages between agents."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def with_given_parser(text: str) -> Assignment:
             "the given agent parser cannot be used: SyntaxError",
         ),
         ("def parser(text): return text", Verdict.FINISHED, ""),
-        # A student's own message may have brought it about.
+        # A student's own message may have caused it.
         ("def parser(text): return text / 1", Verdict.RESPONDER_ERROR, "gave no answer: TypeError: unsupported"),
     ],
 )
@@ -83,7 +83,7 @@ def test_a_given_agent_sees_given_files_alone_and_no_process_sees_anothers_text(
 
 
 def as_notebook(folder: Path, *first: str, leave_out: str = "") -> Submission:
-    """The reference as a notebook: each agent in a cell that writes its file, the responder in the last one."""
+    """Return the reference as a notebook: each agent in a cell that writes its file, the responder in the last cell."""
     sources = {path.name: path.read_text() for path in sorted((examples(ASSIGNMENT.id) / "reference").glob("*.py"))}
     responder = sources.pop("responder.py")
     sources.pop(leave_out, None)

@@ -1,4 +1,4 @@
-"""Criteria about code: what a text has and does without, read inside the sandbox."""
+"""Criteria about code: required and forbidden elements of a text, read inside the sandbox."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def test_what_a_text_cannot_show_is_told_to_staff(runner: TrialRunner) -> None:
         "import string\nstring.Formatter().get_field('0.on_' + go, [tank_drive], {})",
         "import logging.config\nlogging.config.BaseConfigurator({}).resolve('ev3dev2_glue.' + go)",
         "import xmlrpc.server\nxmlrpc.server.resolve_dotted_attribute(tank_drive, 'on_' + go)",
-        # Other modules, and other ways to the same ones.
+        # Other modules, and other ways to import the same ones.
         *(
             f"import {name}\n{name}.run(go)"
             for name in ("profile", "bdb", "pdb", "trace", "doctest", "sched", "turtle")

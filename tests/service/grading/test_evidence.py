@@ -1,4 +1,4 @@
-"""Attacks on evidence: the same thing shown many times, or marks for what was not done at all."""
+"""Attacks on evidence: the same thing shown many times, or marks without any work."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ tank_drive.off()
 _EVERY_BOX = "rows 7 rows 9 rows 10 rows 11 columns 7 columns 9 columns 11 black 49 black 51 black 53 black 60"
 
 
-#: Assignment, robot program, responder, the marks that it must not exceed, and those it had before this was thought of.
+#: Assignment, robot program, responder, the marks now, and the marks before the countermeasure existed.
 _SUBMISSIONS: Sequence[tuple[str, str, str, str, str]] = [
     ("count-bands", _ALL_AT_ONCE.format(words='["1 2 3 4"]'), "", "2.00", "8.00"),
     ("count-bands", _ALL_AT_ONCE.format(words='"1234"'), "", "2.00", "8.00"),
@@ -116,12 +116,12 @@ def test_what_does_not_do_what_was_asked_gets_little(
     assert graded.marks <= Decimal(most) < Decimal(before), [result.message for result in graded.criteria]
 
 
-#: The middle of the left sensor, to the robot's right and ahead, as it is mounted.
+#: The middle of the left sensor as it is mounted: to the robot's right, and ahead.
 _LEFT = (-20.0, 30.0)
 
 
 def _looking_at(x: float, y: float, heading: float) -> Pose:
-    """Where the robot stands with its left sensor at (x, y)."""
+    """Return the pose of a robot with its left sensor at (x, y)."""
     turn = math.radians(heading - 90)
     right, ahead = _LEFT
     return Pose(
@@ -132,7 +132,7 @@ def _looking_at(x: float, y: float, heading: float) -> Pose:
 
 
 def _photographed(*seen: tuple[Pose, str, str], **parts: Any) -> Recording:
-    """Images from these poses: what each shows, and the answer."""
+    """Return a recording of images from these poses: their labels and the answers."""
     images: list[Image] = []
     messages: list[Message] = []
     for number, (pose, truth, answer) in enumerate(seen):
@@ -152,7 +152,7 @@ def _counted(result: CriterionResult) -> int:
 @pytest.mark.parametrize("how", ["majority", "any", "first"])
 @pytest.mark.parametrize("headings", [range(0, 360, 60), range(0, 360, 5)])
 def test_one_pattern_from_many_headings_is_one_pattern(how: str, headings: range) -> None:
-    """Each of these six stands some 36 mm from the next, and gave 6 of 6 patterns."""
+    """Each of these six poses is about 36 mm from the next one, and they used to count as 6 of 6 patterns."""
     one = [(_looking_at(310, 920, heading), "square", "square") for heading in headings]
     result = judged(criterion("classification", each_pattern=how, patterns=6, over="all"), _photographed(*one))
     assert result.marks == 0
@@ -161,7 +161,7 @@ def test_one_pattern_from_many_headings_is_one_pattern(how: str, headings: range
     assert judged(criterion("classification", each_pattern=how, patterns=6, over="all"), _photographed(*six)).marks == 4
 
 
-#: What is driven, by whom it is answered, and the marks of a criterion: now, and before this was thought of.
+#: The drive, the responder, and the marks of a criterion: now, and before the countermeasure existed.
 _DRIVEN = [
     ("one-shape-from-six-sides", "always the same", "shapes-on-the-move", "shapes", "0.00", "3.00"),
     ("one-shape-from-six-sides", "the network", "shapes-on-the-move", "shapes", "0.00", "6.00"),
@@ -190,7 +190,7 @@ def test_what_was_seen_from_many_sides_is_one_thing(
         submission = replace(submission, responder=Code("responder.py", responder))
     graded = grade(submission, asked, runner=runner)
     assert graded.marks == Decimal(now), graded.criteria[0].message
-    # It did what it is here for: told apart by where the robot stood, or not at all, it was worth much more.
+    # Without the countermeasure, patterns differ by the robot's position, or always, and the marks are much higher.
     monkeypatch.setattr(patterns, "part_at", lambda recording, side, pose: (pose.x, pose.y))
     monkeypatch.setattr(collecting, "_different", lambda found, recording: found)
     (once,) = judge(asked, graded.trials)
@@ -198,7 +198,7 @@ def test_what_was_seen_from_many_sides_is_one_thing(
 
 
 def test_a_pattern_that_a_patch_names_is_where_the_patch_is() -> None:
-    """Turning round the patch moves the left sensor far, and the right one, which reads it, not at all."""
+    """A turn around the patch moves the left sensor far, but not the right one, which reads the patch."""
     patch = np.full((20, 20, 4), 255, np.uint8)
     patch[:, :, :3] = 0
     seen = []
@@ -215,7 +215,7 @@ def test_a_pattern_that_a_patch_names_is_where_the_patch_is() -> None:
 
 
 def test_a_robot_may_not_turn_to_what_is_easier() -> None:
-    """The robot stays at its start, and its sensor looks at the shape before."""
+    """The robot stays at its start, and its sensor sees the previous shape."""
     start = _looking_at(310, 920, 0)
     turned = Pose(start.x, start.y, 180)
     run = _photographed((turned, "square", "square"), start=start)
@@ -227,7 +227,7 @@ def test_a_robot_may_not_turn_to_what_is_easier() -> None:
 
 
 def test_sending_the_same_image_again_counts_nothing() -> None:
-    """One that is known, a hundred times, made up for all that are not."""
+    """A known image, sent a hundred times, does not compensate for wrong answers to other images."""
     known = [(_looking_at(230, 920, heading), "square", "square") for heading in range(100)]
     other = [(_looking_at(310 + 80 * number, 920, 0), "diamond", "square") for number in range(3)]
     result = judged(criterion("classification"), _photographed(*known, *other))
@@ -238,7 +238,7 @@ def test_sending_the_same_image_again_counts_nothing() -> None:
 
 
 def test_one_place_gives_one_image_whatever_the_noise() -> None:
-    """With noise no two images are the same, and standing still gave as many different ones as were asked for."""
+    """With noise no two images are equal, so a robot that stood still used to get any number of different ones."""
     patch = np.zeros((20, 20, 4), np.uint8).tobytes()
 
     def collected(*places: float) -> Recording:

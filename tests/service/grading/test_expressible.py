@@ -1,4 +1,4 @@
-"""What assignments can ask without Python code: alternatives, answers in order, figures, events, printed cells."""
+"""Assignments without Python checks: alternatives, answers in order, figures, events, printed cells."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def test_what_cells_print_can_be_marked(keys: dict[str, Any], marks: int) -> Non
     assert judged(criterion("prints", of="responder", **keys), recording).marks == marks
 
 
-#: The robot drives 1 mm a tick, 30 mm a second, and ends after 3 s at x = 190; the answer arrives at 2.1 s.
+#: The robot drives 1 mm a tick (30 mm/s) and ends after 3 s at x = 190. The answer arrives at 2.1 s.
 STOP = (Message(2.0, "robot", "PY::near", 2.0), Message(2.0, "responder", "please stop", 2.1, 0, ""))
 
 

@@ -1,4 +1,4 @@
-"""Criteria about code: what functions return when they are called inside the sandbox."""
+"""Criteria about code: return values of functions that are called inside the sandbox."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def test_of_hidden_calls_the_count_is_told(text: str, marks: str, words: str, ru
     assert words in result.message
 
 
-#: What a function does with an argument that it has not seen, and right answers to what is shown.
+#: Ways in which a function handles an unseen argument, with correct answers to the visible ones.
 _LEAKS = {
     "returns it": "return 4 if x == 2 else [x, 'look']",
     "raises it": "if x != 2: raise ValueError(x)\n    return 4",

@@ -1,4 +1,4 @@
-"""Shares over hidden trials are marked in steps of 5 %: students cannot read off how many passed, staff can."""
+"""Shares over hidden trials are rounded to 5 %: students cannot infer how many passed, staff can see it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _run(right: bool) -> Recording:
 
 
 def _graded(check: str, keys: Mapping[str, Any], good: int, visibility: str = "hidden") -> Grade:
-    """Two visible trials that are as asked for, and 40 others, of which ``good`` are."""
+    """Return a grade with two passing visible trials and 40 hidden ones, of which ``good`` pass."""
     scenarios = (Scenario("shown", (START,), trials=2), Scenario("unseen", (START,), trials=_HIDDEN))
     asked = Assignment("a", "A", WorldSpec("Simple_Shapes"), Parts(), scenarios, (criterion(check, **keys),))
     shown = [("shown", "visible", index, True) for index in range(2)]

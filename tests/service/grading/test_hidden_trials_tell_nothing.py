@@ -1,7 +1,7 @@
-"""Hidden trials reach a student by their marks alone: whatever a submission does in them, it reads the same report.
+"""Hidden trials affect only the marks in a student's report, whatever a submission does in them.
 
-Each attack lets what its robot sees in a hidden trial decide on something that could be told: a count, a text, a
-time, a place. It is graded in two hidden worlds that differ; the visible ones and the marks do not.
+In each attack, the robot's view in a hidden trial decides a reportable detail: a count, a text, a time, a place.
+Each is graded in two hidden worlds that differ. The visible worlds and the marks are the same.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from submissions.sweep import Sweep
 
 POSES = tuple(Pose(200.0 + 80 * place, 900.0, 0.0) for place in range(6))
 
-#: Not worth a mark, so that marks tell nothing: what is left must be the same.
+#: Worth no marks, so that marks reveal nothing and the reports must be equal.
 CRITERIA: tuple[tuple[str, Mapping[str, Any]], ...] = (
     ("finishes", {}),
     ("prints", {"contains": ["never printed"]}),
@@ -72,7 +72,7 @@ def asked() -> Assignment:
 
 
 def students(graded: Grade, submission: Submission, plots: Mapping[str, bytes]) -> dict[str, str]:
-    """Everything that is made of a grade for a student to read."""
+    """Return everything that a student can read about a grade."""
     view = student_view(graded)
     return {
         "report": report(student_view(graded), plots, submission),
@@ -85,7 +85,7 @@ def students(graded: Grade, submission: Submission, plots: Mapping[str, bytes]) 
 
 
 def chosen(graded: Grade) -> list[Any]:
-    """What the submission did in hidden trials, but for what its robot saw."""
+    """Return the actions of the submission in hidden trials, without the robot's sensor data."""
     return [
         (
             recording.verdict,
@@ -108,7 +108,7 @@ def chosen(graded: Grade) -> list[Any]:
 def told_apart(runner: TrialRunner, submission: Submission, asked: Assignment, *, draw: bool = False) -> None:
     first, second = (grade(submission, replace(asked, secret=secret), runner=runner) for secret in ("one", "two"))
     assert [result.marks for result in first.criteria] == [result.marks for result in second.criteria]
-    # There was something to hide.
+    # The hidden trials differ.
     assert chosen(first) != chosen(second)
     pages = [students(graded, submission, draw_all(graded) if draw else {}) for graded in (first, second)]
     assert pages[0] == pages[1]
@@ -169,7 +169,7 @@ RESPONDERS = {
     "what its agent is called with": "    return agent(seen)\nagent = str",
 }  # fmt: skip
 
-#: One of each kind: counts, texts, times, lines, places, images' answers. The others are tried when there is time.
+#: One attack of each kind: counts, texts, times, lines, places, answers to images. The others are long tests.
 QUICK = {
     "the number of images", "the text of a message", "the line of an error", "the moment of the end",
     "the way that it ends", "running on", "what it touches", "logged readings",
@@ -219,7 +219,7 @@ def test_what_the_cells_after_a_hidden_run_do_is_not_told(runner: TrialRunner, a
     told_apart(runner, Submission("s", notebook=Notebook("work.ipynb", cells)), asked)
 
 
-#: Trained on visible images, asked about visible and hidden ones in one process.
+#: Trained on visible images, then asked about visible and hidden ones in one process.
 MODELS = {
     "what the model prints": "print(seen)",
     "what the model raises": "1 / (seen % 2)",
@@ -260,7 +260,7 @@ def test_what_a_model_does_with_hidden_images_is_not_told(
 
 
 def _with_hidden(count: int, *, first: bool) -> Assignment:
-    """The echo assignment with four visible trials, and so many hidden ones before or after them."""
+    """Return the echo assignment with four visible trials, and ``count`` hidden ones before or after them."""
     (own,) = echo().scenarios
     shown = replace(own, poses=tuple(Pose(x, 800, 0) for x in (100, 150, 200, 250)))
     hidden = tuple(replace(own, id=f"secret-{number}", visibility="hidden") for number in range(count))

@@ -1,4 +1,4 @@
-"""The near misses that students make: each report begins with what was found, where, and what was expected."""
+"""Near misses of students: each report begins with the finding, its place, and the expected value."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ starts_with = "Is that a"
 
 
 def asked_in(name: str, folder: Path) -> Assignment:
-    """With one pose a scenario, for that is enough to go wrong."""
+    """Return the assignment with one pose per scenario, which is enough for a mistake."""
     if name != "is-that-a":
         whole = find_assignment(name)
         return replace(whole, scenarios=tuple(replace(each, poses=each.poses[:1]) for each in whole.scenarios))
@@ -70,7 +70,7 @@ def asked_in(name: str, folder: Path) -> Assignment:
 
 
 def written(case: Mapping[str, Any], folder: Path) -> Path:
-    """The reference with the mistake in it."""
+    """Write the reference with the mistake in it."""
     own = folder / "ada"
     own.mkdir()
     for part in ("robot.py", "responder.py"):
@@ -129,7 +129,7 @@ def test_every_format_begins_with_the_cause(runner: TrialRunner, tmp_path: Path)
     for name, text in told.items():
         assert cause in text, name
         if name not in ("csv table", "csv-long table"):
-            # A table says everything in columns.
+            # Tables have their own columns and order.
             assert text.index(cause) < text.index(criterion), name
 
 

@@ -1,4 +1,4 @@
-"""Judging with recordings made by hand: who passes, what is said, and what it is worth."""
+"""Judging with recordings made by hand: passing, messages and marks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hostile texts, and judges that misbehave: judging stays in proportion, and what cannot be judged spoils no other."""
+"""Hostile texts and faulty judges: judging takes proportionate time, and one failed criterion affects no other."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from submissions.submission import Submission
 
 pytestmark = pytest.mark.fast
 
-#: What one text can hold at most that comes over the wire, in characters.
+#: The maximum length of a text over the wire, in characters.
 _LONG = 60_000
 _TEXTS: Mapping[str, Sequence[str]] = {
     "digits": ["1" * _LONG],
@@ -88,7 +88,7 @@ def test_hostile_texts_are_judged_in_little_time(name: str) -> None:
     for check, keys in _CRITERIA:
         begin = time.process_time()
         (result,) = judge(_asking(criterion(check, **keys)), _trials(run))
-        # What grows with the square of the length takes minutes here.
+        # Quadratic time would be minutes here.
         assert time.process_time() - begin < 8, (check, keys)
         assert len(result.message) < 2000
 
@@ -106,7 +106,7 @@ from ev3dev2.sound import Sound
 {lines}
 Sound().speak("end")
 """
-#: What a student's program may do to whoever reads its numbers and words.
+#: Attempts of a student's program to affect the reader of its numbers and words.
 _PROGRAMS = {
     "print and say digits": "print('1' * 20000 + 'x'); Sound().speak('1' * 20000 + 'x')",
     "say signs and points": "Sound().speak('-.' * 20000); print('.1' * 20000)",
@@ -271,7 +271,7 @@ def _recurses() -> None:
 
 
 def _aborts() -> None:
-    faulthandler.disable()  # pytest's would tell of it
+    faulthandler.disable()  # pytest's would report it
     os.abort()
 
 
@@ -287,7 +287,7 @@ def _computes_in_c() -> None:
     sum(range(10**12))
 
 
-#: What stops a judge wherever it runs, and what only a process of its own survives.
+#: Faults that stop any judge, and faults that only a separate process survives.
 _ANYWHERE: Sequence[tuple[Callable[[], None], str]] = [
     (_sleeps, "it took more than 2 s"),
     (_loops, "it took more than 1 s of computing"),
@@ -368,7 +368,7 @@ def test_a_rank_of_what_could_not_be_judged_is_not_judged_either(monkeypatch: py
 
 
 def test_what_comes_back_is_what_was_judged(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Through a process too, and the images are the recordings' own."""
+    """The result is the same through a process, with the recordings' own images."""
     messages = (Message(0, "robot", "IMG_DATA::{}", 0), Message(0, "responder", "a", 0.1, 0))
     images = tuple(Image(n / 2, 15 * n, START, bytes([n]) * 1600, bytes(1600), 0, "a") for n in range(3))
     run = recorded(messages=messages, images=images)

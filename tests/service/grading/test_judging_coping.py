@@ -1,4 +1,4 @@
-"""Judging over a channel that loses: what is held against nobody, and what coping with it means."""
+"""Judging over a lossy channel: losses that cost no marks, and the meaning of coping with them."""
 
 from __future__ import annotations
 
@@ -204,7 +204,7 @@ def believed(*told: tuple[float, str], messages: tuple[Message, ...] = (), **key
     return judged(criterion("fresh_answers", after="Answer:", path="saw", over="mean", **keys), run)
 
 
-#: The answer to 0 comes only after 1 was asked, and the answer to that after it.
+#: The answer to 0 arrives only after 1 was asked, and the answer to 1 after that.
 LATE = (
     asked(0, "PY::0"),
     answer(0, 1.5, 'JSON::{"saw": "n 0"}'),
@@ -220,7 +220,7 @@ LATE = (
         ([(2.6, "Answer: n 1")], 2, 'the answer to "PY::0" came at 1.50 s and no line that begins with "Answer:" has'),
         ([(2.6, "Answer: n 0 n 1")], 0, 'it reported "n 0 n 1"'),
         ([(2.6, "n 0")], 0, "no line that begins with"),
-        ([(2.2, "Answer: n 1")], 0, "no line that begins with"),  # a guess, before it came
+        ([(2.2, "Answer: n 1")], 0, "no line that begins with"),  # a guess, before the answer
     ],
 )
 def test_what_is_reported_is_the_answer_to_what_was_sent_last(

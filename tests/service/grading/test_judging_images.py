@@ -1,4 +1,4 @@
-"""Judging what images were named, with recordings made by hand, and what students are told of hidden trials."""
+"""Judging the labels of images, with recordings made by hand, and messages to students about hidden trials."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def test_what_the_robot_says_can_be_the_answer() -> None:
 
 @pytest.mark.parametrize(
     ("right", "count", "low", "high"),
-    # The score interval of E. B. Wilson (1927), worked out by hand for these counts.
+    # The score interval of E. B. Wilson (1927), calculated by hand for these counts.
     [(0, 0, 0, 1), (6, 6, 0.6097, 1), (0, 6, 0, 0.3903), (4, 6, 0.3000, 0.9032), (90, 100, 0.8256, 0.9448)],
 )
 def test_wilson_interval(right: int, count: int, low: float, high: float) -> None:

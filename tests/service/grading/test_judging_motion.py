@@ -96,10 +96,10 @@ def test_moves_in_order(moves: Any, keys: dict[str, Any], good: bool) -> None:
             (straight(100), spin(90), spin(-90), straight(-100)),
             [{"forward": [95, 105]}, {"turn": [85, 95]}, {"turn": [-95, -85]}, {"forward": [-105, -95]}],
         ),
-        # What lasts less than 0.3 s is part of the move round it.
+        # A move of less than 0.3 s belongs to the move around it.
         ((straight(100), straight(-20), straight(100)), [{"forward": [175, 185]}]),
         ((spin(60), spin(-6), spin(60)), [{"turn": [110, 118]}]),
-        # A bend is a turn, on as well as back.
+        # A bend counts as a turn, whether the robot drives forwards or backwards.
         ((straight(100), (4.0, 2.0, 20)), [{"turn": [-1, 1]}, {"turn": [38, 42]}]),
     ],
 )
@@ -110,11 +110,11 @@ def test_forwards_and_backwards_left_and_right_are_moves_of_their_own(made: Any,
 @pytest.mark.parametrize(
     ("keys", "made", "marks"),
     [
-        # The first move suits both, the second only the first that is asked for.
+        # The first move matches both requirements, the second move only the first one.
         ({"in_order": False}, (80, 200), 4),
         ({"in_order": False}, (200, 80), 4),
         ({"in_order": False}, (200, 220), 2),
-        # The last two that are asked for came, in order.
+        # The last two required moves occurred, in order.
         ({"then": 300}, (80, 300, 200), 2.67),
     ],
 )
@@ -140,7 +140,7 @@ def test_a_missing_move_tells_what_came_instead_and_when() -> None:
 
 
 def there_and_back(*heights: float, back: float = 0.0) -> Any:
-    """Out by each height and back to ``back`` mm from where it went out."""
+    """Return excursions to each height and back to ``back`` mm from their start."""
     moves = []
     for height in heights:
         moves += [straight(height), rest(), straight(back - height), rest()]
@@ -181,7 +181,7 @@ def test_an_excursion_without_a_return_is_told() -> None:
         ([1], (straight(100),), 0.5, "it ended 100 mm from it"),
         ([1, 1], (straight(100), straight(-100), straight(100)), 0.75, "it ended 100 mm from it"),
         ([1], (straight(100), straight(-60)), 0.5, "it ended 40 mm from it"),
-        # Back along the way out, and then off to the side.
+        # Back along the same way, and then off to the side.
         ([1], (straight(100), straight(-100), spin(90), straight(300)), 0.5, "it ended 300 mm from it"),
         # Level with the start, and to the side of it.
         (
@@ -217,7 +217,7 @@ def seeing(dark: range, count: int) -> list[tuple[int, int, int]]:
     ("after", "good"),
     [
         ((straight(-20), rest(), spin(90)), True),
-        ((spin(90), straight(-20)), False),  # the other way round
+        ((spin(90), straight(-20)), False),  # the reverse order
         ((straight(-20), rest(40)), False),
         ((rest(120), straight(-20), spin(90)), False),  # too late
     ],
@@ -285,27 +285,27 @@ def test_only_what_the_pen_draws_are_legs() -> None:
 
 
 def lifted_between(first: Sequence[Any], between_them: Sequence[Any], second: Sequence[Any]) -> Any:
-    """A run of these moves with the pen up for those in the middle."""
+    """Return a run of these moves with the pen up during the middle ones."""
     up = sum(ticks for _, _, ticks in first)
     down = up + sum(ticks for _, _, ticks in between_them)
     return driven(*first, *between_them, *second, pen=((0, True), (up, False), (down, True)))
 
 
 ASIDE = (spin(90), straight(100), spin(-90))
-#: To the left by about 100 mm, and on in the same direction.
+#: About 100 mm to the left, then on in the same direction.
 BEND = ((5.0, 2.0, 35), (5.0, -2.0, 35))
 
 
 @pytest.mark.parametrize(
     ("run", "lengths"),
     [
-        # Parallel strokes, a dashed line, one stroke over the other.
+        # Parallel strokes, a dashed line, one stroke over another.
         (lifted_between([straight(200)], ASIDE, [straight(200)]), [200, 200]),
         (lifted_between([straight(200)], [straight(50)], [straight(200)]), [200, 200]),
         (lifted_between([straight(200)], [straight(-200)], [straight(200)]), [200, 200]),
-        # With the pen down a bend is a corner as well, whatever the direction after it.
+        # With the pen down, a bend also counts as a corner, whatever the next direction is.
         (driven(straight(200), *BEND, straight(200)), [200, 200]),
-        # A rest, a slip and a short bend to the side are none.
+        # A rest, a slip and a short bend to the side do not count.
         (driven(straight(200), rest(30), straight(200)), [400]),
         (driven(straight(200), (5.0, 1.0, 4), (5.0, -1.0, 4), straight(200)), [440]),
     ],
@@ -317,7 +317,7 @@ def test_only_what_goes_on_in_one_line_is_one_leg(run: Any, lengths: list[int]) 
 @given(st.lists(st.tuples(st.integers(40, 200), st.sampled_from((0, 30, 100))), min_size=1, max_size=5))
 @settings(max_examples=30, deadline=None)
 def test_each_stroke_of_a_hatching_is_a_leg(strokes: list[tuple[int, int]]) -> None:
-    """All strokes have one direction; between them the pen is up, and the robot goes on or to the side."""
+    """All strokes have the same direction. Between them the pen is up, and the robot moves forwards or sideways."""
     moves: list[Any] = []
     pen: list[tuple[int, bool]] = []
     for length, aside in strokes:

@@ -88,7 +88,7 @@ NEAR, FAR = {"name": "the near place", "circle": [300, 800, 30]}, {"name": "the 
         ({"places": [FAR, NEAR], "in_order": False}, 4),
         ({"places": [NEAR, {"circle": [300, 900, 30]}], "at_least": 1}, 4),
         ({"places": [NEAR, {"circle": [300, 900, 30]}], "at_least": 2}, 2),
-        # The last two come in order, and are enough; the first comes too late for them.
+        # The last two places are visited in order, which is enough. The first one is visited too late.
         ({"places": [FAR, {"circle": [150, 800, 10]}, NEAR], "at_least": 2}, 4),
         ({"places": [FAR, {"circle": [150, 800, 10]}, NEAR]}, 2.67),
         ({"places": [NEAR, {"circle": [310, 800, 30]}]}, 4),
@@ -221,7 +221,7 @@ def test_circuits(moves: list[Any], keys: dict[str, Any], good: bool) -> None:
 
 
 def wavy(offset: float = 0.0, speed: float = 4.0) -> Any:
-    """A run up the line of the test floor at x 141, ``offset`` mm to its left."""
+    """Return a run up the line of the test floor at x 141, ``offset`` mm to its left."""
     line = np.array(centrelines()["Line_Following_Test/141"])
     lengths = np.concatenate([[0], np.hypot(*np.diff(line, axis=0).T)]).cumsum()
     places = np.arange(60, lengths[-1], speed)
@@ -255,12 +255,12 @@ STRETCH = {"points": [[300, 300], [1300, 300]]}
 @pytest.mark.parametrize(
     ("run", "keys", "share"),
     [
-        # It stands on the line's end, drives over it at right angles, or turns round there.
+        # The robot stands on the end of the line, crosses it at right angles, or turns around there.
         (driven(rest(30), start=Pose(1300, 300, 0)), {}, 0),
         (driven(spin(90), rest(30), start=Pose(1310, 300, 0)), {}, 0),
         (driven(straight(400), start=Pose(1290, 100, 90)), {}, 0),
         (driven(straight(200), spin(180), straight(200), start=Pose(1200, 300, 0)), {}, 1 / 9),
-        # What lies before the tenth by which it must be met need not be driven.
+        # The robot need not drive the part before it joins the line, which it must do within the first tenth.
         (driven(straight(1000), start=Pose(300, 300, 0)), {}, 1),
         (driven(straight(900), start=Pose(400, 300, 0)), {}, 1),
         (driven(straight(850), start=Pose(450, 300, 0)), {}, 850 / 900),
@@ -331,7 +331,7 @@ def test_what_is_driven_of_a_circle_is_covered(part: float, off: float, way: int
 
 
 def circling(laps: float, seconds_a_lap: float, off: float = 0.0) -> Any:
-    """Round a circle of 300 mm about (500, 500) anticlockwise, from just below the start line on its right."""
+    """Circle anticlockwise around (500, 500) with radius 300 mm, from just below the start line on its right."""
     count = round(laps * seconds_a_lap * 30)
     angles = -0.1 + np.linspace(0, laps * 2 * math.pi, count + 1)
     radius = 300 + off * np.sin(angles / 2) ** 2
@@ -340,13 +340,13 @@ def circling(laps: float, seconds_a_lap: float, off: float = 0.0) -> Any:
 
 
 def round_by(*degrees: float) -> Any:
-    """Round the circle to each of these places in turn, degrees from its easternmost point."""
+    """Return a run around the circle to each of these places in turn, in degrees from its easternmost point."""
     angles = np.radians(np.concatenate([np.linspace(a, b, 120) for a, b in itertools.pairwise(degrees)]))
     return np.column_stack([500 + 300 * np.cos(angles), 500 + 300 * np.sin(angles)])
 
 
 def test_a_lap_is_whole_though_the_robot_began_twice() -> None:
-    """It crosses the start line, leaves the track, is put right before the line, and drives a clean lap."""
+    """The robot crosses the start line, leaves the track, is put back before the line, and drives a clean lap."""
     aside = np.linspace([793, 558], [950, 600], 30)
     run = np.concatenate([round_by(-10, 11), aside, aside[::-1], round_by(11, -10), round_by(-10, 360 + 10)])
     result = judged(criterion("laps", **CIRCUIT), along(run, np.zeros(len(run))))
@@ -357,7 +357,7 @@ def test_a_lap_is_whole_though_the_robot_began_twice() -> None:
 @given(st.lists(st.tuples(st.sampled_from((-400, 0, 300, 700, 1000)), st.booleans()), min_size=2, max_size=7))
 @settings(max_examples=100, deadline=None)
 def test_laps_are_those_that_an_exhaustive_search_finds(ways: list[tuple[int, bool]]) -> None:
-    """Between two crossings the robot comes so far along a line of 1000 mm, and leaves it or not."""
+    """Between two crossings the robot moves a distance along a line of 1000 mm, and leaves the line or not."""
     progress = np.concatenate([[0], np.cumsum([way for way, _ in ways])]).astype(float)
     crossings = [Crossing(float(row), row, float(at)) for row, at in enumerate(progress)]
     offsets = np.zeros((len(progress) - 1) * 2 + 1)
@@ -487,7 +487,7 @@ def test_a_run_without_a_tick_is_judged(asked: Any) -> None:
     ],
 )
 def test_the_outside_of_an_area_and_a_distance_are_kept(keys: dict[str, Any], good: bool) -> None:
-    """From (100, 800) to (260, 800)."""
+    """The robot drives from (100, 800) to (260, 800)."""
     assert passes(criterion("keeps_out", **keys), driven(straight(160))) is good
 
 

@@ -1,4 +1,4 @@
-"""Judging whether one series of a recording goes with another, with runs made by hand and one that was driven."""
+"""Judging whether two series of a recording are related, with runs made by hand and one simulated run."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NEARER = {"of": "speed", "to": "ultrasonic", "changes": 50}
 
 
 def towards(*moves: Any) -> Recording:
-    """A run towards a post 1000 mm from the start, whose distance the ultrasonic sensor reads."""
+    """Return a run towards a post 1000 mm from the start, with the distance read by the ultrasonic sensor."""
     run = driven(*moves)
     return replace(run, ticks=replace(run.ticks, ultrasonic=np.abs(1100 - run.ticks.x)))
 
@@ -38,7 +38,7 @@ def towards(*moves: Any) -> Recording:
         ([straight(60, speed) for speed in (1, 2, 3, 4, 5, 6)], {}, False),
         ([straight(60, speed) for speed in (1, 2, 3, 4, 5, 6)], {"goes": "against"}, True),
         ([straight(120, 4)], {}, False),
-        ([straight(60, 3), straight(60, 2)], {}, False),  # by 30 mm/s: too little
+        ([straight(60, 3), straight(60, 2)], {}, False),  # too little, by 30 mm/s
         ([straight(60, 3), straight(60, 2)], {"changes": 20}, True),
         ([straight(60, 6), straight(60, 2), straight(60, 6)], {}, False),
         ([spin(90)], {}, False),

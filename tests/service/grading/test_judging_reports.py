@@ -1,4 +1,4 @@
-"""Judging what is reported, said in order, stopped on and logged, with recordings made by hand."""
+"""Judging reports, ordered speech, stops on events, and logs, with recordings made by hand."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.fast
 
 
 def recorded(seconds: float = 3.0, rgb: Sequence[int] = (255, 255, 255), **parts: Any) -> Recording:
-    """A run along x at 30 mm a second, the left sensor over ``rgb`` and the right one over white."""
+    """Return a run along x at 30 mm/s, with the left sensor over ``rgb`` and the right one over white."""
     count = round(seconds * 30)
     zeros = np.zeros(count)
     sums = np.tile(np.array(rgb, np.int64) * 305, (count, 1))
@@ -163,12 +163,12 @@ def test_a_word_may_be_any_of_a_list() -> None:
 @pytest.mark.parametrize(
     ("words", "keys", "said", "passes"),
     [
-        # The first alternative that fits is the beginning of the one that is meant.
+        # The first matching alternative may be the prefix of the intended one.
         ([["OK", "OK go"], "now"], {}, "OK go now", True),
         ([["OK", "OK go"], "now"], {}, "OK now", True),
         ([["OK", "OK go"], ["go now", "now"], "now"], {}, "OK go now", False),
         ([["OK", "OK go"], ["go now", "now"], "now"], {}, "OK go go now now", True),
-        # An earlier run is as long, but only the later one is the end.
+        # An earlier run is equally long, but only the later one is at the end.
         (["1", "2"], {"lead_in": True}, "1 2 and 1 2", True),
         (["1", ["2", "2 3"]], {}, "1 2 3", True),
         (["1", ["2 3", "2"]], {"more": True}, "1 2 3", True),
@@ -216,7 +216,7 @@ BANDS = [{"text": "1", "zone": [120, 700, 140, 900]}, {"text": ["2", "two"], "zo
 
 @pytest.mark.parametrize(
     ("times", "marks"),
-    # The left sensor is 30 mm ahead and moves at 30 mm a second from x = 130.
+    # The left sensor is 30 mm ahead and moves at 30 mm/s from x = 130.
     [((0.1, 1.2), 4), ((0.1, 0.9), 2), ((1.2, 0.1), 0), ((0.1, 2.0), 2), ((0.1,), 2)],
 )
 def test_each_event_happens_at_its_place(times: tuple[float, ...], marks: int) -> None:
@@ -351,7 +351,7 @@ def test_one_series_dips_below_another_and_samples_have_times() -> None:
 
 
 def image(pose: Pose, side: str = "left", tick: int = 1, noise: int = 0) -> tuple[str, str, int]:
-    """What the sensor sees at ``pose`` on sheet 34, from the image itself."""
+    """Return the sensor's reading at ``pose`` on sheet 34, taken from the image itself."""
     drawn = floor("MNIST_Digits", seed=34).pixels
     column = int(pose.x) - (30 if side == "left" else -10)
     row = 1143 - int(pose.y) - 40

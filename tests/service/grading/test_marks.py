@@ -1,4 +1,4 @@
-"""How many marks an outcome is worth: shares, steps, several trials, and rounding."""
+"""Marks for an outcome: shares, steps, several trials, and rounding."""
 
 from __future__ import annotations
 

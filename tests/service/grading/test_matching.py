@@ -1,4 +1,4 @@
-"""Pairing wishes with what a run has: as many as an exhaustive search finds, and no pair that does not suit."""
+"""Matching of requirements with the items of a run: as many as an exhaustive search finds, and only suitable pairs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ tables = st.integers(0, 5).flatmap(
 
 
 def ways(wishes: int, candidates: int) -> itertools.product[tuple[int | None, ...]]:
-    """Every choice of a candidate, or of none, for each wish."""
+    """Return every choice of a candidate, or of none, for each requirement."""
     return itertools.product([None, *range(candidates)], repeat=wishes)
 
 

@@ -1,4 +1,4 @@
-"""A judge measures nothing but what its criterion says, so that what can be ranked is a closed list."""
+"""A judge measures only the measures of its criterion, so the rankable measures are a closed list."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from submissions.criteria import SCHEMAS
 
 DOCUMENT = (ROOT / "docs" / "criteria.md").read_text()
 TABLES = [tomllib.loads(text) for text in re.findall(r"```toml\n(.*?)```", DOCUMENT, re.DOTALL)]
-#: Judged by more than their trials.
+#: Kinds that need more than their trials.
 APART = {"ranking", "python", "source", "functions"}
 SQUARE = [each for _ in range(4) for each in (straight(100), rest(), spin(90), rest())]
-#: Words that the examples of the documents look for.
+#: Words required by the examples in the documentation.
 TOLD = tuple(Line(t / 10, text) for t, text in enumerate(["3", "2", "1", "0", "OK", "medium", "2", "all", "done"]))
 
 
@@ -43,7 +43,7 @@ def test_what_is_measured_is_listed(table: dict[str, object]) -> None:
     keys = {"id": "c"} | table
     asked = SCHEMAS[str(table["check"])].model_validate_json(json.dumps(keys))
     measured = {measure.name for run in runs() for each in judged(asked, run).evidence for measure in each.measures}
-    # What was done in the place of a move is told of trials that failed alone, and they are never ranked.
+    # Measures of a wrong move occur in failed trials only, and are never ranked.
     assert [name for name in measured if not (asked.measures_a(name) or name.startswith("this move "))] == []
     assert bool(measured) or not asked.measures or table["check"] in ("reports", "events", "sequence")
 

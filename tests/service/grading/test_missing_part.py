@@ -1,4 +1,4 @@
-"""One part of two that was not submitted: what needs it has no marks for that alone, the rest is judged as ever."""
+"""Submissions with one of two parts: criteria that need the missing part get no marks, the others are unaffected."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 from submissions.criteria import SCHEMAS
 
-#: Assignment, the part that is submitted, the marks of the reference for that alone, by criterion.
+#: Assignment, submitted part, and the reference's marks for that part alone, by criterion.
 CASES = [
     ("echo-responder", "robot.py", {"finishes": 1, "counts": 2, "messages": 2, "replies": 0, "says": 1}),
     ("echo-responder", "responder.py", {"finishes": 0, "counts": 0, "messages": 0, "replies": 4, "says": 0}),

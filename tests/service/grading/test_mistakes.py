@@ -1,4 +1,4 @@
-"""Mistakes that students make: the first screen of each report names the line or the cause, and the fix."""
+"""Students' mistakes: the first screen of each report names the line or the cause, and the fix."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from service.grading.trial_runner import TrialRunner
 
 MISTAKES = tomllib.loads((DATA / "mistakes.toml").read_text("utf-8"))["mistake"]
 
-#: So many mistakes in each assignment are tried quickly.
+#: Number of mistakes per assignment in the quick tests.
 _QUICK = 2
 
 
@@ -46,7 +46,7 @@ def test_the_first_screen_names_the_cause_and_the_fix(
 
 @pytest.fixture
 def brick(monkeypatch: pytest.MonkeyPatch) -> Mapping[str, Any]:
-    """The classes that robot programs import."""
+    """Return the classes that robot programs import."""
     before = set(sys.modules)
     monkeypatch.syspath_prepend(str(ROOT / "sim" / "brick"))
     from ev3dev2.motor import LargeMotor, MoveSteering, MoveTank

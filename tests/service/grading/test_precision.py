@@ -1,4 +1,4 @@
-"""Naming everything is not finding it: each kind that looks for something among much, honest and sprayed."""
+"""Listing every possible answer is not finding it: each search criterion, with honest and indiscriminate output."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ GUESSES = tuple(map(str, range(100)))
 
 
 def drove(**parts: Any) -> Recording:
-    """At 30 mm a second along x from x = 100, with the left sensor 30 mm ahead, over white."""
+    """Return a run at 30 mm/s along x from x = 100, with the left sensor 30 mm ahead, over white."""
     return driven(straight(90, per_tick=1), **parts)
 
 
@@ -40,7 +40,7 @@ def logged(*values: float, every: float = 0.02) -> tuple[Datum, ...]:
     return tuple(Datum(0.5 + number * every, "Light", value, None) for number, value in enumerate(values))
 
 
-#: The kind, what it asks, what an honest program puts out (all marks), and what one does that names everything.
+#: The kind, its options, the output of an honest program (full marks), and that of one that lists everything.
 CASES: Sequence[tuple[str, dict[str, Any], dict[str, Any], dict[str, Any]]] = [
     (
         "events",
@@ -105,7 +105,7 @@ CASES: Sequence[tuple[str, dict[str, Any], dict[str, Any], dict[str, Any]]] = [
     (
         "reports",
         {"expected": [[17]]},
-        # What was read, and the count of the readings, may be told all the way.
+        # A program may print readings and their count throughout the run.
         {"printed": tuple(Line(0.5 + n / 100, f"{n}: 100 %, 255") for n in range(100, 190)) + told("17")},
         {"printed": told(*GUESSES, every=0)},
     ),
@@ -178,7 +178,7 @@ def test_a_loop_that_is_stuck_on_one_text_names_nothing_else() -> None:
 
 
 def test_a_log_is_called_made_up_where_most_of_it_is() -> None:
-    """140 samples, of which two are what the sensor read."""
+    """140 samples, of which two are real readings of the sensor."""
     asked = criterion("datalog", series="Light", measured="left light", at_least=40)
     result = judged(asked, drove(datalog=logged(100, 100, *[17.0] * 138)))
     assert "at least 40 samples of Light, but there are 2; 138 of 140 are made up" in result.message

@@ -1,4 +1,4 @@
-"""Criteria about code: checks of the instructor's in Python, and criteria that do not fit what they are asked of."""
+"""Criteria about code: an instructor's checks in Python, and criteria that do not fit their target."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_a_check_that_fails_leaves_its_line_unjudged(
     assert result.unjudged in result.for_staff
 
 
-#: A check that takes on trust what it reads, beside a line that anybody earns who comes to the end.
+#: A check that trusts its input, and a line that every program earns by reaching its end.
 TRUSTING = """
 import json, re
 def check(trial):

@@ -1,4 +1,4 @@
-"""A submission is read once: this process parses each text of it at most once, and decodes each file beside it once."""
+"""A submission is read once: this process parses each text at most once, and decodes each extra file once."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SENSOR = "%%sim_magic_preloaded\nprint(colorLeft.color)"
 
 @pytest.fixture
 def parsed(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
-    """How often each text has been parsed in this process."""
+    """Count how often each text is parsed in this process."""
     return counted(monkeypatch, ast, "parse")
 
 
@@ -42,7 +42,7 @@ def counted(monkeypatch: pytest.MonkeyPatch, module: Any, function: str) -> Coun
 
 
 def with_own_texts(example: str, folder: Path) -> Path:
-    """A copy of an example in texts that nothing has read before."""
+    """Return a copy of an example with unique texts that are in no cache."""
     copy = shutil.copytree(examples(example) / "reference", folder / "ada")
     for file in copy.glob("*.py"):
         file.write_text(f"{file.read_text()}\n# in {folder}\n")

@@ -1,4 +1,4 @@
-"""Recognition judged with recordings made by hand: truths, what becomes of images, and what it is worth."""
+"""Recognition judged with recordings made by hand: true labels, outcomes of images, and marks."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def recorded(
 
 
 def talk(*exchanges: tuple[str | None, str | None]) -> Recording:
-    """An image a second, 30 mm apart: what each shows, and the answer that arrives a tenth later."""
+    """Return images a second and 30 mm apart: their labels, and answers that arrive a tenth of a second later."""
     messages: list[Message] = []
     images = []
     for number, (truth, answer) in enumerate(exchanges):
@@ -180,7 +180,7 @@ _IMAGES = st.lists(
 
 @st.composite
 def recordings(draw: st.DrawFn) -> Recording:
-    """Any talk about images, in any order of arrival; faults at any time."""
+    """Draw any conversation about images, in any order of arrival, with faults at any time."""
     messages: list[Message] = []
     images = []
     t = 0.0
@@ -274,7 +274,7 @@ def test_the_grey_patch_can_be_the_truth_on_an_image_of_the_instructors_own(
     file.write_text(GREY_WORLD + "greys = { church = 42, mill = 190 }\n")
     program = Submission("ada", Code("robot.py", "import time\nprint('IMG_DATA')\ntime.sleep(0.5)\n"))
     result = grade(program, read_assignment(tmp_path), runner=runner).criteria[0]
-    # What has no label's grey shows nothing to name; a trial without an image that counts is a wrong answer.
+    # A grey of no label shows nothing to recognise. A trial without an image that counts is a wrong answer.
     assert result.message.startswith("1 of 3 images named rightly")
     assert accuracy(result).confusion == ((NO_IMAGE, None, 1), ("church", "church", 1), ("mill", "church", 1))
     file.write_text(GREY_WORLD + 'greys = "shapes"\n')
@@ -415,7 +415,7 @@ def test_images_of_one_pattern_are_one_answer(how: str, answers: list[str | None
 
 
 def test_patterns_are_told_apart_by_place_and_missing_ones_are_wrong() -> None:
-    # 30 mm apart: the images before the gap are of one square, those after it of another.
+    # 30 mm apart: the images before the gap show one square, those after it another.
     recording = talk(("square", "square"), ("square", "square"), (None, "square"), ("square", "square"))
     assert accuracy(judged(asked(each_pattern="first"), recording)).n == 2
     result = judged(asked(each_pattern="first", patterns=4), recording)
@@ -424,7 +424,7 @@ def test_patterns_are_told_apart_by_place_and_missing_ones_are_wrong() -> None:
 
 
 def test_images_taken_elsewhere_do_not_count_near_the_start() -> None:
-    """A robot may not drive on to something that is easier to name."""
+    """A robot may not drive on to an image that is easier to recognise."""
     moved = talk(("square", None), ("diamond", None), ("circle", "circle"))
     stayed = talk(("square", None), ("circle", "circle"))
     assert judged(asked(images="last"), moved).marks == 4

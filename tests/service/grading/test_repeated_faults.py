@@ -1,4 +1,4 @@
-"""Trials that are spared a child: their recordings and marks are those of running it."""
+"""Trials that are not run again: their recordings and marks are those of a real run."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ check = "finishes"
 ECHO = "def responder(text):\n    return text\n"
 ASKS = 'import time\nprint("PY::hi")\ntime.sleep(1)\nspeed = colorLeft.reflected_light_intensity\n'
 BUSY = "def responder(text):\n    while True:\n        pass\n"
-#: Statements that come to what follows from the seed by a name that the text does not hold.
+#: Statements that read a value derived from the seed, by a name that does not occur in the text.
 UNSEEN_NAMES = (
     r'"{0._\x5finit_\x5f._\x5fg\x6cobals_\x5f[re].enum.s\x79s.mod\x75les[uuid]._node}".format(json.JSONDecoder)',
     "'{0.enum.s' 'ys.mod' 'ules[uuid]._node}'.format(json.scanner.re)",
@@ -63,7 +63,7 @@ def runs_all() -> Iterator[TrialRunner]:
 
 
 def all_but_ticks(recording: Recording) -> Recording:
-    """What is left to compare once the chain has told of the ticks; a loop that is cut is in another line each time."""
+    """Return the data to compare beside the ticks' hash chain, without the line where a loop was interrupted."""
     faults = (replace(each, line=None) if each.verdict is Verdict.CPU_LIMIT else each for each in recording.faults)
     notes = (note for note in recording.notes if note not in SPARED.values())
     return replace(recording, faults=tuple(faults), notes=tuple(notes), ticks=_NO_TICKS)
@@ -80,9 +80,9 @@ def spared(graded: Grade, role: str) -> list[int]:
         ({"robot.py": "tank_drive.on_for_seconds(30, 30, 1)\nwhile True:\n    x = 1\n    y = 2\n"}, "robot", 2),
         ({"robot.py": "print('PY::hi')\nimport time\ntime.sleep(1)\n1/0\n"}, "robot", 2),
         ({"robot.py": "import helper\nhelper.fail()\n", "helper.py": "def fail():\n    1/0\n"}, "robot", 2),
-        # What the world tells it differs.
+        # The world's answer differs between trials.
         ({"robot.py": "speed = colorLeft.reflected_light_intensity\n1/0\n"}, "robot", 0),
-        # It may use chance.
+        # The program may use random numbers.
         ({"robot.py": "import random\nif random.random() < 2:\n    1/0\n"}, "robot", 0),
         ({"robot.py": "import ｒandom\n1/0\n"}, "robot", 0),
         ({"robot.py": "import helper\n1/0\n", "helper.py": "from random import random\n"}, "robot", 0),
@@ -92,7 +92,7 @@ def spared(graded: Grade, role: str) -> list[int]:
         ({"robot.py": ASKS, "responder.py": BUSY}, "responder", 2),
         ({"robot.py": ASKS, "responder.py": "import numpy\n" + BUSY}, "responder", 0),
         ({"robot.py": ASKS, "responder.py": "open('logger.txt', 'w').write('x')\n" + BUSY}, "responder", 0),
-        # An error in a responder costs nothing.
+        # An error in a responder takes little time, so nothing is spared.
         ({"robot.py": ASKS, "responder.py": "1/0\n"}, "responder", 0),
     ],
 )
@@ -116,7 +116,7 @@ def test_a_spared_trial_is_what_running_it_gives(
 
 
 def _turns_of(seconds: float) -> int:
-    """How many turns of an empty loop take so long here, outside of any function."""
+    """Return the number of iterations of an empty loop, outside of any function, that take this long here."""
     loop = compile("for _ in range(10_000): pass", "loop", "exec")
     turns, began = 0, time.process_time()
     while time.process_time() - began < seconds:
@@ -128,9 +128,9 @@ def _turns_of(seconds: float) -> int:
 @pytest.mark.parametrize(
     "program",
     [
-        # It ends a little after its limit: on a faster machine, or in another trial, it would end before.
+        # The loop ends just after its limit. On a faster machine, or in another trial, it would end before.
         "for _ in range(TURNS): pass\nsay('done')\n",
-        # What it says comes a little before its limit: in another trial it would not come any more.
+        # The output comes just before the limit. In another trial it would come too late.
         "for _ in range(FEWER_TURNS): pass\nsay('done')\nwhile True: pass\n",
     ],
 )

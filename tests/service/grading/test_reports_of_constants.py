@@ -1,4 +1,4 @@
-"""A constant text is no reading: what a program reports without a look passes at few of the poses that differ."""
+"""A constant text is not a reading: a program that reports without a sensor passes at few of the differing poses."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ def _places(count: int) -> tuple[Pose, ...]:
 
 
 def _passes(rows: list[list[Any]], text: str) -> int:
-    """At how many poses the constant text passes."""
+    """Return the number of poses at which the constant text passes."""
     asked = criterion("reports", expected=rows, tolerance=0.4, strays=1000)
     result = judged(asked, *[_said(text)] * len(rows), poses=_places(len(rows)))
     return sum(evidence.passed for evidence in result.evidence)
 
 
 def _scores(rows: list[list[Any]], text: str, over: str) -> tuple[Decimal, list[Decimal]]:
-    """The marks of the constant text, of 4, and those at each pose alone."""
+    """Return the marks of the constant text, out of 4, and those at each pose alone."""
     asked = criterion("reports", expected=rows, tolerance=0.4, strays=1000, over=over)
     poses = _places(len(rows))
     runs = [_said(text)] * len(rows)
@@ -58,7 +58,7 @@ def _scores(rows: list[list[Any]], text: str, over: str) -> tuple[Decimal, list[
 
 
 def _most(rows: list[list[Any]]) -> int:
-    """At how many poses a constant text may pass: half of them, or those that share one row if these are more."""
+    """Return the allowed passes of a constant text: half of the poses, or those that share one row, if more."""
     return max(len(rows) // 2, *(rows.count(row) for row in rows))
 
 
@@ -122,7 +122,7 @@ def test_beginnings_of_few_rows_are_worth_their_part(rows: list[list[Any]], text
 
 
 def _labelled(background: str) -> dict[str, Pose]:
-    """A start for each label of the floor, and for none, by label."""
+    """Return a start pose for each label of the floor, and one for no label, by label."""
     places = {
         each.label: Pose(each.x + each.width / 2 - 30, each.y + each.height / 2 - 20, 0)
         for each in floor(background).labels
@@ -131,7 +131,7 @@ def _labelled(background: str) -> dict[str, Pose]:
 
 
 def _passes_at_labels(background: str, text: str, **keys: Any) -> list[str]:
-    """The labels at which the constant text passes."""
+    """Return the labels at which the constant text passes."""
     asked = criterion("reports", expected="label", strays=1000, **keys)
     places = _labelled(background)
     runs = [recorded(background=background, start=pose, printed=(Line(1.0, text),)) for pose in places.values()]

@@ -1,4 +1,4 @@
-"""Programs whose output follows from hashes and addresses get the same marks and recordings from any process."""
+"""Programs whose output depends on hashes and addresses get the same marks and recordings in every process."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from service.grading.trial_runner import TrialRunner
 from submissions.assignment.reader import find_assignment
 from submissions.submission import Submission
 
-#: What each program says first decides its marks: "TM129", said letter by letter or as a word.
+#: The first output of each program decides its marks: "TM129", spoken letter by letter or as a word.
 _FIRST = "for word in {}: say(word); break"
 BY_HASH = (
     _FIRST.format('{"T M 1 2 9", "TM129"}'),
@@ -47,7 +47,7 @@ BY_ADDRESS = (
 
 
 def _graded(runner: TrialRunner) -> list[list[object]]:
-    """Marks and hashes of all that must be the same here."""
+    """Return the marks and hashes that must be equal."""
     programs = BY_HASH + BY_ADDRESS * ("fixed addresses" in runner.check_sandbox())
     asked = find_assignment("say-tm129")
     grades = [grade(Submission("ada", Code("robot.py", text)), asked, runner=runner) for text in programs]

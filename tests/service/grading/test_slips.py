@@ -1,4 +1,4 @@
-"""Slips that the text of a program proves: found wherever they are, and never in a program that is right."""
+"""Slips that are provable from a program's text: always found, and never reported in a correct program."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def listing(text: str, name: str = "robot.py") -> Listing:
 
 
 def sources() -> Iterator[tuple[str, str]]:
-    """All programs of the catalogue, right or flawed, and the responders and modules that come with Robomark."""
+    """Yield all programs of the catalogue, correct or flawed, and the responders and modules of Robomark."""
     for top in ("submissions/catalogue", "responders/library", "responders/kit", "sim/brick"):
         for file in sorted((ROOT / top).rglob("*.py")):
             yield str(file.relative_to(ROOT)), file.read_text("utf-8")
@@ -104,7 +104,7 @@ def test_no_slip_is_seen_in_what_is_right(line: str) -> None:
 
 
 def effects(text: str) -> list[str]:
-    """The statements of a text that are said to have no effect."""
+    """Return the statements of a text that are reported to have no effect."""
     code = listing(text).code
     return [found for each in code.statements if (found := without_effect(each, code))]
 

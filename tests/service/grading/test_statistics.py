@@ -1,4 +1,4 @@
-"""What a class got for an assignment, in figures that can be worked out by hand."""
+"""Statistics of a class for an assignment, checked with figures calculated by hand."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from service.grading.statistics import MarkedCriterion, MarkedSubmission, marked
 
 
 def _marked(who: str, *marks: int, verdict: str = "finished", assignment: str = "echo") -> MarkedSubmission:
-    """Of a submission for criteria a, b ... of 4 marks each."""
+    """Return a submission's marks for criteria a, b ... with 4 marks each."""
     criteria = tuple(
         MarkedCriterion(name, f"Does {name}", Decimal(got), Decimal(4)) for name, got in zip("abc", marks, strict=False)
     )

@@ -1,4 +1,4 @@
-"""Sweeps: which trials they ask for, what the curves say, and what they are worth; run for real where it matters."""
+"""Sweeps: their trials, curves and marks, with real runs where it matters."""
 
 from __future__ import annotations
 
@@ -203,7 +203,7 @@ def test_delay_loss_and_offset_are_felt(runner: TrialRunner) -> None:
 
 @pytest.mark.long
 def test_cheats_gain_where_nothing_forbids_them_and_nothing_where_it_does(runner: TrialRunner) -> None:
-    """What the catalogue's cheats get on the course's own floor, with its patches, against the shuffled one."""
+    """The marks of the catalogue's cheats on the course's own floor, with its patches, and on the shuffled one."""
     forbidding = find_assignment("shapes-on-the-move")
     allowing = replace(forbidding, world=replace(forbidding.world, background="Simple_Shapes", labels=True, sheet=0))
     got = {}

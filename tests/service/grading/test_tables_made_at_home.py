@@ -1,7 +1,7 @@
-"""A table made at home with the same tool is worth nothing where marks are given: the worlds and the chance are others.
+"""A table of answers made at home is worth no marks: the installation that marks has other worlds and random numbers.
 
-Each attack is a submission that looks up what a spy wrote down in other installations' worlds. That it works at all is
-shown where it has to: in the worlds that it was made in.
+Each attack is a submission that looks up values that a spy recorded on other installations. The tests also show that
+it succeeds in the worlds where the table was made.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from submissions.submission import Submission
 MARKING = Secret("of the installation where marks are given")
 HOMES = (PUBLIC, Secret("of the home of a student"))
 
-#: All that may tell one trial from another before anything was seen, and where the robot stands.
+#: All values that may distinguish a trial before its first image, and the robot's position.
 TELLTALE = """
 import os, random, secrets, uuid
 import numpy
@@ -92,7 +92,7 @@ Table = dict[str, dict[str, str]]
 
 def grading_request(program: str, table: Mapping[str, Mapping[str, str]], name: str) -> Submission:
     packed = base64.b64encode(zlib.compress(json.dumps(table).encode())).decode()
-    # numpy is not there for robot programs.
+    # Robot programs cannot import numpy.
     own = TELLTALE.replace("import numpy\n", "").replace('"numpy": float(numpy.random.random()), ', "")
     responder = RESPONDER.replace("{telltale}", TELLTALE).replace("{table!r}", repr(packed))
     return Submission(
@@ -101,7 +101,7 @@ def grading_request(program: str, table: Mapping[str, Mapping[str, str]], name: 
 
 
 def marked(name: str) -> Assignment:
-    """The assignment with what its marks for recognition depend on, and nothing else."""
+    """Return the assignment with only its hidden scenarios and their marked criteria."""
     asked = find_assignment(name)
     hidden = [scenario for scenario in asked.scenarios if scenario.visibility == "hidden"]
     ids = {scenario.id for scenario in hidden}
@@ -110,7 +110,7 @@ def marked(name: str) -> Assignment:
 
 
 def looked_up(graded: Grade) -> Iterator[tuple[dict[str, str], str | None]]:
-    """The keys that the responder saw with each image, and what the image showed."""
+    """Yield the keys that the responder saw with each image, and the label of the image."""
     for trial in graded.trials:
         lines = [line for line in trial.recording.responder_output.splitlines() if line.startswith("{")]
         for line, image in zip(lines, trial.recording.images, strict=True):
@@ -118,7 +118,7 @@ def looked_up(graded: Grade) -> Iterator[tuple[dict[str, str], str | None]]:
 
 
 def table_of(grades: Sequence[Grade]) -> Table:
-    """What a student writes down at home, where the tool tells what each image showed."""
+    """Return the table that a student writes at home, where the tool reports the label of each image."""
     table: Table = {}
     for graded in grades:
         for keys, truth in looked_up(graded):
@@ -149,7 +149,8 @@ def test_a_table_made_at_home_earns_nothing(runner: TrialRunner, name: str) -> N
     table = table_of(at_home)
     assert len(table["image"]) >= 20
 
-    # Where it was made, the images tell everything. So would the chance, if it did not differ by submission.
+    # In the original world, images reveal everything. Random numbers would too, if they did not depend on the
+    # submission.
     seen = grading_request(program, {"image": table["image"]}, "table of images")
     assert grade(seen, asked, secret=HOMES[1], runner=runner).marks == offered
     chances = {kind: entries for kind, entries in table.items() if kind != "image" and "place" not in kind}
@@ -158,14 +159,14 @@ def test_a_table_made_at_home_earns_nothing(runner: TrialRunner, name: str) -> N
     by_chance = grading_request(program, chances, "table of chance")
     assert grade(by_chance, asked, secret=HOMES[1], runner=runner).marks == 0
 
-    # Where marks are given, no image and no chance is met again.
+    # In the marked world, no image and no random number occurs again.
     everything = grade(
         grading_request(program, {**chances, "image": table["image"]}, "both"), asked, secret=MARKING, runner=runner
     )
     hits = [kind for keys, _ in looked_up(everything) for kind, key in keys.items() if key in table[kind]]
     assert {kind for kind in hits if "place" not in kind and kind != "its step"} == set()
     assert everything.marks == 0
-    # A place tells no more than a guess does.
+    # A position predicts no more than a guess does.
     places = {kind: entries for kind, entries in table.items() if kind in ("its place", "its step")}
     assert (
         grade(grading_request(program, places, "table of places"), asked, secret=MARKING, runner=runner).marks
@@ -190,7 +191,7 @@ def train(images, labels):
 def test_a_table_made_at_home_is_no_model(runner: TrialRunner) -> None:
     asked = find_assignment("train-a-recogniser")
     marking = tuple(criterion for criterion in asked.criteria if criterion.marks)
-    # Nothing is learnt from what was collected.
+    # Nothing is learnt from the collected data.
     collected, _, *hidden = asked.scenarios
     asked = replace(asked, criteria=marking, scenarios=(replace(collected, trials=1), *hidden))
     table = {}
@@ -220,7 +221,7 @@ def _said(graded: Grade) -> list[Any]:
 
 
 def _numbers(graded: Grade) -> list[int]:
-    """The trials in the order in which their processes were started."""
+    """Return the trials in the order in which their processes were started."""
     numbers = [
         next(int(line.text.split()[1]) for line in trial.recording.printed if line.text.startswith("NUMBER"))
         for trial in graded.trials
@@ -268,7 +269,7 @@ def test_the_same_submission_and_secret_give_the_same_recordings(runner: TrialRu
 
 
 def test_a_table_of_truths_follows_the_order_in_which_the_secret_shuffles(runner: TrialRunner) -> None:
-    """The start place that judging goes by is the one that was driven from, whatever the secret."""
+    """Judging uses the start place of the real run, whatever the secret is."""
     asked = find_assignment("black-or-grey")
     shuffled = replace(asked, scenarios=tuple(replace(scenario, choose="shuffled") for scenario in asked.scenarios))
     program = (examples("black-or-grey") / "reference" / "robot.py").read_text()

@@ -1,4 +1,4 @@
-"""Judging two robots: how far they were apart, and either by itself."""
+"""Judging two robots: their distance from each other, and each robot alone."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def both(first: Recording, second: Recording) -> Recording:
     return replace(first, partner=second)
 
 
-#: 1000 mm apart; 600 after 2 s and 200 after 4 s, when the second one's program has ended; 100 after 5 s.
+#: 1000 mm apart; 600 after 2 s; 200 after 4 s, when the second one's program has ended; 100 after 5 s.
 MEET = both(driven(straight(200, 200 / 60), straight(200, 200 / 60), straight(100, 100 / 30), start=HERE),
             driven(straight(200, 200 / 60), straight(200, 200 / 60), start=THERE))  # fmt: skip
 

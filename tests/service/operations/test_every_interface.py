@@ -1,4 +1,4 @@
-"""Each operation by page, API and command: equal rows, log entries, notices to workers, and refusals."""
+"""Each operation by page, API and command: equal rows, activity log entries, notifications to workers, and errors."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from web_world import make_world
 
 _CRITERION = report_builders.faulty_grade().criteria[0].id
 TABLE: dict[str, Row] = batches.ROWS | grades.ROWS | courses.ROWS
-#: Operations without a row, and why.
+#: Operations without a row in the table, and the reason.
 ELSEWHERE = {
     "assignments.prepare": "a part of prepare_from_catalogue and upload",
     "batches.assignment_for": "reads",
@@ -67,7 +67,7 @@ ELSEWHERE = {
     "replies.keep": "the API; test_api.py",
     "replies.forget": "the API; test_api.py",
 }
-#: How functions begin that change nothing; those that a table shows have a row all the same.
+#: Name prefixes of functions that change nothing. Functions in the table have a row even so.
 READING = (
     "list_",
     "show",
@@ -86,7 +86,7 @@ READING = (
 
 
 def _members(web: Web) -> dict[str, Any]:
-    """One of everything, an assignment that nobody has been shown, and a person who runs the installation."""
+    """Create one object of every kind, an unopened assignment, and a person who operates the installation."""
     world = make_world(web)
     with web.store.transaction() as session:
         open_assignments.prepare(session, 1, freeze(find_assignment("json-queue")))

@@ -1,4 +1,4 @@
-"""Interfaces leave transactions to operations; import-linter keeps the store itself from them."""
+"""Interfaces leave transactions to operations. import-linter prevents them from importing the store."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A service to which everything happens at once: every submission is graded exactly once, as on a quiet day."""
+"""A service under many simultaneous faults: every submission is graded exactly once, with its usual grade."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Honest submissions among floods of every kind, in a worker with little memory: no honest mark is another for that."""
+"""Honest submissions among floods of every kind, in a worker with little memory: no honest mark changes."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ for number in range(5):
     sleep(1)
 """
 ECHO = "def responder(msg):\n    return msg\n"
-#: What is no flood of frames, and as little the honest students' business.
+#: Submissions that misbehave without a flood of frames, and must not affect honest students either.
 OTHERS = [
     Flood("memory of a program", "held = []\nwhile True: held.append(bytearray(1 << 20))"),
     Flood("memory of a responder", PROGRAM, "import numpy\nheld = [numpy.ones(1 << 20) for _ in range(1000)]"),
@@ -91,7 +91,7 @@ def _worker(settings: Settings, group: MemoryGroup | None) -> Iterator[None]:
 
 
 def _run(settings: Settings, store: Store, grading_requests: list[GradingRequest], patience_seconds: float) -> str:
-    """Take them in, in one batch and in a random order, and wait for the end of all; the batch."""
+    """Submit the requests in one batch, in random order, and wait until all have ended; return the batch."""
     random.Random(1).shuffle(grading_requests)
     batch = accept_batch(store, "crowd", grading_requests, [], max_attempts=3).id
     with EmbeddedBroker(settings) as broker, memory_group(MEMORY) as group, _worker(broker.settings, group):

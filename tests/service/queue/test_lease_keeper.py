@@ -1,4 +1,4 @@
-"""A lease is kept for as long as work is done under it, however long that says nothing, and no longer."""
+"""A lease is renewed as long as work under it continues, even without progress reports, and no longer."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_what_hangs_is_not_held_for_ever() -> None:
 def test_marks_that_took_too_long_are_not_stored(
     store: Store, service_settings: Settings, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The exception at the end of a job's time can be taken for that of a criterion, which then has no marks."""
+    """The exception for an expired job may look like one of a criterion, which would then get no marks."""
     job_id = accept_one(store).job_id
     graded = report_builders.faulty_grade()
 
@@ -143,7 +143,7 @@ def test_a_renewal_that_fails_is_tried_again() -> None:
 
 
 def test_a_locked_database_holds_up_no_fork(tmp_path: Path) -> None:
-    """A renewal waits for SQLite's write lock, and all forks of the process for the renewal."""
+    """A renewal waits for SQLite's write lock, and all forks of the process wait for the renewal."""
     with opened(settings_in(tmp_path)) as store:
         accept_one(store)
         claim = jobs.claim(store, "worker", 60)
@@ -155,7 +155,7 @@ def test_a_locked_database_holds_up_no_fork(tmp_path: Path) -> None:
             jobs.heartbeat(impatient, claim, 60, 0.0)
 
         with store.transaction() as session, LeaseKeeper(renew, 0.3, 60) as keeper:
-            # From here on the database is locked.
+            # The database is locked from here on.
             session.connection()
             for _ in range(3):
                 renewing.clear()

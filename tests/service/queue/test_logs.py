@@ -1,4 +1,4 @@
-"""What services print: JSON from the first line in a file or pipe, lines for a person in front of a terminal."""
+"""Output of services: JSON from the first line in a file or pipe, readable lines at a terminal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Workers that check themselves with a known answer: one that is wrong is shut out, and its grades are run again."""
+"""Workers check themselves with a known answer: a worker that fails is quarantined, and its grades are run again."""
 
 from __future__ import annotations
 
@@ -296,7 +296,7 @@ def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_submission
             before = submit(range(10, 13))
             until(lambda: _unfinished(store) == 0)
             vouched = _last_right(store)
-            # Its next look is then some seconds away.
+            # Its next check is then some seconds away.
             until(lambda: _last_right(store) != vouched)
             switch.touch()
             time.sleep(0.3)

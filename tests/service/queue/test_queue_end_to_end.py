@@ -40,13 +40,13 @@ from submissions.assignment.examples import examples
 from submissions.batch_folder import read_batch
 from submissions.grading_request import GradingRequest
 
-#: Costs its whole limit of processor time, so that something can be killed while it runs.
+#: Uses its whole limit of processor time, so that something can be killed while it runs.
 SPIN = "print('begun')\nwhile True:\n    pass\n"
 
 
 @dataclass(frozen=True)
 class Service:
-    """What runs, and how to use it."""
+    """The running processes, and methods to use them."""
 
     settings: Settings
     store: Store
@@ -80,7 +80,7 @@ class Service:
         return Notifier(make_celery(self.services.settings), self.store, self.services.settings)
 
     def until_running(self, batch: str) -> Job:
-        """A job of the batch that a worker has in hand."""
+        """Wait for a job of the batch that a worker is running, and return it."""
         return until(lambda: next((job for job in self.jobs(batch) if job.state is JobState.RUNNING), None))
 
     def assert_graded_once(self, batch: str) -> None:
@@ -150,7 +150,7 @@ def test_a_killed_worker_loses_nothing(service: Service) -> None:
     os.kill(service.services.worker_pid, signal.SIGKILL)
     graded = service.wait(batch)
     service.assert_graded_once(batch)
-    # It is known to have ended, so its job went back without costing an attempt.
+    # The worker is known to have ended, so its job was requeued without counting an attempt.
     assert {job.id: job.attempt for job in graded}[running.id] == 1
 
 
@@ -163,7 +163,7 @@ def test_a_killed_pool_child_loses_nothing(service: Service) -> None:
         os.kill(child, signal.SIGKILL)
     graded = service.wait(batch)
     service.assert_graded_once(batch)
-    # Nobody but the lease knew.
+    # The loss was detected only by the expired lease, so it counts as an attempt.
     assert [job.attempt for job in graded] == [2]
 
 
@@ -200,7 +200,7 @@ def test_a_worker_frozen_past_its_lease_changes_nothing_when_it_thaws(tmp_path: 
         job = service.until_running(batch)
         assert services.worker_pid is not None
         worker = services.worker_pid
-        # A job runs for a while before the student does.
+        # A job runs for a while before the student's program does.
         busy = until(lambda: [pid for pid in _pool_children(worker) if _has_student(pid)])
         for pid in busy:
             os.kill(pid, signal.SIGSTOP)
@@ -213,7 +213,7 @@ def test_a_worker_frozen_past_its_lease_changes_nothing_when_it_thaws(tmp_path: 
 
 
 def _has_student(pool_child: int) -> bool:
-    """Whether a student runs below this pool child: the zygote of a doorkeeper, in bubblewrap or not, has a child."""
+    """Return whether this pool child runs a student: the doorkeeper's zygote has a child, in bubblewrap or not."""
     below = [(pid, command_line(pid)) for pid in descendants(pool_child)]
     doorkeepers = [pid for pid, command in below if "inside.zygote" in command and "bwrap" not in command]
     return any(children(zygote) for doorkeeper in doorkeepers for zygote in children(doorkeeper))
@@ -263,7 +263,7 @@ def test_a_broker_holds_the_lock_of_its_home_as_long_as_it_lives(tmp_path: Path)
             fcntl.flock(lock, fcntl.LOCK_EX)
 
         def again() -> bool:
-            # One that has let go of its lock may not have quite ended yet.
+            # A process that has released its lock may still be ending.
             broker.ensure()
             return broker_answers(settings)
 

@@ -1,4 +1,4 @@
-"""``robomark up`` and ``serve``: all of the service comes up, says how it is, and leaves nothing behind at its end."""
+"""``robomark up`` and ``serve``: the whole service starts, reports its state, and leaves nothing behind."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _address(up: subprocess.Popen[str]) -> str:
 
 
 def _first_words(up: subprocess.Popen[str]) -> tuple[str, str]:
-    """Where it answers, and all that it said of itself."""
+    """Return the address that the service prints first, and its complete output."""
     assert up.stdout is not None
     first = up.stdout.readline()
     found = re.search(r"http://[\w.:]+", first)
@@ -54,7 +54,7 @@ def _first_words(up: subprocess.Popen[str]) -> tuple[str, str]:
 
 def _ready(up: subprocess.Popen[str]) -> str:
     address, first = _first_words(up)
-    # What goes to no terminal may go to a journal that others read.
+    # Output that goes to no terminal may go to a log that others read.
     assert "rml_" not in first
     told = Path(json.loads(first)["message"].partition("sign in by the link in ")[2])
     assert stat.S_IMODE(told.stat().st_mode) == 0o600
@@ -121,7 +121,7 @@ def test_all_of_it_comes_up_grades_tells_and_ends(tmp_path: Path) -> None:
         assert told["robomark_phase_seconds", "trials", "0.95"] > 0
         assert told["robomark_workers",] == 1
 
-        # A second one says where the first is, and changes nothing.
+        # A second service reports where the first one runs, and changes nothing.
         second = subprocess.run(
             [*COMMAND, "up"], env=os.environ | _environment(settings), capture_output=True, text=True
         )
@@ -132,7 +132,7 @@ def test_all_of_it_comes_up_grades_tells_and_ends(tmp_path: Path) -> None:
         up.send_signal(signal.SIGINT)
         out, err = up.communicate(timeout=60)
         assert (up.returncode, err) == (0, "")
-        # What was begun was ended in the time that is left to it, or went back.
+        # Running jobs were finished within the time allowed, or requeued.
         assert re.fullmatch(r"ended; jobs in flight that went back: [01]", json.loads(out)["message"])
         assert not any(map(alive, below))
         assert _jobs(store, JobState.RUNNING) == 0
@@ -141,7 +141,7 @@ def test_all_of_it_comes_up_grades_tells_and_ends(tmp_path: Path) -> None:
             assert {(job.state, job.attempt) for job in left} <= {(JobState.QUEUED, 0), (JobState.DONE, 1)}
     locks = {"broker.lock", "up.lock", "worker.lock", "gate.lock", "slots.lock", "right-answer.lock"}
     left_there = {path.name for path in (settings.home / "run").iterdir()}
-    # What the self-test found right here is for the next start.
+    # The next start reuses the result of this self-test.
     assert {name for name in left_there if not name.startswith("right-answer-")} <= locks
 
 
@@ -150,7 +150,7 @@ def test_what_ends_is_started_again_and_a_kill_leaves_nothing(tmp_path: Path) ->
     settings = settings_in(tmp_path, concurrency=1, lease_seconds=300)
     run = settings.home / "run"
     for name in ("valkey.sock", "worker.lock", "up.lock", "broker.lock"):
-        # Whatever lies here, it does not stop the start.
+        # Files in this folder do not prevent the start.
         (run / name / "rubbish").mkdir(parents=True)
     (run / "somebody.alive").write_text("nonsense")
     with open_store(settings) as store:
@@ -172,7 +172,7 @@ def test_what_ends_is_started_again_and_a_kill_leaves_nothing(tmp_path: Path) ->
         assert not broker_answers(settings)
         assert not worker_lives(settings)
         assert _jobs(store, JobState.RUNNING) == 1
-        # The next one needs not wait for the lease of a worker that is known to be dead.
+        # The next worker need not wait for the lease of a worker that is known to have ended.
         with robomark("up", "--no-serve", **_environment(settings)) as up:
             until(lambda: _jobs(store, JobState.DONE))
             up.send_signal(signal.SIGTERM)

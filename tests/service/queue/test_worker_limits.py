@@ -1,4 +1,4 @@
-"""A real worker: a pool child that hangs costs its slot only for a while, and tables that are too new stop claims."""
+"""A real worker: a hung pool child blocks its slot only for a while, and newer tables stop claims."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ DRIVES_LONG = (
 
 @contextmanager
 def _worker(settings: Settings, *command: str) -> Iterator[Path]:
-    """A worker that runs meanwhile; gives its log."""
+    """Run a worker in the background; yield its log."""
     log = settings.home / "worker.log"
     environment = {**os.environ, **settings.environment()}
     with (
@@ -92,7 +92,7 @@ def test_a_worker_begins_nothing_once_the_tables_are_too_new_for_it(tmp_path: Pa
 
             assert "newer release" in until(problem)
             until(lambda: _job(store, running).state is JobState.DONE)
-            # Its messages are left to others, from its next beat on.
+            # From its next heartbeat on, it leaves its messages to other workers.
             until(lambda: "worker.takes_no_messages" in log.read_text())
             notifier.grade(Lane.BATCH)
             until(lambda: notifier.waiting() > 0)

@@ -1,4 +1,4 @@
-"""Tables of a batch in which one is graded, one lacks a part, one was refused and one waits: read by others, too."""
+"""Tables of a batch: one graded, one without a part, one refused, one waiting. Other programs can read them."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def of_moodle(name: str, number: int) -> str:
 
 
 def _without_trials(grade: Grade) -> Grade:
-    # What a run was like is told in the reports' own tests.
+    # The reports' own tests cover the description of a run.
     criteria = tuple(replace(each, evidence=(), predictions=()) for each in grade.criteria)
     return replace(grade, criteria=criteria, trials=())
 
@@ -85,13 +85,13 @@ TABLES = sorted(name for name, form in FORMATS.items() if form.table or form.fil
 
 @pytest.mark.parametrize("form", TABLES)
 def test_a_table_is_as_it_is_kept(form: str) -> None:
-    """After a change that is meant: write what ``written`` gives into the file."""
+    """After an intended change, write the result of ``written`` to the file."""
     kept = (GOLDEN / f"{form}{FORMATS[form].suffix}").read_bytes().decode("utf-8")
     assert written(form) == kept
 
 
 def _rows_of_csv(text: str) -> dict[str, str]:
-    """Reason by student, as pandas reads them."""
+    """Return reasons by student, as pandas reads them."""
     frame = pandas.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
     why = "reason" if "reason" in frame else "Feedback comments"
     who = "student" if "student" in frame else "ID number" if "ID number" in frame else "Full name"
@@ -132,7 +132,7 @@ def test_everybody_is_in_every_table_with_the_reason(form: str, read: Callable[[
         own = row.student.name if by_name else row.student.id
         reason = rows[own] if own in rows else rows[f"'{own}"]
         assert row.reason.partition(";")[0].casefold() in reason.casefold()
-    if "moodle" not in form:  # which has no place for nobody
+    if "moodle" not in form:  # which has no place for a missing id
         assert "names no student" in rows[""]
 
 
@@ -208,7 +208,7 @@ def test_moodle_finds_whose_each_feedback_file_is() -> None:
 
 
 def test_gradescope_takes_each_document_of_one_submission() -> None:
-    """Gradescope's rules: a score, or tests that all have one; known visibilities; else the autograder failed."""
+    """Gradescope's rules: a score, or tests with a score each; known visibilities; otherwise the autograder failed."""
     form = FORMATS["gradescope"]
     assert form.document is not None
     assert form.refusal is not None
@@ -237,7 +237,7 @@ def test_who_was_refused_reads_what_was_found_and_what_to_do() -> None:
 
 @pytest.mark.parametrize("name", sorted(FORMATS))
 def test_no_gradebook_has_a_word_that_is_for_staff(name: str) -> None:
-    """A format that students look into has no row over a limit, and tells no fault of ours."""
+    """Formats for students have no row over a limit, and mention no fault of the host."""
     over: TableRow[Grade] = TableRow(
         Student("eve"), "eve.zip", "echo", reason="for staff only: attempt 2, allowed: 1", for_staff=True
     )

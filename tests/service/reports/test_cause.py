@@ -1,4 +1,4 @@
-"""The one cause: what it is, what was lost through it, and that every format tells it once, first and alike."""
+"""The single cause: its content, the affected criteria, and that every format shows it once, first and equally."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_a_hint_is_the_cause_and_its_line_the_excerpt_and_the_next_step() -> Non
         ((missed(1, None),), True),
         ((missed(1, 9.0),), True),
         ((missed(1, 0.0),), False),  # before the error
-        ((missed(1, 0.0, f"no answer: {ERROR} (line 2)"),), True),  # and yet by it, as it says itself
+        ((missed(1, 0.0, f"no answer: {ERROR} (line 2)"),), True),  # yet caused by it, as its message says
         ((missed(0, None),), False),  # in a trial without it
         ((missed(0, None), missed(1, None)), False),
         ((), False),
@@ -192,7 +192,7 @@ def test_every_format_tells_cause_lines_and_next_step_in_this_order(name: str) -
     assert told.excerpt is not None
     (line,) = (each.text.strip() for each in told.excerpt.lines if each.marked)
     text = " ".join(WRITERS[name](grade).split())
-    assert text.count(told.cause) == 1 + (name == "junit")  # which has the hints as well
+    assert text.count(told.cause) == 1 + (name == "junit")  # junit contains the hints as well
     after = [text.index(each) for each in (told.cause, told.next_step)]
     assert after == sorted(after)
     assert line in text

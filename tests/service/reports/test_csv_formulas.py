@@ -1,4 +1,4 @@
-"""No table that we write has a formula in it, whatever a spreadsheet takes for the separator of its cells."""
+"""No table has a formula in it, whatever separator a spreadsheet uses."""
 
 from __future__ import annotations
 

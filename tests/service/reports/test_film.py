@@ -1,4 +1,4 @@
-"""A film of a trial: a GIF of few frames, the robot where it was, and nothing that makes it endless."""
+"""An animation of a trial: a GIF with few frames, the robot at the right places, and a bounded size."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def frames_of(data: bytes) -> list[np.ndarray]:
 
 
 def place_of(colour: tuple[int, int, int], frame: np.ndarray) -> np.ndarray:
-    """The mean place of the pixels of a colour, above the strip."""
+    """Return the mean position of the pixels of a colour, above the strip."""
     rows, columns = np.nonzero(np.abs(frame[:-60].astype(int) - colour).max(axis=2) < 6)
     return np.array([columns.mean(), -rows.mean()])
 
 
 def circling(count: int) -> Recording:
-    """A robot that turns to the left on white paper."""
+    """Return a robot that turns left on white paper."""
     recording = build.line_follower_recording(count, "Empty_Map", Pose(800, 500, 0))
     turned = np.linspace(0, 90, count)
     ticks = replace(recording.ticks, x=np.full(count, 800.0), y=np.full(count, 500.0), heading=turned)
@@ -46,7 +46,7 @@ def circling(count: int) -> Recording:
 def test_the_robot_heads_where_it_did() -> None:
     frames = frames_of(film(trial_of(circling(60)), {}))
     ways = [place_of(RIGHT_LIGHT, frame) - place_of(LEFT_LIGHT, frame) for frame in (frames[0], frames[-1])]
-    headings = [np.degrees(np.arctan2(way[1], way[0])) + 90 for way in ways]  # the right sensor is to the right
+    headings = [np.degrees(np.arctan2(way[1], way[0])) + 90 for way in ways]  # right sensor to the right
     assert headings == pytest.approx([0, 90], abs=3)
 
 

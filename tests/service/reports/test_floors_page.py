@@ -1,4 +1,4 @@
-"""The page of floors, as an instructor makes it to choose one."""
+"""The page of floors, where an instructor chooses one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One trial over another: which may lie over which and who may see it, and where the two part."""
+"""Comparison of two trials: which trials can be compared, who may see it, and where the two diverge."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PUBLISHED = BEFORE_PUBLICATION | {"after_published", "after_due_date"}
 
 
 def straight(*moves: tuple[float, float, float], length: int = 100_000) -> Recording:
-    """A recording that goes from one of these poses to the next, a tick each; it begins at nought."""
+    """Return a recording that moves between these poses, one per tick, starting at time 0."""
     table = np.array(moves, float).reshape(-1, 3)
     start = Pose(0, 0, 0)
     end = Pose(*table[-1].tolist()) if len(table) else start
@@ -43,7 +43,7 @@ def steps(count: int, x: float = 0, heading: float = 0) -> list[tuple[float, flo
         (straight(*steps(30)), straight(*steps(30, 0, -1)), 6 / 30),
         (straight(*steps(3)), straight((0, 0, 0), (0, 0, 360), (0, 0, 724)), None),
         (straight(*steps(3)), straight((0, 0, 0), (0, 0, 360), (0, 0, 726)), 3 / 30),
-        (straight(*steps(5, 5)), straight(*steps(30, 5)), 8 / 30),  # one trial has ended, the other robot drives on
+        (straight(*steps(5, 5)), straight(*steps(30, 5)), 8 / 30),  # one trial has ended, the other robot continues
         (straight(), straight(*steps(30, 4)), 3 / 30),
         (straight(), straight(), None),
         (straight(*steps(30, 1)), straight(*steps(30, 0.99, 0), length=BROWSER_TICK), None),
@@ -66,7 +66,7 @@ def as_of(student: str) -> Grade:
 
 
 def hiding(grade: Grade) -> Grade:
-    """The same grade with its second trial hidden."""
+    """Return the same grade with its second trial hidden."""
     return replace(grade, trials=(grade.trials[0], replace(grade.trials[1], visibility="hidden")))
 
 

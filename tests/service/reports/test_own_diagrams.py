@@ -1,4 +1,4 @@
-"""A notebook's diagrams beside what happened: the differences, in the drawings and in words."""
+"""A notebook's diagrams compared with the recording: the differences, in the drawings and in words."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from submissions.diagram_cells import DiagramCell
 from submissions.diagram_text import MAX_ACTORS, MAX_STEPS, read_diagram
 from submissions.submission import Cell, Notebook, Submission
 
-#: What the trials of ``build.shape_grade`` show, as a notebook draws it.
+#: The trials of ``build.shape_grade``, as a notebook draws them.
 TRUE = (
     "robot -> responder -> parser; responder <- parser; responder -> agent -> MLP; agent <- MLP; responder <- agent;"
     "responder --> logger; robot <- responder"
 )
-#: As the seed draws it: the agent has the message parsed, which is not what its program does.
+#: The seed's drawing: the agent asks for the message to be parsed, which its program does not do.
 SEED = (
     "robot -> responder -> agent -> parser; agent <- parser; agent -> MLP; agent <- MLP; responder <- agent;"
     "responder --> logger; robot <- responder"
@@ -45,7 +45,7 @@ def found(text: str, kind: DiagramKind = "seqdiag") -> Differences | None:
 
 
 def cells(*texts: str) -> Sequence[DiagramCell]:
-    """Cells 1, 2 ...; a text without dashes is a block diagram."""
+    """Return cells 1, 2 ...; a text without dashes is a block diagram."""
     return [
         DiagramCell(number, read_diagram("blockdiag" if "<->" in text else "seqdiag", text))
         for number, text in enumerate(texts, 1)

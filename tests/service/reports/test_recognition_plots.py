@@ -1,4 +1,4 @@
-"""Images of recognition: confusion with precision and recall, what was misread, curves, and the track."""
+"""Plots of recognition: confusion with precision and recall, misclassified images, curves, and the track."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _texts(figure: Figure) -> list[str]:
 
 
 def _moving() -> Grade:
-    """Two trials of the line follower's that send an image each half second; the second names one in two rightly."""
+    """Return two line-follower trials with an image every half second; half of the second one's answers are correct."""
     grade = build.line_follower_grade()
     left = build.shape_grade().trials[0].recording.images[0].left
     trials: list[TrialResult] = []
@@ -76,7 +76,7 @@ def test_a_misread_image_stands_beside_the_nearest_right_ones() -> None:
     shown = _texts(draw_misread([found], 6, "t"))
     assert {"misread", "right,\nsame truth", "right, same\nanswer", "none", "5. ✗ wrong"} <= set(shown)
     assert any("1 misread of n = 6 images" in text for text in shown)
-    # Of two right images of a class the nearer one is shown.
+    # Of two correct images of a class, the nearer one is shown.
     far = replace(found.like_answer, image=replace(found.like_answer.image, left=b"\x80" * 1600))
     (again,) = misread((far, *grade.criteria[0].predictions))
     assert again.like_answer is found.like_answer

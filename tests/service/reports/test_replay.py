@@ -1,4 +1,4 @@
-"""The replay's data: what is in it, how exact and how large it is, and what no reader finds in it."""
+"""The replay's data: its content, precision and size, and the data that no reader may find in it."""
 
 from __future__ import annotations
 
@@ -271,7 +271,7 @@ def test_a_replay_is_written_as_a_page_or_as_its_data(tmp_path: Path) -> None:
 
 
 def test_the_line_of_a_text_is_looked_up_and_not_searched_for() -> None:
-    """Thousands of texts in a file of thousands of lines that print: a search for each would take minutes."""
+    """Thousands of texts and thousands of printing lines: a search for each text would take minutes."""
     lines = [f"print('{number} is said'); " * 10 for number in range(3000)]
     sources = sources_of_files(Code("robot.py", "\n".join([*lines[:-1], "print('2999 is said')"])), None)
     began = time.process_time()

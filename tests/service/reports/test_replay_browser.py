@@ -1,4 +1,4 @@
-"""The replay in Chromium, from a file and without a network: the robot is where it was, and no text runs."""
+"""The replay in Chromium, from a file and without a network: the robot is in the right place, and no text runs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from sim.recording import Recording
 
 pytestmark = pytest.mark.long
 
-#: The middle of what has this colour, CSS pixels: of an axle, where it has the axle's.
+#: The middle of all pixels of this colour, in CSS pixels. For a robot with this axle colour, the middle of its axle.
 MIDDLE = """(colour) => {
   const canvas = document.querySelector("canvas.floor");
   const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
@@ -73,13 +73,13 @@ def line_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def on_canvas(page: Page, x: float, y: float) -> tuple[float, float]:
-    """Where a point of the world is on the canvas."""
+    """Return the position of a point of the world on the canvas."""
     left, bottom, across, up, width, height = page.evaluate(REGION)
     return (x - left) * width / across, (bottom + up - y) * height / up
 
 
 def pose_at(recording: Recording, t: float) -> tuple[float, float]:
-    """Where the robot was at ``t``, on the straight line from one tick to the next."""
+    """Return the position of the robot at ``t``, interpolated linearly between ticks."""
     ticks = np.arange(len(recording.ticks) + 1) / 30
     x, y = (np.concatenate(([start], values)) for start, values in (
         (recording.start.x, recording.ticks.x), (recording.start.y, recording.ticks.y),
@@ -331,7 +331,7 @@ def test_the_other_robot_is_where_its_recording_has_it(
             found.page.evaluate(SEEK, t)
             assert_both_are_there(found.page, mine, other, t)
         found.page.locator("select").nth(2).select_option("path")
-        for t in (5, 8, 9.9, 10.5, 12):  # the first robot has come to its end at 10 s
+        for t in (5, 8, 9.9, 10.5, 12):  # the first robot's trial ends at 10 s
             found.page.evaluate(SEEK, t)
             assert_both_are_there(found.page, mine, other, t)
         assert_quiet(found, report_of_two)

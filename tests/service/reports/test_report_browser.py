@@ -1,4 +1,4 @@
-"""The report in Chromium: how far it is to the details, what axe finds when all are open, how large type is shown."""
+"""The report in Chromium: the steps to the details, axe's findings with all of them open, and the type size."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from service.reports.view import student_view
 
 pytestmark = pytest.mark.long
 
-#: Of type, points: none in a plot is smaller.
+#: Type size in points: no text in a plot is smaller.
 _SMALLEST = 8
 OPEN_ALL = "document.querySelectorAll('details').forEach((each) => { each.open = true; })"
 

@@ -1,4 +1,4 @@
-"""The HTML report: what it says, what it hides, and that nothing a student writes becomes markup."""
+"""The HTML report: its content, what it hides, and that no student text becomes markup."""
 
 import base64
 import hashlib

@@ -1,4 +1,4 @@
-"""A report and its replay are in the reader's language: nothing that is ours is said in another one."""
+"""A report and its replay are in the reader's language: none of our texts is in another one."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ GERMAN = language_called("de")
 GRADES = (astray_grade, faulty_grade, hidden_grade, line_follower_grade, shape_grade, swept_grade)
 _PIXEL = bytes.fromhex("89504e470d0a1a0a0000000d4948445200000001000000010100000000376ef924")
 _WORD = re.compile(r"[^\W\d_]{3,}")
-#: What is the same in every language: names of ours, units, formats.
+#: Texts that are equal in every language: our names, units, formats.
 _NO_SENTENCE = {"Robomark", "JSON", "IMG", "DATA"}
 
 
 @dataclass(eq=False)
 class Foreign(gettext.NullTranslations):
-    """Puts everything that is said in it into angle brackets, and remembers what that was."""
+    """Puts every translated text into angle brackets, and records the texts."""
 
     said: set[str] = field(default_factory=set)
 
@@ -46,7 +46,7 @@ class Foreign(gettext.NullTranslations):
 
 
 class Texts(HTMLParser):
-    """The texts of a page, and of those attributes that are read out or shown."""
+    """The texts of a page, and of the attributes that are visible or read aloud."""
 
     def __init__(self, page: str) -> None:
         super().__init__()
@@ -77,7 +77,7 @@ def unbracketed(text: str) -> str:
 
 
 def texts_in(value: object) -> Iterator[str]:
-    """Every text that a grade has."""
+    """Yield every text in a grade."""
     if isinstance(value, str):
         yield value
     elif is_dataclass(value) and not isinstance(value, type):
@@ -108,7 +108,7 @@ def foreign() -> Foreign:
 @pytest.mark.parametrize("made", GRADES)
 def test_nothing_of_ours_is_said_in_another_language(made: Callable[[], Grade], foreign: Foreign) -> None:
     grade, language = made(), Language("xx", foreign)
-    # What was written when it was graded stays as it is.
+    # Texts written during grading stay unchanged.
     kept = {word for text in (*texts_in(grade), shown_words("")) for word in _WORD.findall(text)}
     for view in (staff_view(grade, language), student_view(grade, language=language)):
         page = page_of(view)

@@ -93,7 +93,7 @@ def test_json_without_classification_and_with_half_marks() -> None:
 def test_hostile_text_survives_strict_json() -> None:
     text = json_text(staff_view(build.hostile_grade()))
     assert text.isascii()
-    assert json.loads(text)["criteria"][0]["title"].encode()  # no lone surrogate is left
+    assert json.loads(text)["criteria"][0]["title"].encode()  # no lone surrogate remains
 
 
 def test_gradescope_leaves_hiding_to_gradescope_but_tells_nothing_at_the_top() -> None:

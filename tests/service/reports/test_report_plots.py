@@ -1,4 +1,4 @@
-"""Plots: which there are, what they tell, and that the same grade gives the same bytes."""
+"""Plots: the list, their content, and that the same grade gives the same bytes."""
 
 import io
 from dataclasses import replace
@@ -115,7 +115,7 @@ def test_a_path_that_leaves_the_floor_says_so() -> None:
     ticks = replace(far.ticks, y=np.full(90, 800.0))
     shown = _texts(draw_path(TrialResult("a", 0, 1, 0, 0, "visible", replace(far, ticks=ticks)), "t", None))
     assert "the path goes on outside this image" in shown
-    draw_path(TrialResult("a", 0, 1, 0, 0, "visible", far), "t", None)  # not a finite tick but the start
+    draw_path(TrialResult("a", 0, 1, 0, 0, "visible", far), "t", None)  # no finite tick except the start
 
 
 def test_path_tells_units_start_end_and_images() -> None:

@@ -1,4 +1,4 @@
-"""Text from students, made fit to be shown."""
+"""Texts from students, made safe to display."""
 
 from decimal import Decimal
 

@@ -1,4 +1,4 @@
-"""What is alike, told to staff as a page, a table and JSON, with nothing of a student's run; to students not at all."""
+"""Similar submissions, for staff as a page, a table and JSON, without data of a run; not for students."""
 
 from __future__ import annotations
 
@@ -74,14 +74,14 @@ def test_the_table_says_how_much_and_where() -> None:
 
 
 def test_no_grade_and_no_view_of_one_can_have_it_in_it() -> None:
-    """Every format, report and page is made of a grade; what is alike is in none, so no student can be shown it."""
+    """Formats, reports and pages are made from a grade. No grade contains similarities, so no student can see them."""
     assert not any(kind.__module__.startswith("service.similarity") for kind in _within(Grade) | _within(View))
     makers = [each for each in vars(view).values() if "SimilarityView" in str(getattr(each, "__annotations__", {}))]
     assert makers == [staff_similarity]
 
 
 def _within(kind: object) -> set[type]:
-    """All dataclasses that a value of this type can have in it."""
+    """Return all dataclasses that a value of this type can contain."""
     found: set[type] = set()
     waiting = [kind]
     while waiting:

@@ -1,4 +1,4 @@
-"""Grades of two robots in the store, in traces, in reports: what each did is told once, and of whom."""
+"""Grades of two robots in the store, in traces and in reports: each fact appears once, with its robot."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_a_fault_of_the_second_program_is_called_so(crashed: Grade) -> None:
 
 
 def _second_on_its_way(recording: Recording) -> Recording:
-    """As if the second robot had moved a little: in this assignment both stand."""
+    """Return a recording where the second robot has moved a little. In this assignment both stand still."""
     partner = recording.partner
     assert partner is not None
     return replace(recording, partner=replace(partner, ticks=replace(partner.ticks, x=partner.ticks.x + 1.0)))

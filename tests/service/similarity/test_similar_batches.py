@@ -1,4 +1,4 @@
-"""Whole batches, graded: copies are found however they are rewritten, and honest students are no pair."""
+"""Whole graded batches: copies are found in every rewritten form, and honest students form no pair."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ while True:
     steering = GAIN * (light - EDGE)
     tank_drive.on(SpeedPercent(SPEED + steering), SpeedPercent(SPEED - steering))
 """
-#: The same sums in another order, with brackets, as a sum of a list, and with a pair for two variables.
+#: The same sums in another order, with brackets, as a sum of a list, and with a pair instead of two variables.
 WRAPPED = """
 %%sim_magic_preloaded -b Line_Following_Test -x 141 -y 125 -a 90
 v, k, middle = 17, 0.37, 46
@@ -53,7 +53,7 @@ SQUARES = (
 
 
 def _edge_followers(number: int) -> dict[str, str]:
-    """Students who found their own speed, gain and edge for the follower of the lecture."""
+    """Return students with an individual speed, gain and edge for the lecture's follower."""
     return {
         f"s{each:02}": EDGE_FOLLOWER.format(speed=10 + each % 7, gain=0.3 + each / 100, edge=42 + each)
         for each in range(number)

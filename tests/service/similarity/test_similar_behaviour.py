@@ -1,4 +1,4 @@
-"""What robots did the same counts where few of many did, and where the machine did not cut the trial short."""
+"""Identical behaviour of robots counts if few of many have it, and if no limit of the host ended the trial."""
 
 from __future__ import annotations
 

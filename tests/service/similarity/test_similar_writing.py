@@ -1,4 +1,4 @@
-"""Which sources are called alike: copies however disguised, and not what was given, what many share, what is short."""
+"""Similar sources: disguised copies are found; given, widely shared and short sources are ignored."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def alike(found: Writing) -> AlikeSources:
 
 
 def program(number: int, lines: int = 14) -> str:
-    """A program like no other of another number: what it calls is its own."""
+    """Return a program unlike those of other numbers: all names that it calls are unique."""
     return "\n".join(
         f"motor_{number}.turn_{line}(speed) + sensor_{number}.read_{line}(not limit_{number})" for line in range(lines)
     )
@@ -73,7 +73,7 @@ def test_code_that_was_given_is_nobodys_copy() -> None:
     assert compare(
         [source_of("ada", "a.py", f"{given}\n{one}"), source_of("bob", "a.py", f"{other}\n{given}")], [given]
     ) == Writing((), ())
-    # With little of their own beside it there is nothing to say of either.
+    # With little code of their own, there is no result for either.
     assert of_two(given, f"{given}\nspeed = 3", (given,)) == Writing((), ("ada", "bob"))
 
 
@@ -169,7 +169,7 @@ def test_of_too_many_pairs_those_with_most_in_common_are_compared(monkeypatch: p
 
 
 def test_a_file_that_groups_share_is_named_however_many_copied_it() -> None:
-    """Five programs of six students each, of which too much is common for any pair to have enough of its own."""
+    """Five programs of six students each. Too much of each is common for any pair to have enough unique code."""
     shared = program(0, 12)
     sources = [
         source_of(f"s{number:02}", "robot.py", f"{shared}\n{program(number % 5, 3)}\n# no {number}")

@@ -1,4 +1,4 @@
-"""A student asks once at a time, of a grade that they can see; an instructor of the course answers once."""
+"""A student has one open appeal at a time, on a visible grade. An instructor of the course answers once."""
 
 from __future__ import annotations
 

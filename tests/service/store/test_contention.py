@@ -1,4 +1,4 @@
-"""What staff, workers and the lease reaper do at once reaches nobody as a deadlock, and no marks are wrong after it."""
+"""Simultaneous actions of staff, workers and the lease reaper cause no deadlock errors and no wrong marks."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def _waiting(store: Store) -> bool:
 
 @pytest.mark.long
 def test_marks_by_hand_wait_for_a_regrade_that_is_stored_and_do_not_deadlock(server: Store) -> None:
-    """Storing a regrade checks its foreign key to the grade before it, which marks by hand have locked."""
+    """Storing a regrade checks its foreign key to the previous grade, which an override has locked."""
     store = server
     accepted = accept_one(store)
     _finish_next(store, "worker")
@@ -130,7 +130,7 @@ def test_marks_by_hand_wait_for_a_regrade_that_is_stored_and_do_not_deadlock(ser
         with store.transaction() as session:
             session.execute(update(Job).where(Job.id == again).values(progress=0.5))
             locked.set()
-            # The other waits for this row by now, with the row of the first grade locked.
+            # The other transaction now waits for this row, with the row of the first grade locked.
             until(lambda: _waiting(store))
             session.execute(update(Job).where(Job.id == again).values(progress=0.6))
         done.set()
@@ -145,7 +145,7 @@ def test_marks_by_hand_wait_for_a_regrade_that_is_stored_and_do_not_deadlock(ser
 
 
 def _second_waits(store: Store, first: Callable[[Session], object], second: Callable[[], object]) -> Future[object]:
-    """What comes of ``second``, which begins while the transaction of ``first`` is open, and ends after it."""
+    """Return the result of ``second``, which begins while the transaction of ``first`` is open, and ends after it."""
     with ThreadPoolExecutor(1) as pool:
         with store.transaction() as session:
             first(session)
@@ -156,7 +156,7 @@ def _second_waits(store: Store, first: Callable[[Session], object], second: Call
 
 @pytest.fixture
 def server(store: Store) -> Store:
-    """A database with several writers at a time."""
+    """Return a database that allows several writers at a time."""
     if store.engine.dialect.name == "sqlite":
         pytest.skip("SQLite has one writer at a time")
     return store
@@ -246,7 +246,7 @@ def test_of_two_who_make_the_first_row_at_once_one_does(
 
 
 def _marked_by_hand(store: Store) -> tuple[str, int]:
-    """A grade with marks set by hand and an appeal, and the number of what was set."""
+    """Return a grade with an override and an appeal, and the number of the override."""
     accepted = accept_one(store)
     _finish_next(store, "worker")
     with store.transaction() as session:
@@ -334,7 +334,7 @@ def test_other_errors_are_not_run_again() -> None:
 
 
 def _calls(name: str) -> Iterator[tuple[str, ast.Call]]:
-    """Calls of a method of this name in the service, with where they are."""
+    """Yield the calls of a method of this name in the service, with their places."""
     for file in sorted((ROOT / service.__name__).rglob("*.py")):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == name:
@@ -342,7 +342,7 @@ def _calls(name: str) -> Iterator[tuple[str, ast.Call]]:
 
 
 def test_no_lock_keeps_foreign_keys_from_being_checked() -> None:
-    """``FOR UPDATE`` excludes the ``KEY SHARE`` of a foreign key's check; ``key_share=True`` does not."""
+    """``FOR UPDATE`` blocks the ``KEY SHARE`` lock of a foreign key check; ``key_share=True`` does not."""
     found = dict(_calls("with_for_update"))
     assert len(found) > 5
     weak = {where for where, call in found.items() if {"key_share", "read"} & {each.arg for each in call.keywords}}

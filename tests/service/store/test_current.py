@@ -1,4 +1,4 @@
-"""One attempt counts for a student and an assignment, and every reader of grades names the same."""
+"""One attempt is current for a student and an assignment, and every reader of grades selects the same one."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _end_next(store: Store, how: str = "done", worker: str = "worker") -> None:
 
 
 def _readers(store: Store, batch_id: str | None) -> dict[str, str | None]:
-    """The job of the attempt that counts for Ada, as each reader says; None where none does."""
+    """Return the job of Ada's current attempt for each reader; None where there is none."""
     found: dict[str, str | None] = {}
     with store.reading() as session:
         enrolment_id = session.scalars(select(Enrolment.id)).one()
@@ -97,7 +97,7 @@ def test_a_batch_shows_the_attempt_that_counts_from_wherever_it_came(store: Stor
         (line,) = batches.job_lines(session, old.id)
         (row,) = batch_table.table_lines(session, old.id, (), NOBODY)
         (own,) = batches.attempt_lines(session, old.id)
-    # By that name the system that the batch came from knows it again.
+    # The system that the batch came from recognises the student by that name.
     assert (line.attempt, line.source, row.elsewhere) == (2, "ada.zip", True)
     assert (own.id, own.attempt) == (old.jobs[0].job_id, 1)
 
@@ -134,7 +134,7 @@ def test_all_readers_name_the_same_attempt_after_any_history(store: Store, seed:
 
 
 def test_predicates_and_expressions_say_the_same_of_every_outcome(store: Store) -> None:
-    """Of each state, standing, suspicion and limit; a table's reason is empty for the same grades."""
+    """For each state, standing, suspicion and limit. A table gives a reason exactly where students see no grade."""
     made = itertools.product(JobState, Standing, (None, "it adds wrongly"), (None, "attempt 3, allowed: 2"))
     pairs = {
         current.is_trusted: current.IS_TRUSTED,

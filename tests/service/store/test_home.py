@@ -1,4 +1,4 @@
-"""The home is ours alone: closed when it is made, repaired when it is not, refused where others could reach into it."""
+"""The home is private: closed when it is created, repaired if it is open, refused if others could change it."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ def _mode(path: Path) -> int:
 
 
 def _open(home: Path) -> list[Path]:
-    """What others can reach of it."""
+    """Return the paths in it that others can access."""
     return [path for path in (home, *home.rglob("*")) if path.lstat().st_mode & 0o077 and not path.is_symlink()]
 
 
 def _old_home(home: Path) -> None:
-    """As an earlier release may have left it, or somebody who had the rights of a shared folder in mind."""
+    """Set the permissions of an earlier release, or of a shared folder."""
     for folder in ("", "run", "log", "broker/appendonlydir"):
         (home / folder).mkdir(parents=True, exist_ok=True)
     for file in ("log/worker.log", "run/worker.lock", "broker/appendonlydir/appendonly.aof.1.incr.aof"):
@@ -78,7 +78,7 @@ def test_the_home_is_private_whatever_the_umask_and_reports_go_by_it(tmp_path: P
     assert _robomark(home, 0o000, "batch", "export", batch, "-o", marks).returncode == 0
     assert {_mode(path) for path in (*report.iterdir(), marks)} == {0o666}
     assert _mode(report) == 0o777
-    # All that the home knows is in a copy of its database.
+    # A copy of the database contains all data of the home.
     assert _robomark(home, 0o000, "db", "backup", tmp_path / "copy.db").returncode == 0
     assert _mode(tmp_path / "copy.db") == 0o600
 
@@ -94,7 +94,7 @@ def test_what_a_user_asked_for_elsewhere_goes_by_the_users_umask(tmp_path: Path,
 
 
 def test_a_database_is_private_whoever_opens_it_first(tmp_path: Path) -> None:
-    """And so are its log and its shared memory, which lie beside it while it is open."""
+    """So are its log and its shared memory, which are beside it while it is open."""
     before = os.umask(0)
     try:
         with open_store(settings_in(tmp_path / "home")) as store, store.transaction() as session:
@@ -253,7 +253,7 @@ def test_what_a_service_starts_makes_files_for_us_alone(tmp_path: Path) -> None:
 
 
 def test_a_worker_by_itself_takes_the_umask_of_the_home(tmp_path: Path) -> None:
-    """As a unit file starts it, without the command line."""
+    """A unit file starts it in this way, without the command line."""
     process = subprocess.Popen(
         [sys.executable, "-m", "service.queue.worker"],
         env=os.environ | {"ROBOMARK_HOME": str(tmp_path / "home"), "ROBOMARK_BROKER_URL": "redis://127.0.0.1:1/0"},
@@ -277,7 +277,7 @@ def test_what_python_keeps_of_modules_is_for_whoever_reads_the_modules(tmp_path:
     (tmp_path / "package").mkdir()
     source = tmp_path / "package" / "late.py"
     source.write_text("found = 1\n")
-    source.chmod(0o644)  # whatever this process' own umask is by now
+    source.chmod(0o644)  # whatever the umask of this process is now
     code = "from service.home import keep_private; keep_private(); import package.late; open('own', 'w')"
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": ""}
     subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, umask=0o022, check=True)

@@ -1,4 +1,4 @@
-"""The secret of an installation: made once, kept with the database, and shown to nobody, student code least of all."""
+"""The secret of an installation: created once, kept with the database, and never shown, least to student code."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_settings_do_not_tell_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     assert load_settings().own_secret is None
 
 
-#: Looks for it in everything that student code can reach; it holds it scrambled, or it would find itself.
+#: Searches everything that student code can reach. The secret is scrambled, so the search does not find itself.
 SEARCH = """
 import gc, os, sys
 def search():
@@ -143,7 +143,7 @@ def told():
 
 
 def test_student_code_does_not_come_by_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Nor by the seed of its world, from which that could be built at home."""
+    """The seed of its world is not available either, because the world could be rebuilt from it at home."""
     monkeypatch.setenv("ROBOMARK_SECRET", SECRET)
     asked = find_assignment("echo-responder")
     asked = type(asked)("a", "A", asked.world, asked.parts, asked.scenarios[:1], asked.criteria[:1])
@@ -154,7 +154,7 @@ def test_student_code_does_not_come_by_it(monkeypatch: pytest.MonkeyPatch, tmp_p
     with TrialRunner() as runner:
         (trial,) = grade(Submission("s", program, responder), asked, secret=Secret(SECRET), runner=runner).trials
     assert [message.text for message in trial.recording.messages] == ["PY:: []", "[]"]
-    # The search finds what is there.
+    # The search finds an existing secret.
     kept = {"it": SECRET}
     here: dict[str, Any] = {}
     exec(search, here)
@@ -170,7 +170,7 @@ def _seeds(home: Path, **environment: Any) -> list[int]:
 def test_every_home_has_its_own_worlds(tmp_path: Path) -> None:
     one, other = tmp_path / "one", tmp_path / "other"
     assert _seeds(one) == _seeds(one) != _seeds(other)
-    # An autograder's home is new each time.
+    # An autograder has a new home each time.
     assert _seeds(tmp_path / "new", ROBOMARK_SECRET=SECRET) == _seeds(tmp_path / "newer", ROBOMARK_SECRET=SECRET)
     assert not (tmp_path / "new").exists()
 
@@ -202,7 +202,7 @@ def test_only_its_hash_is_told(tmp_path: Path) -> None:
     assert own not in told
     assert [path.name for path in files if own.encode() in path.read_bytes()] == ["robomark.db"]
 
-    # With another secret the worlds are others, and that is what is said.
+    # With another secret the worlds are different, and the message says so.
     environment.pop("ROBOMARK_SECRET")
     other = robomark("verify", found[1], **environment)
     assert other.returncode == 3
@@ -234,5 +234,5 @@ def test_grades_of_before_are_verified_in_the_worlds_of_then(tmp_path: Path) -> 
         session.execute(update(Job).values(secret_sha256=None))
     then = robomark("verify", found[1], **environment)
     assert "graded before this installation had a secret" in then.stderr
-    # This one was not: its worlds are others than those of then.
+    # This grade has no recorded secret: its worlds differ from today's.
     assert then.returncode == 3

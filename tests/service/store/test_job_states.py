@@ -1,4 +1,4 @@
-"""The states of a job: every transition tried from every state, and nothing but ``jobs.py`` writes them."""
+"""The states of a job: every transition is tried from every state, and only ``jobs.py`` writes them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ RETRY = Retry(0.0)
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """A job in some state, and the claim of the worker that holds it, or of one that does not."""
+    """A job in a given state, with the claim of the worker that holds it, or of one that does not."""
 
     job_id: str
     batch_id: str
@@ -73,12 +73,12 @@ def _submissions(subject: Subject) -> Select[int]:
 
 
 def _ask_for(session: Session, subject: Subject, at: datetime) -> None:
-    """As if the job had been cancelled because it is over a limit."""
+    """Request a job as if it had been cancelled because it is over a limit."""
     session.execute(update(Job).where(Job.id == subject.job_id).values(cancelled_for=CancelReason.OVER_LIMIT))
     jobs.ask_for(session, subject.job_id, at)
 
 
-#: One thing to do for each transition, as those do it who may.
+#: One action for each transition, by a caller who may do it.
 MOVES: dict[Transition, Callable[[Store, Subject], object]] = {
     jobs.COPY: _in_session(lambda session, subject, at: jobs.copy(session, subject.job_id, subject.source_id, at)),
     jobs.SUPERSEDE: _in_session(
@@ -98,7 +98,7 @@ MOVES: dict[Transition, Callable[[Store, Subject], object]] = {
 
 
 def _subject(store: Store, state: JobState, student: str, source_id: str) -> Subject:
-    """A job of this state, brought there by the transitions themselves."""
+    """Return a job in this state, reached by the transitions themselves."""
     job_id, batch_id = _accept(store, student)
     nobodys = Claim(job_id, "0" * 32, 1, 2, datetime.now(UTC))
     if state is JobState.QUEUED:
@@ -133,7 +133,7 @@ def test_a_transition_is_made_where_it_begins_and_nowhere_else(store: Store, sta
         assert job.state is (transition.after if state in transition.before else state), transition.name
         assert (job.lease is not None) == (job.state is JobState.RUNNING), transition.name
         assert (job.finished_at is None) == (job.state in (JobState.QUEUED, JobState.RUNNING)), transition.name
-        # So that the next one claimed is the next one's.
+        # So that the next claim gets the next job.
         acting.cancel(store, subject.batch_id)
 
 
@@ -159,7 +159,7 @@ def test_the_drawing_names_every_transition() -> None:
         assert (transition.name, before, transition.after.value, transition.by) in rows
 
 
-#: What belongs to a job's state.
+#: The columns that form a job's state.
 OWN = {"state", "lease", "lease_until", "due_at"}
 
 
@@ -169,7 +169,7 @@ def _imported(source: str) -> set[str]:
 
 
 def _job_writes(tree: ast.AST) -> Iterator[int]:
-    """The lines that write what belongs to a job's state, or could: values that cannot be read here count."""
+    """Yield the lines that write a job's state, or could. Values that are not constant here count."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Assign | ast.AugAssign | ast.AnnAssign):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
@@ -190,7 +190,7 @@ def _job_writes(tree: ast.AST) -> Iterator[int]:
 
 
 def _writes_a_job(call: ast.Call) -> bool:
-    """Whether a job is made, or anything but a job updated, with what belongs to a job's state."""
+    """Return whether the call creates a job, or writes such columns without naming another table."""
     if not any(keyword.arg is None or keyword.arg in OWN for keyword in call.keywords):
         return False
     if isinstance(call.func, ast.Name):
@@ -217,7 +217,7 @@ def test_a_write_of_a_state_would_be_found(written: str) -> None:
     assert list(_job_writes(ast.parse(written)))
 
 
-#: The one module that writes them, and the one of tryouts, which are no jobs and have states of their own.
+#: The one module that writes them, and the module of test runs, which are not jobs and have their own states.
 _WITH_STATES = ("store/queue/jobs.py", "store/queue/tryouts.py")
 
 

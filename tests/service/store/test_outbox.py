@@ -1,4 +1,4 @@
-"""What webhooks are told is written with what it tells of, claimed by one, tried again, and given up after a day."""
+"""Webhook deliveries are stored with their cause, claimed once, retried, and given up after a day."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_a_batch_is_told_of_job_by_job_and_once_when_it_is_finished(store: Store
 
 
 def test_nobody_is_named(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Ids that have the name in them name nobody.
+    # Ids that contain the name identify nobody.
     monkeypatch.setattr(ids, "ALPHABET", "ad")
     hook(store)
     submit(store, "ada")
@@ -208,7 +208,7 @@ def test_addresses_that_are_none_are_refused(store: Store) -> None:
 
 
 def _past(store: Store, time: timedelta) -> None:
-    """Let so much time go by for what waits."""
+    """Simulate the passing of this time for waiting deliveries."""
     with store.transaction() as session:
         for row in session.scalars(select(Delivery)).all():
             due_at = None if row.due_at is None else row.due_at - time

@@ -1,4 +1,4 @@
-"""What is set by hand counts wherever marks are told, in every grade of the submission, until it is withdrawn."""
+"""Overrides count wherever marks are shown, in every grade of the submission, until they are withdrawn."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _grade_all(store: Store, grade: Grade = GRADE) -> None:
 
 
 def _graded(store: Store, grade: Grade = GRADE) -> tuple[str, str]:
-    """A batch of one that is graded, and its job."""
+    """Return a batch with one graded submission, and its job."""
     batch = accept_batch(store, "class", [grading_request("ada")], [], max_attempts=3)
     _grade_all(store, grade)
     return batch.id, batch.jobs[0].job_id
@@ -75,13 +75,13 @@ def _change(store: Store, job_id: str, *changes: Change) -> None:
 
 
 def _totals(store: Store, batch: str) -> dict[str, tuple[float, float]]:
-    """Marks and the most there are, as each reader of them tells."""
+    """Return marks and maximum marks from each reader of them."""
     with store.reading() as session:
         (line,) = batches.job_lines(session, batch)
         job = session.get_one(Job, line.id)
         grade = results.load(session, line.id)
         counted = marked(session, [line])
-    # In statistics the other criteria count for an excused one, as in a gradebook; whoever is excused is out of them.
+    # In statistics, as in a gradebook, the other criteria replace an excused one. Fully excused students are left out.
     assert [(each.marks, each.max_marks) for each in counted] == [
         (marks, grade.worth) for marks in [gradebook_view(grade).marks] if marks is not None
     ]
@@ -148,7 +148,7 @@ def test_every_place_that_tells_marks_tells_the_same(
     with store.reading() as session:
         rows = rows_of(store, batches.job_lines(session, batch))
         assert results.load_graded(session, job_id).criteria == GRADE.criteria
-    # A gradebook knows but what the assignment gives: the others count for what is excused.
+    # A gradebook has one maximum per assignment, so the other criteria replace the excused one.
     moodle = _csv(FORMATS["moodle"].table, rows)[0]["Grade"]
     assert moodle == ("" if of_all is None else f"{of_all:g}")
     (gradescope,) = json.loads(_written(FORMATS["gradescope"].table, rows))
@@ -169,7 +169,7 @@ def test_a_regrade_counts_what_was_set_and_changes_the_rest(store: Store) -> Non
     assert [(each.title, each.by_hand) for each in change.criteria] == [(aloud.title, False)]
     acting.publish(store, batch, actor="staff")
     assert set(_totals(store, batch).values()) == {(7.5, 8)}
-    # What is set goes for the earlier grade and the later one, whichever it was set in.
+    # An override applies to the earlier and the later grade, whichever it was made in.
     _change(store, job_id, _withdraw(SHAPE))
     assert set(_totals(store, batch).values()) == {(2.5, 8)}
 
@@ -208,7 +208,7 @@ def test_a_copy_of_a_grade_has_the_graders_marks_and_not_what_was_set_for_anothe
         told = {job: batches.job_line(session, job).marks for job in (first.job_id, waits.job_id, copied.job_id)}
         assert batches.job_line(session, copied.job_id).copied_from == first.job_id
     assert list(told.values()) == [2, 7, 7]
-    # And what was set for a submission whose grade comes as a copy holds.
+    # An override of a submission also applies to a copied grade.
     _change(store, copied.job_id, _excuse(SHAPE))
     with store.reading() as session:
         assert batches.job_line(session, copied.job_id).marks == 2
@@ -312,7 +312,7 @@ def test_a_report_says_what_was_set_why_and_what_was_written(store: Store) -> No
         assert "Line 3 was right." in _written(FORMATS[form].table, rows), form
     for form in ("text", "gradescope", "json"):
         assert "Line 3 was right." in _written(FORMATS[form].document, grade), form
-    # What is about a criterion that a student does not see is not told either.
+    # Notes on a criterion that a student does not see are hidden as well.
     hidden = replace(grade, criteria=(replace(grade.criteria[0], visibility="hidden"), grade.criteria[1]))
     assert [each.criterion for each in student_view(hidden).grade.comments] == [""]
     _change(store, job_id, lambda session, job: comments.withdraw(session, job, 1, "staff"))
@@ -331,7 +331,7 @@ def test_what_was_set_is_told_where_the_message_is_of_visible_trials_alone() -> 
 
 
 def test_who_is_excused_is_out_of_every_statistic(store: Store) -> None:
-    """Ada is excused from the second criterion, Bob from both: the others' mean, bars and shares are of what counts."""
+    """Ada is excused from the second criterion, Bob from both: mean, bars and shares count the other criteria only."""
     students = ("ada", "bob", "cid")
     batch = accept_batch(store, "class", [grading_request(name) for name in students], [], max_attempts=3)
     _grade_all(store)

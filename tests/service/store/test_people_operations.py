@@ -1,4 +1,4 @@
-"""Persons joined, signed out and removed, and their tokens counted, on each database."""
+"""Persons are merged, signed out and removed, and their tokens counted, on each kind of database."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a job stands in the queue: told as the claims then come."""
+"""The position of a job in the queue equals the order of the following claims."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_places_are_told_as_jobs_are_claimed(store: Store) -> None:
     assert claimed is not None
     assert claimed.job_id == told[0]
     assert _place(store, told[1]).before == 0
-    # Who was just served waits for those who were not.
+    # A student who was just served waits for the others.
     again = _another(store, "ada", "print('again')\n")
     assert _place(store, again).before == 2
     newcomer = accept_one(store, "fay").job_id
@@ -77,7 +77,7 @@ def test_the_time_left_follows_from_what_gradings_took_and_how_many_run_at_once(
         started = now(session) - timedelta(seconds=6)
         session.execute(update(Job).where(Job.id == claim.job_id).values(started_at=started))
     place = _place(store, claim.job_id)
-    # By the time that passes, not by the trials that have run.
+    # By elapsed time, not by the number of trials run.
     assert (place.progress, place.seconds) == (pytest.approx(0.75, abs=0.1), pytest.approx(2.0, abs=1))
     with store.transaction() as session:
         started = now(session) - timedelta(seconds=60)

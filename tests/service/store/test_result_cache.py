@@ -1,4 +1,4 @@
-"""An identical submission is not run again: it has the earlier grade, marked as a copy, where that can be trusted."""
+"""An identical submission is not run again: it gets the earlier grade, marked as a copy, if that can be trusted."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_an_identical_submission_has_the_grade_at_once_and_says_whose(store: Sto
         assert copy.cost == original.cost == cost
         assert artifacts.get(session, second.job_id, prefix="plot-")["plot-a.png"].data == b"image"
         assert batches.job_line(session, second.job_id).copied_from == first
-    # A copy is not copied: what is named is always the grade that was run.
+    # Copies of copies do not exist: the source is always the grade that was run.
     assert _accept(store, "eve").copied_from == first
 
 

@@ -1,4 +1,4 @@
-"""Settings come from the environment, and a wrong one is named in one sentence."""
+"""Settings come from the environment, and an invalid one is named in one sentence."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_a_wrong_setting_is_named(monkeypatch: pytest.MonkeyPatch, name: str, va
 def test_a_user_without_a_home_is_told_what_to_set(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("HOME", raising=False)
     monkeypatch.delenv("XDG_DATA_HOME", raising=False)
-    monkeypatch.setattr("os.getuid", lambda: 4_000_000)  # as in a container that runs as nobody in particular
+    monkeypatch.setattr("os.getuid", lambda: 4_000_000)  # as in a container that runs as an unknown user
     with pytest.raises(UsageError, match="set ROBOMARK_HOME"):
         load_settings()
 

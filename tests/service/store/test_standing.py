@@ -1,4 +1,4 @@
-"""Of each submission exactly one job stands, whatever staff, workers and quarantines do in whichever order."""
+"""Each submission has exactly one standing job, whatever staff, workers and quarantines do, in any order."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _grade_next(store: Store, worker: str) -> bool:
 
 
 def _standing(store: Store) -> dict[int, int]:
-    """How many jobs stand, by submission."""
+    """Return the number of standing jobs by submission."""
     with store.reading() as session:
         stands = func.sum(case((Job.standing == Standing.STANDS, 1), else_=0))
         return dict(session.execute(select(Job.submission_id, stands).group_by(Job.submission_id)).all())

@@ -1,4 +1,4 @@
-"""A backup holds everything and can be brought back into either kind of database; a purge takes what is old alone."""
+"""A backup is complete and can be restored into either kind of database. A purge removes only old data."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ TABLES = METADATA.sorted_tables
 
 @pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.long)])
 def elsewhere(request: pytest.FixtureRequest, tmp_path: Path) -> Settings:
-    """Settings with another empty database of each kind."""
+    """Return settings with another empty database of each kind."""
     home = tmp_path / "elsewhere"
     if request.param == "sqlite":
         return settings_in(home)
@@ -57,7 +57,7 @@ def _grade_all(store: Store) -> None:
 
 
 def _filled(store: Store) -> str:
-    """Two students, a copy of a grade that an instructor looked at, a regrade, and one that waits. The first batch."""
+    """Store two students, a copy of a reviewed grade, a regrade, and a waiting job. Return the first batch."""
     first = _batch(store, "first", "ada", "bob 🤖")
     copied = accept_new(store, "same again", [grading_request("eve")], [], max_attempts=3).batch
     assert copied is not None
@@ -69,7 +69,7 @@ def _filled(store: Store) -> str:
 
 
 def _look_again(store: Store, job_id: str) -> None:
-    """The student appeals, and an instructor sets marks, comments and answers."""
+    """Add the student's appeal, and an instructor's override, comment and answer."""
     with store.transaction() as session:
         appeal = appeals.ask(session, session.get_one(Job, job_id).submission_id, "Why?")
         overrides.excuse(session, job_id, GRADE.criteria[0].id, "was ill", "staff")
@@ -94,7 +94,7 @@ def test_a_backup_brings_everything_back_into_either_kind(store: Store, elsewher
     with open_store(elsewhere) as other:
         restore(copy, other.engine)
         assert _rows(other) == _rows(store)
-        # What waited is graded there, and what comes in is numbered on.
+        # The waiting job is graded there, and new jobs get the next numbers.
         _grade_all(other)
         _batch(other, "later", "zoe")
         with other.reading() as session:
@@ -149,7 +149,7 @@ _COUNTED = (Batch, SubmissionRow, Job, TrialRow, Artifact, Enrolment, Person, Ov
 
 
 def _age(store: Store, *students: str) -> None:
-    """What these have submitted was submitted long ago."""
+    """Backdate the submissions of these students."""
     ids = select(Enrolment.id).where(Enrolment.student.in_(students))
     then = datetime.now(UTC) - timedelta(days=400)
     with store.transaction() as session:
@@ -161,7 +161,7 @@ def test_a_purge_takes_what_is_old_and_no_more(store: Store) -> None:
     before = _counts(store)
     long_ago = datetime.now(UTC) - timedelta(days=100)
     _age(store, "eve", "mia")
-    # mia's still waits.
+    # mia's job still waits.
     assert purge(store, long_ago, "staff", only_count=True) == Purged(1, 1, 1)
     assert _counts(store) == before
     assert purge(store, long_ago, "staff") == Purged(1, 1, 1)
@@ -172,7 +172,7 @@ def test_a_purge_takes_what_is_old_and_no_more(store: Store) -> None:
         "override": 1, "comment": 1, "appeal": 1,
     }  # fmt: skip
     assert after["trial"] < before["trial"]
-    # Of the same students' newer work nothing is missing.
+    # Newer work of the same students is complete.
     assert purge(store, long_ago, "staff") == Purged(0, 0, 0)
 
 

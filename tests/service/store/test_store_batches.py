@@ -41,7 +41,7 @@ def _die(store: Store) -> str:
 
 
 def _states(store: Store) -> list[tuple[int, JobState]]:
-    """The student's attempt and the state of every job."""
+    """Return the student's attempt and the state of every job."""
     query = select(SubmissionRow.attempt, Job.state).join(Job, Job.submission_id == SubmissionRow.id)
     with store.reading() as session:
         return [(attempt, state) for attempt, state in session.execute(query.order_by(SubmissionRow.id))]

@@ -1,4 +1,4 @@
-"""A grade goes into rows and comes back whole; its accuracy can be asked for in SQL."""
+"""A grade is stored in rows and read back complete; SQL queries can read its accuracy."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from sim.recording import Line
 
 
 def _stored(store: Store, grade: Grade) -> str:
-    """The id of a job that was graded so. The rows that the grade is of are made to fit it."""
+    """Store a grade and return its job's id. The rows that the grade belongs to are adapted to it."""
     accepted = accept_one(store, grade.student)
     claim = jobs.claim(store, "worker", 60)
     assert claim is not None

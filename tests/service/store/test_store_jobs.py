@@ -1,4 +1,4 @@
-"""The states of a job: who may change what, whose turn it is, and that nothing is claimed twice or lost."""
+"""The states of a job: permitted transitions, the order of claims, and no double claims or lost jobs."""
 
 from __future__ import annotations
 
@@ -204,7 +204,7 @@ def _batch(store: Store, name: str, count: int) -> str:
 
 
 def _served(store: Store, count: int) -> list[str | None]:
-    """The batches of the next jobs that a single worker takes."""
+    """Return the batches of the next jobs that a single worker claims."""
     served = []
     for _ in range(count):
         claim = _claim(store)
@@ -337,7 +337,7 @@ def _submit_again(settings: Settings) -> None:
 
 @pytest.mark.long
 def test_courses_share_alike_however_many_batches_they_have(store: Store) -> None:
-    """A submits eight batches of 30, B and C one each: B and C have all of theirs after about 90 grades."""
+    """A submits eight batches of 30, B and C one each. B and C have all grades after about 90 grades in total."""
     for course, count in (("A", 8), ("B", 1), ("C", 1)):
         for number in range(count):
             requests = [grading_request(f"{course}{number}-{place}") for place in range(30)]

@@ -1,4 +1,4 @@
-"""The tables: made once whoever comes first, the same as the models say, and never taken down."""
+"""The tables: created once with simultaneous starts, equal to the models, and never downgraded."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_the_migrations_make_what_the_models_say(service_settings: Settings) -> 
 
 
 def _lines_of(statement: str) -> list[str]:
-    """They in one order, as Alembic has none for foreign keys, without what releases of SQLite write differently."""
+    """Return the sorted lines without differences between SQLite releases. Alembic does not sort foreign keys."""
     return sorted(re.sub(r'[\s",]', "", line) for line in statement.splitlines())
 
 
@@ -111,7 +111,7 @@ def test_a_newer_database_that_this_release_can_use_is_used(service_settings: Se
         claim = jobs.claim(store, "worker", 60)
         assert claim is not None
         assert claim.job_id == job_id
-        # What the newer release added would be missing from a copy that is made row by row.
+        # A copy row by row would lack the columns that the newer release added.
         with pytest.raises(HostError, match=r"no way down|release that they are of"):
             _back_up_and_restore(store, tmp_path / "backup.db")
 
@@ -163,7 +163,7 @@ def test_a_database_of_the_first_release_is_upgraded_with_its_data(service_setti
             assert intake.load_grading_request(session, ada.id).submission.program is not None
         with store.engine.begin() as connection:
             command.check(configuration(connection))
-        # What waited is graded by the new release, and what comes in is numbered on.
+        # The new release grades the waiting job, and new jobs get the next numbers.
         waiting = jobs.claim(store, "worker", 60)
         assert waiting is not None
         jobs.finish(store, waiting, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
@@ -199,7 +199,7 @@ def test_a_database_of_release_0_2_0_is_upgraded_with_its_data(service_settings:
             assert policies.limits(session, ada, "echo-responder").attempts == 3
             names = session.scalars(select(Enrolment.student).order_by(Enrolment.id)).all()
             assert set(names) == {"ada", "Bob 🤖", "cyd", "dan"}
-        # The regrades of then are graded, published and added to by the new release.
+        # The new release grades, publishes and extends the old regrades.
         while claim := jobs.claim(store, "worker", 60):
             jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
         acting.publish(store, batch, anyway=True)
@@ -273,7 +273,7 @@ def test_what_was_submitted_on_the_web_before_it_had_a_batch_is_in_one(
 
 
 def test_of_two_jobs_that_stand_the_published_one_stays(service_settings: Settings, tmp_path: Path) -> None:
-    """Quarantine and publication could let two jobs of one submission stand, until the index forbade it."""
+    """Quarantine and publication could leave two standing jobs for one submission, until the index prevented it."""
     engine = lay_first_release(service_settings.database, tmp_path)
     with engine.begin() as connection:
         command.upgrade(configuration(connection), "0013")
@@ -289,8 +289,8 @@ def test_of_two_jobs_that_stand_the_published_one_stays(service_settings: Settin
         copy = text(f"INSERT INTO job ({', '.join(columns)}) SELECT {copied} FROM job WHERE id = :of")
         soon, late = "2030-01-01 00:00:00.000000+00:00", "2031-01-01 00:00:00.000000+00:00"
         for id_, state, at, queued, of in (
-            ("published", "done", soon, soon, done),  # the regrade that was published
-            ("rerun", "done", None, late, done),  # the job that ran a suspect grade again
+            ("published", "done", soon, soon, done),  # the published regrade
+            ("rerun", "done", None, late, done),  # the job that repeated a suspect grade
             ("waiting", "queued", None, late, dead),
         ):
             values = {"id": id_, "state": state, "at": at, "queued": queued, "of": of}
@@ -306,7 +306,7 @@ def test_of_two_jobs_that_stand_the_published_one_stays(service_settings: Settin
 
 
 def test_names_go_to_enrolments_and_credentials_get_their_reach(service_settings: Settings, tmp_path: Path) -> None:
-    """A student of one course keeps what they sign in with, for this course; somebody in two keeps it as it was."""
+    """A student of one course keeps a credential for this course. In two courses, a credential stays unchanged."""
     at = "2026-01-02 03:04:05.000000+00:00"
     engine = lay_first_release(service_settings.database, tmp_path)
     with engine.begin() as connection:

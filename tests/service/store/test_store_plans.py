@@ -1,4 +1,4 @@
-"""What is asked all the time is found without walking through all jobs there ever were."""
+"""Frequent queries do not scan all jobs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Due dates, late days, attempts, cool-downs and extensions: what is over a limit is marked, for staff only."""
+"""Deadlines, late days, attempts, cool-downs and extensions: submissions over a limit are marked for staff only."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_without_a_policy_everything_counts(store: Store) -> None:
 
 def test_attempts_are_different_submissions_that_were_graded(store: Store) -> None:
     _set(store, PolicyLimits(attempts=2))
-    # Superseded before it began, a fault of the assignment's or of ours, the same again: none is an attempt.
+    # Not attempts: superseded before the start, a fault of the assignment or the host, the same files again.
     assert _request(store, 1).staff_only == ""
     assert _request(store, 2).staff_only == ""
     _grade_all(store, Verdict.ASSIGNMENT_ERROR)
@@ -143,7 +143,7 @@ def test_a_cool_down_counts_from_the_one_before(store: Store) -> None:
     _grade_all(store)
     over = _request(store, 2, DUE + timedelta(minutes=9))
     assert over.staff_only == "submitted 9 min after the one before, asked for: 10 min"
-    # What was over does not itself count.
+    # A submission over the limit does not count itself.
     assert _request(store, 3, DUE + timedelta(minutes=10)).staff_only == ""
 
 
@@ -169,7 +169,7 @@ def test_extensions_are_one_students_own_and_hold_together(store: Store) -> None
     assert "late" in _request(store, 1, DUE + 2 * DAY, "bob").staff_only
     _extend(store, "cid", DUE + 5 * DAY)
     _extend(store, "cid", DUE - DAY, assignment="echo-responder")
-    # An extension never takes away what all have.
+    # An extension never reduces the general limits.
     assert _request(store, 1, DUE + DAY, "cid").staff_only == ""
     assert "late" in _request(store, 2, DUE + 6 * DAY, "cid").staff_only
 
@@ -197,7 +197,7 @@ def test_what_is_hidden_opens_when_nobody_can_submission_any_more_or_when_publis
 
 
 def _moment(text: str) -> datetime:
-    """A moment of the wall clock in Berlin: from UTC+1 to UTC+2 on 29 March 2026, and back on 25 October."""
+    """Return a wall-clock time in Berlin: from UTC+1 to UTC+2 on 29 March 2026, and back on 25 October."""
     return datetime.fromisoformat(text).replace(tzinfo=ZoneInfo("Europe/Berlin"))
 
 
@@ -209,7 +209,7 @@ def _moment(text: str) -> datetime:
         ("2026-10-24T02:30", "2026-10-25T02:15", 1, True),
         ("2026-03-28T23:59", "2026-03-29T23:30", 1, True),  # a day of 23 hours
         ("2026-03-28T23:59", "2026-03-30T00:30", 2, False),
-        ("2026-03-28T02:30", "2026-03-29T03:15", 1, True),  # there is no 02:30 that day
+        ("2026-03-28T02:30", "2026-03-29T03:15", 1, True),  # 02:30 does not exist that day
         ("2026-03-28T02:30", "2026-03-29T03:45", 2, False),
         ("2026-11-30T17:00", "2026-11-30T17:00", 0, True),
         ("2026-11-30T17:00", "2026-12-01T17:00", 1, True),
@@ -220,7 +220,7 @@ def test_late_days_are_days_of_the_calendar(
 ) -> None:
     monkeypatch.setenv("TZ", "Europe/Berlin")
     _set(store, PolicyLimits(_moment(due), late_days=1))
-    # The days stay those of the zone that the policy was set in.
+    # Days are counted in the time zone that the policy was set in.
     monkeypatch.setenv("TZ", "America/New_York")
     with store.transaction() as session:
         enrolment_id = Students(session, 1).enrol(Student("ada"), now(session))
@@ -232,7 +232,7 @@ def test_late_days_are_days_of_the_calendar(
 
 
 def test_a_day_has_passed_for_students_and_rulings_at_the_same_moment() -> None:
-    """Every hour around both changes of the clock: what is closed is what is too late."""
+    """Every hour around both clock changes: an assignment closes exactly when submissions become too late."""
     for due in ("2026-03-27T02:30", "2026-03-28T12:00", "2026-10-24T02:30", "2026-10-25T02:30"):
         for late_days in range(3):
             allowed = PolicyLimits(_moment(due), late_days, zone="Europe/Berlin")

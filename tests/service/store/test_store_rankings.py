@@ -1,4 +1,4 @@
-"""What an assignment ranks, read across a batch that is graded."""
+"""An assignment's ranking, read across a graded batch."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from submissions.grading_request import GradingRequest
 
 
 def graded(store: Store, requests: list[GradingRequest], laps: dict[str, tuple[float | None, ...]]) -> str:
-    """A batch in which these lap times were measured, trial by trial; None where a lap did not count."""
+    """Return a batch with these lap times, trial by trial; None for a lap that did not count."""
     batch = accept_batch(store, "class", requests, [], max_attempts=2).id
     for _ in requests:
         claim = jobs.claim(store, "worker", 60)

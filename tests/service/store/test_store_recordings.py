@@ -1,4 +1,4 @@
-"""Recordings and assignments survive the store bit for bit; what is too large is cut and says so."""
+"""The store keeps recordings and assignments bit for bit. Recordings that are too large are cut and marked."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Batches graded again: old grades stay and stand until the new ones are published, and the changes are explained."""
+"""Batches graded again: old grades stay current until the new ones are published, and the changes are explained."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _regrade(store: Store, batch: str, grade: Grade = GRADE, *, changed: bool = 
 
 
 def _standing(store: Store, batch: str) -> dict[str, str]:
-    """The grade that stands, by student."""
+    """Return the standing grade by student."""
     with store.reading() as session:
         return {line.student: line.id for line in batches.job_lines(session, batch)}
 
@@ -195,7 +195,7 @@ def test_what_changes_is_explained(
 
 
 def test_equal_marks_are_equal_however_many_decimals_they_have(store: Store) -> None:
-    """SQLite keeps marks as text, and "8" is not "8.0"."""
+    """SQLite stores marks as text, and "8" is not "8.0"."""
     batch = _batch(store, "ada", "bob", "cyd")
     _grade_all(store)
     again = _regrade(store, batch)

@@ -1,4 +1,4 @@
-"""Who tries a failed job again, what a clock that is set back changes, and what is kept of a job's times."""
+"""Retries of failed jobs by other workers, clocks that are set back, and the recorded times of a job."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_a_job_that_failed_goes_to_another_worker_where_there_is_one(store: Stor
     assert claim is not None
     assert claim.attempt == 2
     jobs.fail(store, claim, "it broke again", NO_WAIT)
-    # The other one was not heard of for long, so that the same one is better than none.
+    # The other worker was last seen long ago, so the same worker is better than none.
     _change(store, Heartbeat, seen_at=datetime.now(UTC) - HOUR)
     assert jobs.claim(store, "second", 60) is not None
 

@@ -1,4 +1,4 @@
-"""One student's data: all of it in a zip, or none of it left, and nobody else's touched."""
+"""One student's data: exported completely as a zip, or erased completely, with other students' data unchanged."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from sim.errors import UsageError
 from submissions.student_identity import Refusal, Student
 
 NOW = datetime.now(UTC)
-#: What a student is known by; none of it may be left.
+#: Identifying data of a student; none of it may remain.
 KNOWN = ("ada-known-as", "Lovelace", "ada@example.org")
 
 
@@ -57,7 +57,7 @@ def submit(store: Store, *students: Student, refused: str = "") -> None:
 
 
 def everything(store: Store) -> int:
-    """A student with a row in every table that knows students, and somebody else; the student's enrolment."""
+    """Create a student with a row in every table that refers to students, and another student. Return the enrolment."""
     ada, bob = Student(KNOWN[0], KNOWN[1], KNOWN[2]), Student("bob")
     submit(store, ada, bob, refused=KNOWN[0])
     with store.transaction() as session:
@@ -151,7 +151,7 @@ def test_what_is_old_goes_with_all_that_was_said_of_it(store: Store) -> None:
     assert (gone.submissions, gone.students) == (2, 2)
     with store.reading() as session:
         assert session.scalars(select(Appeal.id)).all() == []
-        # What is open to students stays open.
+        # Open assignments stay open.
         assert session.scalars(select(OpenAssignment.assignment)).all() == ["echo-responder"]
 
 
@@ -179,7 +179,7 @@ def _in_another_course(session: Session, person_id: int) -> None:
 
 
 def _dump(store: Store) -> str:
-    """All that the database holds, but what is compressed."""
+    """Return all data in the database that is not compressed."""
     with store.reading() as session:
         return "\n".join(str(row) for table in METADATA.sorted_tables for row in session.execute(select(table)))
 

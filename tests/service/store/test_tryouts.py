@@ -1,4 +1,4 @@
-"""Programs that are tried: one at a time, so many an hour, and none lost or run without end by a worker's death."""
+"""Test runs: one at a time, a number per hour, and none lost or endless after a worker's death."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def _line(store: Store, enrolment_id: int, tryout_id: str) -> TryoutLine:
 
 
 def _pass(store: Store, seconds: float) -> None:
-    """Let so much time go by for all of them."""
+    """Simulate the passing of this time for all test runs."""
     with store.transaction() as session:
         for row in session.scalars(select(Tryout)):
             row.queued_at -= timedelta(seconds=seconds)

@@ -1,4 +1,4 @@
-"""A web application of its own for each test, and an instructor's browser on it."""
+"""A separate web application for each test, and an instructor's browser for it."""
 
 from __future__ import annotations
 

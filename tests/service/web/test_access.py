@@ -1,6 +1,6 @@
-"""Every route against every kind of reader: ``tests/data/access`` says who may come near which.
+"""Every route with every kind of reader: ``tests/data/access`` lists who may use which.
 
-A route that is in no table fails, and so does a row of a table that no route has.
+A route without a table row fails the test, and so does a table row without a route.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from web_world import filled, make_world
 API = "/api/v1/"
 _TABLES = sorted((DATA / "access").glob("*.toml"))
 ROUTES = {route: who for table in _TABLES for route, who in tomllib.loads(table.read_text()).items()}
-#: What pages post; other sites may post what says so, and programs have no forms.
+#: Methods of forms on pages. Other sites may post only to routes marked for it, and programs have no forms.
 _CHANGING = [
     route
     for route, who in ROUTES.items()
     if not route.startswith("GET ") and API not in route and not who.endswith(" cross-site")
 ]
 READERS = ("nobody", "owner", "other student", "instructor", "other instructor", "operator")
-#: Who of the readers each word of the tables means.
+#: The kinds of readers for each word in the tables.
 ALLOWED = {
     "anybody": set(READERS),
     "signed-in": set(READERS) - {"nobody"},
@@ -41,7 +41,7 @@ ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class Signed:
-    """What each reader asks with, and what the paths are filled with."""
+    """The credentials of each reader, and the values for the paths."""
 
     browsers: dict[str, TestClient]
     tokens: dict[str, dict[str, str]]
@@ -94,7 +94,7 @@ def test_who_may_come_near(signed: tuple[Web, Signed], route: str) -> None:
     _, asked = signed
     method, path = route.split(" ", 1)
     allowed = ALLOWED[ROUTES[route].split(" ")[0]]
-    # Who may not first: whoever may could end what is asked for.
+    # Readers without permission first: the others could end the objects.
     for who in sorted(READERS, key=lambda each: each in allowed):
         answer = _ask(asked, who, method, filled(path, asked.values))
         if who in allowed:
@@ -129,7 +129,7 @@ def test_what_changes_something_asks_for_the_forms_word(signed: tuple[Web, Signe
     for who in asked.words:
         answer = asked.browsers[who].request(method, filled(path, asked.values), data={"csrf": "0" * 64})
         if path.startswith(API):
-            # The API knows no cookies, so no other site can use them.
+            # The API ignores cookies, so no other site can use them.
             assert answer.status_code == 401
             continue
         assert answer.status_code in (403, 404), (who, answer.status_code)
@@ -140,7 +140,7 @@ def test_what_changes_something_asks_for_the_forms_word(signed: tuple[Web, Signe
 def _ask(asked: Signed, who: str, method: str, path: str) -> Response:
     if path.startswith(API):
         return asked.browsers["nobody"].request(method, path, headers=asked.tokens.get(who, {}))
-    # These end sessions and tokens that are needed again.
+    # These routes end sessions and tokens that later tests need.
     if path in ("/sign-out", "/account/end-others") and who != "nobody":
         return asked.browsers[who].get("/account")
     headers = {"x-csrf-token": asked.words[who]} if who in asked.words else {}

@@ -1,4 +1,4 @@
-"""What programs are answered: once for a key, in pages, with tags, with problems; and what routes do with the store."""
+"""Answers to programs: once per key, in pages, with ETags, with problem details; and how routes use the store."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ HERE = "/api/v1/courses/1"
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """Somebody's token, and what asks with it."""
+    """Somebody's token, and a client that uses it."""
 
     client: TestClient
     token: dict[str, str]
@@ -58,7 +58,7 @@ def ada(web: Web) -> Program:
 
 
 def zipped(**students: str) -> bytes:
-    """A batch: a robot program and an echo for each student."""
+    """Return a batch: a robot program and an echo responder for each student."""
     sink = io.BytesIO()
     with zipfile.ZipFile(sink, "w") as archive:
         for student, program in students.items():
@@ -74,7 +74,7 @@ def upload(program: Program, data: bytes, name: str = "week", **headers: str) ->
 
 
 def graded(web: Web) -> str:
-    """A batch of one with a grade; its job."""
+    """Create a batch of one graded submission; return its job."""
     batch = intake.accept_batch(web.store, "week", [grading_request("ada")], (), course=COURSE, max_attempts=1)
     claim = jobs.claim(web.store, "worker", 60)
     assert claim is not None
@@ -131,7 +131,7 @@ def test_of_two_requests_at_once_the_second_is_told_to_wait(web: Web, grace: Pro
     with web.store.reading() as session:
         identity = identify(session, grace.token["authorization"].removeprefix("Bearer "), CredentialKind.TOKEN)
     assert identity is not None
-    # A key is one of the caller in their role.
+    # A key belongs to one caller in one role.
     assert replies.begin(web.app.state.context.service, actor_from(identity), "instructor k") is None
     answer = grace.ask("POST", "/people", {"idempotency-key": "k"}, json={"students": [{"id": "cyd"}]})
     assert (answer.status_code, answer.headers["retry-after"]) == (409, "5")

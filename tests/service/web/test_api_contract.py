@@ -1,4 +1,4 @@
-"""Programs that were written for the recorded contract of the API still work, and a change that breaks one is found."""
+"""Programs written for the recorded API contract still work, and breaking changes are detected."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What pages do and programs likewise: own assignments, tryouts, one grade, a batch looked at, platforms, students."""
+"""Page actions are available to programs: own assignments, test runs, grades, batches, platforms, students."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ECHO = {"robot.py": "print('hello')\n", "responder.py": "def responder(msg):\n  
 
 @dataclass(frozen=True, slots=True)
 class Programs:
-    """A world, and programs of those who are in it."""
+    """A world, and the programs of its members."""
 
     web: Web
     world: World
@@ -55,7 +55,7 @@ def test_an_assignment_of_ones_own_is_checked_prepared_and_previewed(
     assert (made.status_code, made.json()["open"]) == (201, False), made.text
     shown = programs.ask("grace", "GET", f"/assignments/{made.json()['id']}").json()
     assert [each["marks"] for each in shown["criteria"]]
-    assert shown["has_reference"] is False  # of the catalogue
+    assert shown["has_reference"] is False  # from the catalogue
     broken = files | {"mine/assignment.toml": b"id = 7\n"}
     answer = programs.ask("grace", "POST", "/assignments/uploads", content=zipped(broken), **send)
     assert (answer.status_code, "assignment.toml" in answer.json()["detail"]) == (422, True)

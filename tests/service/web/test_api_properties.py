@@ -1,6 +1,6 @@
-"""The API against its own description: nothing that fits it or does not is answered by a fault of ours, or otherwise.
+"""The API compared with its own description: valid and invalid requests get a documented answer and no server error.
 
-Slow; what single routes do is tried in ``test_api.py``.
+Slow; ``test_api.py`` tests single routes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from web import Web, web_in
 from web_world import make_world
 
 pytestmark = pytest.mark.long
-#: What there is for every name in a path, and who asks, is ours to say; what the store refuses fits the description.
+#: We choose the path values and the caller. Requests that the store refuses still fit the description.
 _NOT_TOLD = [checks.ignored_auth, checks.positive_data_acceptance, checks.negative_data_rejection]
 _EXAMPLES = settings(
     max_examples=10,
@@ -41,7 +41,7 @@ def _as_it_is(_context: Any, value: Any) -> bytes:
 
 @pytest.fixture(scope="module")
 def asked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, dict[str, Any], dict[str, str]]]:
-    """The application, the header of each kind of reader, and what paths name."""
+    """Yield the application, the header of each kind of reader, and the path values."""
     with web_in(tmp_path_factory.mktemp("home"), api_calls_per_minute=1_000_000) as web:
         world = make_world(web)
         with web.store.transaction() as session:

@@ -1,4 +1,4 @@
-"""Appeals come in pages, so that one student with many hides nobody else's."""
+"""Lists of appeals have pages, so that one student's many appeals do not hide others."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MANY = 130
 
 @pytest.fixture
 def web_of_many(web: Web) -> Web:
-    """Many open and answered appeals of Ada, and then one of each of Bob's."""
+    """Create many open and answered appeals by Ada, and then one of each by Bob."""
     intake.accept_batch(
         web.store, "b", [grading_request("ada"), grading_request("bob")], (), course=COURSE, max_attempts=1
     )

@@ -1,4 +1,4 @@
-"""A course's assignments on the web: chosen, uploaded, opened, closed, taken out."""
+"""A course's assignments on the web: selected, uploaded, opened, closed, removed."""
 
 from __future__ import annotations
 

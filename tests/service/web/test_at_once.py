@@ -1,4 +1,4 @@
-"""Requests for the same thing at the same moment: each is done or refused, none is answered as our fault."""
+"""Simultaneous requests for the same thing: each succeeds or is refused, and none gets a server error."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def test_a_student_who_is_removed_while_they_submit_stays_removed(web: Web, monk
 
     def accept_too_late(*asked: Any, **options: Any) -> intake.Accepted:
         privacy.erase_student(web.app.state.context.service, acting.machine(), 1, ada.enrolment_id)
-        # SQLite gives this one the ids of the one before.
+        # SQLite reuses the ids of the previous one.
         web.student("bob")
         return accept(*asked, **options)
 

@@ -1,4 +1,4 @@
-"""Files that are saved: whatever they are called, the header is one, and nothing else makes such a header."""
+"""Saved files: whatever the file name is, there is one valid header, and no other code creates such a header."""
 
 from __future__ import annotations
 

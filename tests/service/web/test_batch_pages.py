@@ -1,4 +1,4 @@
-"""What instructors do with a batch on the web: looked at, taken in, watched, read, published, taken away."""
+"""Instructors' work with a batch on the web: preview, upload, progress, grades, publication, removal."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ ECHO = {"robot.py": "print('hello')\n", "responder.py": "def responder(msg):\n  
 
 
 def a_class(*students: str) -> bytes:
-    """A zip with a folder for each student."""
+    """Return a zip with a folder for each student."""
     return zipped({f"{who}/{name}": text + f"# {who}\n" for who in students for name, text in ECHO.items()})
 
 
 def sent(grace: TestClient, data: bytes, name: str = "week one.zip", **fields: str) -> str:
-    """Upload a batch; where its preflight is."""
+    """Upload a batch; return the address of its preflight."""
     files = {"files": (name, data, "application/zip")}
     answer = submit(grace, f"{HOME}/batches/uploads", {"assignment": "echo-responder", **fields}, files=files)
     assert answer.status_code == 303, words(answer.text)
@@ -51,7 +51,7 @@ def sent(grace: TestClient, data: bytes, name: str = "week one.zip", **fields: s
 
 
 def a_batch(web: Web, *students: str, refusals: tuple[Refusal, ...] = ()) -> intake.AcceptedBatch:
-    """A graded batch."""
+    """Create a graded batch."""
     requests = [grading_request(who, f"print({who!r})\n") for who in students]
     made = intake.accept_batch(web.store, "week one", requests, refusals, course=COURSE, max_attempts=3)
     grade_all(web, report_builders.faulty_grade())
@@ -285,7 +285,7 @@ def test_what_is_nearly_the_same_is_shown_with_its_lines_across_the_batches_of_a
     path = f"{HOME}/batches/{made.id}/similar"
     page = grace.get(path).text
     assert "1 pair is alike among 2 students" in words(page)
-    # Of those with the same file, of those with the same recordings, and of the pair.
+    # Groups with the same file, groups with the same recordings, and the pair.
     assert len(re.findall(rf'href="{HOME}/grades/\w+">ada', page)) == 3
     assert page.count("<details open>") == page.count("<details") == 1
     assert "sum = value * 3" in page
@@ -381,7 +381,7 @@ def test_marks_are_taken_away_as_files(web: Web, grace: TestClient) -> None:
     path = f"{HOME}/batches/{made.id}"
     answer = grace.get(f"{path}/export?format=csv")
     assert answer.headers["content-disposition"].startswith('attachment; filename="week_one-csv.csv"')
-    assert answer.content.startswith(codecs.BOM_UTF8)  # or Excel does not take it for UTF-8
+    assert answer.content.startswith(codecs.BOM_UTF8)  # otherwise Excel does not detect UTF-8
     rows = list(csv.DictReader(io.StringIO(answer.content.decode("utf-8-sig"))))
     assert [row["student"] for row in rows] == ["'=cmd()", "bob"]
     assert rows[0]["marks"]

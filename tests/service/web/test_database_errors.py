@@ -1,4 +1,4 @@
-"""Errors of the database: told as what they are, and never as "nothing was changed" once something is."""
+"""Database errors: reported with their effect, and never as "nothing was changed" after a change."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_the_trace_of_an_error_is_logged_once(web: Web, error: Exception) -> Non
         try:
             browser.get("/broken")
         except ValueError:
-            # The server logs what it is raised.
+            # The server logs the exception.
             traces += 1
     traces += sum("exc_info" in each for each in logs)
     assert traces == 1
@@ -105,5 +105,5 @@ def test_an_answer_of_the_api_is_given_although_it_cannot_be_kept(web: Web, monk
     monkeypatch.setattr(replies, "keep", _raise(_AWAY))
     students = {"students": [{"id": "ada"}]}
     assert web.browser().post("/api/v1/courses/1/people", headers=headers, json=students).status_code == 201
-    # What was done is not done a second time.
+    # A completed request is not repeated.
     assert web.browser().post("/api/v1/courses/1/people", headers=headers, json=students).status_code == 409

@@ -1,4 +1,4 @@
-"""Where names are hidden, no order and no value of an instructor's answer tells whose row is whose."""
+"""With names hidden, neither the order nor a value in an instructor's answer identifies a student."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def grace(web: Web) -> Member:
 
 @pytest.fixture
 def regrade(web: Web, grace: Member) -> str:
-    """A regrade of eight submissions, one each, with names hidden."""
+    """Create a regrade of eight submissions, one per student, with names hidden."""
     requests = [grading_request(who) for who in STUDENTS]
     batch = intake.accept_batch(web.store, "week one", requests, (), course=COURSE, max_attempts=3)
     _grade_all(web)

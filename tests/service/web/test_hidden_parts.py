@@ -1,7 +1,7 @@
-"""Students are answered the same however many scenarios and criteria are hidden from them.
+"""Students get the same answers however many scenarios and criteria are hidden from them.
 
-Each example of an assignment is graded against two versions that differ in their hidden parts alone. The routes are
-those that the application has, so that a new one is asked for by itself.
+Each example is graded against two versions of an assignment that differ only in their hidden parts. The routes are
+taken from the application, so that new routes are included.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from submissions.submission import Submission
 from web import web_in
 
 _WAITING = "waiting"
-#: Right, wrong, ended by an exception, and ended by the limits of CPU time (where trials are spared) and of time.
+#: Correct, wrong, ended by an exception, by the CPU limit (where trials are spared) and by the time limit.
 _EXAMPLES = (
     *(pytest.param(name, marks=pytest.mark.long) for name in ("reference", "responder-raises", "endless", _WAITING)),
     "flawed",
@@ -49,7 +49,7 @@ _MOMENT = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?")
 
 
 def _assignment(hidden: int, *, first: bool, seconds: float) -> Assignment:
-    """The echo assignment with so many hidden scenarios and criteria, whose marks are the same in all."""
+    """Return the echo assignment with a number of hidden scenarios and criteria. The total marks are always the same."""
     whole = echo()
     (own,) = whole.scenarios
     shown = replace(own, poses=tuple(Pose(x, 800, 0) for x in (100, 150, 200, 250)), seconds=90)
@@ -89,7 +89,7 @@ def test_programs_are_tried_the_same_whatever_is_hidden() -> None:
 def _answers(
     home: Path, assignment: Assignment, example: str, runner: TrialRunner, progress: float
 ) -> dict[str, object]:
-    """What Ada is answered while her submission is graded, once it is, and once it is published."""
+    """Return Ada's answers while her submission is graded, after grading, and after publication."""
     submission = _submission(example)
     with web_in(home) as web:
         ada = web.student("ada")
@@ -124,7 +124,7 @@ def _submission(example: str) -> Submission:
 
 
 def _unjudged(graded: Grade) -> Grade:
-    """The grade as if no hidden criterion, and the first visible one, could be judged."""
+    """Return the grade as if the hidden criteria and the first visible one had failed to be judged."""
     broken = {graded.criteria[0].id, *(each.id for each in graded.criteria if each.visibility == "hidden")}
     criteria = tuple(
         replace(each, unjudged="The check failed." if each.id in broken else "") for each in graded.criteria
@@ -133,13 +133,13 @@ def _unjudged(graded: Grade) -> Grade:
 
 
 def _shown_by_gradescope(text: str) -> str:
-    """What students see there: tests are hidden by the visibility that they are sent with."""
+    """Return the part that students see there. The visibility sent with each test hides it."""
     (document,) = json.loads(text)
     return json.dumps(document | {"tests": [each for each in document["tests"] if each["visibility"] == "visible"]})
 
 
 def _without(changing: Mapping[str, str], content: object) -> object:
-    """The same without what is new each time: ids, moments, a form's word."""
+    """Return the value without parts that change each time: ids, times, CSRF tokens."""
     if isinstance(content, dict):
         return {name: _without(changing, text) for name, text in content.items()}
     text = _MOMENT.sub("MOMENT", str(content))

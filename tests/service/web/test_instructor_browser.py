@@ -1,5 +1,5 @@
-"""An instructor's way in Chromium, with a real worker: an assignment from the catalogue, a batch of twenty, a replay,
-marks set by hand, publishing, and what the student sees of it.
+"""An instructor's tasks in Chromium, with a real worker: an assignment from the catalogue, a batch of twenty, a replay,
+adjusted marks, publication, and the student's view of it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ STUDENTS = [f"student{number:02}" for number in range(20)]
 
 @contextmanager
 def grading(folder: Path) -> Iterator[tuple[Web, str]]:
-    """The web with broker and worker, and where it answers."""
+    """Run the web application with broker and worker; yield it and its address."""
     settings = settings_in(folder)
     with open_store(settings) as store, EmbeddedServices(settings, store) as services:
         web = Web(services.settings, store, make_app(services.settings, store))
@@ -39,7 +39,7 @@ def grading(folder: Path) -> Iterator[tuple[Web, str]]:
 
 
 def a_class(folder: Path) -> Path:
-    """Twenty submissions, of which a few drop what the reference has, and one that is none."""
+    """Return twenty submissions: some lack parts of the reference, and one is invalid."""
     reference = examples(ASSIGNMENT) / "reference"
     path = folder / "week one.zip"
     with zipfile.ZipFile(path, "w") as archive:
@@ -65,7 +65,7 @@ def test_from_the_assignment_to_publication(tmp_path: Path) -> None:
         page.get_by_role("link", name="Assignments").click()
         follow(page.get_by_role("link", name="Choose from"))
         assert_in_order(page)
-        # The list follows what is typed.
+        # The list is filtered while typing.
         page.get_by_label("Search").press_sequentially("echo robot")
         expect(page.locator("#found h3")).to_have_count(1)
         assert_in_order(page)

@@ -1,4 +1,4 @@
-"""Launches, members and marks against a platform that is simulated from LTI 1.3, NRPS 2.0 and AGS 2.0."""
+"""Launches, members and marks with a platform that simulates LTI 1.3, NRPS 2.0 and AGS 2.0."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def test_an_instructor_and_then_a_student_come_to_a_course_of_its_own(launched: 
             ("grace", Role.INSTRUCTOR),
         ]
         assert [course.name for course in membership.courses(session)] == ["Robotics"]
-    # The same people again, and a course of the same title in another context.
+    # The same people again, and a course with the same title in another context.
     _launch(web, platform, "grace", INSTRUCTOR)
     _, answer = _launch(web, platform, "grace", INSTRUCTOR, **{f"{CLAIM}context": {"id": "c2", "title": "Robotics"}})
     assert answer.headers["location"] == "/courses/2/batches"

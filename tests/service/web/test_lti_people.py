@@ -1,4 +1,4 @@
-"""Launches take nobody's place: an enrolment keeps its person, a context its deployment, a service its address."""
+"""Launches never replace others: an enrolment keeps its person, a context its deployment, a service its address."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def launch(
     members_url: str | None = None,
     title: str = "Robotics",
 ) -> Launched | None:
-    """A launch whose session then counts, as the web server makes it."""
+    """Return a launch with a valid session, as the web server creates it."""
     with store.transaction() as session:
         who = Student(id or subject, subject.capitalize())
         launched = lti.meet(session, platform, deployment, context, title, subject, who, role, members_url, members_url)
@@ -70,7 +70,7 @@ def launch(
 
 
 def sign_in(session: Session, person_id: int, reach: Reach = credentials.EVERYWHERE) -> None:
-    """A session of this person."""
+    """Create a session of this person."""
     credentials.issue(session, person_id, CredentialKind.SESSION, credentials.SESSION_LIFETIME, reach=reach)
 
 
@@ -87,7 +87,7 @@ def test_a_person_known_from_one_course_takes_nobodys_place_in_another(store: St
         found = {each.id: (each.person_id, each.role) for each in membership.members(session, victim.course_id)}
         assert found["victim"] == (victim.person_id, STUDENT)
         assert found["grace"][1] is INSTRUCTOR
-    # An id that nobody has is theirs.
+    # An unused id becomes theirs.
     other = launch(store, platform, "mallory", context="c2", id="mallory")
     first = launch(store, platform, "mallory", context="c1")
     assert other is not None
@@ -96,7 +96,7 @@ def test_a_person_known_from_one_course_takes_nobodys_place_in_another(store: St
 
 
 def test_a_batch_that_came_first_waits_for_its_students(store: Store, platform: Platform) -> None:
-    """Nobody has signed in as a student whom only a batch names, so the platform says whose the id is."""
+    """Nobody has signed in as a student that only a batch names, so the platform decides whose id it is."""
     for context in ("c1", "c2"):
         launch(store, platform, "grace", INSTRUCTOR, context=context)
     known = launch(store, platform, "ada", context="c1")
@@ -123,7 +123,7 @@ def test_who_has_a_place_keeps_it(store: Store, platform: Platform, who: str) ->
         row = session.get_one(Enrolment, Students(session, 1).enrol(Student("ada"), now(session)))
         if who == "signed in":
             sign_in(session, row.person_id)
-            # Years later nothing of the session is kept.
+            # Years later, no data of the session remains.
             session.execute(update(Credential).values(revoked_at=now(session)))
         elif who == "instructs":
             row.role = INSTRUCTOR
@@ -277,7 +277,7 @@ def test_services_are_only_asked_where_an_operator_registered_them(
     for ask in (lambda: services.members(store, link), lambda: services.send_scores(store, link, "a", "A", [SCORE])):
         with pytest.raises(PlatformError, match="not registered"):
             ask()
-    # Not even a token was asked for.
+    # Not even a token was requested.
     assert asked == []
 
 
@@ -311,7 +311,7 @@ def test_what_a_platform_names_itself_is_only_asked_where_it_is_registered(
 _LAUNCHES = st.lists(
     st.tuples(
         st.sampled_from("abcd"),  # the subject
-        st.sampled_from(["a", "b", "c", "d", "local", "A "]),  # the id that the platform says
+        st.sampled_from(["a", "b", "c", "d", "local", "A "]),  # the id that the platform sends
         st.sampled_from(["c1", "c2"]),
         st.sampled_from([INSTRUCTOR, STUDENT]),
     ),
@@ -348,7 +348,7 @@ def test_no_launch_changes_the_person_or_the_role_of_a_row_that_another_has(
 
 
 def _rows(store: Store) -> set[tuple[int, int, Role, int]]:
-    """Enrolment, person, role and course of all whom somebody has signed in as."""
+    """Return enrolment, person, role and course for every enrolment that somebody has signed in as."""
     with store.reading() as session:
         query = select(Enrolment.id, Enrolment.person_id, Enrolment.role, Enrolment.course_id).join(Person)
         return {tuple(row) for row in session.execute(query.where(Person.signed_in_at.is_not(None)))}  # type: ignore[misc]

@@ -1,4 +1,4 @@
-"""An instructor sets marks, excuses, comments and answers on the web; a student sees what came of it and asks again."""
+"""An instructor adjusts marks, excuses, comments and answers on the web; a student sees the result and appeals."""
 
 from __future__ import annotations
 

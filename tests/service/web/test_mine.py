@@ -1,4 +1,4 @@
-"""A student's pages: what is open, what may be read of it, submitting, waiting, and what is shown afterwards."""
+"""A student's pages: open assignments, their tasks, submitting, waiting, and the feedback."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ HOSTILE = "</textarea><script>alert(1)</script>"
 
 
 def _assignment(name: str) -> Assignment:
-    """The echo assignment with a criterion and a scenario that students do not see, and a file that they get."""
+    """Return the echo assignment with a criterion and a scenario hidden from students, and a given file."""
     asked = echo()
     hidden = asked.criteria[0].model_copy(
         update={"id": "hidden", "title": "Secret criterion", "marks": Decimal(7), "visibility": "hidden"}
@@ -68,7 +68,7 @@ def web(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Web]:
 
 @pytest.fixture
 def ada(web: Web, request: pytest.FixtureRequest) -> Member:
-    """A student of whom nothing is there yet."""
+    """Return a new student without any data."""
     return web.student(request.node.name[:80])
 
 

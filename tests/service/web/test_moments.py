@@ -1,4 +1,4 @@
-"""Moments on pages say the zone that the server is in then."""
+"""Times on pages include the server's time zone at that time."""
 
 from __future__ import annotations
 

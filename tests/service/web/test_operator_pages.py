@@ -1,4 +1,4 @@
-"""What operators see of a service, and what they can do about what could not be graded."""
+"""Operators' pages: the state of a service, and actions on failed jobs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LOST = "the worker one fell silent while it graded; its log may tell why"
 
 
 def lose(web: Web, *students: str, most: int) -> None:
-    """Hand in for these students, and let the worker of each go away once."""
+    """Submit for these students, and let the worker of each fail once."""
     accept_new(web.store, "spring", [grading_request(each) for each in students], (), max_attempts=most)
     for _ in students:
         claim = jobs.claim(web.store, "one", 60)

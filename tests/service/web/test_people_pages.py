@@ -1,4 +1,4 @@
-"""Who is in a course, on the web: let in, given more time, taken out, given a link."""
+"""The people of a course, on the web: enrolled, given extensions, removed, given a link."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A credential reaches no further than its issuer, and ends with the role; its owner and operators can end it."""
+"""A credential has no more rights than its issuer, and ends with the role. Its owner and operators can revoke it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ EVERY_SCOPE = tuple(SCOPES)
 
 
 def also_in(web: Web, member: Member, course: str, role: Role) -> Member:
-    """The same person in another course."""
+    """Enrol the same person in another course."""
     with web.store.transaction() as session:
         other = (membership.make_student if role is Role.STUDENT else membership.make_instructor)(
             session, course, Student(f"{member.id}-{course}", "Also Ada")
@@ -45,7 +45,7 @@ def also_in(web: Web, member: Member, course: str, role: Role) -> Member:
 
 
 def token_of(browser: TestClient, *scopes: str) -> dict[str, str]:
-    """A token that the account's page makes."""
+    """Return a token created on the account page."""
     data = {"name": "t", "days": "366", "word": f"w{len(scopes)}", "scopes": list(scopes)}
     answer = submit(browser, "/account/tokens", data)
     assert answer.status_code == 303, answer.text
@@ -77,7 +77,7 @@ def ada(web: Web, grace: TestClient) -> Member:
 
 
 def test_an_instructors_link_reaches_one_course_and_one_role(web: Web, grace: TestClient, ada: Member) -> None:
-    """So does all that follows from it, whatever its owner becomes, without any sign-out in between."""
+    """All sessions derived from it are limited too, whatever the owner's later roles are, without signing out."""
     browser = sign_in(web, instructors_link(web, grace, ada))
     token = token_of(browser, "read", "submit", "sign-in")
     second = sign_in(web, token["authorization"].removeprefix("Bearer "))
@@ -96,7 +96,7 @@ def test_an_instructors_link_reaches_one_course_and_one_role(web: Web, grace: Te
     told = web.browser().get("/api/v1/me", headers=token).json()
     assert ([course["id"] for course in told["courses"]], told["operator"]) == ([1], False)
     assert web.browser().get("/api/v1/courses/2/mine/assignments", headers=token).status_code == 404
-    # Nor does it reach the same course in another role.
+    # It does not give access to the same course in another role either.
     with web.store.transaction() as session:
         session.execute(update(Enrolment).where(Enrolment.id == ada.enrolment_id).values(role=Role.INSTRUCTOR))
     assert browser.get("/courses/1/people").status_code == 404
@@ -125,7 +125,7 @@ def test_a_token_opens_no_browser_that_may_more(web: Web) -> None:
     assert browser.get(f"/courses/{course.course_id}/people").status_code == 200
     assert browser.get(f"/courses/{root.course_id}/people").status_code == 404
     assert browser.get("/operator").status_code == 404
-    # What the scopes of the token lack the browser may not.
+    # The browser has no more rights than the token's scopes.
     answer = submit(browser, f"/courses/{course.course_id}/people", {"who": "new"})
     assert answer.status_code == 403
     assert "scopes do not include this" in answer.text
@@ -152,7 +152,7 @@ def test_a_token_without_course_but_with_scopes_limits_its_browser(web: Web) -> 
 
 
 def _scopes_of_pages() -> dict[str, str]:
-    """The scope of each page's route of the API."""
+    """Return the scope of the API route that corresponds to each page."""
     routes = {
         route: who.split()[-1]
         for table in sorted((DATA / "access").glob("*.toml"))
@@ -279,7 +279,7 @@ def test_the_number_of_sessions_and_tokens_is_bounded(web: Web, ada: Member) -> 
         answer = submit(browser, "/account/tokens", asked)
         assert answer.status_code == (303 if number < MOST_TOKENS else 409)
     assert "Revoke one first" in answer.text
-    # The same form again makes no other one, so it is answered as before.
+    # The same form again creates nothing new, so it gets the same answer.
     assert submit(browser, "/account/tokens", {"name": "t", "word": "w0", "scopes": ["read"]}).status_code == 303
 
 
@@ -327,7 +327,7 @@ def test_a_stored_answer_ends_with_the_role(web: Web) -> None:
     for _ in range(2):
         assert web.browser().post(path, headers=headers, json=asked).status_code == 201
     with web.store.transaction() as session:
-        # Without what would end the token, too.
+        # Also without the condition that would end the token.
         session.execute(update(Enrolment).where(Enrolment.id == grace.enrolment_id).values(role=Role.STUDENT))
     assert web.browser().post(path, headers=headers, json=asked).status_code == 404
 

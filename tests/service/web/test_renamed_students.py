@@ -1,6 +1,6 @@
-"""Where names are hidden, an instructor's answers are the same whatever the students are called.
+"""With names hidden, an instructor's answers do not depend on the students' names.
 
-The routes are those that the application has, so that a new one is asked for by itself.
+The routes are taken from the application, so that new routes are included.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ API = "/api/v1"
 _COURSE = "/courses/{course_id}"
 _BATCH = f"{_COURSE}/batches/{{batch_id}}"
 _EVERYBODY = (*STUDENTS, IDLE)
-#: Who is in the course is no secret. These say it, and nothing about what a named student submitted.
+#: Membership of a course is no secret. These routes show it, and nothing about a named student's submissions.
 _WITH_NAMES = {f"{start}{_COURSE}/people{rest}" for start in ("", API) for rest in ("", "/{enrolment_id}")} | {
     f"{API}{_COURSE}/people/{{enrolment_id}}/data"
 }
-#: They say nothing about students.
+#: Routes without data about students.
 _OF_NO_STUDENT = {
     f"{_COURSE}/assignments/uploads/my-assignment.zip",
     f"{_COURSE}/batches/uploads/{{upload_id}}",
 }
-#: These lead back to another page, or are withheld while names are hidden.
+#: Routes that redirect to another page, or are withheld while names are hidden.
 _WITHOUT_ANSWER = {
     f"{_COURSE}/assignments/uploads",
     f"{_COURSE}/people/table",
@@ -52,7 +52,7 @@ _WITHOUT_ANSWER = {
 }
 _FORMATS = [f"?format={name}" for name, each in FORMATS.items() if each.filled_in is None and each.packed is None]
 _SORTS = [f"?sort={way}{by}" for way in ("", "-") for by in ("student", "name", "assignment", "marks", "state")]
-#: What else is asked of a route.
+#: More queries for a route.
 _QUERIES: Mapping[str, list[str]] = {
     _BATCH: _SORTS,
     f"{_BATCH}/export": _FORMATS,
@@ -62,13 +62,13 @@ _QUERIES: Mapping[str, list[str]] = {
     f"{API}{_COURSE}/appeals": ["?limit=1", "?answered=true"],
 }
 _NAME = re.compile(r"\{(\w+)(?::\w+)?\}")
-#: All routes are asked twice.
+#: All routes are requested twice.
 pytestmark = pytest.mark.long
 
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What each path was answered, by the route it is of."""
+    """The answer of each path, by its route."""
 
     course: NamelessCourse
     before: Mapping[tuple[str, str], Response]
@@ -77,7 +77,7 @@ class Answers:
 
 @pytest.fixture(scope="module")
 def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Answers]:
-    """The answers of all routes before and after the students change names, where labels go with the students."""
+    """Yield the answers of all routes before and after the students change names, with labels that move with students."""
     labels = dict(zip(_EVERYBODY, ("Participant D", "Participant B", "Participant E", *"AC"), strict=True))
     with pytest.MonkeyPatch.context() as patch, web_in(tmp_path_factory.mktemp("home")) as web:
         course = make_nameless_course(web)
@@ -118,7 +118,7 @@ class _Asked:
 
 
 def _routes(web: Web) -> list[str]:
-    """The routes that answer instructors of a course, but for those that say nothing about students."""
+    """Return the routes for instructors of a course, except those without data about students."""
     found = {str(each.path) for each in iter_route_contexts(web.app.routes) if "GET" in (each.methods or ())}
     return sorted(
         path
@@ -128,7 +128,7 @@ def _routes(web: Web) -> list[str]:
 
 
 def _content(answer: Response) -> bytes | dict[str, bytes]:
-    """The answer without the time that a zip was made."""
+    """Return the answer without the creation time of zips."""
     if not answer.content.startswith(b"PK"):
         return answer.content
     with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
@@ -136,7 +136,7 @@ def _content(answer: Response) -> bytes | dict[str, bytes]:
 
 
 def _texts(answer: Response) -> str:
-    """All that an answer says, places of the next page included."""
+    """Return all texts of an answer, including cursors of the next page."""
     content = _content(answer)
     found = content if isinstance(content, dict) else {"": content}
     places = re.findall(r'"next":"([\w-]+)"', answer.text)
@@ -172,7 +172,7 @@ def test_no_other_answer_has_a_name(answers: Answers) -> None:
 
 
 def test_answers_with_names_share_no_value_with_rows_without(answers: Answers) -> None:
-    """A time, size, number, id or hash that both have would tell whose a row is."""
+    """A time, size, number, id or hash that occurs in both would identify the student of a row."""
     values = {key: _values(answer) for key, answer in answers.before.items()}
     named = {key: found for key, found in values.items() if key[0] in _WITH_NAMES}
     nameless = set().union(*(found for key, found in values.items() if key not in named))
@@ -183,12 +183,12 @@ def test_answers_with_names_share_no_value_with_rows_without(answers: Answers) -
 
 
 def _values(answer: Response) -> set[str]:
-    """What an answer says; of a zip the data on the student, as the same work has the same report."""
+    """Return the values in an answer. In a zip, only data about the student, because equal work has equal reports."""
     content = _content(answer)
     return _in_text(answer.text if isinstance(content, bytes) else content.get("student.json", b"").decode())
 
 
 def _in_text(text: str) -> set[str]:
-    """What of a text could identify something: words with a digit that are not short, and the beginnings of moments."""
+    """Return the identifying parts of a text: longer words with a digit, and the beginnings of times."""
     words = {word for word in re.findall(r"[\w.:+-]+", text) if len(word) > 4 and any(map(str.isdigit, word))}
     return words | {word[:19] for word in words if re.match(r"\d{4}-\d\d-\d\dT", word)}

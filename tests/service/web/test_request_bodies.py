@@ -1,4 +1,4 @@
-"""Bodies of requests: whose are read, how long they may be, and where they are parsed."""
+"""Request bodies: the callers whose bodies are read, the length limits, and the places where they are parsed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from web_world import filled, make_world
 _TABLES = sorted((DATA / "access").glob("*.toml"))
 ROUTES = {route: who for table in _TABLES for route, who in tomllib.loads(table.read_text()).items()}
 _UNSAFE = [route for route in ROUTES if route.split()[0] not in ("GET", "HEAD")]
-#: How long an upload may be, of the routes that declare one.
+#: The length limit of an upload, for routes that declare one.
 _UPLOADS = {
     "POST /api/v1/courses/{course_id}/assignments/uploads": 130,
     "POST /api/v1/courses/{course_id}/mine/submissions": 34,
@@ -44,7 +44,7 @@ _UPLOADS = {
 
 @dataclass(frozen=True, slots=True)
 class _Seen:
-    """What came of a request, and how much of its body was asked for."""
+    """The result of a request, and the length of the body that was read."""
 
     status: int
     read: int
@@ -59,7 +59,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, dict[
 
 
 def _asked(web: Web, route: str, values: dict[str, str], headers: dict[str, str], megabytes: int) -> _Seen:
-    """Send a body in pieces of a megabyte, straight to the application, and count what it takes of it."""
+    """Send a body in pieces of a megabyte directly to the application, and count how much of it is read."""
     method, path = route.split()
     path = filled(path, values)
     read = 0
@@ -93,7 +93,7 @@ def _asked(web: Web, route: str, values: dict[str, str], headers: dict[str, str]
 
 
 def _signed(web: Web, route: str, members: dict[str, Member]) -> dict[str, str]:
-    """The headers of somebody who may call the route."""
+    """Return the headers of a caller who may use the route."""
     who = ROUTES[route].split()[0]
     member = members.get(who, members["owner"])
     if "/api/" in route:
@@ -131,7 +131,7 @@ def test_two_megabytes_are_too_much_but_for_uploads(
     most = _UPLOADS.get(route, 1)
     long = {**headers, "content-length": str(most * 2**20 + 1)}
     assert _asked(web, route, values, long, 3) == _Seen(413, 0)
-    # One that does not say how long it is, is read until it is too much, if the route reads it at all.
+    # A body without a declared length is read up to the limit, if the route reads it at all.
     if most == 1:
         seen = _asked(web, route, values, headers, 3)
         assert seen.status == 413 or seen.read == 0

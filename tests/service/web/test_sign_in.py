@@ -1,4 +1,4 @@
-"""Signing in and out: what counts, how often, for whom, and what it leaves in the browser."""
+"""Signing in and out: valid credentials, rate limits, the people affected, and data left in the browser."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Links that instructors and operators make for others: shown to their maker while they count, and written down."""
+"""Sign-in links for others: visible to their issuer while they are valid, and recorded in the activity log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many SQL statements each page and each answer of the API takes, however much there is to show."""
+"""The number of SQL statements of each page and each API answer is limited, however much data there is."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _ROUTES = {
     for route, who in tomllib.loads(table.read_text()).items()
     if route.startswith("GET ")
 }
-#: Who asks, for each word of the tables.
+#: The caller for each word in the tables.
 _READERS = {
     "anybody": ("nobody",),
     "signed-in": ("ada", "grace", "root"),
@@ -35,7 +35,7 @@ _READERS = {
     "instructor": ("grace",),
     "operator": ("root",),
 }
-#: What begins a transaction, and what sets a connection of SQLite.
+#: Statements that begin a transaction, or set up a connection of SQLite.
 _NO_STATEMENT = re.compile("BEGIN|PRAGMA")
 
 

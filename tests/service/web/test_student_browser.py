@@ -1,4 +1,4 @@
-"""A student's way in Chromium on a phone, with a worker that grades: upload, report, replay, appeal; and a tryout."""
+"""A student's tasks in Chromium on a phone, with a worker: upload, report, replay, appeal; and a test run."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ MOMENT = "() => [location.hash, document.querySelector('.moment').value]"
 
 @dataclass(frozen=True, slots=True)
 class Served:
-    """A web application with a worker behind it, and where it is."""
+    """A web application with a worker, and its address."""
 
     web: Web
     address: str
@@ -60,7 +60,7 @@ def browser() -> Iterator[Browser]:
 
 
 def _page(browser: Browser, running: Served, student: str, **context: object) -> Page:
-    """A phone that is signed in as a student, on the page of their work."""
+    """Return a phone signed in as a student, on the page of the student's work."""
     page = browser.new_context(**{**PHONE, **context}).new_page()
     page.on("pageerror", lambda error: pytest.fail(str(error)))
     page.goto(f"{running.address}/sign-in/{running.web.link(running.web.student(student))}")
@@ -75,7 +75,7 @@ def test_from_the_upload_to_the_second_that_failed(browser: Browser, running: Se
     assert_in_order(page)
     page.set_input_files("#files", {"name": "robot.py", "mimeType": "text/x-python", "buffer": FIRST_BAND.encode()})
     page.get_by_role("button", name="Submit", exact=True).click()
-    # The page follows by itself until the report is there.
+    # The page updates itself until the report is available.
     page.wait_for_selector("section.replay[data-ready]", timeout=PATIENCE)
     assert_in_order(page)
     expect(page.locator(".score")).to_contain_text("of 10 marks")
@@ -142,7 +142,7 @@ def test_all_of_it_works_without_javascript(browser: Browser, running: Served) -
     follow(page.get_by_role("link", name="Ignore the bands"))
     page.set_input_files("#files", {"name": "robot.py", "mimeType": "text/x-python", "buffer": REFERENCE.encode()})
     page.get_by_role("button", name="Submit", exact=True).click()
-    # The page is loaded anew every few seconds.
+    # The page reloads every few seconds.
     expect(page.locator(".score")).to_contain_text("of 10 marks", timeout=PATIENCE)
     page.get_by_role("link", name="submit again").click()
     page.locator("summary").click()

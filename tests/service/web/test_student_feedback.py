@@ -1,4 +1,4 @@
-"""Students read no text for staff and no fault of ours: on no page, in no answer of the API, in no gradebook."""
+"""No student sees texts for staff or faults of the host: on pages, in API answers, in gradebooks."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from sim.errors import UsageError
 from student_reader import StudentReader
 from web import COURSE, Web
 
-#: What these write is read by staff alone.
+#: The output of these formats is for staff only.
 _STAFF_FORMATS = {"csv", "csv-long", "json", "junit", "text", "rich"}
 _SECRET = "/srv/secret-disk"
 _WORKSHEET = "Identifier,ID number,Grade,Feedback comments\nParticipant 1234567,ada,,\n"
@@ -98,7 +98,7 @@ def test_no_gradebook_has_an_attempt_over_a_limit(web: Web) -> None:
 
 
 def _submit(web: Web, program: str = PROGRAM) -> tuple[Member, str]:
-    """Ada's submission in a batch of its own, from Moodle."""
+    """Submit for Ada in a separate batch from Moodle."""
     ada = web.student("ada")
     with web.store.transaction() as session:
         open_assignments.prepare(session, 1, freeze(echo()))
@@ -110,7 +110,7 @@ def _submit(web: Web, program: str = PROGRAM) -> tuple[Member, str]:
 
 
 def _read_by_students(web: Web, ada: Member, batch_id: str, job_id: str, secret: str) -> list[str]:
-    """Where the secret is read by students."""
+    """Return the places where students can read the secret."""
     with web.store.reading() as session:
         submission_id = session.get_one(Job, job_id).submission_id
     values = {"submission_id": str(submission_id), "assignment": "echo-responder"}
@@ -121,7 +121,7 @@ def _read_by_students(web: Web, ada: Member, batch_id: str, job_id: str, secret:
 
 
 def _gradebooks(web: Web, batch_id: str) -> dict[str, str]:
-    """What each format that students look into writes of a batch, where it writes anything."""
+    """Return the output of each format that students see, where it has any for the batch."""
     found = {}
     for name in FORMATS.keys() - _STAFF_FORMATS:
         given = _WORKSHEET if FORMATS[name].filled_in is not None else ""

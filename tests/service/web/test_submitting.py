@@ -1,4 +1,4 @@
-"""What students send becomes submissions: whose it is, what it may be, and what is refused."""
+"""Students' uploads become submissions: their owner, the accepted forms, and the refused ones."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def web(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Web]:
 
 @pytest.fixture
 def ada(web: Web) -> Member:
-    """A student of whom nothing is there yet."""
+    """Return a new student without any data."""
     return web.student(next(_NAMES))
 
 
@@ -161,7 +161,7 @@ def test_nobody_submits_without_end(web: Web, ada: Member) -> None:
 
 
 def _rows(web: Web, member: Member) -> list[tuple[int, bool, JobState]]:
-    """Attempt, whether it is over a limit, and state of all that a student has."""
+    """Return attempt, over-limit flag and state of all jobs of a student."""
     query = (
         select(SubmissionRow.attempt, SubmissionRow.staff_only, Job.state)
         .join(Job, Job.submission_id == SubmissionRow.id)
@@ -174,7 +174,7 @@ def _rows(web: Web, member: Member) -> list[tuple[int, bool, JobState]]:
 
 @pytest.fixture
 def once(tmp_path: Path) -> Iterator[Web]:
-    """A course that allows one attempt, and few bytes."""
+    """Yield a course that allows one attempt and a few bytes."""
     with web_in(tmp_path, student_quota_mb=1) as opened:
         with opened.store.transaction() as session:
             course_of(session, COURSE, datetime.now(UTC))
@@ -205,7 +205,7 @@ def test_over_a_limit_the_newest_is_kept_and_graded_when_staff_ask(once: Web) ->
     assert submit_form(browser, f"{path}/grade-over-limit").status_code == 409
     grade_all(once, faulty_grade())
     assert _rows(once, ada)[-1] == (6, True, JobState.DONE)
-    # What staff asked for stays; what comes after it is put aside again.
+    # A job that staff requested stays. The following one is over the limit again.
     last = _send(once, ada, 7)
     assert [state for _, _, state in _rows(once, ada)] == [JobState.DONE, JobState.DONE, JobState.CANCELLED]
     token = once.token(grace, "mark")
@@ -238,7 +238,7 @@ def test_a_student_fills_no_more_than_the_quota(once: Web) -> None:
         files = (("robot.py", PROGRAM), ("responder.py", RESPONDER), ("model.bin", noise + bytes([number])))
         _submit(once, ada, *files)
         grade_all(once, faulty_grade())
-    # Of those over the limit one is kept: the next takes its place and needs no more room.
+    # One submission over the limit is kept. The next one replaces it and needs no additional space.
     _submit(once, ada, ("robot.py", PROGRAM), ("responder.py", RESPONDER), ("model.bin", noise + b"x"))
     with pytest.raises(UsageError, match="at most 1 MB in all"):
         _submit(once, ada, ("robot.py", PROGRAM), ("responder.py", RESPONDER), ("model.bin", noise * 2))

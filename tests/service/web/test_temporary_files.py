@@ -1,4 +1,4 @@
-"""What a web server lays down while it reads uploads goes with it, or with the next one that starts."""
+"""Temporary files of uploads are removed with the web server, or when the next one starts."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ with own_temporary_folder() as folder:
 
 @pytest.fixture
 def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The system's temporary folder."""
+    """Return the system's temporary folder."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     return tmp_path
 

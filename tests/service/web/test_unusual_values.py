@@ -1,4 +1,4 @@
-"""Every page against values that no page sends, in its path, its query and its form: never answered as our fault."""
+"""Every page with values that no page sends, in path, query and form: none causes a server error."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from service.settings import Settings
 from web import Web, csrf, web_in
 from web_world import World, filled, make_world
 
-#: PostgreSQL takes no NUL in text and no whole number beyond 32 bits, SQLite none beyond 64.
+#: PostgreSQL accepts no NUL in text and no integer beyond 32 bits, SQLite none beyond 64.
 _VALUES = ("\0", "\u00b2", str(2**31), str(2**63))
 _NOT_PAGES = ("/api", "/static", "/health", "/metrics")
-#: The browser that asks is signed out by these.
+#: These sign out the browser that sends them.
 _ENDS_SESSION = ("/sign-out", "/account/end-others")
 _VALID = {"assignment": "echo-responder", "course": "default", "reason": "because"}
 
@@ -54,14 +54,14 @@ def test_no_page_fails_by_an_unusual_value(asked: tuple[Web, World]) -> None:
 
 
 def _reader(path: str) -> str:
-    """Who may open a page, so that the store is asked for the values."""
+    """Return a reader who may open a page, so that the values reach the store."""
     if path.startswith("/operator"):
         return "operator"
     return "student" if "/mine" in path or path.startswith("/account") else "instructor"
 
 
 def _requests(route: Any, path: str, values: dict[str, str]) -> Iterator[tuple[str, str, dict[str, str]]]:
-    """What is varied, the address and the form of each request: all is valid but one value."""
+    """Yield the varied field, the address and the form of each request. All values but one are valid."""
     names = re.findall(r"\{(\w+)", path)
     for name in names:
         for value in _VALUES:

@@ -1,4 +1,4 @@
-"""What students submit on the web to an open assignment is one batch: its table, its end, what is done to it."""
+"""Students' web submissions to an open assignment form one batch: its table, its end, and actions on it."""
 
 from __future__ import annotations
 

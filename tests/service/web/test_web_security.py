@@ -1,4 +1,4 @@
-"""What every answer has and what no request gets: headers, names, bodies, other sites, errors without their causes."""
+"""Properties of every answer, and protection from every request: headers, names, bodies, other sites, error details."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def test_pages_are_counted_for_each_person(tmp_path: Path) -> None:
 
 
 def _told_address(settings: Settings, forwarded: str) -> str:
-    """The address that the application is told of a request from this machine."""
+    """Return the address that the application sees for a request from this machine."""
     seen: list[str] = []
 
     async def application(scope: Any, _receive: object, _send: object) -> None:

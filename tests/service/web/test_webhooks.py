@@ -1,4 +1,4 @@
-"""Deliveries arrive signed, and neither a name nor a redirection leads them inside."""
+"""Deliveries arrive signed, and neither a host name nor a redirect leads them into the internal network."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from service.webhook_sender import send_due
 
 @dataclass
 class Endpoint:
-    """A server that writes down what it is told, and answers this."""
+    """A server that records its requests, and sends a fixed answer."""
 
     status: int = 200
     headers: dict[str, str] = field(default_factory=dict)
@@ -54,7 +54,7 @@ def endpoint() -> Iterator[Endpoint]:
 
 
 def hooked(store: Store, url: str) -> str:
-    """A webhook with one thing to be told; its secret."""
+    """Create a webhook with one pending delivery; return its secret."""
     with store.transaction() as session:
         session.add(Course(id=1, name="default", created_at=now(session)))
         session.flush()

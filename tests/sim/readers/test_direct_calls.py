@@ -1,4 +1,4 @@
-"""Nothing that runs in our own processes parses a format but through its bounded reader, or with a reason here."""
+"""Our own processes parse file formats only with the bounded readers, or with a documented reason."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _PARSERS = {
 }
 _METHODS = {"model_validate_json", "validate_json"}
 _MODULES = ("yaml.", "PIL.Image.open", "zipfile.ZipFile", "xml.dom", "xml.sax")
-#: What runs inside the sandbox: its limits bound it.
+#: Runs inside the sandbox, where limits apply.
 _INSIDE = (
     "responders/sandbox/inside/",
     "responders/kit/",
@@ -101,7 +101,7 @@ _ALLOWED = {
 
 
 def parser_calls(source: str) -> Iterator[str]:
-    """The parsers that are named in the source, by their full names; a call of what a name stands for is one, too."""
+    """Yield the parsers in the source by their full names. A call through an alias is included."""
     tree = ast.parse(source)
     known: dict[str, str] = {name: name for name in ("compile", "eval", "exec")}
     for node in ast.walk(tree):

@@ -1,6 +1,6 @@
-"""Files that are small and ask for much: each reader refuses them before the format's own parser builds anything.
+"""Small files with large demands: each reader refuses them before the format's own parser builds objects.
 
-Work is counted (calls, lines, bytes), and a child process with little memory reads what is allowed to the limit.
+The tests count the work (calls, lines, bytes), and a child process with little memory reads files of the maximum size.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def _png_that_claims(width: int, height: int) -> bytes:
     return data[:12] + header + struct.pack(">I", zlib.crc32(header)) + data[33:]
 
 
-#: What is refused, and the parser that never sees it.
+#: Refused files, and the parser that must not be called.
 _REFUSED: dict[str, tuple[Callable[[], object], str]] = {
     "toml, dotted key": (lambda: read_toml("a" + ".a" * 16_000 + " = 1"), "tomllib.loads"),
     "toml, dotted key with blanks": (lambda: read_toml("a" + " . a" * 20 + " = 1"), "tomllib.loads"),
@@ -171,7 +171,7 @@ _QUOTES = ('\\"', '"\\\\"', "'", '"""', "'''", '"x', '"\n', "'\n", '["', '{"a', 
 @pytest.mark.parametrize("before", ["", "[[" * 60, 'a = """'])
 @pytest.mark.parametrize("read", [read_json, read_toml, parse_module, read_rows, lambda text: read_yaml(text.encode())])
 def test_texts_without_an_end_are_read_once(read: Callable[[str], object], before: str, quotes: str) -> None:
-    """A reader that looked for the end of each again would take many minutes."""
+    """A reader that searched for the end of each text again would take many minutes."""
     text = before + quotes * (300_000 // len(quotes))
     with contextlib.suppress(ValueError, SyntaxError):
         read(text)
@@ -189,7 +189,7 @@ def test_a_json_number_that_is_too_long_is_refused() -> None:
 
 
 class _CountedLines(Sequence[str]):
-    """Lines, and how often one of them was taken."""
+    """Lines, with a count of the accesses."""
 
     def __init__(self, lines: Sequence[str]) -> None:
         self._lines = lines
