@@ -122,7 +122,8 @@ def test_settings_for_plots_in_the_current_folder_change_no_plot(hostile: Path) 
     assert (hostile / "with.png").read_bytes() == (hostile / "without.png").read_bytes()
 
 
-#: Places that start processes. All other code calls ``sim/processes.py``; the sandbox starts its own with no options.
+#: Places that start processes. All other code calls ``sim/processes.py``; the sandbox starts its own without an
+#: environment of ours.
 STARTERS = {
     "sim/processes.py",
     "responders/sandbox/zygote.py",

@@ -27,7 +27,7 @@ ORIGINAL = {
     "Radial_red": "9cc7e643c608aa7e",
     "Simple_Shapes": "379af070c54069ed",
 }
-#: The floors as they were first drawn.
+#: Hashes of the floors at the time when they were added.
 OWN = {
     "Empty_Map": "af88c703b719accc",
     "Loop": "94bc0f2623f91e9b",

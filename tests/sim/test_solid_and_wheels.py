@@ -102,7 +102,7 @@ def test_what_ran_before_leaves_no_trace(physics: Physics, runner: TrialRunner) 
 
 
 def random_drive(seed: int) -> Iterator[tuple[float, float]]:
-    """Yield wheel speeds in degrees per second, with new targets each half second for a minute, and the course's ramps."""
+    """Yield wheel speeds in degrees per second, with new targets each half second for a minute, and motor ramps."""
     chance = random.Random(seed)
     speeds, targets = [0.0, 0.0], [0.0, 0.0]
     for tick in range(1800):

@@ -222,7 +222,7 @@ def test_a_robot_that_was_left_somewhere_stays_there_until_it_is_placed() -> Non
     simulator = Simulator()
     simulator.leave_at(Pose(321.5, 234.49, -45.25))
     assert simulator.apply(Flags()).pose == Pose(321.5, 234.49, -45.25)
-    # The sliders follow the robot in whole numbers, except the one of the angle.
+    # The sliders follow the robot in whole numbers. The slider of the angle does not follow.
     assert simulator.apply(parse_flags("sim_magic", "-y 5")).pose == Pose(322, 5, 0)
 
 

@@ -21,7 +21,7 @@ from web_world import filled, make_world
 API = "/api/v1/"
 _TABLES = sorted((DATA / "access").glob("*.toml"))
 ROUTES = {route: who for table in _TABLES for route, who in tomllib.loads(table.read_text()).items()}
-#: Methods of forms on pages. Other sites may post only to routes marked for it, and programs have no forms.
+#: Routes of forms on pages. Other sites may post only to routes marked for it, and programs have no forms.
 _CHANGING = [
     route
     for route, who in ROUTES.items()

@@ -1,4 +1,4 @@
-"""Answers to programs: once per key, in pages, with ETags, with problem details; and how routes use the store."""
+"""Answers to programs: idempotency keys, pagination, ETags, problem details; and how routes use the store."""
 
 from __future__ import annotations
 

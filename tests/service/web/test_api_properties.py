@@ -22,7 +22,8 @@ from web import Web, web_in
 from web_world import make_world
 
 pytestmark = pytest.mark.long
-#: We choose the path values and the caller. Requests that the store refuses still fit the description.
+#: Excluded checks: we choose the path values and the caller, and the store may refuse requests that fit the
+#: description.
 _NOT_TOLD = [checks.ignored_auth, checks.positive_data_acceptance, checks.negative_data_rejection]
 _EXAMPLES = settings(
     max_examples=10,

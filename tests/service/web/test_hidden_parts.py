@@ -49,7 +49,7 @@ _MOMENT = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?")
 
 
 def _assignment(hidden: int, *, first: bool, seconds: float) -> Assignment:
-    """Return the echo assignment with a number of hidden scenarios and criteria. The total marks are always the same."""
+    """Return the echo assignment with a number of hidden scenarios and criteria. The total marks never change."""
     whole = echo()
     (own,) = whole.scenarios
     shown = replace(own, poses=tuple(Pose(x, 800, 0) for x in (100, 150, 200, 250)), seconds=90)

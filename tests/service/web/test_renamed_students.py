@@ -77,7 +77,7 @@ class Answers:
 
 @pytest.fixture(scope="module")
 def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Answers]:
-    """Yield the answers of all routes before and after the students change names, with labels that move with students."""
+    """Yield the answers of all routes before and after the students change names; labels move with the students."""
     labels = dict(zip(_EVERYBODY, ("Participant D", "Participant B", "Participant E", *"AC"), strict=True))
     with pytest.MonkeyPatch.context() as patch, web_in(tmp_path_factory.mktemp("home")) as web:
         course = make_nameless_course(web)
