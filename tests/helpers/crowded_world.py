@@ -160,7 +160,7 @@ class _Copies:
             self._add(Credential, id=new_id(), person_id=member.person_id, sha256=new_id(), **lasting)
 
     def _copy(self, kind: type[Base], which: ColumnElement[bool], **changes: Any) -> Any:
-        """Copy the selected row, which is the same for all rows of a kind. Return the key of the copy."""
+        """Copy the selected row, which is cached for each table. Return the key of the copy."""
         (row,) = self._read(kind, which)
         return self._add(kind, **(row | changes))
 

@@ -75,7 +75,7 @@ class Left:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The answer of an interface: the HTTP status (0 or 2 for commands) and the text."""
+    """The answer of an interface: the HTTP status (commands: 0 or 2) and the text."""
 
     status: int
     text: str

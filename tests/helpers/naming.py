@@ -6,5 +6,5 @@ import re
 
 
 def is_named(name: str, text: str) -> bool:
-    """Return whether ``name`` is in the text as a word of its own."""
+    """Return whether ``name`` is in the text as a separate word."""
     return re.search(rf"(?<![^\W_]){re.escape(name)}(?![^\W_])", text) is not None

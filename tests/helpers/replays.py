@@ -48,7 +48,7 @@ def values_of(column: dict[str, Any]) -> np.ndarray:
 
 
 def long_recording(ticks: int, images: int = 0) -> Recording:
-    """Return a very long recording with many images that do not compress."""
+    """Return a recording with this many ticks and images, of random content that does not compress."""
     one = line_follower_recording(150)
     times = -(-ticks // 150)
     chance = np.random.default_rng(0)

@@ -108,7 +108,7 @@ def _packets(draw: st.DrawFn) -> bytes:
 
 @st.composite
 def _frames(draw: st.DrawFn, schema: wire.Schema) -> bytes:
-    """Draw a frame: mostly a valid one, sometimes an invalid one, sometimes no frame at all."""
+    """Draw a frame: mostly a valid one, sometimes an invalid one, sometimes bytes that are not a frame."""
     how = draw(st.integers(0, 39))
     if how == 0:
         return draw(st.binary(max_size=100))

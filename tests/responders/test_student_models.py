@@ -167,7 +167,7 @@ def test_a_hostile_pickle_touches_nothing_outside(deed: str, runner: TrialRunner
         with pytest.raises(TimeoutError):
             listening.accept()
     assert recording.verdict is Verdict.RESPONDER_ERROR
-    # Where bubblewrap works too, the file does not even exist in the child.
+    # If bubblewrap works too, the file does not even exist in the child.
     words = recording.faults[0].message
     assert "model.joblib was stopped while it was loaded" in words or "No such file" in words
     assert recording.faults[0].line == 2

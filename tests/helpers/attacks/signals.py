@@ -213,7 +213,7 @@ def time_with_signals():
 
 @attack(SECCOMP)
 def kill_oneself():
-    """A process that ends by a SIGKILL from elsewhere than the worker looks as if the machine had killed it."""
+    """A child that ends by a SIGKILL which the worker did not send looks as if the machine had killed it."""
     os.kill(os.getpid(), signal.SIGKILL)
     return True
 

@@ -47,7 +47,7 @@ with Sandboxes() as sandboxes:
     print(sandboxes.check())
     print(sandboxes.remembers())
 """
-#: A container has devices that record access times, and no way of reading a device records one.
+#: A container can have devices on a mount that records access times. No way of reading a device records one.
 _USE_A_DEVICE = """
 import os, sys
 from responders.sandbox import reading_dates

@@ -49,7 +49,7 @@ def _all() -> Iterator[tuple[tuple[str, ...], Command]]:
 
 
 ALL = dict(_all())
-#: For each command with output, a line that runs here, and the keys of its document besides "schema".
+#: For each command with output, a line that runs here, and the keys of its document except "schema".
 SHOWING = {
     "batch list": "batches",
     "batch status BATCH": "batch pace jobs changes ranks unpublished_regrades statistics history",

@@ -144,7 +144,7 @@ def test_the_autograder_writes_what_gradescope_reads(tmp_path: Path) -> None:
     assert (graded["score"], sum(test["max_score"] for test in graded["tests"])) == (6, 10)
     (root / "source" / "assignment" / "assignment.toml").write_text("id = ")
     ended = _run(root)
-    # An instructor's mistake costs nobody marks.
+    # An instructor's mistake does not change any marks.
     assert ended.returncode != 0
     assert not (root / "results" / "results.json").exists()
 

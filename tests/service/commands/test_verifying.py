@@ -1,4 +1,4 @@
-"""``verify`` distinguishes a program with its own random numbers from a fault of ours by repeating what differs."""
+"""``verify`` distinguishes a program with its own random numbers from a host fault by repeating what differs."""
 
 from __future__ import annotations
 

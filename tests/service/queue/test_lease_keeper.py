@@ -113,7 +113,7 @@ def test_what_hangs_is_not_held_for_ever() -> None:
 def test_marks_that_took_too_long_are_not_stored(
     store: Store, service_settings: Settings, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The exception for an expired job may look like one of a criterion, which would then get no marks."""
+    """The exception for an expired job may look like an error in a criterion, which would then get no marks."""
     job_id = accept_one(store).job_id
     graded = report_builders.faulty_grade()
 

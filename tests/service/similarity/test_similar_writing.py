@@ -73,7 +73,7 @@ def test_code_that_was_given_is_nobodys_copy() -> None:
     assert compare(
         [source_of("ada", "a.py", f"{given}\n{one}"), source_of("bob", "a.py", f"{other}\n{given}")], [given]
     ) == Writing((), ())
-    # With little code of their own, there is no result for either.
+    # Too little code is left to compare, so there is no result for either.
     assert of_two(given, f"{given}\nspeed = 3", (given,)) == Writing((), ("ada", "bob"))
 
 

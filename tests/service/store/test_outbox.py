@@ -72,7 +72,7 @@ def test_a_batch_is_told_of_job_by_job_and_once_when_it_is_finished(store: Store
 
 
 def test_nobody_is_named(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Ids that contain the name identify nobody.
+    # Ids that contain the name do not identify a student.
     monkeypatch.setattr(ids, "ALPHABET", "ad")
     hook(store)
     submit(store, "ada")

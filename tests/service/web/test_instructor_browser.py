@@ -1,5 +1,6 @@
-"""An instructor's tasks in Chromium, with a real worker: an assignment from the catalogue, a batch of twenty, a replay,
-adjusted marks, publication, and the student's view of it.
+"""An instructor's tasks in Chromium, with a real worker: an assignment from the catalogue and a batch of twenty.
+
+They include a replay, adjusted marks, publication, and the student's view of the batch.
 """
 
 from __future__ import annotations

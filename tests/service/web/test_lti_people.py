@@ -348,7 +348,7 @@ def test_no_launch_changes_the_person_or_the_role_of_a_row_that_another_has(
 
 
 def _rows(store: Store) -> set[tuple[int, int, Role, int]]:
-    """Return enrolment, person, role and course for every enrolment that somebody has signed in as."""
+    """Return enrolment, person, role and course for every enrolment with a sign-in."""
     with store.reading() as session:
         query = select(Enrolment.id, Enrolment.person_id, Enrolment.role, Enrolment.course_id).join(Person)
         return {tuple(row) for row in session.execute(query.where(Person.signed_in_at.is_not(None)))}  # type: ignore[misc]
