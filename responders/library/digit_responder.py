@@ -30,7 +30,7 @@ def image_parser(msg):
 
 
 def digit_recognising_agent(msg):
-    """Return the network's digit for an image with its confidence from 0 to 1. A text is echoed."""
+    """What the network says of an image, and how sure it is from 0 to 1; a text is only repeated."""
     if msg is None or msg["typ"] != "IMG_DATA":
         return {"report": f"Agent says: I heard {msg and msg['obj']}"}
     image_data = pd.DataFrame(

@@ -27,7 +27,7 @@ def image_parser(msg):
 
 
 def digit_recognising_agent(msg):
-    """Return the network's digit for an image converted to black and white at a grey of 127."""
+    """What the network says of an image cut to black and white at a grey of 127."""
     image_data = pd.DataFrame(
         [{"side": side, "vals": roboSim.process_raw_image_data(msg["obj"][side])} for side in ("left", "right")]
     )

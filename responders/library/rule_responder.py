@@ -53,7 +53,7 @@ def weight_below(box):
 
 
 def rule_agent(msg):
-    """Return the shape in an image according to the rules. A text is echoed."""
+    """What the rules say of an image; a text is only repeated."""
     if msg is None or msg["typ"] != "IMG_DATA":
         return {"report": f"Agent says: I heard {msg and msg['obj']}"}
     image_data = pd.DataFrame(

@@ -38,7 +38,7 @@ def image_parser(msg):
 
 
 def shape_recognising_agent(msg):
-    """Return the network's shape for an image. A text is echoed."""
+    """What the network says of an image; a text is only repeated."""
     if msg is None or msg["typ"] != "IMG_DATA":
         return {"report": f"Agent says: I heard {msg and msg['obj']}"}
     image_data = pd.DataFrame(

@@ -16,7 +16,7 @@ def check(
         bool, typer.Option("--write-expected", help="Note what examples got of which expected.toml says nothing yet.")
     ] = False,
 ) -> None:
-    """Find the mistakes in an assignment's files, grade its examples, and compare their marks as expected."""
+    """Find the mistakes in an assignment's files, grade its examples and compare the marks with the expected ones."""
     if everything == (assignment is not None):
         raise UsageError("name one assignment to check, or give --all for the whole catalogue")
     if everything and write_expected:
