@@ -89,5 +89,5 @@ def check_number(session: Session, person_id: int) -> None:
 
 def _person(actor: Actor) -> int:
     if actor.person_id is None:
-        raise Forbidden("only somebody who is signed in has sessions and tokens")
+        raise Forbidden("sign in to see your sessions and tokens")
     return actor.person_id

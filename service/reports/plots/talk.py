@@ -76,7 +76,7 @@ def party_of(name: str) -> str:
 def talk_words(told: tuple[Talk, ...], language: Language = ENGLISH) -> str:
     """Return the counts as a sentence; empty if there are none."""
     counts = ", ".join(_told_how_often(each, language) for each in told if each.kind != "return")
-    return language.say("How often who told whom: %(counts)s.", counts=counts) if counts else ""
+    return language.say("Messages by sender and receiver: %(counts)s.", counts=counts) if counts else ""
 
 
 def _told_how_often(talk: Talk, language: Language) -> str:

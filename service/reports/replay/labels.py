@@ -22,7 +22,7 @@ _SENTENCES: Mapping[str, str] = MappingProxyType(
         "cameOfIt": translatable("What came of it"),
         "cannotBeShown": translatable("The replay cannot be shown by this browser: %(error)s"),
         "copied": translatable("Link copied"),
-        "floor": translatable("The floor with the robot. The table below tells what happened in words."),
+        "floor": translatable("The floor with the robot. The table below describes the events in words."),
         "happens": translatable("What happens"),
         "keys": translatable(
             "Space plays; arrows step by 0.1 and 1 s, page keys by 10 s; Home and End go to the ends."

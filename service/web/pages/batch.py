@@ -57,7 +57,7 @@ _COLUMNS = {
 _ACTIONS = {
     "submit": translatable("submitted"),
     "pause": translatable("paused"),
-    "resume": translatable("let it go on"),
+    "resume": translatable("resumed"),
     "cancel": translatable("cancelled"),
     "retry": translatable("queued again what could not be graded"),
     "publish": translatable("published"),

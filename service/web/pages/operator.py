@@ -22,7 +22,7 @@ from service.web.rendering import page, wants_part
 
 router = APIRouter()
 _LANES = {
-    Lane.INTERACTIVE: translatable("interactive: single submissions, that somebody waits for"),
+    Lane.INTERACTIVE: translatable("interactive: single submissions"),
     Lane.BATCH: translatable("batch: whole classes"),
 }
 _TRYOUTS = translatable("tryouts: programs that are run and not marked")
