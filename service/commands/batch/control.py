@@ -14,7 +14,7 @@ BatchId = Annotated[str, typer.Argument(help="The batch's id, or the beginning o
 
 
 def pause(batch: BatchId) -> None:
-    """Begin no more of a batch; what is being graded is graded to its end."""
+    """Pause a batch: start no more jobs. Running jobs continue."""
     from service.operations import batches as operations
 
     with operating() as (service, actor):
