@@ -50,11 +50,6 @@ class Statement:
         return self.tokens[0]
 
     @property
-    def has_body(self) -> bool:
-        """Return whether indented statements follow it."""
-        return ":" in self.tokens and self.keyword in _WITH_BODY
-
-    @property
     def condition(self) -> tuple[str, ...]:
         """The tokens between the keyword and the last colon of a ``while`` or ``if``."""
         end = len(self.tokens) - 1 - self.tokens[::-1].index(":") if ":" in self.tokens else len(self.tokens)
