@@ -6,7 +6,7 @@ PYTHON := $(shell for p in python3.11 python3; do "$$p" -c 'import sys, venv, en
 # What is imported is compiled once and kept, also for who has that switched off: tests start thousands of processes.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup demo test test-fast browser test-long test-all lint format bench bench-quick pictures lock wheel image release release-check clean
+.PHONY: setup demo test test-fast browser test-long test-all lint format bench bench-quick docs pictures lock wheel image release release-check clean
 
 setup: $(VENV)/.ready
 
@@ -61,6 +61,21 @@ bench: setup
 bench-quick: setup
 	$(BIN)/python -m benchmarks --quick
 
+# The documentation as a site, in site/. Its tools have a virtual environment of their own; warnings are errors.
+docs: .venv-docs/.ready
+	.venv-docs/bin/python -m sphinx --quiet --fail-on-warning --keep-going -b html -c docs -d site/.doctrees . site
+	@echo "site/docs/index.html"
+
+.venv-docs/.ready: docs/requirements.lock
+ifneq ($(PYTHON),)
+	test -x .venv-docs/bin/python || $(PYTHON) -m venv .venv-docs
+	.venv-docs/bin/python -m pip install --quiet --require-hashes -r docs/requirements.lock
+else
+	test -x .venv-docs/bin/python || uv venv --python 3.11 .venv-docs
+	uv pip install --quiet --python .venv-docs/bin/python --require-hashes -r docs/requirements.lock
+endif
+	touch $@
+
 # The documents' pictures; needs Chromium, and minutes for the digits. `make pictures PICTURES=report` draws one.
 pictures: setup
 	$(BIN)/python docs/draw_pictures.py $(PICTURES)
@@ -83,11 +98,13 @@ release-check: setup
 	$(BIN)/python deploy/release.py --dry-run
 
 # Needs uv; the lock files name no package index. The second is for images: what grading needs or may use, and nothing for tests.
-LOCK := uv pip compile --quiet --generate-hashes --no-emit-index-url --no-header --python-version 3.11 pyproject.toml
+# The third is for the documentation site.
+LOCK := uv pip compile --quiet --generate-hashes --no-emit-index-url --no-header --python-version 3.11
 
 lock:
-	$(LOCK) --extra test -o requirements.lock
-	$(LOCK) --extra tflite --no-annotate -c requirements.lock -o deploy/requirements.lock
+	$(LOCK) pyproject.toml --extra test -o requirements.lock
+	$(LOCK) pyproject.toml --extra tflite --no-annotate -c requirements.lock -o deploy/requirements.lock
+	$(LOCK) --group docs --no-annotate -c requirements.lock -o docs/requirements.lock
 
 clean:
-	rm -rf $(VENV) dist .mypy_cache .ruff_cache .pytest_cache robomark-demo
+	rm -rf $(VENV) .venv-docs dist site .mypy_cache .ruff_cache .pytest_cache robomark-demo

@@ -1,6 +1,7 @@
-"""Draws the documents' pictures again from what Robomark makes: ``make pictures`` all of them, or those it is told.
+"""Draws the pictures of the documentation again: ``make pictures`` draws all, or the pictures that it is given.
 
-The report's picture is a photograph of the page, so that one needs Chromium. Nothing here is part of Robomark.
+The pictures of the report and of the tutorial are photographs of pages and need Chromium. This module is not part of
+Robomark.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from pathlib import Path
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from tutorial_pictures import find_browser, photograph_tutorial
 
 from service.reports.plots.style import FAULT, font
 from sim.floors import floor, names
@@ -25,16 +27,13 @@ from submissions.assignment.examples import examples
 DOCS = Path(__file__).parent
 _COLUMNS = 5
 _WIDE, _HIGH = 2362, 1143  # mm
-_BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 _PAGE = "880,1030"  # pixels: as far down as a reader of the README wants to look
 _NETWORKS = ("digits", "digits-28", "digits-cnn")
 
 
 def draw_report() -> None:
     """The beginning of the report on a submission that is neither right nor hopeless."""
-    browser = next((found for name in _BROWSERS if (found := shutil.which(name))), None)
-    if browser is None:
-        raise SystemExit("the report's picture needs Chromium; expected " + " or ".join(_BROWSERS))
+    browser = find_browser()
     with tempfile.TemporaryDirectory() as folder:
         _robomark("grade", examples("shape-recognition") / "flawed", "-a", "shape-recognition", "--report", folder)
         flags = ["--headless", "--disable-gpu", "--hide-scrollbars", "--no-first-run", f"--window-size={_PAGE}"]
@@ -76,7 +75,17 @@ def draw_digits() -> None:
         shutil.copyfile(Path(folder, f"{'-and-'.join(_NETWORKS)}.png"), DOCS / "digits-compared.png")
 
 
-PICTURES: dict[str, Callable[[], None]] = {"report": draw_report, "floors": draw_floors, "digits": draw_digits}
+def draw_tutorial() -> None:
+    """The pages of the tutorial, in the order of its steps."""
+    photograph_tutorial(DOCS)
+
+
+PICTURES: dict[str, Callable[[], None]] = {
+    "report": draw_report,
+    "tutorial": draw_tutorial,
+    "floors": draw_floors,
+    "digits": draw_digits,
+}
 
 
 def _robomark(*words: str | Path) -> None:
