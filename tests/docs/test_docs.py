@@ -66,7 +66,8 @@ def files_shown(document: Path) -> list[tuple[str, str]]:
 _SHOWING = [
     pytest.param(
         document,
-        marks=[pytest.mark.long] * (document.stem in ("instructors", "models", "replay", "students", "web")),
+        marks=[pytest.mark.long]
+        * (document.stem in ("instructors", "models", "replay", "students", "tutorial", "web")),
         id=document.stem,
     )
     for document in DOCUMENTS
