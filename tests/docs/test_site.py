@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import runpy
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -49,3 +50,25 @@ def test_a_picture_of_the_tutorial_is_small_and_shown(picture: Any) -> None:
     with Image.open(picture) as opened:
         assert opened.width == 1080
     assert f"({picture.name})" in (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("page", ["README", *sorted(PAGES)])
+def test_an_anchor_in_a_link_is_a_heading(page: str) -> None:
+    file = ROOT / f"{page}.md"
+    linked = re.findall(r"\]\((?!https?:)([^)#\s]*)#([^)\s]+)\)", _prose(file))
+    missing = [
+        f"{target}#{anchor}"
+        for target, anchor in linked
+        if anchor not in _anchors(file.parent / target if target else file)
+    ]
+    assert missing == []
+
+
+def _prose(file: Path) -> str:
+    return re.sub(r"```.*?```", "", file.read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
+def _anchors(file: Path) -> set[str]:
+    """Return the anchors that GitHub and the site give to the headings of a page."""
+    headings = re.findall(r"^#+ (.+)$", _prose(file), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
