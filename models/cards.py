@@ -134,5 +134,5 @@ def weights_bytes(name: str) -> bytes:
     about = card(name)
     data = (_folder() / about.file).read_bytes()
     if hashlib.sha256(data).hexdigest() != about.sha256:
-        raise HostError(f"the weights of {name} ({about.file}) are not those that its card describes; install again")
+        raise HostError(f"the weights of {name} ({about.file}) do not match its card; install again")
     return data

@@ -49,13 +49,13 @@ def why_not_shown(line: JobLine, *, published: bool = False) -> str:
     """Return the reason why a job has no visible grade; empty if it has one."""
     match line.state:
         case JobState.QUEUED:
-            return "waits to be graded"
+            return "queued"
         case JobState.RUNNING:
-            return "is being graded"
+            return "running"
         case JobState.DEAD | JobState.CANCELLED:
             return f"{line.state.value}: {line.error}" if line.error else line.state.value
     if line.suspect is not None:
-        return "is graded again: the machine that graded it was found to grade wrongly"
+        return "is graded again, because the machine that graded it gave wrong grades"
     if line.staff_only is not None:
         return f"for staff only: {line.staff_only}"
     return "not published" if published and line.published_at is None else ""
@@ -65,7 +65,7 @@ def _told(line: JobLine) -> str:
     """Return the reason for students if it differs from the one for staff, who also see host faults."""
     match line.state:
         case JobState.DEAD:
-            return "could not be graded yet; the staff of your course can see why"
+            return "could not be graded yet; your instructors can see the reason"
         case JobState.CANCELLED:
-            return "was cancelled and is not graded"
+            return "was cancelled"
     return "is graded again" if line.suspect is not None else ""

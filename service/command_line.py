@@ -195,14 +195,14 @@ def main() -> NoReturn:
     except OSError as error:
         _debug()
         where = "" if error.filename is None else f"{error.filename}: "
-        _end(f"the machine would not do it: {where}{error.strerror or error}", _OURS)
+        _end(f"the operating system reported an error: {where}{error.strerror or error}", _OURS)
     except Exception as error:
         _debug()
         database = sys.modules.get("sqlalchemy.exc")
         if database is not None and isinstance(error, database.DBAPIError):
-            _end(f"the database would not do it: {error.orig}; robomark doctor looks at it", _OURS)
+            _end(f"the database reported an error: {error.orig}; run robomark doctor", _OURS)
         _end(
-            f"something went wrong in Robomark itself, not in your files: {type(error).__name__}: {error} "
+            f"internal error in Robomark, not in your files: {type(error).__name__}: {error} "
             "(set ROBOMARK_DEBUG=1 to see where)",
             _OURS,
         )
@@ -239,7 +239,7 @@ def _end_misspelt(error: TyperException) -> NoReturn:
     context = getattr(error, "ctx", None)
     command = "robomark" if context is None else context.command_path
     sentence = sentence.replace("Value error, ", "").replace("'?", "'")
-    _end(f"{sentence[:1].lower()}{sentence[1:].rstrip('.')}; {command} --help lists what there is", _CALLER)
+    _end(f"{sentence[:1].lower()}{sentence[1:].rstrip('.')}; see {command} --help", _CALLER)
 
 
 def _end_unread() -> NoReturn:

@@ -101,7 +101,7 @@ def _found_of_service(check: Check, settings: Settings, store: Store) -> Finding
         return Finding(check.what, *check.of_service(settings, store))
     except (RobomarkError, SQLAlchemyError, OSError) as error:
         return Finding(
-            check.what, False, "the disk is full" if _is_disk_full(error) else "the database does not answer"
+            check.what, False, "the disk is full" if _is_disk_full(error) else "no connection to the database"
         )
 
 
@@ -137,12 +137,12 @@ def _files(_settings: Settings) -> tuple[bool, str]:
     recorded = [file for file in metadata.files("robomark") or () if file.hash is not None]
     ours = [file for file in recorded if file.parts[0] in _PACKAGES]
     if not ours:
-        return True, "an editable installation, which has no record of its files to compare with"
+        return True, "an editable installation, so its files cannot be compared with a record"
     changed = sorted(str(file) for file in ours if not _is_as_recorded(file))
     if not changed:
-        return True, f"{len(ours)} files are as they were installed"
+        return True, f"{len(ours)} files are unchanged since installation"
     more = f" and {len(changed) - 1} more" if len(changed) > 1 else ""
-    return False, f"{changed[0]}{more} changed since it was installed, as if by another package: install robomark anew"
+    return False, f"{changed[0]}{more} changed since installation, perhaps by another package: install robomark again"
 
 
 def _is_as_recorded(file: metadata.PackagePath) -> bool:
@@ -167,18 +167,20 @@ def _sandbox(_settings: Settings) -> tuple[bool, str]:
     from responders.sandbox.manager import Sandboxes
 
     with Sandboxes() as sandboxes:
-        return True, f"student code runs behind: {sandboxes.check()}"
+        return True, f"layers around student code: {sandboxes.check()}"
 
 
 def _sandbox_of_workers(_settings: Settings, store: Store) -> tuple[bool, str]:
     standing = sorted({worker.sandbox for worker in _lately(store)})
-    return bool(standing), "; ".join(standing) or "no worker has said which layers it has"
+    return bool(standing), "; ".join(standing) or "no worker has reported its sandbox layers"
 
 
 def _control_groups(settings: Settings) -> tuple[bool, str]:
     """Check control groups, which are optional. A worker's unit may have them although this process does not."""
     reason = control_group.why_not()
-    told = f"a worker started from here has {'one for each grading at a time' if reason is None else f'none: {reason}'}"
+    told = (
+        f"a worker started from here has {'one for each concurrent grading' if reason is None else f'none: {reason}'}"
+    )
     with _opened(settings) as store:
         if store is None:
             return True, told
@@ -186,7 +188,7 @@ def _control_groups(settings: Settings) -> tuple[bool, str]:
     if not lately:
         return True, told
     have = sum("control group" in worker.sandbox for worker in lately)
-    return True, f"{told}; of {len(lately)} heard of lately {have} have"
+    return True, f"{told}; {have} of {len(lately)} workers seen recently have control groups"
 
 
 def _between_trials(_settings: Settings) -> tuple[bool, str]:
@@ -196,8 +198,8 @@ def _between_trials(_settings: Settings) -> tuple[bool, str]:
     with Sandboxes() as sandboxes:
         reason = sandboxes.remembers()
     if reason is None:
-        return True, "a trial can leave nothing for the next"
-    return False, f"a trial can leave something for the next, so hidden scenarios are not graded: {reason}"
+        return True, "no data remains between trials"
+    return False, f"data can remain between trials, so hidden scenarios are not graded: {reason}"
 
 
 def _home(settings: Settings) -> tuple[bool, str]:
@@ -206,7 +208,7 @@ def _home(settings: Settings) -> tuple[bool, str]:
         return False, f"{settings.home} cannot be written"
     free = shutil.disk_usage(settings.home).free
     enough = free >= _FREE_BYTES
-    return enough, f"{settings.home}, {free / 1e9:.1f} GB free" + ("" if enough else "; at least 1 GB is wanted")
+    return enough, f"{settings.home}, {free / 1e9:.1f} GB free" + ("" if enough else "; at least 1 GB is needed")
 
 
 def _database(settings: Settings) -> tuple[bool, str]:
@@ -217,7 +219,7 @@ def _database(settings: Settings) -> tuple[bool, str]:
         engine.dispose()
     where = engine.url.render_as_string(hide_password=True)
     if state.revision is None:
-        return True, f"{where}, no tables yet; they are made when first needed"
+        return True, f"{where}, no tables yet; they are created on first use"
     if state.problem:
         return False, f"{where} is {state.problem}"
     return True, f"{where}, tables at revision {state.revision}"
@@ -226,16 +228,16 @@ def _database(settings: Settings) -> tuple[bool, str]:
 def _tables(_settings: Settings, store: Store) -> tuple[bool, str]:
     state = schema_state(store.engine)
     if not state.is_usable:
-        return False, f"its tables are {state.problem or 'gone'}"
-    return True, f"answers, tables at revision {state.revision}"
+        return False, f"its tables are {state.problem or 'missing'}"
+    return True, f"connected, tables at revision {state.revision}"
 
 
 def _secret(settings: Settings) -> tuple[bool, str]:
     """Check that trials here have the same worlds as the newest grade."""
-    whose = "the database's" if settings.own_secret is None else "that of ROBOMARK_SECRET"
+    whose = "the secret in the database" if settings.own_secret is None else "the secret in ROBOMARK_SECRET"
     with _opened(settings) as store:
         if store is None:
-            return True, f"{whose}; it is made with the tables" if settings.own_secret is None else whose
+            return True, f"{whose}; it is created with the tables" if settings.own_secret is None else whose
         secret = secret_of(store)
         with store.reading() as session:
             newest = session.scalar(
@@ -244,7 +246,7 @@ def _secret(settings: Settings) -> tuple[bool, str]:
                 .order_by(Job.finished_at.desc())
                 .limit(1)
             )
-    told = f"{whose}, called {secret.name} by its hash"
+    told = f"{whose}, hash {secret.name}"
     if newest not in (None, secret.sha256):
         return False, f"{told}; the newest grade has {name_of(newest)}: every machine needs the same ROBOMARK_SECRET"
     return True, told
@@ -262,15 +264,15 @@ def _broker(settings: Settings) -> tuple[bool, str]:
         client.close()
     where = client.connection_pool.connection_kwargs.get("host", settings.broker_url)
     if tuple(int(part) for part in version.split(".")[:2] if part.isdigit()) < _OLDEST_BROKER:
-        return False, f"{where} answers, version {version}; {'.'.join(map(str, _OLDEST_BROKER))} or later is needed"
+        return False, f"{where} is running, version {version}; {'.'.join(map(str, _OLDEST_BROKER))} or later is needed"
     if policy not in ("", "noeviction"):
-        return False, f"{where} throws keys away when its memory is full: set maxmemory-policy to noeviction"
-    return True, f"{where} answers, version {version}"
+        return False, f"{where} deletes keys when its memory is full: set maxmemory-policy to noeviction"
+    return True, f"{where} is running, version {version}"
 
 
 def _broker_of_service(settings: Settings, _store: Store) -> tuple[bool, str]:
     version = broker_version(settings.broker_url, _READY_SECONDS)
-    return version is not None, f"answers, version {version}" if version else "does not answer"
+    return version is not None, f"running, version {version}" if version else "no connection"
 
 
 def _known_answer(settings: Settings) -> tuple[bool, str]:
@@ -282,8 +284,8 @@ def _known_answer(settings: Settings) -> tuple[bool, str]:
         actual = known_answers.ask(runner)
     wrong = "" if actual is None else known_answers.difference(known_answers.known(), actual)
     if wrong:
-        return False, f"this machine grades wrongly: {wrong}"
-    here = "cut by a limit of this machine" if actual is None else "right on this machine"
+        return False, f"this machine gives wrong grades: {wrong}"
+    here = "stopped by a limit of this machine" if actual is None else "correct on this machine"
     with _opened(settings) as store:
         if store is None:
             return True, here
@@ -300,18 +302,22 @@ def _clock(settings: Settings) -> tuple[bool, str]:
     """Compare the clocks. Leases use the database's clock, so a wrong clock here affects only logs."""
     with _opened(settings) as store:
         if store is None:
-            return True, "nothing to compare it with yet"
+            return True, "no other clock to compare with yet"
         if store.engine.dialect.name == "sqlite":
-            return True, "the only one, as the database is a file of this machine"
+            return True, "this machine's, because the database is a local file"
         with store.reading() as session:
             apart = abs((now(session) - datetime.now(UTC)).total_seconds())
     if apart > _APART_SECONDS:
-        return False, f"{apart:.0f} s apart from the database's: the times in this machine's logs are wrong"
-    return True, "as the database's"
+        return False, f"{apart:.0f} s different from the database's clock: times in this machine's logs are wrong"
+    return True, "same as the database's clock"
 
 
 def _workers(settings: Settings) -> tuple[bool, str]:
-    here = "one runs on this machine" if worker_lives(settings) else "none runs on this machine now: robomark up"
+    here = (
+        "running on this machine"
+        if worker_lives(settings)
+        else "not running on this machine; start it with robomark up"
+    )
     with _opened(settings) as store:
         if store is None:
             return True, here
@@ -320,7 +326,7 @@ def _workers(settings: Settings) -> tuple[bool, str]:
         return True, here
     slots = sum(worker.concurrency for worker in lately)
     hosts = len({worker.host for worker in lately})
-    told = f"{here}; heard of lately: {len(lately)} on {hosts} machines, {slots} gradings at a time"
+    told = f"{here}; seen recently: {len(lately)} on {hosts} machines, concurrency {slots}"
     problems = [f"{worker.name}: {worker.problem}" for worker in lately if worker.problem]
     return not problems, "; ".join([told, *problems])
 
@@ -328,9 +334,9 @@ def _workers(settings: Settings) -> tuple[bool, str]:
 def _workers_of_service(_settings: Settings, store: Store) -> tuple[bool, str]:
     lately = _lately(store)
     if not lately:
-        return False, "none was heard of lately"
+        return False, "no worker was seen recently"
     fit = [worker for worker in lately if not worker.problem]
-    told = f"{len(fit)} heard of lately, {sum(worker.concurrency for worker in fit)} gradings at a time"
+    told = f"{len(fit)} seen recently, concurrency {sum(worker.concurrency for worker in fit)}"
     problems = Counter(worker.problem for worker in lately if worker.problem)
     return bool(fit), "; ".join([told, *(f"{count} not ready: {problem}" for problem, count in problems.items())])
 
@@ -346,14 +352,14 @@ def _queue_of_service(_settings: Settings, store: Store) -> tuple[bool, str]:
     waiting = sum(metrics.claimable.values())
     oldest = max(metrics.oldest_seconds.values(), default=0.0)
     dead = metrics.count(JobState.DEAD)
-    told = f"{waiting} waiting" + (f", the oldest for {timedelta(seconds=round(oldest))}" if waiting else "")
-    told += f"; {dead} dead: robomark batch list, and retry" if dead else ""
+    told = f"{waiting} queued" + (f", the oldest for {timedelta(seconds=round(oldest))}" if waiting else "")
+    told += f"; {dead} failed: see robomark batch list and robomark batch retry" if dead else ""
     if waiting and oldest > _LONG_SECONDS and not any(seen.lately for seen in metrics.workers):
-        return False, f"{told}; no worker was heard of lately"
+        return False, f"{told}; no worker was seen recently"
     # In a long backlog, no job may be running for a moment between two jobs.
     idle = metrics.idle_seconds > _STUCK_SECONDS and not metrics.count(JobState.RUNNING)
     if waiting and oldest > _STUCK_SECONDS and idle:
-        return False, f"{told}; workers live and none begins it: their logs may say why, and restarting them may help"
+        return False, f"{told}; workers are running but start no jobs: check their logs or restart them"
     return True, told
 
 

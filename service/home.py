@@ -84,18 +84,20 @@ def open_home(home: Path) -> None:
     Raises UsageError if another user owns the home or could replace it, HostError if it cannot be created.
     """
     if home in (Path("/"), *_folders_of_all()):
-        raise UsageError(f"the home {home} is not for Robomark alone; expected a folder of its own in ROBOMARK_HOME")
+        raise UsageError(f"the home {home} contains other files; expected a separate folder in ROBOMARK_HOME")
     try:
         _check_way(home)
         home.mkdir(mode=0o700, parents=True, exist_ok=True)
         repaired = _repair(home)
     except FileExistsError:
-        raise UsageError(f"the home {home} is no folder, expected one for Robomark alone in ROBOMARK_HOME") from None
+        raise UsageError(f"the home {home} is not a folder, expected a separate folder in ROBOMARK_HOME") from None
     except OSError as error:
         raise HostError(f"the home {error.filename or home} cannot be used: {error.strerror}") from None
     if repaired:
-        _log.warning("robomark: the home %s was open to other users (%d of its files and folders); "
-                     "now it is this user's alone", home, repaired)  # fmt: skip
+        _log.warning((
+            "robomark: the home %s was open to other users (%d of its files and folders); now only this user has "
+            "access"
+        ), home, repaired)  # fmt: skip
 
 
 def _folders_of_all() -> tuple[Path, ...]:
@@ -118,16 +120,16 @@ def _check_way(home: Path) -> None:
         _check_owner(home, folder, found, _POWERFUL)
         if found.st_mode & stat.S_IWOTH and not found.st_mode & stat.S_ISVTX:
             raise UsageError(
-                f"the home {home} is not this user's alone: everybody may write in {folder}; "
-                f"expected another folder in ROBOMARK_HOME, or chmod o-w {folder}"
+                f"the home {home} is open to other users: all users can write in {folder}; expected another folder in "
+                f"ROBOMARK_HOME, or chmod o-w {folder}"
             )
 
 
 def _check_owner(home: Path, path: Path, found: os.stat_result, also: tuple[int, ...] = ()) -> None:
     if found.st_uid not in (os.geteuid(), *also):
         raise UsageError(
-            f"the home {home} is not this user's alone: {path} belongs to {_called(found.st_uid)}, and Robomark runs "
-            f"as {_called(os.geteuid())}; run it as that user, or name another folder in ROBOMARK_HOME"
+            f"the home {home} has another owner: {path} belongs to {_called(found.st_uid)}, and Robomark runs "
+            f"as {_called(os.geteuid())}; run it as that user, or set another folder in ROBOMARK_HOME"
         )
 
 

@@ -45,6 +45,6 @@ def _opened(settings: Settings) -> Secret:
             return secret_of(store)
     except HostError as error:
         raise HostError(
-            f"The secret that trials depend on cannot be kept: {error}. Set ROBOMARK_HOME to a folder that "
-            "can be written, or ROBOMARK_SECRET."
+            f"The secret for trials cannot be saved: {error}. Set ROBOMARK_HOME to a writable folder, or "
+            "ROBOMARK_SECRET."
         ) from None

@@ -125,7 +125,7 @@ def _target(url: str) -> _Target:
         parts = urlsplit(url)
         port = parts.port or (443 if parts.scheme == "https" else 80)
     except ValueError:
-        raise NotReached("the address is none") from None
+        raise NotReached("the address is not valid") from None
     if parts.scheme not in ("http", "https") or not parts.hostname:
         raise NotReached("the address is neither http nor https")
     path = f"{parts.path or '/'}?{parts.query}" if parts.query else parts.path or "/"

@@ -99,7 +99,7 @@ def write_grade_film(store: Store, line: JobLine, grade: Grade, path: Path, numb
         floors = own_floors(intake.load_assignment(session, line.id))
         seen = _view(session, line, grade).grade
     if not seen.trials:
-        raise UsageError(f"{line.id} has no trial that may be shown, so no film")
+        raise UsageError(f"{line.id} has no visible trial, so there is no film")
     if number is not None and not 1 <= number <= len(seen.trials):
         raise UsageError(f"--trial {number}: expected 1 to {len(seen.trials)}, as the replay numbers them")
     index = worst_trial(seen, scenarios(seen)[0]) if number is None else number - 1
@@ -145,7 +145,7 @@ def write_batch(store: Store, title: str, lines: Sequence[JobLine], refusals: Se
         BatchRow(
             refusal.student.id or refusal.source,
             report=path.name,
-            note=f"not taken in: {refusal.sentence}",
+            note=f"rejected: {refusal.sentence}",
             name=refusal.student.name if refusal.student.name != refusal.student.id else "",
         )
         for refusal, path in zip(refusals, paths[len(graded) :], strict=True)

@@ -31,9 +31,7 @@ def default_home() -> Path:
     try:
         base = Path(data) if data.startswith("/") else Path.home() / ".local" / "share"
     except RuntimeError:
-        raise UsageError(
-            "this user has no home folder: set ROBOMARK_HOME to one where Robomark may keep its data"
-        ) from None
+        raise UsageError("this user has no home folder: set ROBOMARK_HOME to a folder for Robomark's data") from None
     return base / "robomark"
 
 
@@ -46,7 +44,7 @@ def _folder(written: str | Path) -> Path:
     try:
         return Path(written).expanduser().absolute()
     except RuntimeError:
-        raise ValueError("expected a folder; there is no such user's home") from None
+        raise ValueError("expected a folder; this user has no home folder") from None
 
 
 def _broker(url: str) -> str:
@@ -76,7 +74,7 @@ def _database(url: str) -> str:
 def _address(url: str) -> str:
     scheme, _, name = url.rstrip("/").partition("://")
     if url and (scheme not in {"https", "http"} or not name or "/" in name):
-        raise ValueError("expected https://name, as browsers are to write it")
+        raise ValueError("expected https://name, as in the browser's address bar")
     return url.rstrip("/")
 
 
@@ -109,7 +107,7 @@ def _log_level(level: str) -> str:
 def _secret(given: str | Secret) -> Secret:
     text = given.text if isinstance(given, Secret) else given.strip()
     if 0 < len(text) < _SHORTEST_SECRET:
-        raise ValueError(f"expected at least {_SHORTEST_SECRET} characters that nobody can guess")
+        raise ValueError(f"expected at least {_SHORTEST_SECRET} characters that are hard to guess")
     return Secret(text)
 
 
@@ -229,7 +227,7 @@ def load_settings(**overrides: object) -> Settings:
     """
     folder = os.environ.get(SECRET_FILES) or None
     if folder is not None and not Path(folder).is_dir():
-        raise UsageError(f"{SECRET_FILES} is {folder!r}: expected a folder with files named as the settings")
+        raise UsageError(f"{SECRET_FILES} is {folder!r}: expected a folder with a file for each setting")
     written = ({} if folder is None else _in_files(Path(folder))) | _of_settings(os.environ)
     return Settings(**(written | overrides))  # type: ignore[arg-type]
 

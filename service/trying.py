@@ -95,7 +95,7 @@ def _notes(graded: Grade, submission: Submission) -> tuple[str, ...]:
         return graded.notes
     with_marks = {missing_part_note(part, submission.files) for part in PART_FILES}
     others = tuple(note for note in graded.notes if note not in with_marks)
-    return (*others, f"There is no {graded.missing}: only the part that is there was run.")
+    return (*others, f"There is no {graded.missing}, so only the other part was run.")
 
 
 def _words(run: Grade, submission: Submission) -> dict[str, Any]:

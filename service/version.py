@@ -30,7 +30,7 @@ def release_problem() -> str:
     installed = _version("robomark")
     if installed == GRADER_VERSION:
         return ""
-    return f"another release ({installed}) is installed than the one that runs ({GRADER_VERSION}); restart"
+    return f"the installed release ({installed}) differs from the running one ({GRADER_VERSION}); restart"
 
 
 @cache

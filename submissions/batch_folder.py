@@ -128,7 +128,7 @@ def _read(rows: Iterable[_Row]) -> BatchContents:
             if row.problem:
                 raise UsageError(row.problem)
             if row.student.id in near:
-                raise UsageError(f"{cannot_be_told(near[row.student.id])}; expected names that can be told apart.")
+                raise UsageError(f"{cannot_be_told(near[row.student.id])}; expected names that are clearly different.")
             found.append(row.read())
         except UsageError as error:
             found.append(" ".join(str(error).split()).removeprefix(f"{row.name}: "))
@@ -180,7 +180,7 @@ def _request(
     submission, own = _submission(found, folder, asked, student), asked
     if own is None:
         if submission.assignment is None:
-            raise UsageError("does not say which assignment it is for; name it with -a, or in its submission.toml.")
+            raise UsageError("has no assignment; name it with -a or in its submission.toml.")
         own = find(submission.assignment)
         submission = fit_parts(submission, own.parts)
     return GradingRequest(submission, own, found.source, found.submitted_at, student)
@@ -198,7 +198,7 @@ def _roster_request(
     folder: Path, row: RosterRow, asked: Assignment | None, find: Callable[[str], Assignment], student: Student
 ) -> GradingRequest:
     if not row.assignment and asked is None:
-        raise UsageError("names no assignment; name it with -a, or in a column assignment.")
+        raise UsageError("has no assignment; name it with -a or in a column assignment.")
     path = file_inside(folder, row.file)
     assignment = find(row.assignment) if row.assignment or asked is None else asked
     submission = read_submission(path, student=student.id, asked=assignment.parts)

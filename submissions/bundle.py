@@ -148,7 +148,7 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
     notes += [missing_part_note(part, submission.files) for part in missing]
     for part, source in parts.items():
         if source is not None and part not in wanted:
-            notes.append(f"{shown(source.name)} was left out: {PART_WORDS[part]} is not asked for.")
+            notes.append(f"{shown(source.name)} was left out: the assignment does not need {PART_WORDS[part]}.")
             parts[part] = None
     fitted = dataclasses.replace(submission, program=parts.get("program"), responder=parts.get("responder"))
     notes += [f"{name} is empty." for name in empty_parts(fitted)]
@@ -177,7 +177,7 @@ def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, wher
     parts: dict[Part, Code | None] = {"program": submission.program, "responder": submission.responder}
     givers: dict[Part, str] = {"program": asked.program, "responder": asked.responder}
     if all(parts[part] is not None for part, who in givers.items() if who == "student"):
-        note = f"{shown(notebook.name)} was left out: the files beside it are what is asked for."
+        note = f"{shown(notebook.name)} was left out: the assignment needs the other files."
         alone = dataclasses.replace(submission, notebook=None, notes=(*submission.notes, note))
         return fit_parts(alone, asked, where=where)
     if asked.program == "student":
@@ -186,9 +186,9 @@ def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, wher
     for source in (submission.program, submission.responder):
         if source is not None:
             files[source.name] = source.text.encode("utf-8", "surrogatepass")
-            notes.append(f"{shown(source.name)} lies beside the notebook; the notebook is what is run.")
+            notes.append(f"{shown(source.name)} is not used: the notebook is run instead.")
     if asked.program != "student" and runs_of(notebook):
-        notes.append(f"{shown(notebook.name)}: the assignment brings the robot program that is marked.")
+        notes.append(f"{shown(notebook.name)}: the assignment provides the robot program.")
     alone = dataclasses.replace(
         submission,
         program=None,
@@ -222,7 +222,7 @@ def _with_agents(submission: Submission, asked: Parts, where: str) -> Submission
         each for each in files if asked.agents.get(agent_of(each, asked.agents) or "", "student") != "student"
     ]:
         del files[name]
-        notes.append(f"{shown(name)} was left out: the assignment brings that agent itself.")
+        notes.append(f"{shown(name)} was left out: the assignment provides this agent.")
     if submission.notebook is not None:
         files = _written_by_cells(submission.notebook, asked.agents) | files
     there = {agent_of(name, asked.agents) for name in files}
@@ -265,7 +265,7 @@ def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submissio
     left_out = [each for each, data in files.items() if is_compiled(each, data)]
     for compiled in left_out:
         del files[compiled]
-        notes.append(f"{shown(compiled)} was left out: it is compiled code; submit the Python that it was made of.")
+        notes.append(f"{shown(compiled)} was left out: it is compiled code; submit its Python source.")
     if left_out and not files:
         raise UsageError(
             "%(where)s: has only %(names)s in it, which is not Python source, expected robot.py and responder.py.",
@@ -286,7 +286,7 @@ def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submissio
     student = shown_name(name)[:LONGEST_NAME].strip() or UNNAMED
     named = shown_name(text_of(meta, "student", where) or student)
     if named != student:
-        notes.append(f"{META} names the student {shown(named)}; the student is {shown(student)}, whatever it says.")
+        notes.append(f"{META} names the student {shown(named)}, but the student is {shown(student)}.")
     run = run_of(meta, where)
     if run is not None and notebook is None:
         notes.append(f"{META} says run = {shown_name(run)}, which is not used: there is no notebook.")
@@ -338,7 +338,7 @@ def _find_notebook(files: dict[str, bytes], where: str, notes: list[str]) -> Not
     scripts = [name for name in sorted(files) if name.lower().endswith(".py") and _is_script(files[name], name)]
     if len(scripts) != 1:
         return None
-    notes.append(f"{shown(scripts[0])} was read as the notebook that it was made of.")
+    notes.append(f"{shown(scripts[0])} was read as the notebook that it was exported from.")
     return read_script(decode_source(files.pop(scripts[0]), shown(scripts[0])).text, shown(scripts[0]))
 
 

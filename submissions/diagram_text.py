@@ -307,7 +307,9 @@ class _Reader:
     def _known(self, name: str, known: frozenset[str] | None, whose: str) -> str:
         if known is None or name in known:
             return name
-        raise mistake(self._line(), f"{name[:40]!r} is no attribute of {whose}{meant(name, known, 'label or color')}")
+        raise mistake(
+            self._line(), f"{name[:40]!r} is not an attribute of {whose}{meant(name, known, 'label or color')}"
+        )
 
     def _check_shape(self, shape: str) -> None:
         if shape not in SHAPES:

@@ -74,4 +74,4 @@ def _content(kind: str, piece: str) -> str:
 def _strange(rest: str) -> str:
     if rest[0] in _NEVER_ENDS and (rest[0] != "/" or rest.startswith("/*")):
         return f"{_NEVER_ENDS[rest[0]]} never ends"
-    return f"{rest[0]!r} has no meaning here, expected a name, an arrow such as ->, or a text in quotes"
+    return f"{rest[0]!r} is not valid here, expected a name, an arrow such as ->, or a text in quotes"

@@ -25,9 +25,7 @@ def read_list(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise UsageError(f"{path.name}: cannot be read: {error.strerror}.") from None
     except Unreadable as error:
-        raise UsageError(
-            f"{path.name}: cannot be read: {error}, expected Gradescope's list as it was exported."
-        ) from None
+        raise UsageError(f"{path.name}: cannot be read: {error}, expected the file exported from Gradescope.") from None
     if not isinstance(listed, dict):
-        raise UsageError(f"{path.name}: is no list of submissions, expected Gradescope's as it was exported.")
+        raise UsageError(f"{path.name}: is not a list of submissions, expected the file exported from Gradescope.")
     return {name: own for name, own in listed.items() if isinstance(name, str)}

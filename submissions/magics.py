@@ -261,7 +261,7 @@ class Simulator:
             self._move(x, y, angle)
         self._choose_noise(wanted["N"], wanted["M"])
         if "P" in values and values["P"] not in _PEN_COLOURS:
-            self._note(f"-P {values['P'][:40]} is no colour of the pen's; it has {', '.join(_PEN_COLOURS)}")
+            self._note(f"-P {values['P'][:40]} is not a pen colour; expected one of {', '.join(_PEN_COLOURS)}")
         return Setup(
             self.background,
             self.robot,

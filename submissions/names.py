@@ -67,7 +67,7 @@ def alike(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
 def cannot_be_told(others: Sequence[str]) -> str:
     """Return ``cannot be told from x`` with the reason."""
     listed = " and ".join(f'"{shown(other)}"' for other in others)
-    return f"cannot be told from {listed} (case, blanks, and letters that cannot be seen or look alike do not count)"
+    return f"cannot be distinguished from {listed} (case, spaces, and invisible or similar letters do not count)"
 
 
 def _folded(text: str) -> str:

@@ -229,14 +229,14 @@ def _list(value: object) -> list[Any]:
 
 def _cell_problem(raw: object) -> str:
     if not isinstance(raw, dict):
-        return "it is no cell"
+        return "it is not a cell"
     if not isinstance(raw.get("cell_type"), str):
-        return "it does not say what kind of cell it is"
+        return "it has no cell type"
     lines = _lines(raw)
     if raw["cell_type"] != "code" or isinstance(lines, str):
         return ""
     if not isinstance(lines, list) or not all(isinstance(line, str) for line in lines):
-        return "its code is no text"
+        return "its code is not text"
     return ""
 
 

@@ -16,7 +16,7 @@ from submissions.notebook import pack_notebook, read_notebook
 from submissions.raw_files import MAX_FILES
 from submissions.submission import META, PART_FILES, Part, Submission, parse_meta, run_of
 
-_KEPT = "the kept submission"
+_KEPT = "the stored submission"
 _PACKED_NOTEBOOK = "notebook.ipynb"
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time in the zip format
 

@@ -19,11 +19,11 @@ PART_WORDS: Mapping[Part, Sentence] = MappingProxyType(
 
 def taken_for_note(name: str, part: Part) -> str:
     """Return the note that a file with another name was used as a part."""
-    return f"{shown(name)} was taken for {PART_WORDS[part]}."
+    return f"{shown(name)} was used as {PART_WORDS[part]}."
 
 
 def missing_part_note(part: Part, files: Mapping[str, bytes]) -> str:
     """Return the note that a part is missing; ``files`` are the other files of the submission."""
     others = [shown(name) for name in files if name.lower().endswith(".py")]
-    beside = f" (beside it lies {', '.join(others[:3])})" if others else ""
-    return f"There is no {PART_FILES[part]}{beside}; what needs {PART_WORDS[part]} has no marks."
+    beside = f" (other files: {', '.join(others[:3])})" if others else ""
+    return f"There is no {PART_FILES[part]}{beside}; criteria that need {PART_WORDS[part]} get no marks."

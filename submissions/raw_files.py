@@ -106,7 +106,7 @@ def _within(where: str, name: str) -> str:
 
 def _twice(where: str, name: str) -> UsageError:
     if where == name:
-        return UsageError("%(where)s: is there twice, expected every file once.", where=where)
+        return UsageError("%(where)s: is included twice, expected every file once.", where=where)
     return UsageError("%(where)s: has %(name)s twice, expected every file once.", where=where, name=name)
 
 
@@ -298,11 +298,11 @@ def _plain_entries(infos: Iterable[ZipInfo], where: str) -> list[tuple[tuple[str
         kind = stat.S_IFMT(info.external_attr >> 16)
         if kind == stat.S_IFLNK:
             raise UsageError(
-                "%(where)s: has a link in it (%(name)s), expected the file itself.", where=where, name=shown(original)
+                "%(where)s: contains a link (%(name)s), expected the file itself.", where=where, name=shown(original)
             )
         if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
             raise UsageError(
-                "%(where)s: has something in it that is no file (%(name)s), expected files.",
+                "%(where)s: contains an entry that is not a file (%(name)s), expected files.",
                 where=where,
                 name=shown(original),
             )
@@ -370,7 +370,7 @@ def _list_folder(descriptor: int, where: str, notes: list[str]) -> tuple[list[st
             elif entry.is_symlink():
                 notes.append(f"{shown(entry.name)} is a link and was left out.")
             else:
-                notes.append(f"{shown(entry.name)} is no ordinary file and was left out.")
+                notes.append(f"{shown(entry.name)} is not a regular file and was left out.")
     return sorted(files), sorted(folders)
 
 
@@ -386,5 +386,5 @@ def _regular_file(where: str, name: str, folder: int | None) -> contextlib.Abstr
         ) from None
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise UsageError("%(where)s: is no ordinary file, expected one that can be read.", where=shown(where))
+        raise UsageError("%(where)s: is not a regular file, expected a readable file.", where=shown(where))
     return os.fdopen(descriptor, "rb")

@@ -98,7 +98,7 @@ def moment(text: str, *, end_of_day: bool = False) -> datetime:
 
 def _problem(student: str, file: str) -> str:
     if not student:
-        return "names no student."
+        return "has no student."
     if len(student) > LONGEST_NAME:
         return f"has a student's name of {len(student)} characters, expected at most {LONGEST_NAME}."
-    return "" if file else "names no file."
+    return "" if file else "has no file."

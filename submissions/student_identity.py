@@ -83,8 +83,8 @@ class People:
             if written.name in ("", NAMELESS) or _key(written.name).endswith(_key(known.name)):
                 return known
             raise UsageError(
-                f"{self.file} has {shown(known.name)} as Participant {number}, not {shown(written.name)}; "
-                "expected the table of this very assignment."
+                f"{self.file} has {shown(known.name)} as Participant {number}, not {shown(written.name)}; expected "
+                "the table of this assignment."
             )
         # With group submissions, Moodle puts the group before the name: Group 1-Ada.
         for key in (*whole, *(key.partition("-")[2] for key in whole)):
@@ -94,7 +94,7 @@ class People:
             if found:
                 raise UsageError(
                     f"{len(found)} people in {self.file} are called {shown(whole.get(key, key))}, expected a table "
-                    "that tells them apart by the Identifier of Moodle's worksheet, or by id."
+                    "that distinguishes them by the Identifier of Moodle's worksheet, or by id."
                 )
         name = written.name or written.id
         hint = did_you_mean(name, {each.name or each.id for several in self.called.values() for each in several})
@@ -150,11 +150,11 @@ def _students(rows: Sequence[CsvRow], file: str) -> Iterator[tuple[CsvRow, Stude
         lines.setdefault(_key(own), []).append(str(row.line))
     for row, own, name, email in zip(rows, ids, names, emails, strict=True):
         if not own:
-            raise UsageError(f"{file}: line {row.line} names nobody, expected an id, a name or an e-mail address.")
+            raise UsageError(f"{file}: line {row.line} has no id, name or e-mail address, expected one of them.")
         if len(lines[_key(own)]) > 1:
             raise UsageError(
-                f"{file}: lines {' and '.join(lines[_key(own)][:5])}: {shown(own)} is the id of several, "
-                "expected one for each."
+                f"{file}: lines {' and '.join(lines[_key(own)][:5])}: {shown(own)} is the id of several students, "
+                "expected a different id for each."
             )
         yield row, Student(own, name, email)
 

@@ -25,7 +25,7 @@ def list_appeals(
         found += appeals.list_answered(service, actor, course_id) if answered else []
     document(appeals=found)
     if not found:
-        tell("no appeal is open")
+        tell("no open appeals")
         return
     listed = table("number", "asked", "student", "assignment", "grade", "text", "answer", right=("number",))
     for each in found:
@@ -43,4 +43,4 @@ def answer(
     with operating() as (service, actor):
         appeals.answer(service, actor, courses.find(service, actor, course), number, text)
     document(appeal=number)
-    tell(f"appeal {number} is answered")
+    tell(f"appeal {number} answered")

@@ -46,7 +46,7 @@ def policy(
     """Set the policy, which replaces the earlier one; without options, show it."""
     allowed = PolicyLimits(_due(due), late_days, attempts, cool_down * 60)
     if drop and allowed != PolicyLimits():
-        raise UsageError("--drop takes away what was set, expected no other limits beside it")
+        raise UsageError("--drop removes all limits, expected no other limits with it")
     with operating() as (service, actor):
         course_id = courses.find(service, actor, course)
         if drop:
@@ -75,7 +75,7 @@ def extend(
         policies.extend(service, actor, course_id, member.enrolment_id, request)
     student = member.id
     until = "" if due_at is None else f" until {due_at:%Y-%m-%d %H:%M}"
-    more = f", {more_attempts} times more" if more_attempts else ""
+    more = f", {more_attempts} more attempts" if more_attempts else ""
     document(student=student, assignment=assignment, due=due_at, more_attempts=more_attempts)
     tell(f"{student}: {assignment or 'every assignment'} may be submitted{until}{more}")
 
@@ -125,7 +125,7 @@ def remove_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> Non
     with operating() as (service, actor):
         assignments.remove(service, actor, courses.find(service, actor, course), assignment)
     document(assignment=assignment)
-    tell(f"{assignment} is in the course no more")
+    tell(f"{assignment} is removed from the course")
 
 
 def hide_names(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
@@ -144,7 +144,7 @@ def list_courses() -> None:
         found = courses.list_courses(service, actor)
     document(courses=found)
     if not found:
-        tell("there is no course yet")
+        tell("no courses yet")
         return
     listed = table("name", "instructors", "students", right=("instructors", "students"))
     for each in found:
@@ -169,7 +169,7 @@ def _tell_state(line: CourseAssignment) -> None:
         closed_at=line.closed_at,
         version=line.version,
     )
-    state = "is open" if line.open else "is closed" if line.closed_at else "is prepared, and not open yet"
+    state = "is open" if line.open else "is closed" if line.closed_at else "is not open yet"
     tell(f"{line.assignment} {state}")
 
 
@@ -185,7 +185,7 @@ def _due(text: str | None) -> datetime | None:
 def _show(found: dict[str, PolicyLimits]) -> None:
     document(policies=[{"assignment": name, **asdict(allowed)} for name, allowed in found.items()])
     if not found:
-        tell("no policy: everything that is submitted is marked, whenever it comes")
+        tell("no policy: all submissions are marked at any time")
         return
     listed = table("assignment", "due", "late days", "attempts", "cool-down")
     for assignment, allowed in found.items():

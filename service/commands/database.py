@@ -38,7 +38,7 @@ def restore_database(file: Annotated[Path, typer.Argument(help="What db backup m
     with operating() as (service, actor):
         where = database.restore(service, actor, file)
     document(database=where, file=file)
-    tell(f"{where} has what {file} has")
+    tell(f"{where} restored from {file}")
 
 
 def purge_database(
@@ -55,7 +55,7 @@ def purge_database(
     except ValueError:
         raise UsageError(f"--before {before}: expected a date like 2025-09-01") from None
     if archive is not None and for_good:
-        raise UsageError("--archive keeps a copy and --for-good keeps none; name one of them")
+        raise UsageError("--archive keeps a copy and --for-good keeps none; use one of them")
     only_count = archive is None and not for_good
     with operating() as (service, actor):
         if archive is not None:
@@ -63,4 +63,6 @@ def purge_database(
         gone = (database.count_old if only_count else database.remove_old)(service, actor, earliest_kept)
     counted = f"{gone.submissions} submissions, {gone.grades} grades, {gone.students} students"
     document(removed=not only_count, archive=archive, **asdict(gone))
-    tell(f"{counted} would go; --archive FILE or --for-good removes them" if only_count else f"removed: {counted}")
+    tell(
+        f"{counted} to remove; use --archive FILE or --for-good to remove them" if only_count else f"removed: {counted}"
+    )

@@ -22,4 +22,4 @@ def doctor() -> None:
     show(looked_at)
     wrong = [finding.what for finding in findings if not finding.well]
     if wrong:
-        raise HostError(f"not well: {', '.join(wrong)}")
+        raise HostError(f"problems: {', '.join(wrong)}")

@@ -110,7 +110,7 @@ def grade_all(
         sys.stdout.write(together(rows))
     if worst is not None:
         kind = UsageError if isinstance(worst, UsageError) else HostError
-        raise kind("not every submission could be graded")
+        raise kind("some submissions could not be graded")
 
 
 def _with_run(submission: Submission, run: str | None) -> Submission:
@@ -118,7 +118,7 @@ def _with_run(submission: Submission, run: str | None) -> Submission:
     if run is None:
         return submission
     if submission.notebook is None:
-        raise UsageError(f"{submission.student}: is no notebook and has no run {run}; leave --run out.")
+        raise UsageError(f"{submission.student}: is not a notebook and has no run {run}; omit --run.")
     return replace(submission, run=run)
 
 
@@ -137,7 +137,7 @@ def _on_channel(asked: Assignment, given: Mapping[str, object]) -> Assignment:
 def _tried(given: Mapping[str, object]) -> tuple[str, ...]:
     """Return the notes for a grade that was made with channel flags."""
     words = ", ".join(f"{name} {value}" for name, value in given.items())
-    return (f"tried with another channel than the assignment's ({words}); these are not its marks",) if given else ()
+    return (f"graded with another channel than the assignment's ({words}); these marks do not count",) if given else ()
 
 
 def _print(form: Format, graded: Grade, submission: Submission) -> None:
@@ -173,9 +173,7 @@ def read_with_assignment(path: Path, asked: Assignment | None) -> tuple[Submissi
         return read_submission(path, asked=asked.parts), asked
     submission = read_submission(path)
     if submission.assignment is None:
-        raise UsageError(
-            f"{path}: which assignment is this for? name it with -a, or in the submission's submission.toml"
-        )
+        raise UsageError(f"{path}: the assignment is unknown; name it with -a or in the submission's submission.toml")
     try:
         asked = find_in_catalogue(submission.assignment)
     except UsageError as error:

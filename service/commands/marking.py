@@ -108,7 +108,7 @@ def history(grade: GradeId) -> None:
     for each in written:
         tell(f"comment {each.id} of {each.actor}{f' on {each.criterion}' if each.criterion else ''}: {each.text}")
     if done:
-        told = table("when", "who", "did", "criterion", "before", "after", "why, or what")
+        told = table("when", "who", "did", "criterion", "before", "after", "reason or text")
         for step in done:
             when = step.at.astimezone().strftime("%Y-%m-%d %H:%M")
             told.add_row(when, step.actor, step.action, step.criterion, step.before, step.after, step.text)

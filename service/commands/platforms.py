@@ -49,7 +49,7 @@ def list_platforms() -> None:
         found = platforms.list_platforms(service, actor)
     document(platforms=found)
     if not found:
-        tell("no learning platform is registered")
+        tell("no learning platforms yet")
         return
     listed = table("name", "issuer", "client", "deployments")
     for each in found:

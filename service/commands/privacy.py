@@ -48,12 +48,12 @@ def delete_student(
     The audit log keeps an entry without the name. Earlier backups still contain the data.
     """
     if not for_good:
-        raise UsageError("this cannot be undone; say --for-good, after export-student if a copy is wanted")
+        raise UsageError("this cannot be undone; export a copy with export-student if needed, then use --for-good")
     with operating() as (service, actor):
         member = people.find(service, actor, DEFAULT_COURSE, student)
         gone = privacy.erase_student(service, actor, member.course_id, member.enrolment_id)
     document(submissions=gone.submissions, grades=gone.grades)
-    tell(f"removed: {gone.submissions} submissions, {gone.grades} grades, and who the student was")
+    tell(f"removed: {gone.submissions} submissions, {gone.grades} grades, and the student's identity")
 
 
 def purge_course(
@@ -66,7 +66,7 @@ def purge_course(
     Without --archive or --for-good, show how much would be removed.
     """
     if archive is not None and for_good:
-        raise UsageError("--archive keeps a copy and --for-good keeps none; name one of them")
+        raise UsageError("--archive keeps a copy and --for-good keeps none; use one of them")
     only_count = archive is None and not for_good
     with operating() as (service, actor):
         course_id = courses.find(service, actor, DEFAULT_COURSE)
@@ -75,4 +75,6 @@ def purge_course(
         gone = privacy.purge(service, actor, course_id, PurgeRequest(older_than, only_count))
     counted = f"{gone.submissions} submissions, {gone.grades} grades, {gone.students} students"
     document(removed=not only_count, archive=archive, **asdict(gone))
-    tell(f"{counted} would go; --archive FILE or --for-good removes them" if only_count else f"removed: {counted}")
+    tell(
+        f"{counted} to remove; use --archive FILE or --for-good to remove them" if only_count else f"removed: {counted}"
+    )

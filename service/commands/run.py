@@ -125,7 +125,7 @@ class Kept:
         if self.picture is not None and self.picture.suffix.lower() != ".png":
             raise UsageError(f"--picture {self.picture}: expected a name that ends in .png")
         if self.over is not None and self.replay is None:
-            raise UsageError("--over draws over what a replay shows; expected --replay too")
+            raise UsageError("--over needs a replay; expected --replay too")
 
 
 @with_option_groups

@@ -96,11 +96,11 @@ def _run_notebook(
     path: Path, notebook: Notebook, options: RunOptions, conditions: Conditions, kept: Kept, runner: TrialRunner
 ) -> None:
     if conditions.responder is not None:
-        raise UsageError(f"{path.name} is a notebook and answers the robot itself; leave --responder out")
+        raise UsageError(f"{path.name} is a notebook and answers the robot itself; omit --responder")
     if conditions.second is not None:
-        raise UsageError(f"{path.name} is a notebook and starts its robots itself; leave --second out")
+        raise UsageError(f"{path.name} is a notebook and starts its robots itself; omit --second")
     if kept.over is not None:
-        raise UsageError(f"{path.name} is a notebook, which no other program is run over; leave --over out")
+        raise UsageError(f"{path.name} is a notebook and cannot have an overlay; omit --over")
     text = "\n".join(cell.source for cell in notebook.cells)
     executed = run_notebook(notebook, read_files_beside(path, text), options, runner)
     runs = [{"cell": run.cell, **_told(run.recording)} for run in executed.runs]
@@ -115,7 +115,7 @@ def _run_program(
     program: ProgramFile, options: RunOptions, conditions: Conditions, kept: Kept, runner: TrialRunner
 ) -> None:
     if kept.diagrams is not None:
-        raise UsageError(f"{program.path.name} is not a notebook and draws no diagrams; leave --diagrams out")
+        raise UsageError(f"{program.path.name} is not a notebook and has no diagrams; omit --diagrams")
     ran = run_program(
         program,
         options,

@@ -30,14 +30,14 @@ def check() -> None:
     tell(f"robot programs: {robot}")
     tell(f"responders: {responder}")
     if no_bubblewrap is None:
-        tell("extra: bubblewrap gives them name spaces of their own")
+        tell("extra: bubblewrap gives them separate namespaces")
     else:
-        tell(f"extra: bubblewrap, which would give them name spaces of their own, is not used: {no_bubblewrap}")
+        tell(f"extra: bubblewrap, which provides separate namespaces, is not used: {no_bubblewrap}")
     if no_group is None:
-        tell("extra: a worker started from here has a control group for each grading at a time")
+        tell("extra: a worker started from here has a control group for each concurrent grading")
     else:
-        tell(f"extra: a worker started from here has no control group for each grading at a time: {no_group}")
+        tell(f"extra: a worker started from here has no control group for each concurrent grading: {no_group}")
     if kept is None:
-        tell("between trials: a trial can leave nothing for the next")
+        tell("between trials: no data remains between trials")
     else:
-        tell(f"between trials: a trial can leave something for the next, so hidden scenarios are not graded: {kept}")
+        tell(f"between trials: data can remain between trials, so hidden scenarios are not graded: {kept}")

@@ -66,7 +66,7 @@ def answer(host: str, port: int) -> None:
     check_reach(host, settings)
     database.upgrade(settings)
     with listen(host, port) as listening:
-        announce("serve.answers", f"robomark answers on {address(listening)}; Ctrl-C ends it")
+        announce("serve.answers", f"robomark is running on {address(listening)}; press Ctrl-C to stop")
         try:
             serve_on(settings, listening)
         except KeyboardInterrupt:
@@ -79,15 +79,15 @@ def _keep_up(settings: Settings, service: Supervisor, where: str) -> None:
             service.ensure()
             count = len(service.workers)
             workers = "1 worker" if count == 1 else f"{count} workers"
-            announce("up.coming", f"robomark is coming up in {settings.home}: {workers}{where}")
+            announce("up.coming", f"robomark is starting in {settings.home}: {workers}{where}")
             _until_ready(service)
-            announce("up.ready", f"ready: {count * settings.concurrency} gradings at a time; Ctrl-C ends it")
+            announce("up.ready", f"ready: concurrency {count * settings.concurrency}; press Ctrl-C to stop")
             while True:
                 _ensure(service)
                 time.sleep(_LOOK_SECONDS)
         except KeyboardInterrupt:
             given_back = service.stop()
-            announce("up.ended", f"ended; jobs in flight that went back: {given_back}")
+            announce("up.ended", f"stopped; running jobs returned to the queue: {given_back}")
             raise
 
 
@@ -97,12 +97,12 @@ def _told_link(settings: Settings, link: str) -> str:
     Standard output that is not a terminal often goes to a journal that many people can read.
     """
     if sys.stdout.isatty():
-        return f"sign in by {link}"
+        return f"sign in with {link}"
     path = settings.home / _LINK_FILE
     path.unlink(missing_ok=True)
     with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as stream:
         stream.write(f"{link}\n")
-    return f"sign in by the link in {path}"
+    return f"sign in with the link in {path}"
 
 
 def _first_link(service: Service, actor: Actor, listening_at: str) -> str:

@@ -48,9 +48,9 @@ def show(
 ) -> None:
     """Show a stored grade: its marks and the evidence for them."""
     if over is not None and output is None and replay is None:
-        raise UsageError("--over lays trials over those of a replay; expected --replay or --output too")
+        raise UsageError("--over needs a replay; expected --replay or --output too")
     if trial is not None and film is None:
-        raise UsageError("--trial says which trial a film shows; expected --film too")
+        raise UsageError("--trial needs a film; expected --film too")
     with operating() as (service, actor):
         line = stored_grades.find(service, actor, grade)
         others = None if over is None else _over(service, actor, over, line)

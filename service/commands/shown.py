@@ -113,4 +113,4 @@ def _plain(value: Any) -> Any:
             return dict(value)
     if is_dataclass(value):
         return {field.name: getattr(value, field.name) for field in fields(value)}
-    raise TypeError(f"{type(value).__name__} has no place in a document")
+    raise TypeError(f"{type(value).__name__} cannot be written to a JSON document")

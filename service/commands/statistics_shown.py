@@ -34,7 +34,7 @@ def statistics_parts(found: Iterable[AssignmentStatistics]) -> Iterator[Renderab
             shares.add_row(one_line(criterion.title), f"{criterion.mean_share:.0%}")
         yield shares
         if each.causes:
-            causes = table("commonest causes", "students", "who", right=("students",))
+            causes = table("most common causes", "students", "who", right=("students",))
             for cause in each.causes[:_MOST_CAUSES]:
                 causes.add_row(one_line(cause.sentence), str(len(cause.students)), named(cause.students))
             yield causes

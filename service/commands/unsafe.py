@@ -7,4 +7,4 @@ import sys
 
 def warn_of_no_sandbox() -> None:
     """Print the warning. ``--quiet`` does not suppress it."""
-    print("robomark: NO SANDBOX: these submissions can read and change everything that you can", file=sys.stderr)
+    print("robomark: NO SANDBOX: these submissions can read and change all your files", file=sys.stderr)

@@ -32,7 +32,7 @@ def add(
 ) -> None:
     """Add an instructor or a student to a course, and print a sign-in link, which works once."""
     if student and operator:
-        raise UsageError("a student does not run the installation: say --student or --operator")
+        raise UsageError("a student cannot be an operator: use --student or --operator")
     role = Role.STUDENT if student else Role.INSTRUCTOR
     with operating() as (service, actor):
         added = courses.add_member(service, actor, MemberRequest(course, who, name, email, role, operator))
@@ -40,7 +40,8 @@ def add(
     _tell_link(service.settings, member.id, added.secret)
     for other, instructor in added.elsewhere:
         note(
-            f"{_called(instructor)} instructs {other}, too. If this is the same person: robomark user join {member.id} "
+            f"{_called(instructor)} is also an instructor of {other}. If this is the same person: robomark user join "
+            f"{member.id} "
             f"--course {course} --same-as {instructor.id} --of {other}"
         )
 
@@ -76,7 +77,7 @@ def links(
     ]
     document(links=lines)
     if not lines:
-        tell("the course has no students")
+        tell("no students yet")
         return
     listed = table("id", "name", "address", "link")
     for line in lines:
@@ -84,7 +85,7 @@ def links(
         listed.add_row(*(str(each) for each in (line["id"], line["name"], line["email"], link)))
     show(listed)
     if not public:
-        note("the links follow the address that robomark up or serve prints")
+        note("add each link to the address that robomark up or serve prints")
 
 
 def token(
@@ -120,7 +121,7 @@ def sign_out(
         member = people.find(service, actor, course, who)
         ended = people.sign_out(service, actor, member.enrolment_id, release=release)
     document(id=member.id, ended=ended)
-    tell(f"{_called(member)} is signed out: {ended} links, sessions and tokens ended")
+    tell(f"{_called(member)} is signed out: {ended} links, sessions and tokens revoked")
 
 
 def remove(who: Id, course: Course = DEFAULT_COURSE) -> None:
@@ -147,7 +148,7 @@ def join(
         other = people.find(service, actor, of, same_as)
         people.join(service, actor, JoinRequest(member.enrolment_id, other.enrolment_id, from_platform))
     document(id=member.id, course=course, same_as=other.id, of=of)
-    tell(f"{_called(member)} in {course} and {_called(other)} in {of} are one person now")
+    tell(f"{_called(member)} in {course} and {_called(other)} in {of} are now one person")
 
 
 def list_people(course: Course = DEFAULT_COURSE) -> None:
@@ -170,7 +171,7 @@ def _tell_link(settings: Settings, who: str, secret: str) -> None:
     path = f"/sign-in/{secret}"
     where = f"{settings.public_url}{path}" if settings.public_url else path
     document(id=who, path=path, url=f"{settings.public_url}{path}" if settings.public_url else None)
-    tell(where if settings.public_url else f"{path}   (behind the address that robomark up or serve prints)")
+    tell(where if settings.public_url else f"{path}   (add this to the address that robomark up or serve prints)")
 
 
 def _called(member: Member) -> str:

@@ -25,10 +25,14 @@ Row = tuple[TrialResult, TrialResult]
 
 #: Explanation of a difference, by cause.
 _REASONS = {
-    "program": "three gradings of it in fresh processes differ from each other, so the program uses chance of its own, "
-    "such as addresses of objects or the processor's clock",
-    "grader": "three gradings of it in fresh processes are the same, so the fault is Robomark's and not the program's; "
-    "please report it with both versions",
+    "program": (
+        "three gradings in fresh processes differ from each other, so the program depends on outside values, such as "
+        "object addresses or the processor's clock"
+    ),
+    "grader": (
+        "three gradings in fresh processes are the same, so this is a fault in Robomark; please report it with both "
+        "versions"
+    ),
 }
 #: The machine and its load decide when such a trial ends, so its hash can differ.
 _CUT = frozenset({Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR})
@@ -50,16 +54,18 @@ def verify_grade(grade: str) -> None:
         hashes = (before.recording.sha256[:16], after.recording.sha256[:16])
         compared.add_row(before.scenario, str(before.index), *hashes, _compared(before, after))
     show(compared)
-    tell(f"marks: {stored.marks} stored, {again.marks} again")
+    tell(f"marks: {stored.marks} stored, {again.marks} regraded")
     if grading.grader_sha256 != grader_sha256():
-        note(f"graded by Robomark {stored.grader_version}, again by {GRADER_VERSION}; their code or libraries differ")
+        note(
+            f"graded by Robomark {stored.grader_version}, regraded by {GRADER_VERSION}; their code or libraries differ"
+        )
     for result, compared_marks in zip(stored.criteria, marks, strict=False):
         if compared_marks != "same":
             note(f"the marks of {result.title} differ ({compared_marks})")
     if not same:
         reason = f": {_REASONS[cause]}" if cause else ""
-        raise HostError(f"grade {grading.job_id} is not what grading it again gives{reason}")
-    tell(f"grade {grading.job_id} is what grading it again gives")
+        raise HostError(f"grade {grading.job_id} does not match its regrade{reason}")
+    tell(f"grade {grading.job_id} matches its regrade")
 
 
 def _grade_again(request: GradingRequest, secret: Secret, earlier: int = 0) -> Grade:
@@ -118,12 +124,12 @@ def _secret_of(grading: Grading) -> Secret:
     """Return the secret that the grading used. Raises HostError if this installation has another secret."""
     own, needed = grading.own_secret, grading.secret_sha256
     if needed is None:
-        note("graded before this installation had a secret: again in the worlds of then")
+        note("graded before this installation had a secret: regraded in the same worlds")
         return PUBLIC
     if needed != own.sha256:
         raise HostError(
-            f"grade {grading.job_id} cannot be verified with this secret: its worlds are of {name_of(needed)}, "
-            f"and the secret here is {own.name}; set ROBOMARK_SECRET to the one that it was graded with"
+            f"grade {grading.job_id} cannot be verified with this secret: it was graded with {name_of(needed)}, and "
+            f"the secret here is {own.name}; set ROBOMARK_SECRET to the original secret"
         )
     note(f"secret: {own.name}")
     return own

@@ -38,7 +38,7 @@ def add(
         line, secret = webhooks.create(service, actor, courses.find(service, actor, course), url, chosen)
     document(webhook=line, secret=secret)
     tell(secret)
-    note(f"webhook {line.id} is added; its secret is not shown again")
+    note(f"webhook {line.id} added; its secret is shown only once")
 
 
 def list_webhooks(course: Course = DEFAULT_COURSE) -> None:
@@ -49,7 +49,7 @@ def list_webhooks(course: Course = DEFAULT_COURSE) -> None:
         found = webhooks.list_webhooks(service, actor, courses.find(service, actor, course))
     document(webhooks=found)
     if not found:
-        tell("the course has no webhooks")
+        tell("no webhooks yet")
         return
     listed = table("id", "created", "events", "address")
     for each in found:
@@ -68,7 +68,7 @@ def remove(
     with operating() as (service, actor):
         webhooks.revoke(service, actor, courses.find(service, actor, course), webhook)
     document(webhook=webhook)
-    tell(f"webhook {webhook} is removed")
+    tell(f"webhook {webhook} removed")
 
 
 def list_deliveries(
@@ -82,7 +82,7 @@ def list_deliveries(
         found = webhooks.list_deliveries(service, actor, courses.find(service, actor, course), limit)
     document(deliveries=found)
     if not found:
-        tell("no deliveries")
+        tell("no deliveries yet")
         return
     listed = table("made", "webhook", "event", "attempts", "delivered", "error", right=("attempts",))
     for each in found:

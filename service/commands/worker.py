@@ -34,4 +34,4 @@ def worker(
         with EmbeddedBroker(settings) as broker:
             status = run_worker(broker.settings, unsafe=unsafe)
     if status:
-        raise HostError(f"the worker ended with status {status}; its log says why")
+        raise HostError(f"the worker stopped with status {status}; see its log")

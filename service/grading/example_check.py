@@ -109,7 +109,9 @@ def check_examples(name_or_path: str, *, runner: TrialRunner) -> CheckedAssignme
         if name == REFERENCE and graded is not None:
             measures = tuple(_compared(original, graded) for original in wanted.original)
     missing = sorted(wanted.examples.keys() - set(names))
-    results += [ExampleResult(name, None, (), 0.0, (f"{name}: is expected, but is no example",)) for name in missing]
+    results += [
+        ExampleResult(name, None, (), 0.0, (f"{name}: is expected, but is not an example",)) for name in missing
+    ]
     return CheckedAssignment(assignment, tuple(results), measures)
 
 
@@ -146,7 +148,7 @@ def _check_example(
 
 
 def _no_table(name: str) -> str:
-    return f"{name}: has no table in {EXPECTED} (check --write-expected notes what it got)"
+    return f"{name}: has no table in {EXPECTED} (check --write-expected writes its results)"
 
 
 def _found(graded: Grade, lost: tuple[str, ...]) -> Expectation:
@@ -183,7 +185,7 @@ def _differences(graded: Grade, lost: tuple[str, ...], wanted: Expectation | Non
         found.append(f"ended as {graded.verdict}, expected {wanted.verdict}{_fault(graded)}")
     if wanted.loses is not None and set(lost) != set(wanted.loses):
         found.append(f"lost marks in {', '.join(lost) or 'nothing'}, expected {', '.join(wanted.loses) or 'nothing'}")
-    found += [f'was not told "{phrase}", but {told}' for phrase in wanted.feedback if phrase not in told]
+    found += [f'did not get the feedback "{phrase}", but {told}' for phrase in wanted.feedback if phrase not in told]
     return found
 
 

@@ -261,4 +261,4 @@ class Grade:
 def unjudged_notes(criteria: Sequence[CriterionResult]) -> tuple[str, ...]:
     """Return a note on the number of criteria that could not be judged; empty if all were judged."""
     count = sum(bool(result.unjudged) for result in criteria)
-    return (f"{count} of {len(criteria)} criteria could not be judged; staff will look at it",) if count else ()
+    return (f"{count} of {len(criteria)} criteria could not be judged; staff will review them",) if count else ()

@@ -94,7 +94,7 @@ def grade(
         student=submission.student,
         criteria=criteria,
         trials=tuple(results),
-        sandbox=results[0].recording.sandbox if results else analysis.sandbox or "no student code was run",
+        sandbox=results[0].recording.sandbox if results else analysis.sandbox or "no student code ran",
         grader_version=GRADER_VERSION,
         notes=(
             *submission.notes,
@@ -172,8 +172,8 @@ def _spared_notes(results: Sequence[TrialResult]) -> tuple[str, ...]:
     shown = [result.recording.notes for result in results if result.visibility == "visible"]
     counts = [(note, sum(note in notes for notes in shown)) for note in SPARED.values()]
     return tuple(
-        f"{note.replace('this trial', f'{count} of {len(shown)} trials')}: two trials had ended in the same fault, it "
-        "uses no chance, and it was told nothing else, so it would have done the same"
+        f"{note.replace('this trial', f'{count} of {len(shown)} trials')}: two trials had ended with the same fault, "
+        "and the program had the same input and uses no random numbers, so the result would be the same"
         for note, count in counts
         if count
     )

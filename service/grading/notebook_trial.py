@@ -48,7 +48,7 @@ class NotebookTrial:
         instead = self._instead(started) if executed.marked is None else None
         if instead is not None:
             assert site is not None
-            never = f"the run of cell {site.cell} was never come to, so that of cell {instead.cell} is marked"
+            never = f"the run of cell {site.cell} never started, so the run of cell {instead.cell} is marked"
             executed, _ = self._execute(spec, obstacles, instead, runner, meter)
             executed = replace(executed, notes=(never, *executed.notes))
             site = instead
@@ -116,13 +116,13 @@ def _why_not(executed: ExecutedNotebook, site: Site | None) -> Fault:
 
     It counts as a fault of the program, which did not run.
     """
-    never = f"The robot program of cell {site.cell} is marked, and was never run." if site is not None else ""
+    never = f"The robot program of cell {site.cell} is marked, but it never ran." if site is not None else ""
     failed = next((fault for fault in executed.raised if site is not None and fault.cell == site.cell), None)
     cause = executed.stopped or failed
     if cause is None:
         hint = f"In {executed.raised[0].place}: {executed.raised[0].message}" if executed.raised else ""
         cell = site.cell if site is not None else None
-        message = f"{never} Nothing in the notebook came to it."
+        message = f"{never} No cell of the notebook started it."
         return Fault(0.0, Verdict.PROGRAM_ERROR, "program", message, cell=cell, hint=hint)
     verdict = Verdict.PROGRAM_ERROR if cause.verdict is Verdict.RESPONDER_ERROR else cause.verdict
     return replace(cause, who="program", verdict=verdict, hint=never)

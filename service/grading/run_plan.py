@@ -165,13 +165,13 @@ def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
     head = _read_head(code.text, assignment) if code is not None else _Head(Flags(), "", ())
     notes = head.notes
     if submission.responder is not None and responder is not submission.responder:
-        notes += ("your responder is not used: this assignment brings its own, or none",)
+        notes += ("your responder is not used: this assignment uses another one, or none",)
     files = _files(submission, assignment, asked.program)
     program = _program(Code(code.name, head.text), head.flags, files, assignment) if code is not None else None
     beside = _responder(responder, _files(submission, assignment, asked.responder), assignment)
     plan = _beside_each_other(ProgramTrial(), program, head.flags, beside, assignment, notes)
     if missing == "program" and (asking := _stand_in(assignment)) is not None:
-        asked_by = "your responder was asked by a program of Robomark's own, which only sends the texts"
+        asked_by = "your responder was called by a Robomark program that only sends the texts"
         plan = replace(plan, program=asking, notes=(*plan.notes, asked_by))
     # Text sent to a missing responder is still a message.
     collaborative = plan.collaborative or missing == "responder"
@@ -203,7 +203,7 @@ def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignm
         # Executing the notebook reports an unreadable magic line, and may reach another cell.
         notes = () if head.ignored else head.notes
         if cell is not None:
-            again = "" if site.cell == cell.number else f", as it is run again by cell {site.cell}"
+            again = "" if site.cell == cell.number else f", because it is run again by cell {site.cell}"
             marked = f"the robot program in cell {cell.number} of {notebook.name} is marked{again}"
             notes = (marked, *choice.notes, *notes)
         return _executed(submission, notebook, assignment, Code(notebook.name, head.text), head.flags, notes, choice)

@@ -124,7 +124,7 @@ def _answers(criterion: SourceRules, plan: RunPlan, caller: FunctionCaller, mete
     called = caller.call(_READER, calls, 0, meter)
     fault = called.fault or called.returned[0].fault
     if fault is not None:
-        return SourceAnswers(error=f"it cannot be taken apart ({fault_words(fault)})")
+        return SourceAnswers(error=f"it cannot be analysed ({fault_words(fault)})")
     return SourceAnswers.read(called.returned[0].value, criterion)
 
 

@@ -151,7 +151,7 @@ class TrialRunner:
         """
         reason = self._sandboxes.remembers() if self._sandboxes.isolation.seccomp else None
         if reason is not None:
-            raise HostError(f"a trial could leave something for the next, so nothing hidden is graded here: {reason}")
+            raise HostError(f"a trial could leave data for the next, so hidden scenarios are not graded here: {reason}")
 
     @property
     def children_cpu_seconds(self) -> float:

@@ -11,7 +11,7 @@ from sim.recording import Verdict
 #: Every verdict has a label.
 ENDED: Mapping[Verdict, str] = MappingProxyType(
     {
-        Verdict.FINISHED: translatable("finished"),
+        Verdict.FINISHED: translatable("completed"),
         Verdict.PROGRAM_ERROR: translatable("error in the robot program"),
         Verdict.RESPONDER_ERROR: translatable("error in the responder"),
         Verdict.PROTOCOL_ERROR: translatable("answer could not be read"),
@@ -20,8 +20,8 @@ ENDED: Mapping[Verdict, str] = MappingProxyType(
         Verdict.MEMORY_LIMIT: translatable("used too much memory"),
         Verdict.OUTPUT_LIMIT: translatable("printed too much"),
         Verdict.STALLED: translatable("stopped responding"),
-        Verdict.SANDBOX_VIOLATION: translatable("did something not allowed"),
-        Verdict.ASSIGNMENT_ERROR: translatable("assignment is broken"),
+        Verdict.SANDBOX_VIOLATION: translatable("action not allowed"),
+        Verdict.ASSIGNMENT_ERROR: translatable("error in the assignment"),
         Verdict.HOST_ERROR: translatable("grading failed"),
     }
 )

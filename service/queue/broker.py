@@ -140,7 +140,9 @@ class EmbeddedBroker:
                     if broker_answers(self._settings):
                         return
                     if time.monotonic() > until:
-                        raise HostError(f"the broker of {self._settings.home} runs but does not answer; end it first")
+                        raise HostError(
+                            f"the broker of {self._settings.home} is running but does not respond; stop it first"
+                        )
                     time.sleep(0.05)
                 if not broker_answers(self._settings):
                     self._start(lock.fileno())
@@ -157,7 +159,7 @@ class EmbeddedBroker:
         shutil.rmtree(aside, ignore_errors=True)
         data.replace(aside)
         if not self._begin(data, log, lock):
-            raise HostError(f"the bundled broker does not start; {log} may tell why")
+            raise HostError(f"the bundled broker does not start; see {log}")
 
     def _begin(self, data: Path, log: Path, lock: int) -> bool:
         """Start the server and wait for a response. Return False if it exits immediately or does not respond."""

@@ -31,7 +31,7 @@ class EmbeddedServices:
         """Start missing services. Raises HostError if one cannot be started."""
         if self._worker.process.short_lives >= _SHORT_LIVES:
             log = self._worker.process.log
-            raise HostError(f"the worker ends as soon as it is started; {log} may tell why")
+            raise HostError(f"the worker stops immediately after its start; see {log}")
         if self._worker.process.pid is not None or not worker_lives(self.settings):
             self._worker.ensure()
         # It responds long before the worker needs it.

@@ -126,7 +126,7 @@ def _refuse_broken(graded: Grade) -> None:
     broken = next((trial for trial in graded.trials if trial.verdict is Verdict.HOST_ERROR), None)
     if broken is not None:
         faults = faults_of(broken.recording)
-        raise HostError(faults[0].message if faults else "a trial ended by a fault of the machine")
+        raise HostError(faults[0].message if faults else "a trial ended because of a machine fault")
 
 
 class _Progress:

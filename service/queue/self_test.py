@@ -78,11 +78,10 @@ def difference(expected: KnownAnswer, actual: KnownAnswer) -> str:
         pairs = zip(expected.chains, actual.chains, strict=False)
         number = next((i for i, (ours, theirs) in enumerate(pairs, 1) if ours != theirs), len(expected.chains))
         return (
-            f"trial {number} of the known answer has another hash than it must: "
-            f"{_start(actual, number)} instead of {_start(expected, number)}"
+            f"trial {number} of the known answer has hash {_start(actual, number)}, expected {_start(expected, number)}"
         )
     if actual.marks != expected.marks:
-        return f"the known answer got {actual.marks} marks instead of {expected.marks}"
+        return f"the known answer got {actual.marks} marks, expected {expected.marks}"
     return ""
 
 
@@ -150,7 +149,7 @@ class Watch:
         try:
             actual = ask(self._runner)
             if actual is None:
-                _log.warning("self_test.unclear", reason="it was cut by a limit of this machine")
+                _log.warning("self_test.unclear", reason="it was stopped by a limit of this machine")
                 return SelfTestAnswer.UNCLEAR
             wrong = difference(known(), actual)
             if not wrong:
@@ -191,7 +190,7 @@ def write_answer() -> None:
     with TrialRunner() as runner:
         actual = ask(runner)
     if actual is None:
-        raise SystemExit("the machine cut the trials; try again")
+        raise SystemExit("a limit of this machine stopped the trials; try again")
     text = json.dumps({"marks": actual.marks, "chains": actual.chains}, indent=2)
     _ANSWER.write_text(text + "\n", encoding="utf-8")
 

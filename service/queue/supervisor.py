@@ -60,7 +60,7 @@ class Supervisor:
         """Return a sentence about a process that repeatedly ends right after its start; None if there is none."""
         for process in [*(worker.process for worker in self.workers), *self._web]:
             if process.short_lives >= _SHORT_LIVES:
-                return f"a process ends as soon as it is started; {process.log} may tell why"
+                return f"a process stops immediately after its start; see {process.log}"
         return None
 
     def stop(self) -> int:
@@ -96,7 +96,7 @@ def alone_in(settings: Settings) -> Iterator[Callable[[str], None]]:
             except BlockingIOError:
                 lock.seek(0)
                 found = " ".join(lock.read(400).split())
-                raise UsageError(f"robomark is up already in {settings.home} ({found})") from None
+                raise UsageError(f"robomark is already running in {settings.home} ({found})") from None
 
             def leave(note: str) -> None:
                 lock.truncate(0)

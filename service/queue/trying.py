@@ -37,7 +37,11 @@ def try_next(store: Store, settings: Settings, runner: TrialRunner) -> bool:
         except Exception:
             # This is never the student's fault: their faults are returned as verdicts.
             _log.exception("tryout.host_error")
-            tryouts.fail(store, claimed, "Something went wrong here, not with your program; try it again in a minute.")
+            tryouts.fail(
+                store,
+                claimed,
+                "The test run failed because of a problem on the server, not in your program. Try again in a minute.",
+            )
             return False
     return True
 
@@ -48,16 +52,16 @@ def _run(store: Store, settings: Settings, runner: TrialRunner, claimed: TryoutC
     assignment = assignment_from_bytes(content)
     once = tryout_assignment(assignment)
     if once is None:
-        raise UsageError(f"{assignment.id} has nothing to try: no robot is run that you see.")
+        raise UsageError(f"{assignment.id} has no test runs, because it has no visible robot run.")
 
     impatient = store.impatient()
 
     def renew() -> None:
         if not tryouts.keep(impatient, claimed, settings.lease_seconds):
-            raise Cancelled("another worker has it")
+            raise Cancelled("another worker has claimed it")
 
     with LeaseKeeper(renew, settings.lease_seconds, settings.job_seconds) as keeper:
         result = run_tryout(unpack_submission(packed), once, runner, lambda _: keeper.check())
     if result.verdict is Verdict.HOST_ERROR:
-        raise HostError("a trial ended by a fault of the machine")
+        raise HostError("a trial ended because of a machine fault")
     tryouts.finish(store, claimed, result.words, result.replay)

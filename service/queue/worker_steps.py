@@ -39,7 +39,7 @@ _UNBLOCK_SECONDS = 1.0
 #: Number of consecutive beats with waiting messages, an idle worker and no message received.
 _DEAF_BEATS = 3
 #: Reason why a worker claims no jobs if the tables are too new.
-OUTDATED = "it begins nothing more, as the database needs a newer release: install that and restart"
+OUTDATED = "it starts no more jobs, because the database needs a newer release: install it and restart"
 
 
 @dataclass(slots=True)
@@ -75,7 +75,7 @@ class _Hearing:
         self._taken, self._beats = taken, self._beats + 1 if deaf else 0
         if self._beats >= _DEAF_BEATS:
             self._beats = 0
-            raise BrokerGone("messages wait, but none comes")
+            raise BrokerGone("messages are queued, but none arrives")
 
 
 def add_steps(app: Celery, store: Store, settings: Settings, worker: WorkerDescription, alive: Path) -> None:
@@ -142,7 +142,7 @@ class _Reaping(bootsteps.StartStopStep):
             try:
                 if not self.what():
                     # It cannot claim or finish jobs any more, and must not take other workers' notifications.
-                    _log.error("worker.ends", reason="it is in quarantine; robomark doctor says why")
+                    _log.error("worker.ends", reason="it is in quarantine; see robomark doctor")
                     os.kill(os.getpid(), signal.SIGTERM)
                     return
             except Exception:

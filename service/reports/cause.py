@@ -128,7 +128,7 @@ def _of_hint(
         return Diagnosis(hint, step, hints[1:], lost=with_it)
     line, name = int(place[1]), place[2]
     step = language.say(
-        "Fix line %(line)s of %(file)s, run it without submitting, and submit it again.",
+        "Fix line %(line)s of %(file)s, run it without submitting, then submit again.",
         line=line,
         file=name,
     )
@@ -199,14 +199,16 @@ def found(grade: Grade, result: CriterionResult, language: Language = ENGLISH) -
 def _confused_words(accuracy: Accuracy, wrong: Sequence[tuple[str, str]], language: Language) -> str:
     right, of = accuracy_counted(accuracy, language)
     taken = [
-        language.say("“%(truth)s” was taken for “%(answer)s”", truth=one_line(truth, 60), answer=one_line(answer, 60))
+        language.say(
+            "“%(truth)s” was identified as “%(answer)s”", truth=one_line(truth, 60), answer=one_line(answer, 60)
+        )
         for truth, answer in wrong[:2]
     ]
     examples = language.say(" and ").join(taken)
     if len(wrong) > len(taken):
         examples = language.say("%(examples)s, among others", examples=examples)
     return language.say(
-        "%(right)s of %(all)s %(of)s were named rightly: %(examples)s.",
+        "%(right)s of %(all)s %(of)s were identified correctly: %(examples)s.",
         right=right,
         all=accuracy.n,
         of=of,
@@ -220,7 +222,7 @@ def _where(grade: Grade, evidence: Evidence, language: Language) -> str:
     trial = grade.trials[evidence.trial]
     several = sum(each.scenario == trial.scenario for each in grade.trials) > 1
     where = trial_words(trial, language) if several else one_line(trial.scenario, 60)
-    return " " + language.say("That was in scenario %(where)s.", where=where)
+    return " " + language.say("Scenario: %(where)s.", where=where)
 
 
 def _costly_fault(grade: Grade, lost: dict[int, CriterionResult]) -> Fault | None:

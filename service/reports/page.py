@@ -43,7 +43,7 @@ from submissions.submission import Submission
 _TIMELINE_FIRST, _TIMELINE_LAST = 40, 15
 _MOST_MESSAGES = 40
 _MOST_TRIALS = 250
-_STOOD_STILL = translatable("the robot stood still, so neither its path nor its sensors are drawn")
+_STOOD_STILL = translatable("the robot did not move, so its path and sensors are not drawn")
 PROCESS_LIMITS = "process limits only"
 
 
@@ -198,7 +198,7 @@ def page_of(view: View, submission: Submission | None = None, played: frozenset[
         lost=tuple(line for index, line in enumerate(criteria) if index in diagnosis.lost),
         others=tuple(line for index, line in enumerate(criteria) if index not in diagnosis.lost),
         faults=faults,
-        faults_title=language.say("How it ended") if time_alone else language.say("What went wrong"),
+        faults_title=language.say("Result") if time_alone else language.say("Errors"),
         recognition=tuple(_seen(grade, alike, plots, language) for alike in same_answers(grade)),
         scenes=tuple(_scene(grade, scenario, plots, language) for scenario in scenarios(grade)),
         diagrams=() if submission is None else own_diagrams(grade, diagrams_in(submission.notebook).cells, language),
@@ -262,7 +262,7 @@ def _criterion_line(
 
 def _watch(grade: Grade, trial: int, seconds: float, language: Language) -> str:
     if len(grade.trials) == 1:
-        return language.say("Watch it at %(seconds)s s", seconds=f"{seconds:.2f}")
+        return language.say("Watch at %(seconds)s s", seconds=f"{seconds:.2f}")
     return language.say("Watch trial %(trial)s at %(seconds)s s", trial=trial + 1, seconds=f"{seconds:.2f}")
 
 
@@ -273,7 +273,7 @@ def _state(marks: Decimal, max_marks: Decimal) -> str:
 def _where(grade: Grade, evidence: Evidence, language: Language) -> str:
     if not 0 <= evidence.trial < len(grade.trials) or len(grade.trials) == 1:
         return ""
-    return language.say("First missed in %(trial)s", trial=trial_words(grade.trials[evidence.trial], language))
+    return language.say("First failed in %(trial)s", trial=trial_words(grade.trials[evidence.trial], language))
 
 
 def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...], language: Language) -> Scene:
@@ -299,11 +299,11 @@ def _scene(grade: Grade, scenario: str, plots: tuple[Plot, ...], language: Langu
 
 def _outputs(recording: Recording, language: Language) -> Iterator[TextOutput]:
     say = language.say
-    yield TextOutput(say("What your responder printed"), readable(recording.responder_output, 4000))
-    yield TextOutput(say("What your responder wrote to logger.txt"), readable(recording.responder_log, 4000))
+    yield TextOutput(say("Output of your responder"), readable(recording.responder_output, 4000))
+    yield TextOutput(say("Log file of your responder (logger.txt)"), readable(recording.responder_log, 4000))
     for each in recording.agent_outputs:
-        yield TextOutput(say("What the agent %(name)s printed", name=each.agent), readable(each.printed, 4000))
-        yield TextOutput(say("What the agent %(name)s wrote to logger.txt", name=each.agent), readable(each.log, 4000))
+        yield TextOutput(say("Output of the agent %(name)s", name=each.agent), readable(each.printed, 4000))
+        yield TextOutput(say("Log file of the agent %(name)s (logger.txt)", name=each.agent), readable(each.log, 4000))
 
 
 def _seen(grade: Grade, alike: tuple[int, ...], plots: tuple[Plot, ...], language: Language) -> Seen:

@@ -100,7 +100,7 @@ def _confidence(accuracy: Accuracy, language: Language) -> str:
         return ""
     means = []
     if found.right is not None:
-        means.append(language.say("%(mean)s when right (n = %(n)s)", mean=f"{found.right:.2f}", n=found.n_right))
+        means.append(language.say("%(mean)s when correct (n = %(n)s)", mean=f"{found.right:.2f}", n=found.n_right))
     if found.wrong is not None:
         means.append(language.say("%(mean)s when wrong (n = %(n)s)", mean=f"{found.wrong:.2f}", n=found.n_wrong))
     return language.say("Mean confidence %(means)s.", means=language.say(" and ").join(means))

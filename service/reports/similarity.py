@@ -36,32 +36,32 @@ def what_it_says(found: Similarity, language: Language = ENGLISH) -> str:
     """Return a sentence on an assignment: the number of pairs, and what could not be compared."""
     parts: dict[str, object] = {"assignment": found.assignment, "students": found.students}
     groups = len({*found.same, *found.same_recordings})
-    said = language.say("%(assignment)s: no pairs are alike among %(students)s students", **parts)
+    said = language.say("%(assignment)s: no similar pairs among %(students)s students", **parts)
     if groups:
         said = language.counted(
-            "%(assignment)s: %(count)s group has a file or all recordings in common among %(students)s students",
-            "%(assignment)s: %(count)s groups have a file or all recordings in common among %(students)s students",
+            "%(assignment)s: %(count)s group with a common file or common recordings among %(students)s students",
+            "%(assignment)s: %(count)s groups with a common file or common recordings among %(students)s students",
             groups,
             **parts,
         )
     if found.pairs:
         said = language.counted(
-            "%(assignment)s: %(count)s pair is alike among %(students)s students",
-            "%(assignment)s: %(count)s pairs are alike among %(students)s students",
+            "%(assignment)s: %(count)s similar pair among %(students)s students",
+            "%(assignment)s: %(count)s similar pairs among %(students)s students",
             len(found.pairs),
             **parts,
         )
     if found.too_short:
         said += "; " + language.counted(
-            "%(count)s has too little code to compare (under %(tokens)s tokens), so only their robots are compared",
-            "%(count)s have too little code to compare (under %(tokens)s tokens), so only their robots are compared",
+            "%(count)s student has too little code to compare (fewer than %(tokens)s tokens), so only the recordings "
+            "are compared",
+            "%(count)s students have too little code to compare (fewer than %(tokens)s tokens), so only the "
+            "recordings are compared",
             len(found.too_short),
             tokens=FEWEST_TOKENS,
         )
     if found.not_compared:
-        said += "; " + language.say(
-            "%(count)s pairs that have less in common were too many to compare", count=found.not_compared
-        )
+        said += "; " + language.say("%(count)s less similar pairs were not compared", count=found.not_compared)
     return said
 
 

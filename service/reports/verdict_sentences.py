@@ -38,103 +38,102 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
     {
         Verdict.FINISHED: VerdictWords(
             ENDED[Verdict.FINISHED],
-            translatable("Your program ran to its end without an error."),
-            translatable("Nothing stopped it."),
-            translatable("Compare what each criterion asked for with what your robot did."),
+            translatable("Your program completed without errors."),
+            translatable("No error stopped it."),
+            translatable("Compare each criterion with the actions of your robot."),
             "good",
         ),
         Verdict.PROGRAM_ERROR: VerdictWords(
             ENDED[Verdict.PROGRAM_ERROR],
-            translatable("Your robot program stopped with an error before it was done."),
+            translatable("Your robot program stopped with an error before it completed."),
             translatable("The error is in your robot program."),
             translatable(
-                "Go to the line that is named, fix it, and run the program once in the simulator before submitting it."
+                "Fix the line in the error message. Run the program once in the simulator, then submit again."
             ),
             "bad",
         ),
         Verdict.RESPONDER_ERROR: VerdictWords(
             ENDED[Verdict.RESPONDER_ERROR],
-            translatable("The code of your responder failed, so the robot got no answer from it."),
-            translatable("The error is in your responder, or in the code beside it."),
-            translatable("Fix this in your responder, call it once yourself with a message, and submit it again."),
+            translatable("Your responder stopped with an error, so the robot got no answer."),
+            translatable("The error is in your responder or in a module that it imports."),
+            translatable("Fix this in your responder. Test it by calling it with a message, then submit again."),
             "bad",
         ),
         Verdict.PROTOCOL_ERROR: VerdictWords(
             ENDED[Verdict.PROTOCOL_ERROR],
-            translatable("Your responder answered, but not in a form that the robot can read."),
-            translatable("The answer that your responder returns is at fault."),
-            translatable("Return a string. After JSON:: it must contain valid JSON, as json.dumps makes it."),
+            translatable("Your responder answered, but the robot cannot read the answer."),
+            translatable("The error is in the value that your responder returns."),
+            translatable(
+                "Return a string. After JSON:: the string must contain valid JSON. The function json.dumps creates it."
+            ),
             "bad",
         ),
         Verdict.TIME_LIMIT: VerdictWords(
             ENDED[Verdict.TIME_LIMIT],
-            translatable("Your program was still running when the simulated time was up."),
+            translatable("Your program was still running at the end of the simulated time."),
             translatable(
-                "That is no fault where a program may run for ever, as a line follower may; "
-                "where it was to end, it is one."
+                "This is a mistake only if the program must end by itself. A line follower, for example, may run "
+                "until time is up."
             ),
-            translatable(
-                "If the program is meant to end, check what its loops wait for, and whether that ever happens."
-            ),
+            translatable("If the program must end by itself, check the conditions of its loops. Can each loop end?"),
             "notice",
         ),
         Verdict.CPU_LIMIT: VerdictWords(
             ENDED[Verdict.CPU_LIMIT],
-            translatable("Your code computed for so long without waiting that it was stopped."),
+            translatable("Your code was stopped because it computed for too long without waiting."),
             translatable(
-                "A loop never ends, or never waits, so that the robot's world cannot move; "
-                "or a calculation is too long."
+                "A loop never ends or never waits, or a calculation takes too long. The robot moves only while your "
+                "program waits."
             ),
             translatable(
-                "Check when the loop in that line ends. In a robot program, put a sensor reading or a short "
-                "time.sleep inside it; in a responder, make the calculation smaller."
+                "Check when the loop in that line ends. In a robot program, add a sensor reading or a short "
+                "time.sleep to the loop. In a responder, make the calculation shorter."
             ),
             "bad",
         ),
         Verdict.MEMORY_LIMIT: VerdictWords(
             ENDED[Verdict.MEMORY_LIMIT],
-            translatable("Your code asked for more memory than it may use, and was stopped."),
-            translatable("Something in your code keeps growing."),
-            translatable("Look for a list or a string that grows on every turn of a loop and is never emptied."),
+            translatable("Your code was stopped because it used too much memory."),
+            translatable("A value in your code keeps growing."),
+            translatable("Look for a list or a string that grows in every pass of a loop."),
             "bad",
         ),
         Verdict.OUTPUT_LIMIT: VerdictWords(
             ENDED[Verdict.OUTPUT_LIMIT],
-            translatable("Your code printed more than may be recorded, and was stopped."),
-            translatable("A loop in your code prints on every turn."),
-            translatable("Print only when something changes, or put a short time.sleep inside the loop."),
+            translatable("Your code was stopped because it printed too much."),
+            translatable("A loop in your code prints in every pass."),
+            translatable("Print only when a value changes, or add a short time.sleep to the loop."),
             "bad",
         ),
         Verdict.STALLED: VerdictWords(
             ENDED[Verdict.STALLED],
+            translatable("Your code was stopped because it did nothing: it did not compute and did not use the robot."),
+            translatable("Your code waits for an event that never happens."),
             translatable(
-                "Your code fell silent: it neither computed nor asked the robot for anything, and was stopped."
-            ),
-            translatable("Your code waits for something that never comes."),
-            translatable(
-                "Look for a call that waits for a person, a file or another program; none of these exist here."
+                "Look for a call that waits for a person, a file or another program. Remove it, because none of these "
+                "exist here."
             ),
             "bad",
         ),
         Verdict.SANDBOX_VIOLATION: VerdictWords(
             ENDED[Verdict.SANDBOX_VIOLATION],
-            translatable("Your code tried something that graded code may not do, and was stopped."),
+            translatable("Your code was stopped because it tried an action that is not allowed."),
             translatable("The attempt came from your code or from a module that it imports."),
-            translatable("Use no network, no other programs, and no files outside your own folder."),
+            translatable("Do not use the network, other programs, or files outside your folder."),
             "bad",
         ),
         Verdict.ASSIGNMENT_ERROR: VerdictWords(
             ENDED[Verdict.ASSIGNMENT_ERROR],
-            translatable("The assignment itself has a mistake, so your work could not be marked fairly."),
-            translatable("This is not your fault: the instructor has to fix the assignment."),
-            translatable("You need not do anything but tell your instructor; your work can be graded again."),
+            translatable("The assignment has an error, so your submission could not be graded fairly."),
+            translatable("This is not your fault. Your instructor must fix the assignment."),
+            translatable("Please tell your instructor. Your submission can then be graded again."),
             "notice",
         ),
         Verdict.HOST_ERROR: VerdictWords(
             ENDED[Verdict.HOST_ERROR],
-            translatable("The machine that grades your work failed before it was done."),
+            translatable("The grading computer failed before grading was complete."),
             translatable("This is not your fault, and it does not count as an attempt."),
-            translatable("You need not do anything; the grading can be run again."),
+            translatable("You don't need to do anything. The grading can be repeated."),
             "notice",
         ),
     }
@@ -145,8 +144,8 @@ _LOSSES: Mapping[LossReason, str] = MappingProxyType(
     {
         "chance": translatable("by chance"),
         "out of range": translatable("because the robot was out of range"),
-        "facing away": translatable("because it faced away"),
-        "blocked": translatable("because a wall or an obstacle stood between"),
+        "facing away": translatable("because the robot faced away"),
+        "blocked": translatable("because of a wall or an obstacle between them"),
     }
 )
 
@@ -168,9 +167,9 @@ def _said(words: VerdictWords, language: Language) -> VerdictWords:
 #: No robot was run: functions were called and the source was checked.
 _NO_ROBOT = VerdictWords(
     translatable("code checked"),
-    translatable("Your functions were called and your code was read; no robot was run."),
-    translatable("Each criterion below says what happened."),
-    translatable("Call the function yourself with the values that are named there."),
+    translatable("Your functions and your code were checked without running a robot."),
+    translatable("The criteria below have the details."),
+    translatable("Call the function yourself with the values from the message."),
     "good",
 )
 
@@ -180,18 +179,16 @@ _WITHOUT: Mapping[str, VerdictWords] = MappingProxyType(
     {
         "robot.py": VerdictWords(
             translatable("no robot.py"),
-            translatable("There is no robot.py, so only your responder was graded, by itself."),
-            translatable("The marks that need a robot program are missing for that alone."),
-            translatable("Submit robot.py beside responder.py; if it is there, check its name."),
+            translatable("There is no robot.py, so only your responder was graded."),
+            translatable("Only criteria that need a robot program lost marks through this."),
+            translatable("Submit robot.py together with responder.py. If you did, check the file name."),
             "bad",
         ),
         "responder.py": VerdictWords(
             translatable("no responder.py"),
-            translatable(
-                "There is no responder.py, so nothing answered your robot program, which was graded by itself."
-            ),
-            translatable("The marks that need a responder are missing for that alone."),
-            translatable("Submit responder.py beside robot.py; if it is there, check its name."),
+            translatable("There is no responder.py, so your robot program was graded without answers."),
+            translatable("Only criteria that need a responder lost marks through this."),
+            translatable("Submit responder.py together with robot.py. If you did, check the file name."),
             "bad",
         ),
     }
@@ -200,11 +197,9 @@ _WITHOUT: Mapping[str, VerdictWords] = MappingProxyType(
 #: An agent of the responder failed.
 _AGENT_ERROR = VerdictWords(
     translatable("error in an agent"),
-    translatable("An agent of yours raised an error, so whoever asked it got no answer."),
-    translatable("The error is in the agent that is named below, or in a function that it calls."),
-    translatable(
-        "Call the agent's function yourself with the message that it was sent, and fix the line that is named."
-    ),
+    translatable("One of your agents raised an error, so the sender of the message got no answer."),
+    translatable("The error is in the agent named below, or in a function that it calls."),
+    translatable("Fix the line in the error message. Test the agent's function by calling it with the same message."),
     "bad",
 )
 
@@ -225,7 +220,7 @@ def _next_step(grade: Grade, words: VerdictWords, language: Language) -> str:
     if lost.marks >= lost.max_marks:
         return language.say(FULL_MARKS)
     most = language.say(
-        "Most marks are missing at “%(criterion)s”: %(missing)s of %(of)s.",
+        "The most marks are available for “%(criterion)s”: %(missing)s of %(of)s.",
         criterion=one_line(lost.title, 100),
         missing=number(lost.max_marks - lost.marks),
         of=number(lost.max_marks),
@@ -310,18 +305,18 @@ def by_hand_words(result: CriterionResult, language: Language = ENGLISH) -> str:
     reason += "" if reason.endswith((".", "!", "?", "…")) else "."
     marks = number(result.marks)
     if said.excused and said.graded is None:
-        return language.say("Excused, so that it does not count: %(reason)s", reason=reason)
+        return language.say("Excused, does not count: %(reason)s", reason=reason)
     if said.graded is None:
-        return language.say("Set by hand to %(marks)s: %(reason)s", marks=marks, reason=reason)
+        return language.say("Adjusted by staff to %(marks)s: %(reason)s", marks=marks, reason=reason)
     had = number(said.graded)
     if said.excused:
         return language.say(
-            "Excused, so that it does not count (it had %(had)s of %(worth)s): %(reason)s",
+            "Excused, does not count (before: %(had)s of %(worth)s): %(reason)s",
             had=had,
             worth=number(said.worth),
             reason=reason,
         )
-    return language.say("Set by hand from %(had)s to %(marks)s: %(reason)s", had=had, marks=marks, reason=reason)
+    return language.say("Adjusted by staff from %(had)s to %(marks)s: %(reason)s", had=had, marks=marks, reason=reason)
 
 
 def comments_of(grade: Grade) -> tuple[str, ...]:
@@ -336,7 +331,7 @@ def accuracy_words(grade: Grade) -> str:
     result, accuracy = grade.recognition, grade.accuracy
     if result is None or accuracy is None:
         return ""
-    practice = "" if result.worth else " in practice, which is not marked:"
+    practice = "" if result.worth else " for practice (not marked):"
     return (
         f"Accuracy{practice} {accuracy.value:.3f} (95 % interval {accuracy.low:.3f} to {accuracy.high:.3f}, "
         f"{accuracy.n} {accuracy_counted(accuracy)[1]})."
@@ -356,7 +351,7 @@ def channel_words(grade: Grade, language: Language = ENGLISH) -> str:
         sent=len(messages),
         reasons=reasons,
     )
-    fair = language.say("What was lost by chance is held against nobody.")
+    fair = language.say("Messages lost by chance do not cost marks.")
     return f"{told} {fair}" if lost["chance"] else told
 
 
@@ -371,8 +366,8 @@ def cost_words(grade: Grade, language: Language = ENGLISH) -> str:
         "most_output": limits.kept_bytes >> 20,
     }
     return language.say(
-        "Used %(cpu)s of %(most_cpu)s s of CPU, %(sleep)s of %(most_sleep)s s of sleep, "
-        "%(output)s of %(most_output)s MB of output.",
+        "CPU time: %(cpu)s of %(most_cpu)s s. Sleep: %(sleep)s of %(most_sleep)s s. Output: %(output)s of "
+        "%(most_output)s MB.",
         cpu=f"{round(spent.cpu_seconds, 1):g}",
         sleep=f"{round(spent.sleep_seconds, 1):g}",
         output=f"{round(spent.kept_bytes / _MEGABYTE, 1):g}",

@@ -307,7 +307,7 @@ def _given(document: Mapping[str, object], files: Files, problems: Problems) -> 
             known = packaged_models()
             problems.add(
                 place,
-                f'"{model[:60]}" is no packaged model, expected {listed(known) if known else "one (there are none)"}'
+                f'"{model[:60]}" is not a packaged model, expected {listed(known) if known else "one (there are none)"}'
                 f"{did_you_mean(model, known)}",
             )
         else:
@@ -341,7 +341,7 @@ def _training(
     hidden = [scenario.id for scenario in scenarios if scenario is not None and scenario.visibility != "visible"]
     for number, name in enumerate(table.scenarios):
         if name in hidden:
-            sentence = f'scenarios names "{name[:60]}", which is not visible, expected one whose images may be told'
+            sentence = f'scenarios names "{name[:60]}", which is not visible, expected a visible scenario'
             problems.add(("training", "scenarios", number), sentence)
         if name not in ids:
             problems.add(
@@ -350,11 +350,12 @@ def _training(
             )
     if ids and not set(ids) - set(table.scenarios):
         problems.add(
-            ("training", "scenarios"), "scenarios names every scenario, expected one whose images are not trained on"
+            ("training", "scenarios"),
+            "scenarios names every scenario, expected at least one scenario without training images",
         )
     if ground is not None and not label_names(ground.name):
         problems.add(
-            ("training",), f"the images of {ground.name} have no labels to train with, expected a floor that has"
+            ("training",), f"the images of {ground.name} have no labels for training, expected a floor with labels"
         )
     return Training(table.scenarios, table.function, table.image)
 

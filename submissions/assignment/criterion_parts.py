@@ -61,7 +61,8 @@ def check_given(document: Mapping[str, object], problems: Problems) -> None:
     for number, name in enumerate(texts_in(document.get("given"))):
         if name in answers:
             problems.add(
-                ("given", number), f'given names "{name[:60]}", which holds answers, expected what students may read'
+                ("given", number),
+                f'given names "{name[:60]}", which contains answers, expected a file that students may read',
             )
 
 
@@ -87,7 +88,7 @@ def _criterion(raw: Mapping[str, Any], place: Place, problems: Problems) -> Crit
     criterion = checked_table(schema, raw, place, problems)
     for key in sorted(_marked(schema, NOT_EMPTY)):
         if raw.get(key) == []:
-            problems.add((*place, key), f"{key} is an empty list and asks for nothing, expected at least one text")
+            problems.add((*place, key), f"{key} is an empty list and has no condition, expected at least one text")
     return criterion and criterion.model_copy(update={"id": criterion.id or _slug(criterion.title)})
 
 
@@ -98,9 +99,9 @@ def _marked(schema: type[Criterion], mark: str) -> set[str]:
 def _without_a_part(criterion: Criterion, around: Surroundings, robotless: bool) -> Iterator[Misfit]:
     """Yield the parts that the criterion needs and the assignment lacks: a run, a second robot or a responder."""
     if criterion.robot > around.robots:
-        yield Misfit("robot", "robot is 2, but there is one, expected robots = 2 in world")
+        yield Misfit("robot", "robot is 2, but there is only one robot, expected robots = 2 in world")
     if criterion.robot > 1 and not criterion.judges_runs:
-        yield Misfit("robot", "robot is 2, but check looks at no run, expected it without robot")
+        yield Misfit("robot", "robot is 2, but check uses no run, expected it without robot")
     if criterion.asks_responder and "responder" in around.without:
         yield Misfit("check", 'check needs a responder, but parts has responder = "none", expected one')
     if robotless and criterion.judges_runs:

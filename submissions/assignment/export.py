@@ -107,7 +107,7 @@ def _files(folder: Path) -> Mapping[str, bytes]:
 def _write(target: Path, files: Mapping[str, bytes]) -> int:
     """Write all files or none: write them beside ``target``, then rename."""
     if target.exists() or target.is_symlink():
-        raise UsageError(f"{target} is there already, expected a new folder or .zip")
+        raise UsageError(f"{target} exists already, expected a new folder or .zip")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=target.parent, prefix=".robomark-") as scratch:

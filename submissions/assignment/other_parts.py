@@ -31,7 +31,7 @@ def read_agents(
     """Return the source of each agent by name, and the texts of the files given here. Add mistakes to ``problems``."""
     table = document.get("agents", {})
     if not isinstance(table, dict):
-        problems.add(("agents",), 'agents is no table, expected [agents] and lines like parser = "student"')
+        problems.add(("agents",), 'agents is not a table, expected [agents] and lines like parser = "student"')
         return {}, {}
     if table and parts is not None:
         _check_parts(table, parts, problems)
@@ -55,10 +55,10 @@ def _check_parts(table: Mapping[str, object], parts: PartsTable, problems: Probl
     if len(table) > _MOST:
         problems.add(("agents",), f"agents has {len(table)} names, expected at most {_MOST}")
     if parts.responder == "none" or parts.program == "none":
-        problems.add(("agents",), "agents are there and no robot with a responder, expected both in [parts]")
+        problems.add(("agents",), "agents needs a robot with a responder, expected both in [parts]")
     elif "student" not in (parts.program, parts.responder):
         problems.add(
-            ("agents",), 'agents are there and neither robot.py nor responder.py is "student", expected one of them'
+            ("agents",), 'agents needs robot.py or responder.py from the student, expected one of them as "student"'
         )
 
 
@@ -94,7 +94,7 @@ def check_robots(document: Mapping[str, object], world: WorldTable, parts: Parts
     if "agents" in document:
         problems.add(("world", "robots"), "robots is 2, but agents are asked for one robot alone, expected robots = 1")
     if "training" in document:
-        problems.add(("world", "robots"), "robots is 2, but what is trained answers no robot, expected robots = 1")
+        problems.add(("world", "robots"), "robots is 2, but a trained model answers no robot, expected robots = 1")
     for number, raw in enumerate(scenarios):
         if "second_poses" not in raw:
             problems.add(("scenario", number), "second_poses is missing, expected where the second robot starts")

@@ -195,7 +195,7 @@ class Problems:
         """
         self.found.append((line_of(self.lines, path), sentence))
         if len(self.found) > _MOST:
-            raise AssignmentProblems((*self.sorted(), f"{self.where}:1: has more mistakes, which were not looked for"))
+            raise AssignmentProblems((*self.sorted(), f"{self.where}:1: may have more mistakes; checking stopped here"))
 
     def sorted(self) -> tuple[str, ...]:
         """Return ``file:line: sentence`` for each mistake, sorted by line."""

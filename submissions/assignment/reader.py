@@ -28,9 +28,9 @@ _SYNTAX = re.compile(r"^(?P<what>.*?) \(at (?:line (?P<line>\d+), column (?P<col
 #: Plain explanations of common mistakes, by the start of the message from ``tomllib``.
 _PLAINER = MappingProxyType(
     {
-        "invalid value": ": texts stand in quotes, numbers do not",
+        "invalid value": ": texts need quotes, numbers do not",
         "cannot overwrite": "; this key is given twice in its table",
-        "cannot declare": "; this table is there already",
+        "cannot declare": "; this table exists already",
         "illegal character": "; is a closing quote missing?",
         "unclosed array": "; is a comma or a ] missing?",
         "expected newline": "; is there a quote or a comma too many?",
@@ -70,7 +70,7 @@ def read_assignment(folder: Path) -> Assignment:
     folder = Path(os.path.abspath(folder))  # noqa: PTH100 - resolve() would change the name that is shown
     where = f"{folder.name}/{FILE_NAME}"
     if not folder.is_dir():
-        raise AssignmentProblems((f"{folder}: is not there, expected a folder with {FILE_NAME} in it",))
+        raise AssignmentProblems((f"{folder}: does not exist, expected a folder with {FILE_NAME} in it",))
     if not (folder / FILE_NAME).is_file():
         raise AssignmentProblems((f"{folder}: has no {FILE_NAME} in it, expected one",))
     files = _folder_files(folder)

@@ -62,7 +62,7 @@ class WorldTable(StrictTable):
     def _which_sheet(cls, value: object) -> object:
         if value in ("fixed", "per-seed") or (type(value) is int and 0 <= value < 1 << 63):
             return value
-        raise ValueError('is no digit sheet, expected "fixed", "per-seed" or a whole number from 0')
+        raise ValueError('is not a digit sheet, expected "fixed", "per-seed" or a whole number from 0')
 
     @field_validator("obstacles", mode="before")
     @classmethod
@@ -96,9 +96,7 @@ class PartsTable(StrictTable):
         tagged = isinstance(value, str) and value.startswith("tag:") and value.removeprefix("tag:").strip()
         if value == "last" or tagged or (type(value) is int and 1 <= value <= 1000):
             return value
-        raise ValueError(
-            'is no cell of a notebook, expected "last", "tag:NAME" or the number of a robot program, from 1'
-        )
+        raise ValueError('is not a notebook cell, expected "last", "tag:NAME" or the number of a robot program, from 1')
 
 
 class ChannelTable(StrictTable):
@@ -123,11 +121,11 @@ class ChannelTable(StrictTable):
         if self.link == "cable" and needless:
             raise ValueError(f'has {min(needless)} and no link that it limits, expected link = "infrared" beside it')
         if self.link == "between robots" and self.beacon is not None:
-            raise ValueError("has a beacon, but the robots are each other's, expected none beside this link")
+            raise ValueError("has a beacon, but the robots talk to each other, expected no beacon with this link")
         if self.link == "infrared" and self.beacon is None:
-            raise ValueError('has link = "infrared" and nothing at its other end, expected beacon = [x, y] beside it')
+            raise ValueError('has link = "infrared" and no beacon, expected beacon = [x, y] beside it')
         if self.beacon is not None and not (0 < self.beacon[0] < WIDTH and 0 < self.beacon[1] < HEIGHT):
-            raise ValueError(f"has its beacon off the floor, expected it within {WIDTH} x {HEIGHT} mm")
+            raise ValueError(f"has a beacon off the floor, expected it within {WIDTH} x {HEIGHT} mm")
         return self
 
 

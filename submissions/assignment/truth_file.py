@@ -34,7 +34,7 @@ def read_places(name: str, files: Mapping[str, bytes]) -> tuple[LabelledPlace, .
         _place(row, f"{name}:{number}") for number, row in enumerate(rows, start=1) if number > first and any(row)
     )
     if not places:
-        raise UsageError(f"{name} has no places in it, expected rows of x, y, label")
+        raise UsageError(f"{name} has no places, expected rows of x, y, label")
     return places
 
 
@@ -72,7 +72,7 @@ def _place(row: Sequence[str], where: str) -> LabelledPlace:
         x, y, label = (cell.strip() for cell in row)
         place = float(x), float(y), label
     except ValueError:
-        raise UsageError(f"{where}: {','.join(row)[:60]!r} is no place, expected x, y (mm) and a label") from None
+        raise UsageError(f"{where}: {','.join(row)[:60]!r} is not a place, expected x, y (mm) and a label") from None
     if not (math.isfinite(place[0]) and math.isfinite(place[1]) and label):
-        raise UsageError(f"{where}: {','.join(row)[:60]!r} is no place, expected x, y (mm) and a label")
+        raise UsageError(f"{where}: {','.join(row)[:60]!r} is not a place, expected x, y (mm) and a label")
     return place

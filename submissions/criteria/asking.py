@@ -29,7 +29,7 @@ class BetweenAgents(Criterion):
     @classmethod
     def _a_pair(cls, value: tuple[str, ...]) -> tuple[str, ...]:
         if len(value) not in (0, 2) or len(set(value)) < len(value):
-            raise ValueError("is no pair, expected [who tells, who is told]")
+            raise ValueError("is not a pair, expected [sender, receiver]")
         return value
 
     @model_validator(mode="after")
@@ -37,7 +37,7 @@ class BetweenAgents(Criterion):
         other = next((name for name in _OF_THE_ROBOT if self.agents and getattr(self, name, None)), None)
         if other is not None:
             shown = "json" if other == "json_queue" else other
-            raise ValueError(f"has {shown} beside agents, expected conditions of the text (a list is its JSON)")
+            raise ValueError(f"has {shown} beside agents, expected conditions for the text (JSON for a list)")
         return self
 
     def misfits(self, around: Surroundings) -> Iterator[Misfit]:

@@ -83,7 +83,7 @@ class SourceRules(Criterion):
     @classmethod
     def _calls(cls, value: Texts) -> Texts:
         if not all(text.endswith("()") for text in value):
-            raise ValueError('has what is no call, expected calls like "say()"')
+            raise ValueError('has an entry that is not a call, expected calls like "say()"')
         return value
 
     @property
@@ -99,7 +99,7 @@ class SourceRules(Criterion):
     @model_validator(mode="after")
     def _fits(self) -> Self:
         if not (self.uses or self.avoids or self.in_loop or self.defines or self.flags):
-            raise ValueError("asks for nothing, expected uses, avoids, in_loop, defines or flags")
+            raise ValueError("has no condition, expected uses, avoids, in_loop, defines or flags")
         if self.flags and self.part != "program":
             raise ValueError("has flags for the responder, expected them for the program")
         return self
@@ -122,7 +122,7 @@ class ExpectedCall(StrictTable):
     def _expects_something(self) -> Self:
         # A function that does nothing returns None, so a call without an expected value would always pass.
         if "returns" not in self.model_fields_set and not self.one_of:
-            raise ValueError("says of a call neither returns nor one_of, expected what the function must return")
+            raise ValueError("has a call without returns or one_of, expected the result of the function")
         return self
 
 

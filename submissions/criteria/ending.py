@@ -39,7 +39,7 @@ class SinceEvent(StrictTable):
     @model_validator(mode="after")
     def _asks_something(self) -> Self:
         if self.moved is None and self.seconds is None:
-            raise ValueError("asks for nothing, expected moved = [least, most] in mm, seconds = [least, most] or both")
+            raise ValueError("has no condition, expected moved = [least, most] in mm, seconds = [least, most] or both")
         return self
 
 
@@ -68,5 +68,5 @@ class EndPose(Criterion):
             raise ValueError("has one of x and y, expected both")
         asked = (self.x, self.heading, self.zone, self.areas or None, self.since)
         if all(each is None for each in asked):
-            raise ValueError("asks for nothing, expected x and y, heading, zone, areas or since")
+            raise ValueError("has no condition, expected x and y, heading, zone, areas or since")
         return self

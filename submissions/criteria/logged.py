@@ -80,7 +80,7 @@ class ImageLog(Criterion):
         counts = self.left is not None or self.right is not None or self.left_at_least or self.right_at_least
         if not (counts or self.at_start or self.pairs or self.uniform):
             raise ValueError(
-                "asks for nothing, expected left, right, left_at_least, right_at_least, at_start, pairs or uniform"
+                "has no condition, expected left, right, left_at_least, right_at_least, at_start, pairs or uniform"
             )
         if (self.left is not None and self.left_at_least) or (self.right is not None and self.right_at_least):
             raise ValueError("has a number of images beside at_least, expected one or the other for each sensor")

@@ -45,7 +45,7 @@ class NamedMotion(AskedMotion):
     def _asks_something(self) -> Self:
         if not self.asks:
             raise ValueError(
-                "asks for nothing, expected one of forward, sideways, distance, turn, turn_size and seconds"
+                "has no condition, expected one of forward, sideways, distance, turn, turn_size and seconds"
             )
         return self
 
@@ -76,7 +76,7 @@ class Displacement(AskedMotion, Criterion):
         wheels = (self.left_wheel, self.right_wheel, self.agrees_with_wheels)
         if not self.asks and all(value is None for value in wheels):
             raise ValueError(
-                "asks for nothing, expected one of forward, sideways, distance, turn, turn_size, seconds, left_wheel, "
+                "has no condition, expected one of forward, sideways, distance, turn, turn_size, seconds, left_wheel, "
                 "right_wheel and agrees_with_wheels"
             )
         return self

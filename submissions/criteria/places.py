@@ -22,7 +22,7 @@ Point = Annotated[tuple[float, float], Entries("[x, y]")]
 
 def _ordered(value: tuple[float, float]) -> tuple[float, float]:
     if value[0] > value[1]:
-        raise ValueError("is a range with nothing in it, expected [least, most]")
+        raise ValueError("is an empty range, expected [least, most]")
     return value
 
 
@@ -54,7 +54,7 @@ class Area(StrictTable):
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
         if sum(shape is not None for shape in (self.rectangle, self.circle, self.polygon, self.bar)) != 1:
-            raise ValueError("is no area, expected one of rectangle, circle, polygon and bar")
+            raise ValueError("is not an area, expected one of rectangle, circle, polygon and bar")
         if self.rectangle is not None:
             left, bottom, right, top = self.rectangle
             if not (left < right and bottom < top):
@@ -118,7 +118,7 @@ class LineToFollow(StrictTable):
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
         if sum(kind is not None for kind in (self.on, self.points, self.ellipse)) != 1:
-            raise ValueError("is no line, expected one of on, points and ellipse")
+            raise ValueError("is not a line, expected one of on, points and ellipse")
         if not 0 < abs(self.arc[1] - self.arc[0]) <= 360:
             raise ValueError("has an arc of no length or of more than 360 degrees, expected arc = [from, to]")
         if self.ellipse is not None and not (self.ellipse[2] > 0 and self.ellipse[3] > 0):

@@ -31,7 +31,7 @@ class Closest(Criterion):
     @model_validator(mode="after")
     def _asks_something(self) -> Self:
         if self.distance is None and self.than_straight is None and self.first_turn is None:
-            raise ValueError("asks for nothing, expected one of distance, than_straight and first_turn")
+            raise ValueError("has no condition, expected one of distance, than_straight and first_turn")
         return self
 
 

@@ -136,12 +136,12 @@ class Recognition(Criterion):
             raise ValueError('has greys without truth = "grey", expected both or neither')
         levels = sorted(self.greys.values()) if isinstance(self.greys, dict) else []
         if any(after - before < _GREYS_APART for before, after in pairwise(levels)):
-            raise ValueError(f"has greys that are hard to tell apart, expected them {_GREYS_APART} or more apart")
+            raise ValueError(f"has greys that are too similar, expected them {_GREYS_APART} or more apart")
         if self.patterns and self.each_pattern is None:
             raise ValueError('has patterns without each_pattern, expected each_pattern = "majority" or the like')
         if self.each_pattern is not None and (self.images != "all" or isinstance(self.truth, tuple)):
             raise ValueError(
-                "has each_pattern beside images or a list of truths, expected it with what the floor or places tell"
+                "has each_pattern beside images or a list of truths, expected it with labels from the floor or places"
             )
         if self.answer_from != "reply" and (self.confidence is not None or self.late == "wrong"):
             raise ValueError(f'has confidence or late beside answer_from = "{self.answer_from}", expected replies')

@@ -42,5 +42,5 @@ class StopOn(Criterion):
     @model_validator(mode="after")
     def _fits(self) -> Self:
         if self.reflected is None and self.rgb is None and self.zone is None and self.near is None:
-            raise ValueError("asks for nothing, expected reflected, rgb, zone or near")
+            raise ValueError("has no condition, expected reflected, rgb, zone or near")
         return self

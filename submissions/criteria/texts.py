@@ -56,7 +56,7 @@ class TextSequence(TextConditions, AmongMany):
         counted = (self.at_least, self.at_most, self.exactly) != (None, None, None)
         if not (self.has_conditions or self.in_order or counted or self._asks_more()):
             raise ValueError(
-                "asks for nothing, expected one of equals, contains, starts_with, matches, among, in_order, "
+                "has no condition, expected one of equals, contains, starts_with, matches, among, in_order, "
                 "at_least, at_most, exactly"
             )
         if self.exactly is not None and (self.at_least is not None or self.at_most is not None):

@@ -31,7 +31,7 @@ class Apart(Criterion):
     @model_validator(mode="after")
     def _asks(self) -> Self:
         if self.at_most is None and self.at_least == 0:
-            raise ValueError("asks for nothing, expected at_least or at_most")
+            raise ValueError("has no condition, expected at_least or at_most")
         if self.at_most is not None and self.at_most < self.at_least:
             raise ValueError("has an at_most below at_least, expected room between them")
         return self

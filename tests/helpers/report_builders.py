@@ -157,7 +157,7 @@ def shape_grade(wrong: int = 4, **changes: object) -> Grade:
         criteria=(
             CriterionResult(
                 "names-the-right-shape", "Names the right shape", Decimal(right), Decimal(6),
-                f"{right} of 6 images were named rightly; the {SHAPES[wrong]} was taken for a diamond.",
+                f"{right} of 6 images were identified correctly; the {SHAPES[wrong]} was identified as a diamond.",
                 evidence=tuple(Evidence(index, index != wrong, "") for index in range(6)),
                 accuracy=accuracy, predictions=predictions,
             ),

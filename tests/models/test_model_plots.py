@@ -131,4 +131,4 @@ def test_classifiers_are_compared_on_the_same_images(tmp_path: Path) -> None:
 def test_classifiers_of_different_things_are_not_compared() -> None:
     done = robomark("models", "compare", "digits", "shapes")
     assert done.returncode == 2
-    assert "digits, shapes cannot be compared; expected two or more models of the same things" in done.stderr
+    assert "digits, shapes cannot be compared; expected two or more models of the same classes" in done.stderr

@@ -58,7 +58,7 @@ def test_a_module_that_a_cell_imports_may_display(tmp_path: Path, runner: TrialR
         ([RESPONDER, PROGRAM, "x = 1"], "the robot program in cell 2 of {name} is marked"),
         (
             [RESPONDER, PROGRAM, "%sim_magic -R -x 200"],
-            "the robot program in cell 2 of {name} is marked, as it is run again by cell 3",
+            "the robot program in cell 2 of {name} is marked, because it is run again by cell 3",
         ),
     ],
 )

@@ -134,7 +134,7 @@ def test_a_robot_program_draws_no_diagrams(tmp_path: Path) -> None:
     (tmp_path / "robot.py").write_text("say('hello')")
     done = robomark("run", tmp_path / "robot.py", "--diagrams", tmp_path / "d")
     assert done.returncode == 2
-    assert "robot.py is not a notebook and draws no diagrams; leave --diagrams out" in done.stderr
+    assert "robot.py is not a notebook and has no diagrams; omit --diagrams" in done.stderr
 
 
 # Selection of the marked run.
@@ -186,7 +186,7 @@ def test_what_is_marked_instead_is_told(tmp_path: Path, runner: TrialRunner) -> 
     assert spoken(result.trials[0].recording) == ["done"]
     assert any("that is run 1 of 3, the last that fits" in note for note in result.notes)
     never = graded(tmp_path, runner, [RESPONDER, two_programs("one"), cells[3]])
-    assert "the run of cell 3 was never come to, so that of cell 2 is marked" in never.notes
+    assert "the run of cell 3 never started, so the run of cell 2 is marked" in never.notes
 
 
 def test_a_responder_that_comes_too_late_is_told_with_its_cell(tmp_path: Path, runner: TrialRunner) -> None:
@@ -203,7 +203,7 @@ def test_a_marked_cell_that_fails_is_told_with_its_line(tmp_path: Path, runner: 
     result = graded(tmp_path, runner, cells, 'cell = "tag:this"', tags={3: ["this"]})
     (fault,) = result.trials[0].recording.faults
     assert (fault.message, fault.place) == ("ValueError: math domain error", "cell 3, line 2")
-    assert fault.hint == "The robot program of cell 3 is marked, and was never run."
+    assert fault.hint == "The robot program of cell 3 is marked, but it never ran."
     assert (result.verdict, result.marks) == (Verdict.PROGRAM_ERROR, Decimal(0))
 
 
@@ -227,7 +227,7 @@ def test_a_notebook_without_the_cell_asked_for_is_refused(tmp_path: Path, cell: 
 def test_what_is_no_cell_is_refused(tmp_path: Path, cell: str) -> None:
     with pytest.raises(AssignmentProblems) as refused:
         assignment(tmp_path, f"cell = {cell}")
-    assert "cell is no cell of a notebook, expected" in str(refused.value)
+    assert "cell is not a notebook cell, expected" in str(refused.value)
 
 
 # Parts.
@@ -239,7 +239,7 @@ def test_a_given_program_meets_the_responder_that_the_notebook_ends_with(tmp_pat
     result = graded(tmp_path, runner, cells, 'program = "given.py"', given=given)
     recording = result.trials[0].recording
     assert (answers(recording), recording.spoken) == (["other"], ())
-    assert any("the assignment brings the robot program" in note for note in result.notes)
+    assert any("the assignment provides the robot program" in note for note in result.notes)
 
 
 def test_a_notebook_without_a_robot_program_will_do_where_the_program_is_given(

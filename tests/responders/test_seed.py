@@ -197,7 +197,7 @@ def test_9_block_diagram(executed: ExecutedNotebook) -> None:
 @pytest.mark.parametrize(
     ("cell", "described", "words"),
     [
-        (7, 12, "It shows what happened."),
+        (7, 12, "The diagram matches the events."),
         # In the text the agent calls the parser. In the program, the parser's result is passed to the agent.
         (15, 20, "agent → parser and parser → agent did not happen. responder → parser happened and is not drawn."),
         (27, 33, "agent → parser and parser → agent did not happen. responder → parser happened and is not drawn."),

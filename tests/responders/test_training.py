@@ -76,7 +76,7 @@ def test_the_accuracy_of_a_grade_is_that_of_the_marked_images(runner: TrialRunne
     assert (result.recognition.id, result.accuracy) == ("unseen", result.criteria[1].accuracy)
     shown = student_view(result).grade
     assert shown.recognition is not None
-    assert (shown.recognition.id, "in practice, which is not marked" in accuracy_words(shown)) == ("practice", True)
+    assert (shown.recognition.id, "for practice (not marked)" in accuracy_words(shown)) == ("practice", True)
     assert "practice" not in accuracy_words(result)
 
 

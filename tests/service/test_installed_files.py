@@ -33,7 +33,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_files_as_recorded_are_well(installed: Path) -> None:
-    assert doctor._files(Settings(home=installed)) == (True, "2 files are as they were installed")
+    assert doctor._files(Settings(home=installed)) == (True, "2 files are unchanged since installation")
 
 
 @pytest.mark.parametrize("name", ["models/__init__.py", "sim/world.py"])

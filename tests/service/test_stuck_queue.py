@@ -46,7 +46,7 @@ def test_a_queue_that_stands_still_is_not_well(
         assert jobs.claim(store, "worker", 60) is not None
     found, sentence = _queue(service_settings, store)
     assert found is well
-    assert ("none begins it" in sentence) is not well
+    assert ("start no jobs" in sentence) is not well
 
 
 @pytest.mark.parametrize(("ended_seconds_ago", "well"), [(5, True), (600, False)])
@@ -144,12 +144,12 @@ def test_a_full_disk_is_named(
     of_service = examine_service(service_settings.with_broker("redis://127.0.0.1:1/0"), store)
     (found,) = [each for each in of_service if each.what == "database"]
     assert not found.well
-    assert found.sentence == ("the disk is full" if "full" in message else "the database does not answer")
+    assert found.sentence == ("the disk is full" if "full" in message else "no connection to the database")
 
 
 def test_the_clock_of_a_file_is_not_compared_with_itself(service_settings: Settings, store: Store) -> None:
     (found,) = [each for each in examine(service_settings) if each.what == "clock"]
-    assert ("the only one" in found.sentence) is (store.engine.dialect.name == "sqlite")
+    assert ("a local file" in found.sentence) is (store.engine.dialect.name == "sqlite")
 
 
 def test_nothing_is_claimed_from_tables_that_need_newer_code(store: Store) -> None:
@@ -209,4 +209,4 @@ def test_a_release_that_is_exchanged_in_place_is_noticed(
     monkeypatch.syspath_prepend(info.parent)
     well, sentence = ready()
     assert not well
-    assert f"another release (99) is installed than the one that runs ({GRADER_VERSION}); restart" in sentence
+    assert f"the installed release (99) differs from the running one ({GRADER_VERSION}); restart" in sentence

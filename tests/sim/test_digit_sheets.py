@@ -126,4 +126,4 @@ def test_what_is_no_sheet_is_refused(tmp_path: Path, sheet: str) -> None:
     with pytest.raises(AssignmentProblems) as refused:
         assignment(tmp_path, sheet)
     (problem,) = refused.value.problems
-    assert "assignment.toml:7: sheet is no digit sheet, expected" in problem
+    assert "assignment.toml:7: sheet is not a digit sheet, expected" in problem

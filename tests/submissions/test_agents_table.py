@@ -62,8 +62,8 @@ def test_an_agent_may_be_called_network(tmp_path: Path) -> None:
         ("parser = 3", PAIR, "parser is no text, expected"),
         ("\n".join(f'a{n} = "student"' for n in range(9)) + '\nparser = "student"', PAIR, "expected at most 8"),
         ('parser = "student"', '["robot", "parser"]', 'agents names "robot", expected parser, responder'),
-        ('parser = "student"', '["parser"]', "agents is no pair, expected [who tells, who is told]"),
-        ('parser = "student"', '["parser", "parser"]', "agents is no pair"),
+        ('parser = "student"', '["parser"]', "agents is not a pair, expected [sender, receiver]"),
+        ('parser = "student"', '["parser", "parser"]', "agents is not a pair"),
         ('parser = "student"', PAIR + "\njson = true", "has json beside agents"),
     ],
 )
@@ -76,8 +76,8 @@ def test_a_mistake_is_named(agents: str, pair: str, sentence: str, tmp_path: Pat
 @pytest.mark.parametrize(
     ("parts", "sentence"),
     [
-        ('responder = "none"', "no robot with a responder"),
-        ('program = "given.py"\nresponder = "given.py"', 'neither robot.py nor responder.py is "student"'),
+        ('responder = "none"', "agents needs a robot with a responder"),
+        ('program = "given.py"\nresponder = "given.py"', "agents needs robot.py or responder.py from the student"),
     ],
 )
 def test_agents_need_somebody_who_asks_them(parts: str, sentence: str, tmp_path: Path) -> None:
@@ -127,4 +127,4 @@ def test_a_missing_agent_is_named_and_one_too_many_left_out(tmp_path: Path) -> N
     full = {"responder.py": RESPONDER, "parser.py": PARSER, "agent.py": PARSER}
     submission = read_submission(folder(tmp_path / "bob", full), asked=ASKED)
     assert list(submission.files) == ["parser.py"]
-    assert "agent.py was left out: the assignment brings that agent itself." in submission.notes
+    assert "agent.py was left out: the assignment provides this agent." in submission.notes

@@ -44,13 +44,13 @@ def test_a_new_assignment_like_another_marks_like_it(tmp_path: Path, runner: Tri
         ('[reference]\nmarks = "5"\n', "reference: got 6.00 marks, expected 5; nothing was lost"),
         ('[reference]\nmarks = "6"\nloses = ["says"]\n', "reference: lost marks in nothing, expected says"),
         ('[reference]\nmarks = "6"\nverdict = "time_limit"\n', "reference: ended as finished, expected time_limit"),
-        ('[reference]\nmarks = "6"\nfeedback = ["Bravo"]\n', 'reference: was not told "Bravo", but'),
-        ('[reference]\nmarks = "6"\n[other]\nmarks = "1"\n', "other: is expected, but is no example"),
+        ('[reference]\nmarks = "6"\nfeedback = ["Bravo"]\n', 'reference: did not get the feedback "Bravo", but'),
+        ('[reference]\nmarks = "6"\n[other]\nmarks = "1"\n', "other: is expected, but is not an example"),
         (
             '[reference]\nmarks = "6"\n[stops-short]\nmarks = "3"\nloses = ["stop"]\n',
             'stops-short: expected.toml says it loses "stop", expected the id of a criterion: finishes, says, stops',
         ),
-        ("", "stops-short: has no table in expected.toml (check --write-expected notes what it got)"),
+        ("", "stops-short: has no table in expected.toml (check --write-expected writes its results)"),
         (
             '[reference]\nmarks = "6"\nearns = { stops = "2", stop = "3" }\n',
             'reference: expected.toml says it earns "stop", expected the id of a criterion: finishes, says, stops',
@@ -167,7 +167,7 @@ def test_an_exported_assignment_is_the_same_assignment(tmp_path: Path) -> None:
 
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
     (tmp_path / "task").mkdir()
-    with pytest.raises(UsageError, match="is there already, expected a new folder"):
+    with pytest.raises(UsageError, match="exists already, expected a new folder"):
         write_new(tmp_path / "task")
     with pytest.raises(UsageError, match="cannot be the id of an assignment"):
         write_new(tmp_path / "My Task")
@@ -196,13 +196,13 @@ def test_what_new_examples_got_is_noted_and_nothing_that_stands_there_is_changed
     (tmp_path / "task" / "examples" / "says, nothing" / "robot.py").write_text("tank_drive.off()\n")
     noted = robomark("assignments", "check", tmp_path / "task", "--write-expected")
     assert noted.returncode == 0, noted.stderr
-    assert "wrote what reference, says, nothing got; is it what they must get?" in noted.stdout
+    assert "results of reference, says, nothing written; check that they are the expected ones" in noted.stdout
     assert file.read_text().startswith(old)
     tables = expected(str(tmp_path / "task")).examples
     assert tables["reference"].marks == 6
     assert tables["says, nothing"].marks == sum(tables["says, nothing"].earns.values()) + 1
     again = robomark("assignments", "check", tmp_path / "task", "--write-expected")
-    assert (again.returncode, again.stdout.count("nothing was written")) == (0, 1)
+    assert (again.returncode, again.stdout.count("no changes")) == (0, 1)
     assert robomark("assignments", "check", "--all", "--write-expected").returncode == 2
 
 

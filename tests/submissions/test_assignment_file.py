@@ -265,7 +265,7 @@ check = "pose"
         (
             HEAD + SCENARIO + FINISHES.replace("finishes", "timing") + "between = [3, 2]\n",
             10,
-            "between is a range with nothing in it",
+            "between is an empty range",
         ),
         (
             HEAD + SCENARIO + FINISHES.replace("finishes", "reports") + 'expected = [["a"], ["b"]]\n',
@@ -293,13 +293,13 @@ check = "pose"
             10,
             'of is "movin", expected "program", "moving" or "speech"; did you mean "moving"?',
         ),
-        (HEAD + SCENARIO + FINISHES + "id = one\n", 10, "texts stand in quotes"),
+        (HEAD + SCENARIO + FINISHES + "id = one\n", 10, "texts need quotes"),
         (HEAD + SCENARIO + FINISHES + "marks = 2\n", 10, "this key is given twice"),
         (HEAD + SCENARIO + "channel = { los = 1 }\n" + FINISHES, 6, 'did you mean "loss"?'),
         (HEAD + SCENARIO + "channel = { loss = 1.5 }\n" + FINISHES, 6, "expected at most 1"),
         (HEAD + SCENARIO + "channel = { facing = 90 }\n" + FINISHES, 6, "facing and no link that it limits, expected"),
         (HEAD + SCENARIO + 'channel = { link = "infrared" }\n' + FINISHES, 6, "expected beacon = [x, y] beside it"),
-        (HEAD + SCENARIO + INFRARED.format("[3000, 50]") + FINISHES, 6, "has its beacon off the floor, expected"),
+        (HEAD + SCENARIO + INFRARED.format("[3000, 50]") + FINISHES, 6, "has a beacon off the floor, expected"),
         (HEAD + SCENARIO + INFRARED.format("[100]") + FINISHES, 6, "too few numbers, expected [x, y]"),
         (POST + SCENARIO + INFRARED.format("[1000, 510]") + FINISHES, 8, "beacon is in an obstacle, which blocks"),
         (HEAD + SCENARIO + FINISHES.replace("finishes", "in_reach"), 9, 'expected link = "infrared" in scenario "s"'),
@@ -343,7 +343,7 @@ def test_mistake_is_named_with_its_line(tmp_path: Path, text: str, line: int, ph
 @pytest.mark.parametrize("check", ["says", "prints", "messages"])
 def test_criterion_that_asks_for_nothing_is_refused(tmp_path: Path, check: str) -> None:
     found = problems(tmp_path / "bad", HEAD + SCENARIO + FINISHES.replace("finishes", check))
-    assert "asks for nothing" in found[0]
+    assert "has no condition" in found[0]
 
 
 @pytest.mark.parametrize("poses", ["[1, 2, 3]", '[["a", 2, 3]]', "[[1, 2]]", "[[nan, 2, 3]]"])

@@ -113,7 +113,7 @@ def test_lone_file_is_the_part_that_is_asked_for(tmp_path: Path) -> None:
     submission = read_submission(tmp_path / "alice.py", asked=Parts("robot.py", "student"))
     assert submission.responder == Code("alice.py", PROGRAM)
     assert submission.program is None
-    assert submission.notes == ("alice.py was taken for a responder.",)
+    assert submission.notes == ("alice.py was used as a responder.",)
 
 
 def test_two_files_of_any_name_are_told_apart(tmp_path: Path) -> None:
@@ -127,13 +127,13 @@ def test_one_missing_part_of_two_is_named_and_the_other_taken(tmp_path: Path) ->
     submission = read_submission(path, asked=Parts())
     assert (submission.program, submission.responder) == (Code("robot.py", PROGRAM), None)
     assert submission.notes == (
-        "There is no responder.py (beside it lies my_responder.py); what needs a responder has no marks.",
+        "There is no responder.py (other files: my_responder.py); criteria that need a responder get no marks.",
     )
     lone = tmp_path / "eve.py"
     lone.write_text(RESPONDER)
     submission = read_submission(lone, asked=Parts())
     assert (submission.program, submission.responder) == (None, Code("eve.py", RESPONDER))
-    assert "There is no robot.py; what needs a robot program has no marks." in submission.notes
+    assert "There is no robot.py; criteria that need a robot program get no marks." in submission.notes
 
 
 def test_without_any_part_that_is_asked_for_it_is_refused(tmp_path: Path) -> None:
@@ -146,7 +146,7 @@ def test_part_that_the_assignment_gives_is_left_out_with_a_note() -> None:
     submitted = Submission("a", Code("robot.py", PROGRAM), Code("responder.py", RESPONDER))
     fitted = fit_parts(submitted, Parts("robot.py", "student"))
     assert fitted.program is None
-    assert fitted.notes == ("robot.py was left out: a robot program is not asked for.",)
+    assert fitted.notes == ("robot.py was left out: the assignment does not need a robot program.",)
 
 
 def test_submission_toml_names_the_assignment_and_not_the_student(tmp_path: Path) -> None:
@@ -154,7 +154,7 @@ def test_submission_toml_names_the_assignment_and_not_the_student(tmp_path: Path
     path = folder(tmp_path / "json-queue" / "h1", {**BOTH, "submission.toml": meta})
     submission = read_submission(path)
     assert (submission.assignment, submission.student) == ("echo-responder", "h1")
-    assert submission.notes == ("submission.toml names the student Zoë Q; the student is h1, whatever it says.",)
+    assert submission.notes == ("submission.toml names the student Zoë Q, but the student is h1.",)
     assert not submission.files
     assert read_submission(path, student="s1").student == "s1"
     (path / "submission.toml").unlink()
@@ -235,7 +235,7 @@ def test_links_pipes_and_devices_in_folders_are_never_opened(tmp_path: Path) -> 
     (tmp_path / "link").symlink_to(path)
     assert "is a link" in refusal(tmp_path / "link")
     os.mkfifo(tmp_path / "robot.py")
-    assert "no ordinary file" in refusal(tmp_path / "robot.py")
+    assert "not a regular file" in refusal(tmp_path / "robot.py")
 
 
 def test_folder_caps(tmp_path: Path) -> None:

@@ -20,11 +20,11 @@ AREA = {"rectangle": [0, 0, 10, 10]}
     ("check", "keys", "place", "sentence"),
     [
         ("moves", {"moves": [{"foward": [1, 2]}]}, ("moves", 0, "foward"), 'did you mean "forward"?'),
-        ("moves", {"moves": [{"name": "a turn"}]}, ("moves", 0), "moves[0] asks for nothing, expected one of forward"),
+        ("moves", {"moves": [{"name": "a turn"}]}, ("moves", 0), "moves[0] has no condition, expected one of forward"),
         ("moves", {"moves": []}, ("moves",), "moves has too few entries, expected at least 1"),
         ("moves", {"moves": [{"turn": [90]}]}, ("moves", 0, "turn"), "too few numbers, expected [least, most]"),
-        ("moves", {"moves": [{"turn": [95, 85]}]}, ("moves", 0, "turn"), "a range with nothing in it"),
-        ("displacement", {}, (), "asks for nothing, expected one of forward"),
+        ("moves", {"moves": [{"turn": [95, 85]}]}, ("moves", 0, "turn"), "an empty range"),
+        ("displacement", {}, (), "has no condition, expected one of forward"),
         ("displacement", {"forward": "far"}, ("forward",), 'forward is "far", expected a list'),
         ("excursions", {"heights": [1, -1]}, ("heights",), "expected proportions like [1, 2, 1]"),
         ("encounters", {}, (), "below is missing"),
@@ -34,7 +34,7 @@ AREA = {"rectangle": [0, 0, 10, 10]}
         ("visits", {"places": [{"rectangel": [0, 0, 1, 1]}]}, ("places", 0, "rectangel"), 'did you mean "rectangle"?'),
         ("visits", {"places": [{"circle": [0, 0]}]}, ("places", 0, "circle"), "expected [x, y, radius]"),
         ("keeps_out", {"areas": [AREA], "of": "nose"}, ("of",), 'expected "robot", "pen"'),
-        ("closest", {"x": 1, "y": 2}, (), "asks for nothing, expected one of distance"),
+        ("closest", {"x": 1, "y": 2}, (), "has no condition, expected one of distance"),
         (
             "circuits",
             {"x": 1, "y": 2, "times": [0.5, 1], "gyro": [330, 390]},

@@ -116,13 +116,13 @@ def test_attributes_of_arrows() -> None:
         ("seqdiag", "// nothing", "line 1: there is nothing to draw"),
         ("seqdiag", "a ->\n;", "line 2: ';' stands here, expected the name of an actor"),
         ("seqdiag", "a ->", "line 1: the text ends here, expected the name of an actor"),
-        ("seqdiag", "a -> b\n[label 3]", "line 2: '3' is no attribute of an arrow"),
-        ("seqdiag", "a -> b [lable = 'x'];", "line 1: 'lable' is no attribute of an arrow; did you mean label?"),
-        ("seqdiag", "\n\nedge_lenght = 3; a -> b", "line 3: 'edge_lenght' is no attribute of a diagram; did"),
+        ("seqdiag", "a -> b\n[label 3]", "line 2: '3' is not an attribute of an arrow"),
+        ("seqdiag", "a -> b [lable = 'x'];", "line 1: 'lable' is not an attribute of an arrow; did you mean label?"),
+        ("seqdiag", "\n\nedge_lenght = 3; a -> b", "line 3: 'edge_lenght' is not an attribute of a diagram; did"),
         ("seqdiag", "a -> b [label = ];", "line 1: ']' stands here, expected what label is"),
         ("seqdiag", 'a -> b\n[label = "x];', "line 2: a text in quotes never ends"),
         ("seqdiag", "a -> b /* x", "line 1: a comment never ends"),
-        ("seqdiag", "a @ b", "line 1: '@' has no meaning here"),
+        ("seqdiag", "a @ b", "line 1: '@' is not valid here"),
         ("seqdiag", "seqdiag { a -> b", "line 1: the text ends here, expected }"),
         ("seqdiag", "a -> b }", "line 1: '}' stands here, expected the end of the text"),
         ("seqdiag", "a -- b", "line 1: '--' stands here, expected one of -> <-"),
@@ -253,7 +253,7 @@ def test_a_problem_names_the_cell_and_the_line_in_it() -> None:
     found = diagrams_in(Notebook("n.ipynb", cells))
     assert [cell.cell for cell in found.cells] == [3]
     assert len(found.problems) == 1
-    assert found.problems[0].startswith("cell 2, line 5: '@' has no meaning here")
+    assert found.problems[0].startswith("cell 2, line 5: '@' is not valid here")
     assert found.problems[0].endswith("; the diagram is not drawn")
     assert diagrams_in(None).cells == ()
 

@@ -193,7 +193,7 @@ MERGES = "m0: &m0 {k: v}\n" + "".join(f"m{n}: &m{n} {{<<: [*m{n - 1}, *m{n - 1}]
     ("text", "expected"),
     [
         ("submission_1: [", "not YAML at line"),
-        ("- a\n- b\n", "is no list of submissions"),
+        ("- a\n- b\n", "is not a list of submissions"),
         ("[" * 100_000, "cannot be read"),
         ("a: &a [*a]\n", "cannot be read"),
         ("? [a]\n: b\n", "cannot be read"),

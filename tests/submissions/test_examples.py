@@ -126,7 +126,7 @@ def test_every_example_is_marked_as_expected(
         if all(result.marks >= result.max_marks for result in results):
             clues = clues_of(submission, plan, trials, results)
             alarms.extend((*near_misses(clues), *accepted_differences(clues)))
-            alarms.extend(result.for_staff for result in results if "more than its text" in result.for_staff)
+            alarms.extend(result.for_staff for result in results if "more than it shows" in result.for_staff)
             as_lost = replace(clues, lost=plan.assignment.criteria, results=tuple(results))
             alarms.extend(sentence for rule in rules_that_prove() for sentence in rule(as_lost))
         return ()

@@ -85,7 +85,7 @@ def test_pose(flags: str, pose: tuple[float, float, float]) -> None:
         ("-N 500", "becomes 128"),
         ("-o Maze", "stay as they are"),
         ("-b Obstacles_Test -o None", "-o None leaves the obstacles as they are"),
-        ("-P blue", "-P blue is no colour of the pen's; it has red, orange, green"),
+        ("-P blue", "-P blue is not a pen colour; expected one of red, orange, green"),
         ("-b Radial_grey", "also sets the light sensors 60 mm to either side"),
         ("-b Radial_grey -N 10", "-N and -M do nothing after -b Radial_grey"),
     ],

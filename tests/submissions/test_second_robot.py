@@ -63,7 +63,7 @@ def test_a_second_pose_stands_for_all_and_has_a_jitter_of_its_own(tmp_path: Path
         (HEAD + SCENARIO + 'channel = { link = "between robots" }\n' + CRITERION, 'expected robots = 2 in world'),
         (HEAD + WORLD + '[parts]\nresponder = "none"\n' + SCENARIO + SECOND +
          'channel = { link = "infrared", beacon = [9, 9] }\n' + CRITERION, 'expected "between robots"'),
-        (HEAD + WORLD + SCENARIO + SECOND + APART.replace("at_most = 200\n", ""), "asks for nothing"),
+        (HEAD + WORLD + SCENARIO + SECOND + APART.replace("at_most = 200\n", ""), "has no condition"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_refused(tmp_path: Path, text: str, phrase: str) -> None:

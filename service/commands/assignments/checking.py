@@ -18,9 +18,9 @@ def check(
 ) -> None:
     """Find the mistakes in an assignment's files, grade its examples and compare the marks with the expected ones."""
     if everything == (assignment is not None):
-        raise UsageError("name one assignment to check, or give --all for the whole catalogue")
+        raise UsageError("name one assignment to check, or use --all for the whole catalogue")
     if everything and write_expected:
-        raise UsageError("name the one assignment whose expectations are to be written")
+        raise UsageError("name one assignment to use --write-expected")
     from service.commands.assignments import examples
 
     examples.check(assignment, write_expected=write_expected)

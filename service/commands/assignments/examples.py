@@ -81,11 +81,11 @@ def _told(checked: CheckedAssignment) -> dict[str, Any]:
 def _noted(assignment: str, checked: CheckedAssignment) -> CheckedAssignment:
     """Write the missing expectations to a file for review, and return the check result with them."""
     if not checked.unwritten:
-        tell(f"{EXPECTED} has a table for every example that could be noted: nothing was written")
+        tell(f"{EXPECTED} has a table for every example: no changes")
         return checked
     with for_the_user():
         path = add_expected(assignment, checked.unwritten)
-    tell(f"{path}: wrote what {', '.join(checked.unwritten)} got; is it what they must get?")
+    tell(f"{path}: results of {', '.join(checked.unwritten)} written; check that they are the expected ones")
     return checked.written()
 
 
@@ -93,7 +93,7 @@ def _show(checked: CheckedAssignment) -> None:
     found = checked.assignment
     criteria = count_words(len(found.criteria), "criterion", "criteria")
     trials = count_words(found.trial_count, "trial", "trials")
-    tell(f"{found.id}: in order; {criteria}, {found.max_marks:g} marks, {trials} (version {found.version[:12]})")
+    tell(f"{found.id}: no problems; {criteria}, {found.max_marks:g} marks, {trials} (version {found.version[:12]})")
     if checked.examples:
         show(examples_table(checked))
     else:

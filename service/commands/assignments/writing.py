@@ -57,4 +57,4 @@ def autograder(
     with for_the_user():
         write_autograder(assignment, output, secret_here(load_settings()))
     document(output=output)
-    tell(f"{output}: zip what is in it, and upload that to Gradescope")
+    tell(f"{output}: zip the contents of this folder and upload the zip to Gradescope")

@@ -35,8 +35,8 @@ def remarks(line: JobLine) -> list[str]:
         f"staff only: {line.staff_only}": line.staff_only is not None,
         f"no {line.missing}": bool(line.missing),
         f"{line.unjudged} criteria not judged": line.unjudged > 0,
-        f"{line.set_by_hand} criteria set by hand": line.set_by_hand > 0,
-        f"{line.surprises} trials that the log explains": line.surprises > 0,
+        f"{line.set_by_hand} criteria adjusted by staff": line.set_by_hand > 0,
+        f"{line.surprises} trials explained in the log": line.surprises > 0,
         "suspect": line.suspect is not None,
         f"attempt {line.newer_attempt} is newer and does not count": line.newer_attempt is not None,
         "published": line.published_at is not None,
@@ -51,7 +51,7 @@ def unjudged_words(lines: Sequence[JobLine]) -> str:
         return ""
     told = ", ".join(students[:_MOST_NAMED]) + (" ..." if len(students) > _MOST_NAMED else "")
     whose = f"{len(students)} submissions have" if len(students) > 1 else "1 submission has"
-    return f"{whose} criteria that could not be judged and give no marks: {told}; robomark show GRADE says why"
+    return f"{whose} criteria that could not be judged and give no marks: {told}; robomark show GRADE shows the reasons"
 
 
 def out_of(marks: Decimal | None, most: Decimal | None) -> str:

@@ -22,7 +22,7 @@ def pause(batch: BatchId) -> None:
         held = operations.pause(service, actor, found.course_id, found.id)
     was = "is paused" if held.changed else "was paused already"
     document(batch=found.id, changed=held.changed, waiting=held.waiting, running=held.running)
-    tell(f"batch {found.id} {was}: {held.waiting} waiting, {held.running} graded to their end")
+    tell(f"batch {found.id} {was}: {held.waiting} queued, {held.running} still running")
 
 
 def resume(batch: BatchId) -> None:
@@ -32,9 +32,9 @@ def resume(batch: BatchId) -> None:
     with operating() as (service, actor):
         found = operations.find(service, actor, batch)
         held = operations.resume(service, actor, found.course_id, found.id)
-    was = "goes on" if held.changed else "was not paused"
+    was = "is resumed" if held.changed else "was not paused"
     document(batch=found.id, changed=held.changed, waiting=held.waiting, running=held.running)
-    tell(f"batch {found.id} {was}: {held.waiting} waiting, {held.running} being graded")
+    tell(f"batch {found.id} {was}: {held.waiting} queued, {held.running} running")
 
 
 def cancel(batch: BatchId) -> None:
@@ -46,9 +46,12 @@ def cancel(batch: BatchId) -> None:
         ended = operations.cancel(service, actor, found.course_id, found.id)
     document(batch=found.id, changed=ended.changed, waiting=ended.waiting, running=ended.running)
     if ended.changed:
-        tell(f"batch {found.id} is cancelled: {ended.waiting} not begun, {ended.running} stopped")
+        tell(
+            f"batch {found.id} is cancelled: {ended.waiting} queued jobs cancelled, {ended.running} running jobs "
+            "stopped"
+        )
     else:
-        tell(f"batch {found.id}: nothing changed, all of it has ended already")
+        tell(f"batch {found.id}: nothing changed, all its jobs have ended")
 
 
 def retry(
@@ -59,14 +62,14 @@ def retry(
     from service.operations import batches as operations
 
     if (batch is not None) == every:
-        raise UsageError("name one batch, or --all for the dead of all batches")
+        raise UsageError("name one batch, or use --all for the failed jobs of all batches")
     with operating() as (service, actor):
         batch_id = None if batch is None else operations.find(service, actor, batch).id
         retried = operations.retry_dead(service, actor, batch_id)
     where = "all batches" if batch_id is None else f"batch {batch_id}"
     document(batch=batch_id, queued=retried.queued, outdated=retried.outdated)
     if retried.queued + retried.outdated == 0:
-        tell(f"{where}: nothing changed, no submission is dead")
+        tell(f"{where}: nothing changed, there are no failed jobs")
         return
-    outdated = f"; {retried.outdated} left, because a newer submission came" if retried.outdated else ""
+    outdated = f"; {retried.outdated} left out, because there is a newer submission" if retried.outdated else ""
     tell(f"{where}: {retried.queued} queued again{outdated}")

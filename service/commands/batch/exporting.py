@@ -39,9 +39,9 @@ def export_batch(batch: str, form: str, output: Path | None, worksheet: Path | N
     chosen = FORMATS[form]
     if output is None and (chosen.packed is not None or (chosen.table is None and chosen.document is not None)):
         what = "a folder" if chosen.document is not None else "a file"
-        raise UsageError(f"{form} is no text for a screen; name {what} with --output")
+        raise UsageError(f"{form} cannot be printed to a terminal; name {what} with --output")
     if (chosen.filled_in is None) != (worksheet is None):
-        raise UsageError("--worksheet names what --format moodle-worksheet fills in; expected both or neither")
+        raise UsageError("--worksheet and --format moodle-worksheet need each other; expected both or neither")
     one_each = output is not None and _is_for_files(chosen, output)
     asked = ExportRequest(form, published, None if worksheet is None else _read(worksheet), one_each)
     with operating() as (service, actor):
@@ -53,7 +53,7 @@ def export_batch(batch: str, form: str, output: Path | None, worksheet: Path | N
             made = export(service, actor, found.course_id, found.id, asked)
     _warn_of(made)
     if chosen.packed is not None:
-        _name_left_over(made.left_over, "left out, for Moodle would not know whose it is")
+        _name_left_over(made.left_over, "left out, because Moodle cannot match the student")
     elif one_each and output is not None:
         _write_each(made, output)
     else:
@@ -69,7 +69,7 @@ def _warn_of(made: Export) -> None:
     for line in made.for_staff:
         _warn(f"{line.student} is for staff only: {line.staff_only}; robomark show {line.id}")
     if made.waiting_regrades:
-        _warn(f"{made.waiting_regrades} regrades are not published: these are the grades that stand")
+        _warn(f"{made.waiting_regrades} regrades are not published: these are the current grades")
     if unjudged := unjudged_words(made.unjudged):
         _warn(unjudged)
 
@@ -80,7 +80,7 @@ def _read(worksheet: Path) -> str:
     except OSError as error:
         raise UsageError(f"{worksheet} cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise UsageError(f"{worksheet} is not UTF-8; expected it as Moodle wrote it") from None
+        raise UsageError(f"{worksheet} is not UTF-8; expected the file as downloaded from Moodle") from None
 
 
 def _is_for_files(chosen: Format, output: Path) -> bool:

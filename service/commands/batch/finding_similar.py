@@ -37,7 +37,7 @@ def find_similar(batch: str, given: Path | None, output: Path | None) -> None:
         shown = show_similar_in_batch(service, actor, found.course_id, found.id, given)
         view = staff_similarity(shown.found or ())
         if output is not None:
-            page = similarity_page(view, shown.source, f"Alike in {shown.batch.name}", _MOST_SHOWN)
+            page = similarity_page(view, shown.source, f"Similar submissions in {shown.batch.name}", _MOST_SHOWN)
             path = write_page(output, "similar.html", page)
             note(f"evidence: {path}")
     document(assignments=as_plain(view))
@@ -47,13 +47,13 @@ def find_similar(batch: str, given: Path | None, output: Path | None) -> None:
 def _show(view: SimilarityView) -> None:
     for found in view.found:
         tell(what_it_says(found))
-        for kind, groups in (("a whole file in common", found.same), ("the same recordings", found.same_recordings)):
+        for kind, groups in (("the same file", found.same), ("the same recordings", found.same_recordings)):
             for group in groups[:_MOST_SHOWN]:
                 tell(f"{kind}: {', '.join(group)}")
-        alike = table("student", "student", "alike", "where", "did the same")
+        alike = table("student", "student", "alike", "where", "same behaviour")
         for row in similarity_rows(found)[:_MOST_SHOWN]:
             alike.add_row(*row)
         if found.pairs:
             show(alike)
         if len(found.pairs) > _MOST_SHOWN:
-            tell(f"and {len(found.pairs) - _MOST_SHOWN} pairs more: --json has them all")
+            tell(f"{len(found.pairs) - _MOST_SHOWN} more pairs are not shown; --json shows all")

@@ -19,7 +19,7 @@ def list_batches(
 
     with operating() as (service, actor):
         lines = list_newest(service, actor, course)
-    listed = table("batch", "name", "taken in", "submissions", "refused", "state", right=("submissions", "refused"))
+    listed = table("batch", "name", "submitted", "submissions", "refused", "state", right=("submissions", "refused"))
     for line in lines:
         when = line.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
         listed.add_row(line.id, line.name, when, str(line.jobs), str(len(line.refusals)), summary(line))

@@ -20,7 +20,11 @@ if TYPE_CHECKING:
     from service.operations.batch_views import ClassOverview, TableLine
     from submissions.student_identity import Student
 
-_WHY = {"low": "far below the others", "slow": "took far longer than the others", "close": "close to the pass mark"}
+_WHY = {
+    "low": "much lower than the others",
+    "slow": "took much longer than the others",
+    "close": "close to the pass mark",
+}
 
 
 def show_overview(
@@ -44,11 +48,11 @@ def show_overview(
         if each.outliers:
             show(_outliers(each, by_id))
         for same in each.identical:
-            tell(f"the very same: {named(tuple(line.student for line in same))}")
+            tell(f"identical: {named(tuple(line.student for line in same))}")
         _tell_missing(each.missing)
     _tell_missing(shown.missing)
     for refusal in refusals:
-        tell(f"refused: {refusal.source}: {refusal.reason}")
+        tell(f"rejected: {refusal.source}: {refusal.reason}")
 
 
 def _tell_missing(students: Sequence[Student]) -> None:
@@ -66,7 +70,7 @@ def _distribution(each: ClassOverview) -> Table:
 
 
 def _outliers(each: ClassOverview, by_id: dict[str, TableLine]) -> Table:
-    made = table("to be looked at", "why", "grade")
+    made = table("needs review", "why", "grade")
     for outlier in each.outliers:
         made.add_row(by_id[outlier.id].student, _WHY[outlier.why], outlier.id)
     return made

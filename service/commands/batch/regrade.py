@@ -39,9 +39,9 @@ def regrade(
         found = batches.find(service, actor, batch)
         by = replace(service, notifier=NotifiedLater()) if wait else service
         made = operations.regrade_batch(by, actor, found.course_id, found.id, changed)
-        tell(f"batch {made.batch_id}: {made.jobs} queued to be graded again{_left_out(made)}")
+        tell(f"batch {made.batch_id}: {made.jobs} queued for regrading{_left_out(made)}")
         if not wait:
-            note(f"what changes, and why: robomark batch status {made.batch_id}")
+            note(f"changes and reasons: robomark batch status {made.batch_id}")
             document(batch=made.batch_id, regraded=made)
             return
         from service.commands.batch.tables import changes_table
@@ -52,7 +52,7 @@ def regrade(
             regraded.for_marks()
             changes = operations.list_changes(service, actor, found.course_id, made.batch_id)
             show(changes_table(changes))
-            note(f"to let the new grades stand: robomark batch publish {made.batch_id}")
+            note(f"to publish the new grades: robomark batch publish {made.batch_id}")
             regraded.for_plots()
     document(batch=made.batch_id, regraded=made, changes=changes)
     dead = [change for change in changes if change.state is JobState.DEAD]
@@ -109,8 +109,8 @@ def regrade_one(
         found = batches.find_grade(service, actor, grade)
         job = operations.regrade_one(service, actor, found.course_id, found.id, changed)
     document(grade=found.id, job=job)
-    tell(f"grade {found.id}: queued to be graded again as {job}")
-    note(f"to let the new grade stand: robomark batch publish-one {job}")
+    tell(f"grade {found.id}: queued for regrading as {job}")
+    note(f"to publish the new grade: robomark batch publish-one {job}")
 
 
 def grade_over_limit(grade: GradeId) -> None:
@@ -164,13 +164,13 @@ def _counted(done: Published, verb: str) -> str:
         if count
     ]
     replaced = f", {done.replaced} of them regrades" if done.replaced else ""
-    return f"{done.published} grades {verb}{replaced}{'; left: ' if left else ''}{', '.join(left)}"
+    return f"{done.published} grades {verb}{replaced}{'; not published: ' if left else ''}{', '.join(left)}"
 
 
 def _left_out(made: Regraded) -> str:
     left = []
     if made.other_assignment:
-        left.append(f"{made.other_assignment} left, for another assignment")
+        left.append(f"{made.other_assignment} left out, for another assignment")
     if made.unfinished:
-        left.append(f"{made.unfinished} left, not graded yet")
+        left.append(f"{made.unfinished} left out, not graded yet")
     return "".join(f"; {sentence}" for sentence in left)

@@ -36,12 +36,12 @@ def status(batch: BatchId) -> None:
     )
     tell(f"batch {line.id}: {line.name}: {summary(line)}")
     if pace is not None:
-        tell(f"{pace.per_minute:.0f} a minute, {pace.left} left")
+        tell(f"{pace.per_minute:.0f} per minute, {pace.left} left")
     show(marks_table(graded.lines, line.refusals) if line.regrade_of is None else changes_table(shown.changes))
     show(*map(rank_table, shown.ranks), *statistics_parts(graded.statistics))
     if unjudged := unjudged_words(graded.lines):
         tell(unjudged)
     if graded.waiting_regrades:
-        tell(f"{graded.waiting_regrades} regrades are done and not published: robomark batch publish {line.id}")
+        tell(f"{graded.waiting_regrades} regrades are completed but not published: robomark batch publish {line.id}")
     if shown.history:
         show(history_table(shown.history))

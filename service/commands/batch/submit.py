@@ -48,7 +48,8 @@ def submit(
 
         refused = submitting.submit(submitting.BatchToSubmit(grading_requests, assignment, people, course, again))
     if refused:
-        raise UsageError(f"{refused} of the submissions could not be taken in; the others were")
+        what = "submission was" if refused == 1 else "submissions were"
+        raise UsageError(f"{refused} {what} rejected; the others are queued")
 
 
 def submit_and_wait(

@@ -58,10 +58,10 @@ def submit(asked: BatchToSubmit) -> int:
 
 def _who_grades(lively: Sequence[WorkerDescription]) -> str:
     if not lively:
-        return "no worker runs: robomark worker starts one, and so does robomark up"
+        return "no worker is running; start one with robomark worker or robomark up"
     slots = sum(worker.concurrency for worker in lively)
     many = f"{len(lively)} workers grade" if len(lively) > 1 else "1 worker grades"
-    return f"{many} them, {slots} at a time"
+    return f"{many} them, concurrency {slots}"
 
 
 def submit_to(services: Services, service: Service, actor: Actor, asked: BatchToSubmit, output: Path | None) -> int:
@@ -91,7 +91,7 @@ def submit_to(services: Services, service: Service, actor: Actor, asked: BatchTo
         lines, statistics, page = _shown(service, actor, batch, done, asked.path.name, output)
     except KeyboardInterrupt:
         where = f"status {done.batch.id}" if done.batch else "list"
-        raise Cancelled(f"stopped; what is not graded stays queued: robomark batch {where}") from None
+        raise Cancelled(f"stopped; ungraded submissions stay queued: robomark batch {where}") from None
     document(**_accepted_keys(done), jobs=lines, statistics=statistics, report=page)
     failed = [line for line in lines if line.state is JobState.DEAD]
     if failed:
@@ -109,7 +109,7 @@ def _submit(service: Service, actor: Actor, asked: BatchToSubmit) -> SubmittedBa
     checked = read_batch_for(asked.path, assignment, None if asked.people is None else read_people(asked.people))
     _show_refusals(checked.refusals)
     if not checked.grading_requests:
-        raise UsageError(f"{asked.path}: none of {len(checked.refusals)} submissions can be taken in")
+        raise UsageError(f"{asked.path}: none of {len(checked.refusals)} submissions can be accepted")
     done = operations.submit(service, actor, course_id, SubmitRequest(asked.path.name, checked, asked.again))
     _show_refusals(done.refused_now)
     if done.known:
@@ -118,9 +118,9 @@ def _submit(service: Service, actor: Actor, asked: BatchToSubmit) -> SubmittedBa
             known_ones.add_row(known.student, f"already submitted as {known.job_id}{_hint(known)}")
         show(known_ones)
     if done.batch is None:
-        tell("nothing new; --again grades it again")
+        tell("no new submissions; use --again to grade them again")
         return done
-    alike = f"; {done.copied} identical to a graded one, and so graded already" if done.copied else ""
+    alike = f"; {done.copied} identical to graded submissions" if done.copied else ""
     tell(f"batch {done.batch.id}: {done.queued} queued{alike}")
     over = [job for job in done.jobs if job.staff_only]
     if over:
@@ -155,7 +155,7 @@ def _accepted_keys(done: SubmittedBatch) -> dict[str, object]:
 
 def _hint(known: AlreadySubmitted) -> str:
     if known.state is JobState.DEAD:
-        return f", dead: robomark batch retry {known.batch_id}"
+        return f", failed: robomark batch retry {known.batch_id}"
     if known.other_grader and known.batch_id is not None:
         return f", by another version of the grader: robomark batch regrade {known.batch_id}"
     return ""

@@ -51,13 +51,13 @@ def marks_table(lines: Sequence[JobLine], refusals: Sequence[Refusal] = ()) -> T
         )
     for refusal in refusals:
         whose = who(refusal.student.id or refusal.source, refusal.student.name, refusal.assignment)
-        made.add_row(*whose, "", "", Text(f"not taken in: {refusal.sentence}", style="red"), "")
+        made.add_row(*whose, "", "", Text(f"rejected: {refusal.sentence}", style="red"), "")
     return made
 
 
 def refusals_table(refusals: Sequence[Refusal]) -> Table:
     """Return a table of rejected submissions with reasons."""
-    made = table("not taken in", "why")
+    made = table("rejected", "why")
     for refusal in refusals:
         made.add_row(refusal.source, refusal.reason)
     return made
@@ -81,14 +81,14 @@ def changes_table(changes: Sequence[Change]) -> RenderableType:
         )
     same = len(changes) - len(shown)
     standing = sum(change.standing is Standing.STANDS for change in changes)
-    told = f"{same} of {len(changes)} unchanged; {standing} of the new grades stand"
+    told = f"{same} of {len(changes)} unchanged; {standing} new grades are current"
     return Group(made, told) if shown else told
 
 
 def rank_table(ranks: RankTable) -> RenderableType:
     """Return a table with one row for each student, best first."""
     measure = ", ".join(filter(None, (ranks.measure, ranks.unit)))
-    made = table("place", "student", measure, "95 % interval", "trials that count", right=("place", measure))
+    made = table("place", "student", measure, "95 % interval", "counted trials", right=("place", measure))
     for row in ranks.texts:
         made.add_row(*row)
     return Group(f"{ranks.assignment}: {ranks.title}", made)
@@ -96,7 +96,7 @@ def rank_table(ranks: RankTable) -> RenderableType:
 
 def history_table(history: Sequence[AuditEntry]) -> Table:
     """Return a table of the activity log."""
-    made = table("when", "who", "did", "what came of it")
+    made = table("when", "who", "did", "outcome")
     for entry in history:
         detail = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in entry.detail.items())
         when = entry.at.astimezone().strftime("%Y-%m-%d %H:%M")
@@ -110,4 +110,4 @@ def _worth_a_row(change: Change) -> bool:
 
 def _criterion(change: CriterionChange) -> str:
     before, after = (out_of(*worth) if worth is not None else "none" for worth in (change.before, change.after))
-    return f"{change.title}: {before} to {after}{' (set by hand)' if change.by_hand else ''}"
+    return f"{change.title}: {before} to {after}{' (adjusted by staff)' if change.by_hand else ''}"

@@ -45,7 +45,7 @@ class _Rate(ProgressColumn):
             return Text("")
         rate = done / elapsed
         left = timedelta(seconds=round((task.total - task.completed) / rate))
-        return Text(f"{60 * rate:.0f} a minute, {left} left", style="progress.remaining")
+        return Text(f"{60 * rate:.0f} per minute, {left} left", style="progress.remaining")
 
 
 @dataclass(frozen=True, slots=True)

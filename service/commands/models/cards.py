@@ -40,7 +40,7 @@ def compare(
     with for_the_user():
         about = [card(name) for name in chosen]
         if len({each.classes for each in about}) > 1 or len(set(chosen)) < 2:
-            raise UsageError(f"{', '.join(chosen)} cannot be compared; expected two or more models of the same things")
+            raise UsageError(f"{', '.join(chosen)} cannot be compared; expected two or more models of the same classes")
     if output is not None:
         from service.reports.written import prepare_folder
 

@@ -34,7 +34,7 @@ def train(
     same = name in names() and card(name).sha256 == about.sha256
     document(file=output / about.file, training_images=about.training_images, sha256=about.sha256, same=same)
     tell(f"{output / about.file}: {about.training_images} images, sha256 {about.sha256[:16]}")
-    tell("the same bytes as the packaged weights" if same else "other bytes than the packaged weights")
+    tell("identical to the packaged weights" if same else "differs from the packaged weights")
 
 
 def evaluate(name: Name, output: Output = None) -> None:
@@ -52,7 +52,7 @@ def evaluate(name: Name, output: Output = None) -> None:
     for curve in _curves(result.measured.curves):
         show("", curve)
     if result.measured != result.card.measured:
-        note("\nThis is not what the card says: other versions of the libraries, or other weights.")
+        note("\nThis differs from the card: other library versions or other weights.")
     if output is not None:
         _write(result, output)
 

@@ -195,7 +195,7 @@ class _Judging:
         try:
             return judge_one(criterion, self.case)
         except MemoryError:
-            return _unjudged(criterion, f"it took more than {self.bounds.memory_bytes >> 20} MB of memory")
+            return _unjudged(criterion, f"it used more than {self.bounds.memory_bytes >> 20} MB of memory")
         except RobomarkError as error:
             return _unjudged(criterion, str(error).rstrip(".")[:_LONGEST_CAUSE])
         except Exception as error:
@@ -325,7 +325,7 @@ def _unjudged(criterion: Criterion, cause: str) -> CriterionResult:
         title=criterion.title,
         marks=Decimal(0),
         max_marks=criterion.marks,
-        message="This could not be judged; staff will look at it.",
+        message="This criterion could not be judged. Staff will review it.",
         visibility=criterion.visibility,
         unjudged=cause,
         for_staff=f"Could not be judged: {cause}.",

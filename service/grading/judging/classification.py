@@ -38,7 +38,7 @@ def _share(criterion: Classification, found: Classified, hidden: bool) -> Fracti
 
 def _what_marks_need(criterion: Classification) -> str:
     if criterion.at_least is not None:
-        return f" All marks are given from {criterion.at_least:g} on."
+        return f" Full marks need an accuracy of {criterion.at_least:g}."
     if criterion.steps:
-        return " Marks: " + ", ".join(f"{marks:g} from {accuracy:g} on" for accuracy, marks in criterion.steps) + "."
+        return " Marks: " + ", ".join(f"{marks:g} from {accuracy:g}" for accuracy, marks in criterion.steps) + "."
     return ""

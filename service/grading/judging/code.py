@@ -58,14 +58,16 @@ def judge_source(
     wrong: list[str] = []
     for rule, place in zip(criterion.uses, answers.uses, strict=True):
         if place is None:
-            wrong.append(f"Expected {whose} to use {_words(rule)}, but it does not, or not where it is run")
+            wrong.append(f"Expected {whose} to use {_words(rule)}, but it does not, or only in code that is not run")
     for rule, place in zip(criterion.avoids, answers.avoids, strict=True):
-        but = f"{place} has it" if place is not None else _spoke(rule, answers, trials) or answers.unread
+        but = f"{place} uses it" if place is not None else _spoke(rule, answers, trials) or answers.unread
         if but:
-            wrong.append(f"Expected {whose} to do without {_words(rule)}, but {but}")
+            wrong.append(f"Expected {whose} not to use {_words(rule)}, but {but}")
     for rule, place in zip(criterion.in_loop, answers.in_loop, strict=True):
         if place is None:
-            wrong.append(f"Expected {whose} to call {rule} inside a loop, but it does not, or not where it is run")
+            wrong.append(
+                f"Expected {whose} to call {rule} inside a loop, but it does not, or only in code that is not run"
+            )
     for rule, place in zip(criterion.defines, answers.defines, strict=True):
         if place is None:
             wrong.append(f"Expected {whose} to define a function {rule}, but it does not")
@@ -73,7 +75,7 @@ def judge_source(
     wrong += [f"Expected the magic line of {whose} to have {told}, but it does not" for told in asked if told]
     for_staff = _for_staff(criterion, answers)
     if not wrong:
-        return passed(f"The text of {whose} is as expected.", for_staff=for_staff)
+        return passed(f"The code of {whose} is as expected.", for_staff=for_staff)
     count = len(criterion.uses + criterion.avoids + criterion.in_loop + criterion.defines) + len(asked)
     message = f"{'. '.join(wrong[:_MOST_TOLD])}."
     return failed(message, score=Fraction(count - len(wrong), count), for_staff=for_staff)
@@ -89,14 +91,14 @@ def _spoke(rule: str, answers: SourceAnswers, trials: Sequence[TrialResult]) -> 
     if not rule.endswith("()") or not any(meant) or shown:
         return ""
     spoke = any(trial.recording.spoken for trial in trials if trial.visibility == "visible")
-    return "the robot spoke when it was run" if spoke else ""
+    return "the robot spoke during the run" if spoke else ""
 
 
 def _for_staff(criterion: SourceRules, answers: SourceAnswers) -> str:
     """Return what staff should check for avoided constructs, because the source does not show all it can do."""
     if not criterion.avoids or not answers.doubts:
         return ""
-    return f"Can do more than its text shows: {'; '.join(answers.doubts)}."
+    return f"The code may do more than it shows: {'; '.join(answers.doubts)}."
 
 
 def _missing_flags(criterion: SourceRules, flags: Flags) -> list[str]:
@@ -142,7 +144,7 @@ def _returned(criterion: Functions, called: Called | None) -> Outcome:
         if score < least:
             told = f"Expected {_call_words(criterion, call)} to return {_wanted(call)}, but {what}"
             if call.hidden:
-                for_staff = for_staff or f"The first hidden call that went wrong: {told}."
+                for_staff = for_staff or f"The first hidden call with a wrong result: {told}."
             else:
                 first = first or told
     return _of_calls(criterion, scores, first or _hidden_words(criterion, called, scores, least), for_staff)
@@ -153,11 +155,11 @@ def _of_calls(criterion: Functions, scores: Sequence[Fraction], wrong: str, for_
     share = sum(scores, Fraction(0)) / len(scores)
     measures = (Measure("right", float(share)),)
     if not wrong or (criterion.table and share >= Fraction(str(criterion.at_least))):
-        some = f"{float(share):.0%} right" if criterion.each else f"{len(scores)} of {len(scores)} calls right"
-        some = f"at least {criterion.at_least:.0%} of {len(scores)} calls right" if criterion.table else some
-        return passed(f"The functions returned what they must: {some}.", measures=measures, for_staff=for_staff)
+        some = f"{float(share):.0%} correct" if criterion.each else f"{len(scores)} of {len(scores)} calls correct"
+        some = f"at least {criterion.at_least:.0%} of {len(scores)} calls correct" if criterion.table else some
+        return passed(f"The functions returned the expected values: {some}.", measures=measures, for_staff=for_staff)
     right = sum(score == 1 for score in scores)
-    tally = f" ({right} of {len(scores)} calls right)" if len(scores) > 1 and not criterion.table else ""
+    tally = f" ({right} of {len(scores)} calls correct)" if len(scores) > 1 and not criterion.table else ""
     score = in_steps(share) if criterion.table else share
     return failed(f"{wrong}{tally}.", score=score, measures=measures, for_staff=for_staff)
 
@@ -171,12 +173,12 @@ def _hidden_words(criterion: Functions, called: Called, scores: Sequence[Fractio
     if all(
         fault == no_function(call.function or criterion.function) for call, fault in zip(calls, faults, strict=True)
     ):
-        return f"Expected all functions to be there, but {faults[0]}"
+        return f"Expected all functions to exist, but {faults[0]}"
     hidden = [score for call, score in zip(calls, scores, strict=True) if call.hidden]
     if criterion.table:
         share = in_steps(sum(scores, Fraction(0)) / len(scores))
-        asked = f"Expected {criterion.function} to be right in {criterion.at_least:.0%} of {len(scores)} calls"
-        return f"{asked}, but it was in about {float(share):.0%}"
+        asked = f"Expected {criterion.function} to be correct in {criterion.at_least:.0%} of {len(scores)} calls"
+        return f"{asked}, but it was correct in about {float(share):.0%}"
     right = sum(score >= least for score in hidden)
     return f"Expected the right values in all {len(hidden)} hidden calls as well, but {right} of them were right"
 

@@ -67,7 +67,7 @@ def judge_resends(criterion: Resends, trial: TrialResult) -> Outcome:
         again = f", {tries - count} of them again" if tries > count else ""
         last = max(message.t for each in questions for message in each.tries)
         return passed(
-            f"The robot sent {tries} messages{again}, until each of {count} was answered or given up.",
+            f"The robot sent {tries} messages{again}, until each of {count} was answered or the robot gave up.",
             last,
             pose_at(recording, last),
             measures,
@@ -120,7 +120,7 @@ def judge_fresh_answers(criterion: FreshAnswers, trial: TrialResult) -> Outcome:
     """Judge each report against the answers to the text sent last before it, and against all other answers."""
     recording = trial.recording
     questions = _questions(recording)
-    expected = "Expected the robot to report each answer as that to what it sent last"
+    expected = "Expected the robot to report only answers to the message that it sent last"
     if len(questions) < criterion.at_least:
         return failed(f"{expected}, but it {_few(questions)}.")
     answers = _Answered(criterion, questions)
@@ -159,8 +159,8 @@ def judge_fresh_answers(criterion: FreshAnswers, trial: TrialResult) -> Outcome:
         )
         return failed(f"{expected}, but {what} {told}.", at, pose_at(recording, at), Fraction(right, judged))
     if not judged:
-        return passed("The channel lost every message or its answer by chance, and the robot believed none.")
-    return passed(f"{right} of {judged} answers were reported, each as that to what was sent last.")
+        return passed("The channel lost every message or its answer by chance, and the robot reported no wrong answer.")
+    return passed(f"{right} of {judged} answers were reported, each for the message sent last.")
 
 
 def _unanswered(question: _Question) -> str:

@@ -123,7 +123,9 @@ def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
         )
     told = ", ".join(f"{mean:.0f}" for mean in means)
     return passed(
-        f"The path has {len(legs)} straight legs as asked, of {told} mm.", *place_at(recording, legs[-1].last), measures
+        f"The path has {len(legs)} straight legs as expected, of {told} mm.",
+        *place_at(recording, legs[-1].last),
+        measures,
     )
 
 

@@ -56,7 +56,7 @@ def judge_follows(criterion: Follows, trial: TrialResult) -> Outcome:
         )
     if share < criterion.covers - 1e-9:
         met = float(found.progress[0])
-        late = f"came upon it only {met / found.length:.0%} of the way along, and " if met > begin else ""
+        late = f"reached it only at {met / found.length:.0%} of its length, and " if met > begin else ""
         return failed(
             f"Expected {who} to follow {criterion.covers:.0%} of {line} within {criterion.within:g} mm, "
             f"but it {late}followed {share:.0%} of it.",
@@ -130,8 +130,8 @@ def judge_laps(criterion: Laps, trial: TrialResult) -> Outcome:
                 measures=measures,
             )
         return failed(
-            f"Expected {_laps_words(criterion.laps)} from start line to start line, but the robot came "
-            f"{max(driven, 0) / found.length:.0%} of the way round and crossed the start line "
+            f"Expected {_laps_words(criterion.laps)} from start line to start line, but the robot drove "
+            f"{max(driven, 0) / found.length:.0%} of a lap and crossed the start line "
             f"{len(crossings)} time{'' if len(crossings) == 1 else 's'}.",
             recording.end_t,
             recording.end,

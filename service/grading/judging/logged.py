@@ -43,19 +43,19 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
         measures += (Measure("made up", float(made_up)),)
     if logged and not values:
         return failed(
-            f"Expected {name} to be what {_instrument(criterion)} read, but all {len(logged)} samples are made up: "
-            "none is what it read when they were printed.",
+            f"Expected {name} to be readings of {_instrument(criterion)}, but all {len(logged)} samples are made up: "
+            "none matches the reading at the time of printing.",
             measures=measures,
         )
     if not values and (criterion.at_least or criterion.plateaus or criterion.between or criterion.covers):
         return failed(
-            f'Expected the program to log {name}, but the datalog has none: nothing like "{name}: 42" was printed.'
+            f'Expected the program to log {name}, but the datalog has none: no line like "{name}: 42" was printed.'
         )
     checks = _datalog_checks(criterion, samples, recording)
     if criterion.plateaus:
         checks.append(_plateau_check(criterion, values))
     wrong = next((words for reached, words in checks if reached < 1), None)
-    told = f"; {made_up} of {len(logged)} are made up, not what {_instrument(criterion)} read" if made_up else ""
+    told = f"; {made_up} of {len(logged)} are made up, not readings of {_instrument(criterion)}" if made_up else ""
     if wrong is None:
         outcome = passed(f"The program logged {len(values)} samples of {name} as expected{told}.", measures=measures)
     else:
@@ -106,7 +106,7 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
         sides = [entry[0] for entry in log]
         turns = bool(sides) and sides == ["left", "right"] * (len(sides) // 2)
         checks.append(
-            (Fraction(turns), "Expected left and right images to take turns, but they did not (image_data both)")
+            (Fraction(turns), "Expected left and right images to alternate, but they did not (image_data both)")
         )
     if criterion.at_start:
         moved = next((entry for entry in log if not _shows_start(entry, recording, trial.light_noise)), None)

@@ -27,6 +27,6 @@ def loss_words(message: Message) -> str:
         case "facing away":
             return f"the robot faced {abs(round(message.angle or 0, 1)):g}° away from the receiver"
         case "blocked":
-            return "a wall or an obstacle stood between the robot and the receiver"
+            return "a wall or an obstacle was between the robot and the receiver"
         case _:
             return "by chance"

@@ -64,5 +64,5 @@ def early_end(trial: TrialResult, outcome: Outcome | None = None) -> str:
     if fault is None or (outcome is not None and outcome.tells_end):
         return ""
     if fault.verdict is Verdict.TIME_LIMIT:
-        return f" The program was still running when the time was up, at {fault.t:g} s."
+        return f" The program was still running when time ran out, at {fault.t:g} s."
     return f" The run ended early, at {fault.t:.2f} s."

@@ -60,8 +60,8 @@ def judge_displacement(criterion: Displacement, trial: TrialResult) -> Outcome:
     share = criterion.agrees_with_wheels
     if share is not None and not abs(whole.distance - expected) <= share * max(expected, 1e-9):
         return failed(
-            f"Expected the robot to have gone the {expected:.0f} mm that its left wheel's position stands for "
-            f"(within {share:.0%}), but it ended {whole.distance:.0f} mm from its start.",
+            f"Expected the robot to drive {expected:.0f} mm according to its left wheel's position (within "
+            f"{share:.0%}), but it ended {whole.distance:.0f} mm from its start.",
             t,
             end,
             measures=measures,
@@ -87,7 +87,7 @@ def judge_moves(criterion: Moves, trial: TrialResult) -> Outcome:
         return _missing_move(criterion, recording, made, found, missing, score, measures)
     others = [move for move in made if move not in found]
     if criterion.only and others:
-        expected = f"only the {_count(len(found), 'move')} asked for"
+        expected = f"only the {_count(len(found), 'move')} expected"
         return failed(
             f"Expected {expected}, but the robot also {others[0]}.",
             *place_at(recording, others[0].first),
@@ -95,7 +95,7 @@ def judge_moves(criterion: Moves, trial: TrialResult) -> Outcome:
             measures=measures,
         )
     told = "; ".join(str(move) for move in found[:4] if move is not None)
-    return passed(f"The robot moved as asked: it {told}.", *place_at(recording, made[-1].last), measures)
+    return passed(f"The robot moved as expected: it {told}.", *place_at(recording, made[-1].last), measures)
 
 
 @judges(Excursions)
@@ -174,7 +174,7 @@ def judge_encounters(criterion: Encounters, trial: TrialResult) -> Outcome:
     score = Fraction(min(len(answered), criterion.at_least), criterion.at_least)
     if len(answered) >= criterion.at_least:
         return passed(
-            f"The robot came upon something dark {_times(len(falls))}, and did what was asked {_times(len(answered))}.",
+            f"The robot saw something dark {_times(len(falls))}, and reacted as expected {_times(len(answered))}.",
             *place_at(recording, answered[-1]),
             measures,
         )
@@ -183,7 +183,7 @@ def judge_encounters(criterion: Encounters, trial: TrialResult) -> Outcome:
     ignored = min(set(falls).difference(answered), default=None)
     if ignored is not None:
         return failed(
-            f"{expected}, but it {_did(len(answered))}; here is the first time that it did not.",
+            f"{expected}, but it {_did(len(answered))}; this is the first time without a reaction.",
             *place_at(recording, ignored),
             score=score,
             measures=measures,
@@ -261,7 +261,7 @@ def _missing_move(
     after = max((made.index(move) for move in found[:number] if move is not None), default=-1) + 1
     free = [move for move in made[after if criterion.in_order else 0 :] if move not in found]
     if not free:
-        told = f"did not: the last that it did is that it {made[-1]}" if made else "did not move at all"
+        told = f"did not: in its last move it {made[-1]}" if made else "did not move at all"
         return failed(
             f"Expected {called}{_asked(wanted)}, but the robot {told}.",
             recording.end_t,

@@ -49,11 +49,9 @@ def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
     if missed is not None and reached < enough:
         near = _nearest(distance_to(missed, points))
         then = ", after the places before it," if criterion.in_order and criterion.places[0] is not missed else ""
-        told = (
-            f"it came no nearer to it than {near[1]:.0f} mm" if near and near[1] > 0 else "it did not come there then"
-        )
+        told = f"its smallest distance was {near[1]:.0f} mm" if near and near[1] > 0 else "it did not get there"
         return failed(
-            f"Expected {who} to come{then} to {missed}, but {told} "
+            f"Expected {who} to reach{then} {missed}, but {told} "
             f"({reached} of {len(criterion.places)} places visited).",
             *place_at(recording, near[0] if near else len(points) - 1),
             score=score,
@@ -63,13 +61,13 @@ def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
     if criterion.without_stopping and stops:
         place, row = stops[0]
         return failed(
-            f"Expected {who} not to stop in {place}, but it stood still there.",
+            f"Expected {who} not to stop in {place}, but it stopped there.",
             *place_at(recording, row),
             score=Fraction(max(min(reached, enough) - len(stops), 0), enough),
             measures=measures,
         )
     places = str(criterion.places[0]) if len(criterion.places) == 1 else f"{reached} of {len(criterion.places)} places"
-    return passed(f"{_upper(who)} came to {places}.", *place_at(recording, max(rows)), measures)
+    return passed(f"{_upper(who)} reached {places}.", *place_at(recording, max(rows)), measures)
 
 
 def _visited(criterion: Visits, points: Floats) -> list[int | None]:
@@ -130,11 +128,11 @@ def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
         row = int(np.flatnonzero(within.any(axis=0))[0])
         number = int(np.flatnonzero(within[:, row])[0])
         nearest = float(np.nanmin(distances[number]))
-        keep = f"keep {criterion.clear_of:g} mm from" if criterion.clear_of else "keep out of"
+        keep = f"keep {criterion.clear_of:g} mm from" if criterion.clear_of else "stay out of"
         where = f"at ({points[row, 0]:.0f}, {points[row, 1]:.0f})"
-        told = f"it came into it {where}"
+        told = f"it entered it {where}"
         if criterion.clear_of:
-            told = f"it came nearer {where}, and {max(nearest, 0):.0f} mm was the nearest"
+            told = f"it came too near {where}; its smallest distance was {max(nearest, 0):.0f} mm"
         return failed(
             f"Expected {who} to {keep} {criterion.areas[number]}, but {told}.",
             *place_at(recording, row),
@@ -143,7 +141,7 @@ def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
     if _way(recording) < criterion.drives:
         return _drove_too_little(recording, criterion.drives, measures)
     return passed(
-        f"{_upper(who)} kept out of {'them all' if len(criterion.areas) > 1 else criterion.areas[0]}, "
+        f"{_upper(who)} stayed out of {'them all' if len(criterion.areas) > 1 else criterion.areas[0]}, "
         f"by {np.nanmin(distances):.0f} mm or more.",
         recording.end_t,
         recording.end,

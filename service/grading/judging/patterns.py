@@ -101,4 +101,4 @@ def _majority(group: Sequence[Sample]) -> Sample:
         words = f"{listed(leaders)} were answered equally often for its {len(group)} images"
         return replace(group[0], answer=None, words=words)
     chosen = next(sample for sample in group if sample.answer == leaders[0])
-    return replace(chosen, words=f"it was taken for {listed(leaders)} {most} times in {len(group)} images")
+    return replace(chosen, words=f"it was identified as {listed(leaders)} {most} times in {len(group)} images")

@@ -44,20 +44,20 @@ def judge_closest(criterion: Closest, trial: TrialResult) -> Outcome:
     if criterion.distance is not None and not criterion.distance[0] <= least <= criterion.distance[1]:
         low, high = criterion.distance
         return failed(
-            f"Expected the robot to come as near to {point} as {low:g} to {high:g} mm, "
-            f"but the nearest it came was {least:.0f} mm.",
+            f"Expected the robot's smallest distance to {point} to be {low:g} to {high:g} mm, but it was {least:.0f} "
+            "mm.",
             *where,
             measures=measures,
         )
     if criterion.than_straight is not None and (least < straight) != (criterion.than_straight == "nearer"):
         wish = "come nearer to" if criterion.than_straight == "nearer" else "stay farther from"
         return failed(
-            f"Expected the robot to {wish} {point} than by driving straight on ({straight:.0f} mm), "
-            f"but the nearest it came was {least:.0f} mm.",
+            f"Expected the robot to {wish} {point} than by driving straight on ({straight:.0f} mm), but its smallest "
+            f"distance was {least:.0f} mm.",
             *where,
             measures=measures,
         )
-    return passed(f"The robot came as near to {point} as {least:.0f} mm.", *where, measures)
+    return passed(f"The robot's smallest distance to {point} was {least:.0f} mm.", *where, measures)
 
 
 def _to(direction: str) -> str:
@@ -136,7 +136,7 @@ def judge_circuits(criterion: Circuits, trial: TrialResult) -> Outcome:
     )
     if nearest < criterion.clear_of:
         return failed(
-            f"Expected the path to keep {criterion.clear_of:g} mm clear of {point}, but it came as near as "
+            f"Expected the path to keep {criterion.clear_of:g} mm clear of {point}, but its smallest distance was "
             f"{nearest:.0f} mm.",
             *end,
             measures=tuple(measures),

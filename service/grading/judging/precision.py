@@ -35,7 +35,8 @@ def tempered(outcome: Outcome, criterion: AmongMany, wanted: int, strays: Strays
     if excess <= 0:
         return outcome
     return failed(
-        f"{outcome.message} Besides, {strays.words}, which costs marks: naming everything is not finding it.",
+        f"{outcome.message} Also, {strays.words}. This costs marks, because listing everything is not finding the "
+        "answer.",
         outcome.t,
         outcome.pose,
         outcome.score * wanted / (wanted + excess),

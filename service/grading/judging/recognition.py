@@ -213,7 +213,7 @@ def told(sample: Sample) -> str:
             return f"Expected an image (IMG_DATA), but {sample.words}."
         return f"Expected {quoted(sample.truth)}, but {sample.words}."
     if sample.right:
-        return f"The image showed {quoted(sample.truth)} and was named so."
+        return f"The image showed {quoted(sample.truth)} and was identified correctly."
     return f"The image showed {quoted(sample.truth)}, but {sample.words}."
 
 
@@ -290,7 +290,7 @@ def _replies(criterion: Recognition, recording: Recording) -> list[Reply]:
     for image in recording.images:
         heard = _between(recording, image, criterion.answer_from == "speech")
         text = " | ".join(line.text for line in heard)
-        silent = Reply("unanswered", None, f"the robot {said} nothing after it")
+        silent = Reply("unanswered", None, f"the robot {said} nothing after the image")
         replies.append(Reply("answered", text, "") if heard else silent)
     return replies
 
@@ -314,7 +314,7 @@ def _answer(criterion: Recognition, reply: Reply, finder: LabelFinder) -> tuple[
         return None, f"the answer names no label: {quoted(text)}", confidence
     if len(found) > 1:
         return None, f"the answer names more than one label: {' and '.join(map(quoted, found))}", confidence
-    return found[0], f"it was taken for {quoted(found[0])}", confidence
+    return found[0], f"it was identified as {quoted(found[0])}", confidence
 
 
 def _probability(value: object) -> float | None:
@@ -348,7 +348,7 @@ def _tally(criterion: Recognition, found: Classified) -> str:
     accuracy = found.accuracy
     what = "images" if criterion.each_pattern is None else "patterns"
     words = (
-        f"{found.right} of {accuracy.n} {what} named rightly: accuracy {accuracy.value:.2f} "
+        f"{found.right} of {accuracy.n} {what} identified correctly: accuracy {accuracy.value:.2f} "
         f"(95 % interval {accuracy.low:.2f} to {accuracy.high:.2f})."
     )
     counts = accuracy.counts

@@ -51,7 +51,7 @@ def judge_relation(criterion: Relation, trial: TrialResult) -> Outcome:
     if share >= Fraction(str(criterion.at_least)):
         return passed(f"As expected, {criterion.of} was {lower} where {criterion.to} was: {told}.", t, end, measures)
     return failed(
-        f"{asked}, of two moments in {criterion.at_least:.0%} or more, but it was so in {float(share):.0%}; {span}.",
+        f"{asked}, of two moments in {criterion.at_least:.0%} or more, but it was true for {float(share):.0%}; {span}.",
         t,
         end,
         share / Fraction(str(criterion.at_least)),

@@ -147,13 +147,13 @@ def _unsent(tries: Sequence[Message], sent: Sequence[Message]) -> str:
     if astray:
         return f"the channel lost it ({loss_words(astray)})"
     texts = tuple(dict.fromkeys(message.text for message in sent if len(message.text) <= _LONGEST_SENT))
-    return f"it never was; it was sent {listed(texts[:_MOST_SENT])}" if texts else "it never was"
+    return f"it was not; it was sent {listed(texts[:_MOST_SENT])}" if texts else "it was not"
 
 
 def _wrong_answer(criterion: Replies, answers: Answers, index: int, right_ones: Sequence[object]) -> str:
     """Return the problem with the answer to the message at ``index``; empty if it is one of the correct ones."""
     mistakes = [_mismatch(criterion, answers, index, each) for each in right_ones]
-    return "" if "" in mistakes else mistakes[0] if mistakes else "nothing is right"
+    return "" if "" in mistakes else mistakes[0] if mistakes else "no answer is correct"
 
 
 def _mismatch(criterion: Replies, answers: Answers, index: int, answer: object) -> str:

@@ -38,7 +38,9 @@ def judge_reports(criterion: Reports, trial: TrialResult) -> Outcome:
     rows = _rows(criterion, trial.recording)
     outcome = _reported(criterion, wanted, rows, [line.text for line in lines], [token for token, _ in told])
     guesses = _guesses(criterion, wanted, told, trial.recording)
-    return tempered(outcome, criterion, len(wanted), Strays(f"{guesses} other numbers came as well", others=guesses))
+    return tempered(
+        outcome, criterion, len(wanted), Strays(f"{guesses} other numbers were reported as well", others=guesses)
+    )
 
 
 def _reported(
@@ -60,7 +62,7 @@ def _reported(
     if found.count < len(wanted):
         missing = _entries(wanted[found.count : found.count + 1])
         where = f" after {_entries(wanted[found.count - 1 : found.count])}" if found.count else ""
-        beside = ", and as many entries of most other poses came as well" if guessed else ""
+        beside = ", and it reported as many entries of most other poses" if guessed else ""
         return failed(
             f"{asked}, but {missing} did not come{where}{beside}: {heard}.",
             score=Fraction(0 if guessed else found.count, len(wanted)),
@@ -68,7 +70,7 @@ def _reported(
         )
     if guessed:
         return failed(
-            f"{asked} and not what belongs to other poses, but that came as well: {heard}.", measures=measures
+            f"{asked} and no entries of other poses, but it reported those as well: {heard}.", measures=measures
         )
     return passed(f"{who.capitalize()} reported {_entries(wanted)}.", measures=measures)
 
@@ -202,7 +204,7 @@ def judge_events(criterion: Events, trial: TrialResult) -> Outcome:
     mentions = _mentions(criterion, trial.recording)
     outcome = _found_in_places(criterion, mentions, trial.recording)
     elsewhere = _elsewhere(criterion, mentions)
-    beside = Strays(f"these texts came {elsewhere} times where they do not belong", elsewhere)
+    beside = Strays(f"these texts came {elsewhere} times at wrong places", elsewhere)
     return tempered(outcome, criterion, len(criterion.events), beside)
 
 
@@ -288,7 +290,8 @@ def _stray(
 ) -> Outcome:
     (x, y), t = mention.place, mention.line.t
     return failed(
-        f"{_expected(criterion, event)} and not where another belongs, but it came at ({x:.1f}, {y:.1f}) as well.",
+        f"{_expected(criterion, event)} and not at the place of another text, but it came at ({x:.1f}, {y:.1f}) as "
+        "well.",
         t,
         pose_at(recording, t),
         Fraction(len(found), len(criterion.events)),

@@ -60,6 +60,6 @@ def _words(criterion: Robustness, curve: AccuracyCurve) -> str:
         return f"{words} Mean over the sweep: {float(area(levels)):.2f}."
     held = range_above(levels, criterion.level)
     if held is None:
-        return f"{words} It is below {criterion.level:g} at the easiest level already."
+        return f"{words} It is below {criterion.level:g} even at the easiest level."
     where = f"only at {held[0].at:g}" if held[0].at == held[1].at else f"from {held[0].at:g} to {held[1].at:g}"
     return f"{words} It is at least {criterion.level:g} {where} {about.unit}."

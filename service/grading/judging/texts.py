@@ -42,7 +42,7 @@ _SOMETHING = "something that "
 _LONG = 200
 _NUMBER = re.compile(r"[-+]?\d[\d.,]*")
 
-_EXCUSED = "What the channel lost by chance counts as received."
+_EXCUSED = "Messages lost by chance count as received."
 _PRINT = Deed("the program", "print", "printed")
 _RESPONDER_PRINT = Deed("the responder", "print", "printed")
 _SAY = Deed("the robot", "say", "said")
@@ -145,15 +145,13 @@ def same_text(text: str, wanted: str, ignore_case: bool) -> bool:
 def _judge_last(criterion: TextSequence, lines: Sequence[Line], deed: Deed, recording: Recording) -> Outcome:
     wanted = conditions(criterion)
     if not lines:
-        return failed(
-            f"Expected the last thing that {deed.who} {deed.past} to be {wanted}, but it {deed.past} nothing."
-        )
+        return failed(f"Expected the last text that {deed.who} {deed.past} to be {wanted}, but it {deed.past} nothing.")
     last = lines[-1]
     pose = pose_at(recording, last.t)
     if meets(criterion, last.text):
-        return passed(f"The last thing that {deed.who} {deed.past} was {quoted(last.text)}.", last.t, pose)
+        return passed(f"The last text that {deed.who} {deed.past} was {quoted(last.text)}.", last.t, pose)
     return failed(
-        f"Expected the last thing that {deed.who} {deed.past} to be {wanted}, but it was {quoted(last.text)}.",
+        f"Expected the last text that {deed.who} {deed.past} to be {wanted}, but it was {quoted(last.text)}.",
         last.t,
         pose,
     )
@@ -216,7 +214,7 @@ def _out_of_order(criterion: TextSequence, chosen: Sequence[Line], found: Sequen
         for line in changed
         if id(line) not in taken
     )
-    words = f"texts of this sort were {deed.past} {extra} times where they do not belong"
+    words = f"such texts were {deed.past} {extra} times at the wrong point"
     # A text that only contains "1" may be about anything.
     sure = every or criterion.compare == "equals"
     return Strays(words, misplaced=extra) if sure else Strays(words, others=extra)
@@ -233,8 +231,8 @@ def _judge_count(
     pose = pose_at(recording, last.t) if last else None
     if count >= least and (most is None or count <= most):
         if last is None:
-            return passed(f"{deed.who.capitalize()} {deed.past} nothing that it should not have.")
-        again = f" ({count} times such a text)" if count > 1 else ""
+            return passed(f"{deed.who.capitalize()} {deed.past} no forbidden text.")
+        again = f" ({count} such texts)" if count > 1 else ""
         return passed(f"{deed.who.capitalize()} {deed.past} {quoted(last.text)}{again}.", at, pose)
     times = _times(least, most)
     expected = f"Expected {deed.who} to {deed.verb} {what}{times}"
@@ -343,7 +341,7 @@ def _queue_grows(recording: Recording) -> Outcome:
     if not asked:
         astray = next((message for _, message in sent if out_of_reach(message)), None)
         if sent and not astray:
-            return passed("The channel lost every PY:: message by chance, so there was nothing to queue up.")
+            return passed("The channel lost every PY:: message by chance, so there were no answers to queue.")
         lost = f"the channel lost {quoted(astray.text)} ({loss_words(astray)})" if astray else ""
         return failed(f"{expected}, but {lost or 'the robot sent no PY:: message'}.")
     answers = Answers(recording)

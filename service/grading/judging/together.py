@@ -38,7 +38,7 @@ def judge_apart(criterion: Apart, trial: TrialResult) -> Outcome:
     expected = f"Expected the robots to be {_asked(criterion)}"
     if criterion.when == "always":
         needed = "all" if criterion.share == 1 else f"{criterion.share * 100:g}%"
-        told = f"they were so for {float(share) * 100:.0f}% of the time after {seconds_at(recording, first):.2f} s"
+        told = f"this was true for {float(share) * 100:.0f}% of the time after {seconds_at(recording, first):.2f} s"
         at = first + int(np.argmin(good))
         if share >= Fraction(str(criterion.share)):
             return passed(

@@ -53,7 +53,7 @@ def marks_table(grade: Grade, told: frozenset[int] = frozenset()) -> Table:
     """Return the criteria with marks and messages, and the total as footer. Criteria in ``told`` have no message."""
     table = Table(box=box.SIMPLE_HEAD, show_footer=True, padding=(0, 1), expand=False)
     table.add_column("Marks", justify="right", no_wrap=True, footer=_marks(grade))
-    table.add_column("Criterion", footer=Text("in all"))
+    table.add_column("Criterion", footer=Text("Total"))
     for index, result in enumerate(grade.criteria):
         full = result.marks >= result.max_marks
         style = "green" if full else ("red" if result.marks == 0 else "yellow")

@@ -80,9 +80,9 @@ def draw_table(table: ConfusionTable, title: str, subtitle: str) -> Figure:
     _draw_names(axes, table, _smaller(size), upright=upright)
     _draw_cells(axes, table, size)
     told = (
-        "precision: right of what was answered",
-        "✓: right  ✗: wrong;  recall: right of what it was",
-        "rows: what it was;  columns: what was answered",
+        "precision: correct share of the answers",
+        "✓: correct  ✗: wrong;  recall: correct share of the images",
+        "rows: true class;  columns: answer",
     )
     for number, line in enumerate(told):
         write(figure, 0.08, 0.10 + 0.14 * number, line, size=8, colour=FAINT)
@@ -94,7 +94,7 @@ def _draw_names(axes: Axes, table: ConfusionTable, size: float, *, upright: bool
     for row, truth in enumerate((*table.truths, "precision")):
         _name(axes, -0.12, row + 0.5, truth, size, ha="right", va="center")
     count = len(table.answers)
-    heads = [*((column + 0.5, answer) for column, answer in enumerate(table.answers)), (count + _ALL, "in all")]
+    heads = [*((column + 0.5, answer) for column, answer in enumerate(table.answers)), (count + _ALL, "total")]
     for x, name in (*heads, (count + _RECALL, "recall")):
         if upright:
             _name(axes, x, -0.18, name, size, ha="left", va="center", rotation=90)

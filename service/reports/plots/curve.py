@@ -73,7 +73,7 @@ def draw_curves(panels: Sequence[AccuracyPanel], title: str, subtitle: str = "",
               va="center", colour=FAINT)  # fmt: skip
         axes = axes_at(figure, _LEFT, top - _ABOVE - _PANEL, WIDTH - _LEFT - _RIGHT_MARGIN, _PANEL)
         draw_panel(axes, panel)
-    write(figure, 0.08, 0.09, "line: share right;  band: 95 % interval (Wilson)", size=7.5, colour=FAINT)
+    write(figure, 0.08, 0.09, "line: accuracy;  band: 95 % interval (Wilson)", size=7.5, colour=FAINT)
     return figure
 
 
@@ -93,12 +93,12 @@ def draw_panel(axes: Axes, panel: AccuracyPanel) -> None:
         axes.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 5, 10]))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}".replace("-", "\N{MINUS SIGN}")))
     axes.set_xlabel(drawable(f"{one_line(panel.varied, 40)}, {panel.unit}"), font=font(8), color=INK, labelpad=2)
-    axes.set_ylabel("share right", font=font(8), color=INK, labelpad=3)
+    axes.set_ylabel("accuracy", font=font(8), color=INK, labelpad=3)
     set_tick_type(axes)
     if panel.level is not None:
         axes.axhline(panel.level, color=FAULT, linewidth=0.9, linestyle=(0, (6, 2)), zorder=2)
         axes.text(
-            0.995, panel.level - 0.03, f"asked for: {panel.level:g}", transform=axes.get_yaxis_transform(), ha="right",
+            0.995, panel.level - 0.03, f"required: {panel.level:g}", transform=axes.get_yaxis_transform(), ha="right",
             va="top", color=FAULT, font=font(7.5),
         )  # fmt: skip
     if len(panel.curves) > 1:
@@ -125,7 +125,7 @@ def _counts(curves: Sequence[Curve], counted: str) -> str:
     if not counts:
         return "n = 0"
     least, most = min(counts), max(counts)
-    return f"n = {least if least == most else f'{least} to {most}'} {counted} a point"
+    return f"n = {least if least == most else f'{least} to {most}'} {counted} per point"
 
 
 def _readable_ticks(xs: Sequence[float]) -> list[float]:

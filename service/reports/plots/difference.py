@@ -92,7 +92,7 @@ def differences(diagram: Diagram, told: Sequence[Talk]) -> Differences | None:
 def in_words(found: Differences, language: Language = ENGLISH) -> str:
     """Return the differences as sentences."""
     if not found:
-        return language.say("It shows what happened.")
+        return language.say("The diagram matches the events.")
     told = []
     if found.drawn_actors:
         told.append(language.say("%(names)s took no part.", names=_listed(found.drawn_actors, language)))

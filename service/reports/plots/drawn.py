@@ -88,9 +88,9 @@ def _classifications(grade: Grade, language: Language) -> Iterator[Plot]:
         if accuracy is not None and accuracy.confusion:
             right = sum(count for truth, answer, count in accuracy.confusion if truth == answer)
             yield Plot(
-                f"confusion-{slug(result.id)}{suffix}", "confusion", index, "", title_of(say("what was answered")),
+                f"confusion-{slug(result.id)}{suffix}", "confusion", index, "", title_of(say("answers")),
                 say(
-                    "What each image showed and what was answered, for “%(criterion)s”.",
+                    "True class and answer for each image, for “%(criterion)s”.",
                     criterion=one_line(result.title, 80),
                 ),
                 say(
@@ -108,10 +108,10 @@ def _classifications(grade: Grade, language: Language) -> Iterator[Plot]:
                 "predictions",
                 index,
                 "",
-                title_of(say("what the sensor saw")),
+                title_of(say("sensor images")),
                 say(
-                    "What the left light sensor sent, whole and in the focus that a network is shown. "
-                    "A dashed frame marks the focus; a thick frame and ✗ mark a wrong answer."
+                    "Images from the left light sensor: the whole image and the part that a network receives. A "
+                    "dashed frame marks this part. A thick frame and ✗ mark a wrong answer."
                 ),
                 _told_of_predictions(result, wrong, language),
             )  # fmt: skip
@@ -120,14 +120,14 @@ def _classifications(grade: Grade, language: Language) -> Iterator[Plot]:
 def _told_of_predictions(result: CriterionResult, wrong: Sequence[Prediction], language: Language) -> str:
     answered = "; ".join(
         language.say(
-            "%(truth)s answered as %(answer)s",
+            "%(truth)s identified as %(answer)s",
             truth=one_line(prediction.truth, 40),
             answer=one_line(prediction.answer or language.say("nothing"), 40),
         )
         for prediction in wrong[:4]
     )
     told = language.say(
-        "%(shown)s sensor images, %(wrong)s of %(all)s answered wrongly",
+        "%(shown)s sensor images, %(wrong)s of %(all)s with a wrong answer",
         shown=len(chosen_predictions(result.predictions)),
         wrong=len(wrong),
         all=len(result.predictions),
@@ -150,8 +150,8 @@ def _along(grade: Grade, index: int, result: CriterionResult, suffix: str, langu
         )
         yield Plot(
             f"curves-{slug(result.id)}{suffix}", "curves", index, "", title_of(say("robustness")),
-            say("How often images were named rightly as conditions got harder, for “%(criterion)s”.", criterion=title),
-            say("Curves of accuracy. %(curves)s.", curves=told),
+            say("Share of images identified correctly as conditions get harder, for “%(criterion)s”.", criterion=title),
+            say("Accuracy curves. %(curves)s.", curves=told),
         )  # fmt: skip
     on_track = tracks(result.predictions, grade.trials)
     if on_track:
@@ -159,21 +159,21 @@ def _along(grade: Grade, index: int, result: CriterionResult, suffix: str, langu
         yield Plot(
             f"track-{slug(result.id)}{suffix}", "track", index, "", title_of(say("along the track")),
             say(
-                "Where images were taken and whether they were named rightly: in the trial with most mistakes over the "
-                "floor, and in all trials by the way driven."
+                "Places of the images, with correct and wrong answers. The floor shows the trial with the most "
+                "mistakes. The curve shows all trials by distance driven."
             ),
             say(
-                "%(right)s of %(all)s images right along the track in %(trials)s trials.",
+                "%(right)s of %(all)s images identified correctly along the track in %(trials)s trials.",
                 right=right, all=len(result.predictions), trials=len(on_track),
             ),
         )  # fmt: skip
     wrong = misread(result.predictions)
     if wrong:
         yield Plot(
-            f"misread-{slug(result.id)}{suffix}", "misread", index, "", title_of(say("what was misread")),
+            f"misread-{slug(result.id)}{suffix}", "misread", index, "", title_of(say("misread images")),
             say(
-                "Images that were misread, each beside the nearest one of the same truth that was read rightly, and "
-                "the nearest right one of what it was taken for."
+                "Each misread image beside two correct ones: the most similar image of its true class, and the most "
+                "similar image of the class in the answer."
             ),
             say("%(wrong)s of %(all)s images were misread.", wrong=len(wrong), all=len(result.predictions)),
         )  # fmt: skip
@@ -192,8 +192,8 @@ def _trials(grade: Grade, language: Language) -> Iterator[Plot]:
         yield Plot(
             f"path-{name}", "path", index, scenario, say("%(scenario)s: path", scenario=title),
             say(
-                "Where the robot went. The dashed outline is the robot at the start, the solid one at the end; "
-                "darts point where it was heading. The circles are its light sensors, left blue, right orange."
+                "Path of the robot. The dashed outline is the robot at the start, the solid outline at the end. "
+                "Arrowheads show its heading. The circles are its light sensors: left blue, right orange."
             ),
             _told_of_path(recording, language),
         )  # fmt: skip
@@ -204,7 +204,7 @@ def _trials(grade: Grade, language: Language) -> Iterator[Plot]:
         yield Plot(
             f"sensors-{name}", "sensors", index, scenario, say("%(scenario)s: sensors", scenario=title),
             say(
-                "What the sensors read at every moment, whether or not the program asked. Marks at the top: "
+                "Sensor readings over time, including those that the program did not request. Marks at the top: "
                 "messages sent, answers received, speech, touches and faults."
             ),
             say(
@@ -218,7 +218,7 @@ def _told_of_path(recording: Recording, language: Language) -> str:
     start, end, partner = recording.start, recording.end, recording.partner
     told = language.say(
         "Path over the floor %(floor)s from %(start)s mm, heading %(heading)s degrees, to %(end)s mm, heading "
-        "%(end_heading)s degrees, in %(seconds)s seconds; %(touches)s touches.",
+        "%(end_heading)s degrees. Seconds: %(seconds)s. Touches: %(touches)s.",
         floor=one_line(recording.background, 40),
         start=_at(start),
         heading=turned(start.heading),
@@ -230,7 +230,7 @@ def _told_of_path(recording: Recording, language: Language) -> str:
     if partner is None:
         return told
     other = language.say(
-        "The second robot's from %(start)s mm to %(end)s mm.", start=_at(partner.start), end=_at(partner.end)
+        "Path of the second robot from %(start)s mm to %(end)s mm.", start=_at(partner.start), end=_at(partner.end)
     )
     return f"{told} {other}"
 

@@ -24,7 +24,7 @@ def draw_floor(floor: Floor) -> Figure:
     subtitle = f"start ({whole(pose.x)}, {whole(pose.y)}) heading {turned(pose.heading)}°"
     names = tuple(dict.fromkeys(label.label for label in floor.labels))
     if names:
-        subtitle += f"; {len(floor.labels)} places with a label, {len(names)} labels"
+        subtitle += f"; {len(floor.labels)} labelled places, {len(names)} labels"
     figure = new_figure(HEAD + height + _FOOT, floor.name, subtitle)
     axes = axes_at(figure, _LEFT_EDGE, _FOOT, width, height)
     axes.imshow(floor.pixels[:, :, :3], extent=(0, _FLOOR_WIDTH, 0, _FLOOR_HEIGHT), interpolation="antialiased")

@@ -29,11 +29,11 @@ def draw_misread(found: Sequence[Misread], images: int, title: str) -> Figure:
     height = _ROW * len(shown)
     count = f"{len(shown)} of {len(found)}" if len(shown) < len(found) else str(len(found))
     figure = new_figure(
-        HEAD + _HEADS + height, title, f"{count} misread of n = {images} images; each: the focus that a network sees"
+        HEAD + _HEADS + height, title, f"{count} misread of n = {images} images; each: the part that a network receives"
     )
     axes = axes_at(figure, 0.02, 0.0, WIDTH - 0.04, height + _HEADS)
     axes.set_axis_off()
-    for column, head in enumerate(("misread", "right,\nsame truth", "right, same\nanswer")):
+    for column, head in enumerate(("misread", "correct,\nsame truth", "correct,\nsame answer")):
         _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, -0.5 * _HEADS, head, FAINT, 8, ha="center")
     for row, item in enumerate(shown):
         _draw_row(axes, item, row * _ROW)

@@ -54,7 +54,7 @@ def draw_evaluation_confusion(evaluation: Evaluation) -> Figure:
     """Draw the confusion matrix."""
     measured, classes = evaluation.measured, evaluation.card.classes
     table = ConfusionTable(classes, classes, measured.confusion, tuple(sum(row) for row in measured.confusion))
-    return draw_table(table, f"{evaluation.card.name}: who was taken for whom", in_words(measured.accuracy))
+    return draw_table(table, f"{evaluation.card.name}: confusion matrix", in_words(measured.accuracy))
 
 
 def in_words(tally: Tally) -> str:
@@ -73,8 +73,8 @@ def draw_robustness(evaluation: Evaluation) -> Figure:
             AccuracyPanel(varied, curves[0].unit, tuple(_curve(curve) for curve in curves))
             for varied, curves in panels.items()
         ],
-        f"{evaluation.card.name}: how robust it is",
-        "what the left sensor sees, as one condition after another gets harder",
+        f"{evaluation.card.name}: robustness",
+        "accuracy for images of the left sensor under harder conditions",
     )
 
 
@@ -89,8 +89,8 @@ def comparison_plot(names: Sequence[str], found: Sequence[Sequence[CardCurve]]) 
             )
             for curves in found
         ],
-        f"{', '.join(names[:-1])} and {names[-1]}: how robust they are",
-        "the same places and the same noise for each",
+        f"{', '.join(names[:-1])} and {names[-1]}: robustness",
+        "same places and same noise for each model",
     )
     return png(figure)
 
@@ -119,10 +119,10 @@ def draw_misread(evaluation: Evaluation) -> Figure:
     chosen = _one_each(misread)[:MOST_MISREAD]
     count, total = len(misread), len(evaluation.answered)
     shown = f"{len(chosen)} of {count}" if len(chosen) < count else f"all {count}" if count else "none"
-    title = f"{evaluation.card.name}: what was misread"
+    title = f"{evaluation.card.name}: misread images"
     if not chosen:
         figure = new_figure(HEAD + 0.3, title, f"none of n = {total} images was misread")
-        write(figure, 0.08, 0.1, "There is nothing to show.", size=9)
+        write(figure, 0.08, 0.1, "No misread images.", size=9)
         return figure
     heads = 0.40
     height = heads + _ROW * len(chosen)
@@ -131,7 +131,7 @@ def draw_misread(evaluation: Evaluation) -> Figure:
     axes.set_axis_off()
     axes.set_xlim(-0.05, WIDTH - 0.21)
     axes.set_ylim(height, 0)
-    for column, words in enumerate(("misread", "nearest right\nof that class", "nearest right\nof that answer")):
+    for column, words in enumerate(("misread", "nearest correct\nof that class", "nearest correct\nof that answer")):
         _text(axes, column * (_SIDE + _GAP), heads - 0.20, words, FAINT, 7.4, va="center")
     right = [each for each in evaluation.answered if each.right]
     for row, each in enumerate(chosen):

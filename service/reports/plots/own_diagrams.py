@@ -75,7 +75,7 @@ def _closest(grade: Grade, cells: Sequence[DiagramCell], trial: int) -> dict[int
 
 
 def _alone(cell: DiagramCell, language: Language) -> OwnDiagram:
-    title, caption = title_of_cell(cell, language), language.say("As the notebook draws it.")
+    title, caption = title_of_cell(cell, language), language.say("The diagram in the notebook.")
     plot = Plot(f"own-cell-{cell.cell}", "own", 0, "", title, caption, _alt(cell, language))
     return OwnDiagram(cell, None, title, "", (plot,))
 
@@ -85,15 +85,15 @@ def _compared(cell: DiagramCell, found: Differences, grade: Grade, index: int, l
     trial = grade.trials[index]
     name = f"cell-{cell.cell}-{trial_name(trial)}"
     title, words, where = title_of_cell(cell, language), in_words(found, language), trial_words(trial, language)
-    drawn, happened = say("As the notebook draws it."), say("As it was observed in %(trial)s.", trial=where)
+    drawn, happened = say("The diagram in the notebook."), say("The events recorded in %(trial)s.", trial=where)
     if found.drawn_actors or found.drawn_arrows:
-        drawn += " " + say("✗: it did not happen.")
+        drawn += " " + say("✗: drawn, but did not happen.")
     if found.happened_actors or found.happened_arrows:
-        happened += " " + say("+: it is not drawn.")
-    beside = say("The same of what happened in %(trial)s.", trial=where)
+        happened += " " + say("+: happened, but is not drawn.")
+    beside = say("The same diagram of the events in %(trial)s.", trial=where)
     plots = (
         Plot(f"own-{name}", "own", index, "", title, drawn, f"{_alt(cell, language)} {words}"),
-        Plot(f"happened-{name}", "happened", index, "", say("What happened"), happened, f"{beside} {words}"),
+        Plot(f"happened-{name}", "happened", index, "", say("Events"), happened, f"{beside} {words}"),
     )
     return OwnDiagram(cell, found, title, words, plots)
 

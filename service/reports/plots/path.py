@@ -114,7 +114,7 @@ def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Figure:
         frameon=False, handletextpad=0.5, columnspacing=0.9, labelspacing=0.35, borderaxespad=0.3,
     )  # fmt: skip
     if _goes_on(everywhere, view):
-        axes.text(0.5, 0.03, "the path goes on outside this image", transform=axes.transAxes, ha="center",
+        axes.text(0.5, 0.03, "the path continues outside this image", transform=axes.transAxes, ha="center",
                   font=font(7.5, bold=True), color=INK, zorder=9,
                   bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5})  # fmt: skip
     if located:

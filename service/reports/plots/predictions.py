@@ -46,7 +46,7 @@ def _subtitle(predictions: Sequence[Prediction], shown: Sequence[int]) -> str:
     count = (
         f"{len(predictions)} images" if len(shown) == len(predictions) else f"{len(shown)} of {len(predictions)} images"
     )
-    return f"{count}, {wrong} answered wrongly; each: all 20×20, then the 14×14 focus"
+    return f"{count}, {wrong} with a wrong answer; each: whole 20×20 image, then its 14×14 part"
 
 
 def _draw_card(axes: Axes, prediction: Prediction, number: int, x: float, y: float) -> None:
@@ -66,9 +66,9 @@ def _draw_card(axes: Axes, prediction: Prediction, number: int, x: float, y: flo
             Rectangle((x - 0.04, y - 0.04), 2 * _SIDE + 0.20, _SIDE + 0.08, facecolor="none", edgecolor=colour,
                       linewidth=1.8)
         )  # fmt: skip
-    sign, word = ("✓", "right") if right else ("✗", "wrong")
+    sign, word = ("✓", "correct") if right else ("✗", "wrong")
     answer = "no answer" if prediction.answer is None else one_line(prediction.answer, 30)
-    told = f"answered: {answer}" if prediction.answer is not None else answer
+    told = f"answer: {answer}" if prediction.answer is not None else answer
     said = [one_line(prediction.truth, 40)] if right else [told, f"truth: {one_line(prediction.truth, 40)}"]
     lines = [(f"{number}. {sign} {word}", colour, True)]
     lines += [(line, INK, False) for text in said for line in textwrap.wrap(text, _LINE, max_lines=2, placeholder="…")]

@@ -51,7 +51,7 @@ def draw_track(
     width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
     height = width * view.height / view.width
     trial = trials[worst]
-    what = f"{right} of n = {len(images)} images right, {len(own)} {'trial' if len(own) == 1 else 'trials'}"
+    what = f"{right} of n = {len(images)} images correct, {len(own)} {'trial' if len(own) == 1 else 'trials'}"
     where = f"floor: {trial.scenario}, trial {trial.index + 1}"
     figure = new_figure(HEAD + height + _GAP + _ALONG + _FOOT, title, f"{what}; {where}")
     top = axes_at(figure, _LEFT_EDGE, _FOOT + _ALONG + _GAP, width, height)
@@ -62,7 +62,7 @@ def draw_track(
     top.set_xlabel("x, mm", font=font(8), labelpad=1)
     top.set_ylabel("y, mm", font=font(8), labelpad=4)
     _draw_along(axes_at(figure, _LEFT_EDGE, _FOOT, width, _ALONG), images)
-    write(figure, 0.08, 0.23, "beside each place: ○ right  ✗ wrong  □ no answer", size=8, colour=FAINT)
+    write(figure, 0.08, 0.23, "beside each place: ○ correct  ✗ wrong  □ no answer", size=8, colour=FAINT)
     write(figure, 0.08, 0.09, "band: 95 % interval; above it: n", size=8, colour=FAINT)
     return figure
 
@@ -127,8 +127,8 @@ def _draw_along(axes: Axes, images: Sequence[Taken]) -> None:
     draw_curve(axes, curve)
     for x, count in zip(curve.x, curve.n, strict=True):
         axes.text(x, 1.07, str(count), font=font(7.5), color=FAINT, ha="center", va="bottom", clip_on=False)
-    axes.set_xlabel("way driven, mm", font=font(8), labelpad=1)
-    axes.set_ylabel("share right", font=font(8), labelpad=3)
+    axes.set_xlabel("distance driven, mm", font=font(8), labelpad=1)
+    axes.set_ylabel("accuracy", font=font(8), labelpad=3)
     set_tick_type(axes)
 
 

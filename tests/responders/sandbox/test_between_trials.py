@@ -149,7 +149,7 @@ def test_this_machine_forgets(tmp_path: Path) -> None:
     found = {finding.what: finding for finding in examine(Settings(home=tmp_path))}
     assert (found["between trials"].well, found["between trials"].sentence) == (
         True,
-        "a trial can leave nothing for the next",
+        "no data remains between trials",
     )
 
 
@@ -169,7 +169,7 @@ def test_nothing_hidden_is_graded_where_a_trial_could_leave_something() -> None:
     with TrialRunner(Sandboxes(Isolation(doorkeeper=False))) as runner:
         assert grade(_SUBMISSION, echo(), runner=runner).trials
         with pytest.raises(
-            HostError, match=r"^a trial could leave something for the next, so nothing hidden is graded"
+            HostError, match=r"^a trial could leave data for the next, so hidden scenarios are not graded"
         ):
             grade(_SUBMISSION, hidden, runner=runner)
     with TrialRunner() as runner:

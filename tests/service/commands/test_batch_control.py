@@ -102,17 +102,17 @@ def test_each_change_is_one_sentence(graded: tuple[Path, Path, Ended], tmp_path:
     home = tmp_path / "home"
     batch = _batch(robomark(home, "batch", "submit", roster, "-a", "echo-responder"))
     for words, status, sentence in [
-        (("pause", batch), 0, f"batch {batch} is paused: 2 waiting, 0 graded to their end"),
+        (("pause", batch), 0, f"batch {batch} is paused: 2 queued, 0 still running"),
         (("pause", batch[:6]), 0, f"batch {batch} was paused already"),
         (("status", batch), 0, "roster.csv: paused: 2 queued"),
-        (("resume", batch), 0, f"batch {batch} goes on: 2 waiting, 0 being graded"),
-        (("retry", batch), 0, f"batch {batch}: nothing changed, no submission is dead"),
+        (("resume", batch), 0, f"batch {batch} is resumed: 2 queued, 0 running"),
+        (("retry", batch), 0, f"batch {batch}: nothing changed, there are no failed jobs"),
         (("retry", "--all"), 0, "all batches: nothing changed"),
-        (("cancel", batch), 0, f"batch {batch} is cancelled: 2 not begun, 0 stopped"),
+        (("cancel", batch), 0, f"batch {batch} is cancelled: 2 queued jobs cancelled, 0 running jobs stopped"),
         (("cancel", batch), 0, "nothing changed"),
         (("list",), 0, "cancelled: 2 cancelled"),
         (("resume", batch), 2, "was cancelled; submit it again"),
-        (("retry",), 2, "name one batch, or --all"),
+        (("retry",), 2, "name one batch, or use --all"),
         (("pause", "nosuchbatch"), 2, "there is no batch"),
     ]:
         ended = robomark(home, "batch", *words)
@@ -171,7 +171,7 @@ def test_a_changed_assignment_is_regraded_shown_and_published_when_told(
     regraded = robomark(home, "batch", "regrade", batch, "-a", changed, "--wait")
     assert regraded.status == 0, regraded
     assert re.search(r"^=1/2 🤖 +10 / 10 +12 / 12 .*: 4 / 4 to 6 / 6 +assignment changed", regraded.out, re.MULTILINE)
-    again = re.search(r"batch (\w{12}): 2 queued to be graded again", regraded.out)
+    again = re.search(r"batch (\w{12}): 2 queued for regrading", regraded.out)
     assert again is not None
 
     kept = robomark(home, "batch", "export", batch)
@@ -185,18 +185,18 @@ def test_a_changed_assignment_is_regraded_shown_and_published_when_told(
     status = robomark(home, "batch", "status", batch)
     assert re.search(r"^=1/2 🤖 .* 12 / 12 .*published", status.out, re.MULTILINE)
     assert re.search(r"\w+@\S+ +publish +published 2, replaced 2", status.out)
-    assert "2 of the new grades stand" in robomark(home, "batch", "status", again[1]).out
+    assert "2 new grades are current" in robomark(home, "batch", "status", again[1]).out
     grade = re.search(r"^bob .* (\w{12})$", status.out, re.MULTILINE)
     assert grade is not None
     verified = robomark(home, "verify", grade[1])
-    assert (verified.status, "is what grading it again gives" in verified.out) == (0, True)
+    assert (verified.status, "matches its regrade" in verified.out) == (0, True)
     with open_store(settings_in(home)) as store, store.transaction() as session:
         session.execute(update(TrialRow).where(TrialRow.job_id == grade[1]).values(sha256="0" * 64))
         session.execute(
             update(CriterionResultRow).where(CriterionResultRow.job_id == grade[1]).values(marks=Decimal(0))
         )
     doubted = robomark(home, "verify", grade[1])
-    assert (doubted.status, "is not what grading it again gives" in doubted.err) == (3, True)
+    assert (doubted.status, "does not match its regrade" in doubted.err) == (3, True)
 
 
 def test_a_policy_and_an_extension_are_said_back(tmp_path: Path) -> None:

@@ -62,4 +62,4 @@ def test_a_grade_on_another_channel_says_so() -> None:
     replies = next(line["message"] for line in lost["criteria"] if line["id"] == "content")
     assert 'Expected the responder to be sent "PY::0", but the channel lost it (the robot was 1900 mm' in replies
     told = robomark("grade", ECHO, "-a", "json-queue", *away).stdout
-    assert "tried with another channel than the assignment's" in " ".join(told.split())
+    assert "graded with another channel than the assignment's" in " ".join(told.split())

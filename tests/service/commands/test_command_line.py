@@ -47,7 +47,7 @@ from submissions.assignment.folder import assignment_folder
         ),
         ("run x.py --loss 2", "loss is 2.0, expected at most 1"),
         ("run x.py --range 300", 'the channel has range and no link that it limits, expected link = "infrared"'),
-        ("run x.py --link infrared", "nothing at its other end, expected beacon = [x, y] beside it"),
+        ("run x.py --link infrared", "no beacon, expected beacon = [x, y] beside it"),
         ("run x.py --link radio", 'link is "radio", expected "cable", "infrared" or "between robots"'),
         ("run x.py --beacon here", "--beacon is here, expected X,Y such as 1200,600"),
         ("run \x1b[31mx", "\\x1b[31mx cannot be read"),
@@ -80,7 +80,10 @@ def test_a_reader_that_goes_away_is_no_error_of_ours() -> None:
 def test_a_full_disk_is_said_in_a_sentence() -> None:
     with Path("/dev/full").open("w") as full:
         ended = robomark_anew("assignments", "list", out=full.fileno())
-    assert (ended.returncode, ended.stderr) == (3, "robomark: the machine would not do it: No space left on device\n")
+    assert (ended.returncode, ended.stderr) == (
+        3,
+        "robomark: the operating system reported an error: No space left on device\n",
+    )
 
 
 def test_every_flag_of_the_magic_is_taken(tmp_path: Path) -> None:

@@ -69,7 +69,7 @@ def test_a_download_of_moodles_becomes_its_worksheet_and_feedback(download: Path
     for row in (
         r"^Ada Lovelace .* 10 / 10 +finished",
         r"^Alan Turing .* 6 / 10 +finished; no responder\.py",
-        r"^Zoë Ångström .* not taken in: Zoë Ångström_500002_assignsubmission_file: has no robot\.py or responder\.py",
+        r"^Zoë Ångström .* rejected: Zoë Ångström_500002_assignsubmission_file: has no robot\.py or responder\.py",
     ):
         assert re.search(row, status, re.MULTILINE), status
     filled, feedback = tmp_path / "filled.csv", tmp_path / "feedback.zip"
@@ -93,7 +93,7 @@ def test_a_download_of_moodles_becomes_its_worksheet_and_feedback(download: Path
 def test_submitting_says_whether_a_worker_runs(download: Path, tmp_path: Path) -> None:
     home = tmp_path / "home"
     alone = robomark(home, "batch", "submit", download, "-a", ECHO)
-    assert "no worker runs: robomark worker starts one" in alone.err
+    assert "no worker is running; start one with robomark worker" in alone.err
     with open_store(Settings(home=home)) as store:
         for name in ("one", "two"):
             workers.beat(store, WorkerDescription(name, "here", 3, "0", "all"))

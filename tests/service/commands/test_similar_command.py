@@ -93,10 +93,10 @@ def test_the_command_shows_a_table_and_writes_a_page(
     monkeypatch.setenv("COLUMNS", "200")
     similar(batch, output=tmp_path)
     out = capsys.readouterr().out
-    assert f"{ASSIGNMENT}: 1 pair is alike among 10 students; 8 have too little" in out
+    assert f"{ASSIGNMENT}: 1 similar pair among 10 students; 8 students have too little" in out
     assert [line.split()[:2] for line in out.splitlines() if line.startswith("ada")] == [["ada", "zebedee"]]
     page = (tmp_path / "similar.html").read_text(encoding="utf-8")
-    assert "Alike in &lt;class&gt;" in page
+    assert "Similar submissions in &lt;class&gt;" in page
     assert "across, down = shape.sum" in page
     with pytest.raises(
         UsageError, match=r"nowhere: cannot be read \(No such file or directory\), expected Python files"

@@ -132,7 +132,7 @@ def judged(full: Grade, check: str, **keys: Any) -> tuple[bool, str]:
             "messages",
             {"agents": ["agent", "responder"], "last": True, "contains": "my"},
             True,
-            "The last thing that the",
+            "The last text that the",
         ),
         ("messages", {"agents": ["parser", "logger"], "at_least": 1}, False, "it told the logger nothing"),
         ("messages", {"equals": "PY::0", "exactly": 1}, True, "The robot sent"),
@@ -145,7 +145,7 @@ def judged(full: Grade, check: str, **keys: Any) -> tuple[bool, str]:
         ("replies", {"agents": ["responder", "logger"], "equals": "1"}, False, "(1 of 4 answered as expected)"),
         ("replies", {"agents": ["agent", "parser"], "expect": {"PY::0": 0}}, True, "The parser answered 1 of 1"),
         ("replies", {"agents": ["agent", "parser"], "expect": {"PY::0": "0"}}, False, 'but it answered "0"'),
-        ("replies", {"agents": ["agent", "parser"], "expect": {"PY::5": 5}}, False, "but it never was"),
+        ("replies", {"agents": ["agent", "parser"], "expect": {"PY::5": 5}}, False, "but it was not"),
         ("replies", {"agents": ["logger", "parser"]}, False, "of the logger's messages, but none reached it"),
     ],
 )
@@ -168,7 +168,7 @@ def test_what_agents_say_is_in_reports_and_exports(full: Grade) -> None:
         "parser → agent",
     ]
     outputs = {each.title: each.text for each in scene.outputs}
-    assert "Received message: PY::0" in outputs["What the agent logger wrote to logger.txt"]
+    assert "Received message: PY::0" in outputs["Log file of the agent logger (logger.txt)"]
     (trial,) = json_document(staff_view(full))["trials"]
     assert trial["agent_messages"][2]["text"] == "0"
     assert len(plain_trial(full.trials[0])["agent_messages"]) == len(recording.agent_messages) == 24
@@ -197,7 +197,7 @@ def test_a_fault_is_told_with_the_agents_own_line(runner: TrialRunner) -> None:
     group = fault_groups(result, submission)[0]
     assert group.where == "Agent parser (parser.py), line 2"
     assert [line.text for line in group.excerpt if line.marked] == ["    return 1 / 0"]
-    assert "An agent of yours raised an error" in page_of(staff_view(result), submission).words.happened
+    assert "One of your agents raised an error" in page_of(staff_view(result), submission).words.happened
 
 
 def test_recordings_with_agents_are_kept_and_cut_like_others(full: Grade) -> None:

@@ -88,8 +88,8 @@ def test_rules_on_the_text(rules: dict[str, Any], holds: bool, runner: TrialRunn
 def test_rule_that_is_broken_is_told_with_its_line(runner: TrialRunner) -> None:
     outcome = judged(PROGRAM, runner, avoids=["while", "say()"], uses=["for"])
     assert outcome.message == (
-        "Expected your program to do without a while loop, but line 11 has it. "
-        "Expected your program to do without say(), but line 10 has it."
+        "Expected your program not to use a while loop, but line 11 uses it. "
+        "Expected your program not to use say(), but line 10 uses it."
     )
     assert outcome.score == pytest.approx(1 / 3)
 
@@ -159,8 +159,8 @@ def test_another_name_does_not_hide_what_is_avoided(
 def test_what_a_text_cannot_show_is_told_to_staff(runner: TrialRunner) -> None:
     outcome = judged("x = 1\nexec(''.join(['s', 'ay(1)']))", runner, avoids=["say()"])
     assert outcome.passed
-    assert outcome.message == "The text of your program is as expected."
-    assert outcome.for_staff == "Can do more than its text shows: line 2 has exec."
+    assert outcome.message == "The code of your program is as expected."
+    assert outcome.for_staff == "The code may do more than it shows: line 2 has exec."
 
 
 @pytest.mark.parametrize(
@@ -200,7 +200,7 @@ def test_what_a_text_cannot_show_is_told_to_staff(runner: TrialRunner) -> None:
 def test_what_runs_or_looks_up_a_text_is_doubtful(text: str, runner: TrialRunner) -> None:
     outcome = judged(text, runner, avoids=["on_for_*()"])
     assert outcome.passed
-    assert "Can do more than its text shows: line " in outcome.for_staff
+    assert "The code may do more than it shows: line " in outcome.for_staff
 
 
 @pytest.mark.parametrize(

@@ -291,7 +291,7 @@ def test_an_event_is_not_said_where_another_belongs() -> None:
     assert said((1.0, "1"), (1.8, "nearly 2"), (3.0, "2"), (3.5, "2")).marks == 4  # between the places
     both = said((1.0, "1 2"), (3.0, "1 2"))
     assert both.marks == 0
-    assert "and not where another belongs, but it came at" in both.message
+    assert "and not at the place of another text, but it came at" in both.message
     assert said((1.0, "1"), (1.1, "2"), (3.0, "2")).marks == 2
 
 
@@ -346,4 +346,4 @@ def test_spinning_beside_a_point_is_no_round() -> None:
     assert judged(asked, circle(200)).marks == 4
     near = judged(asked, circle(20))
     assert near.marks == 0
-    assert "150 mm clear of (450, 493), but it came as near as 20 mm" in near.message
+    assert "150 mm clear of (450, 493), but its smallest distance was 20 mm" in near.message

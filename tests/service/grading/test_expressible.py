@@ -128,5 +128,5 @@ def test_the_end_may_be_asked_relative_to_an_event(since: dict[str, Any], words:
 
 
 def test_an_event_without_bounds_asks_for_nothing() -> None:
-    with pytest.raises(ValidationError, match="asks for nothing, expected moved"):
+    with pytest.raises(ValidationError, match="has no condition, expected moved"):
         criterion("pose", since={"of": "sent", "contains": "near"})

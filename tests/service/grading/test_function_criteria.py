@@ -94,7 +94,7 @@ def test_entries_of_a_list_are_marked_one_by_one(runner: TrialRunner) -> None:
 def test_first_wrong_call_is_told(runner: TrialRunner) -> None:
     calls = [{"arguments": [2], "returns": 4}, {"arguments": [3], "returns": 9}]
     result = graded("def f(x): return x + x", runner, criterion("functions", function="f", calls=calls))
-    assert result.criteria[0].message == "Expected f(3) to return 9, but it returned 6 (1 of 2 calls right)."
+    assert result.criteria[0].message == "Expected f(3) to return 9, but it returned 6 (1 of 2 calls correct)."
     assert result.sandbox.startswith("Landlock")
 
 
@@ -124,14 +124,18 @@ SQUARES = [
 @pytest.mark.parametrize(
     ("text", "marks", "words"),
     [
-        ("def f(x): return x * x", "4.00", "3 of 3 calls right"),
+        ("def f(x): return x * x", "4.00", "3 of 3 calls correct"),
         (
             "def f(x): return 4",
             "1.33",
-            "Expected the right values in all 2 hidden calls as well, but 0 of them were right (1 of 3 calls right).",
+            "Expected the right values in all 2 hidden calls as well, but 0 of them were right (1 of 3 calls correct).",
         ),
         ("def f(x): return 2 * x", "1.33", "Expected the right values in all 2 hidden calls"),
-        ("def f(x): return abs(x) ** 3", "0.00", "Expected f(2) to return 4, but it returned 8 (0 of 3 calls right)."),
+        (
+            "def f(x): return abs(x) ** 3",
+            "0.00",
+            "Expected f(2) to return 4, but it returned 8 (0 of 3 calls correct).",
+        ),
         ("def g(x): return 0", "0.00", "there is no function called f"),
     ],
 )
@@ -168,7 +172,9 @@ def test_what_is_done_with_a_hidden_argument_is_not_told(leak: str, runner: Tria
 def test_staff_read_which_hidden_call_went_wrong(runner: TrialRunner) -> None:
     asked = criterion("functions", function="f", calls=SQUARES)
     result = graded("def f(x): return x + x", runner, asked).criteria[0]
-    assert result.for_staff == "The first hidden call that went wrong: Expected f(3) to return 9, but it returned 6."
+    assert (
+        result.for_staff == "The first hidden call with a wrong result: Expected f(3) to return 9, but it returned 6."
+    )
 
 
 def test_a_hidden_call_cannot_be_told_by_a_later_one() -> None:
@@ -197,14 +203,14 @@ _LETTERS = "kind,letter\n" + "".join(
 @pytest.mark.parametrize(
     ("text", "marks", "words"),
     [
-        ("def kind(x): return 'vowel' if x in 'aeiou' else 'other'", "4.00", "at least 90% of 20 calls right"),
-        ("def kind(x): return 'vowel' if x in 'aei' else 'other'", "4.00", "at least 90% of 20 calls right"),
+        ("def kind(x): return 'vowel' if x in 'aeiou' else 'other'", "4.00", "at least 90% of 20 calls correct"),
+        ("def kind(x): return 'vowel' if x in 'aei' else 'other'", "4.00", "at least 90% of 20 calls correct"),
         (
             "def kind(x): return 'other'",
             "3.20",
-            "Expected kind to be right in 90% of 20 calls, but it was in about 80%.",
+            "Expected kind to be correct in 90% of 20 calls, but it was correct in about 80%.",
         ),
-        ("def kind(x): return 1.0", "0.00", "but it was in about 0%"),
+        ("def kind(x): return 1.0", "0.00", "but it was correct in about 0%"),
         ("def accuracy(): return 1.0", "0.00", "there is no function called kind"),
     ],
 )

@@ -96,7 +96,7 @@ def test_reached_part_of_an_order_counts_with_mean() -> None:
     result = judged(asked, cut)
     assert result.marks == 3
     assert (
-        '"4" did not come after "3" (3 of 4 found). The program was still running when the time was up, at 3 s.'
+        '"4" did not come after "3" (3 of 4 found). The program was still running when time ran out, at 3 s.'
         in result.message
     )
     assert result.evidence[0].t == 2.0

@@ -342,7 +342,7 @@ def test_a_criterion_that_cannot_be_judged_spoils_no_other(
     before, bad, after = judge_within(bounds, _criteria("before", "bad", "after"), trials, StaticAnalysis())
     assert [result.marks for result in (before, bad, after)] == [2, 0, 2]
     assert bad.max_marks == 2
-    assert bad.message == "This could not be judged; staff will look at it."
+    assert bad.message == "This criterion could not be judged. Staff will review it."
     assert bad.unjudged.startswith(cause)
     assert bad.for_staff == f"Could not be judged: {bad.unjudged}."
     assert not before.unjudged
@@ -413,7 +413,7 @@ def test_a_grade_says_that_staff_have_to_look(
     (tmp_path / "echo.py").write_text("def responder(text):\n    return text\n")
     program = Code("robot.py", _STORY.format(lines="print('1 2 3!')"))
     graded = grade(Submission("ada", program, None), read_assignment(tmp_path), runner=runner)
-    assert graded.notes == ("1 of 6 criteria could not be judged; staff will look at it",)
+    assert graded.notes == ("1 of 6 criteria could not be judged; staff will review them",)
     assert {result.id: result.marks for result in graded.criteria} | {"number": 0} == {
         "end": 1, "pattern": 1, "number": 0, "words": 1, "log": 0, "answers": 1,
     }  # fmt: skip

@@ -50,7 +50,7 @@ def test_when_chance_lost_all_there_was_nothing_to_answer() -> None:
 
 def test_a_text_that_was_never_sent_is_missed_as_ever() -> None:
     result = replies(asked(0, "PY::0", "chance"))
-    assert 'Expected the responder to be sent "PY::1", but it never was' in result.message
+    assert 'Expected the responder to be sent "PY::1", but it was not' in result.message
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_a_text_that_was_never_sent_is_missed_as_ever() -> None:
     [
         ("out of range", "the robot was 812 mm from the receiver, which is out of the link's range"),
         ("facing away", "the robot faced 95° away from the receiver"),
-        ("blocked", "a wall or an obstacle stood between the robot and the receiver"),
+        ("blocked", "a wall or an obstacle was between the robot and the receiver"),
     ],
 )
 def test_what_is_sent_from_out_of_reach_does_not_count_and_the_sentence_says_why(lost: LossReason, words: str) -> None:
@@ -91,7 +91,7 @@ def test_answers_that_chance_lost_are_not_missed_in_the_queue() -> None:
         answer(2, 1.1, "JSON::1"),
     )
     assert queue(*lossy, json=True, in_order=["0", "1"]).marks == 4
-    assert "counts as received" in queue(*lossy, json=True, in_order=["0", "1"]).message
+    assert "count as received" in queue(*lossy, json=True, in_order=["0", "1"]).message
     assert queue(*lossy, json=True, exactly=1).marks == 4
     assert queue(*lossy, json=True, in_order=["1", "0"]).marks == 0
     assert queue(*lossy, queue_grows=True).marks == 4

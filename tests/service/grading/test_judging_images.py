@@ -77,7 +77,7 @@ def test_classification_pools_and_counts_silence_as_wrong() -> None:
         (NO_IMAGE, None): 2,
     }
     assert len(result.predictions) == 3
-    assert 'The image showed "square", but it was taken for "diamond".' in result.message
+    assert 'The image showed "square", but it was identified as "diamond".' in result.message
     assert [evidence.passed for evidence in result.evidence] == [True, False, False, False, False]
 
 
@@ -99,7 +99,7 @@ def test_truth_told_for_each_pose() -> None:
 def test_what_the_robot_says_can_be_the_answer() -> None:
     asked = criterion("classification", answer_from="speech")
     assert judged(asked, imaged(SQUARE, None, spoken="Is that a square")).marks == 4
-    assert "said nothing after it" in judged(asked, imaged(SQUARE, "square")).message
+    assert "said nothing after the image" in judged(asked, imaged(SQUARE, "square")).message
 
 
 @pytest.mark.parametrize(

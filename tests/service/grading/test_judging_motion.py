@@ -48,7 +48,7 @@ def test_displacement_is_seen_from_how_the_robot_stood() -> None:
 def test_wheels_that_did_not_carry_the_robot_are_told() -> None:
     there_and_back = driven(straight(200), rest(), straight(-200))
     result = judged(criterion("displacement", agrees_with_wheels=0.05), there_and_back)
-    assert "400 mm that its left wheel's position stands for" in result.message
+    assert "400 mm according to its left wheel's position" in result.message
 
 
 def test_moves_are_parted_by_rests_and_by_kind() -> None:

@@ -153,7 +153,7 @@ def test_several_areas_are_one() -> None:
 def test_the_pen_may_be_lifted_over_a_bar() -> None:
     asked = criterion("keeps_out", of="pen", areas=[{"name": "the bar", "bar": [300, 700, 300, 900, 20]}])
     run = driven(straight(400))
-    assert "Expected the pen to keep out of the bar" in judged(asked, run).message
+    assert "Expected the pen to stay out of the bar" in judged(asked, run).message
     lifted = driven(straight(400), pen=((0, True), (20, False), (60, True)))
     assert passes(asked, lifted)
     assert "has no -p" in judged(asked, driven(straight(400), pen=())).message
@@ -288,7 +288,7 @@ def test_no_more_is_followed_than_was_driven_along(met: float, joins_by: float, 
 
 def test_coming_upon_the_line_too_late_is_told() -> None:
     result = judged(criterion("follows", line=STRETCH), driven(straight(500), start=Pose(800, 300, 0)))
-    assert "but it came upon it only 50% of the way along, and followed 56% of it" in result.message
+    assert "but it reached it only at 50% of its length, and followed 56% of it" in result.message
 
 
 def test_going_back_and_forth_over_the_line_is_not_one_side() -> None:
@@ -494,7 +494,9 @@ def test_the_outside_of_an_area_and_a_distance_are_kept(keys: dict[str, Any], go
 def test_how_near_it_came_to_the_outside_is_told() -> None:
     inside = {"name": "the arena", "rectangle": [0, 700, 300, 900], "outside": True}
     result = judged(criterion("keeps_out", areas=[inside], clear_of=60), driven(straight(160)))
-    told = "keep 60 mm from the outside of the arena, but it came nearer at (245, 800), and 40 mm was the nearest"
+    told = (
+        "keep 60 mm from the outside of the arena, but it came too near at (245, 800); its smallest distance was 40 mm"
+    )
     assert told in result.message
     assert measured(result, "least clearance") == pytest.approx(40)
 

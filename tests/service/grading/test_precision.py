@@ -182,4 +182,4 @@ def test_a_log_is_called_made_up_where_most_of_it_is() -> None:
     asked = criterion("datalog", series="Light", measured="left light", at_least=40)
     result = judged(asked, drove(datalog=logged(100, 100, *[17.0] * 138)))
     assert "at least 40 samples of Light, but there are 2; 138 of 140 are made up" in result.message
-    assert "not what the left light sensor read" in result.message
+    assert "not readings of the left light sensor" in result.message

@@ -91,7 +91,7 @@ def test_a_check_that_fails_leaves_its_line_unjudged(
 ) -> None:
     (result,) = checked(tmp_path / "a", check, runner).criteria
     assert result.marks == 0
-    assert result.message == "This could not be judged; staff will look at it."
+    assert result.message == "This criterion could not be judged. Staff will review it."
     assert re.search(words, result.unjudged)
     assert result.unjudged in result.for_staff
 
@@ -154,7 +154,7 @@ def test_no_text_of_a_students_ends_the_job_by_way_of_a_check(
     told = plain_text(staff_view(result))
     assert "For staff: Could not be judged: " in told
     shown = plain_text(student_view(result))
-    assert "This could not be judged; staff will look at it." in shown
+    assert "This criterion could not be judged. Staff will review it." in shown
     assert asked.unjudged[:30] not in shown
 
 
@@ -174,9 +174,9 @@ def test_a_check_has_what_it_needs_when_the_submission_has_used_up_its_own(
     [
         (
             ('check = "python"\nfile = "check.py"', 'check = "functions"\ncalls = [{ arguments = [3] }]'),
-            "neither returns nor one_of",
+            "without returns or one_of",
         ),
-        (('title = "A"', 'title = "A"\ngiven = ["check.py"]'), r'given names "check\.py", which holds answers'),
+        (('title = "A"', 'title = "A"\ngiven = ["check.py"]'), r'given names "check\.py", which contains answers'),
         (("check.py", "other.py"), r'file is "other\.py", expected a \.py file beside this file'),
         (
             ('check = "python"\nfile = "check.py"', 'check = "ranking"\nof = "x"\nmeasure = "time"\nsteps = [[1, 1]]'),

@@ -111,7 +111,7 @@ def test_a_spared_trial_is_what_running_it_gives(
         assert one.recording.sha256 == other.recording.sha256
         assert all_but_ticks(one.recording) == all_but_ticks(other.recording)
     assert [each.marks for each in found.criteria] == [each.marks for each in wanted.criteria]
-    told = [note for note in found.notes if "it would have done the same" in note]
+    told = [note for note in found.notes if "the result would be the same" in note]
     assert [f"in {count} of 4 trials" in note for note in told] == ([True] if count else [])
 
 

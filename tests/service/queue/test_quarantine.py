@@ -82,7 +82,7 @@ def test_a_falsified_constant_is_found_out(store: Store, runner: TrialRunner, mo
     with store.reading() as session:
         (shut_out,) = workers.in_quarantine(session)
         assert shut_out.worker == "machine-1"
-        assert "trial 1 of the known answer has another hash" in shut_out.reason
+        assert "trial 1 of the known answer has hash" in shut_out.reason
         assert [entry.action for entry in audit.entries(session, "worker", "machine-1")] == ["quarantine"]
 
 

@@ -56,7 +56,7 @@ def _ready(up: subprocess.Popen[str]) -> str:
     address, first = _first_words(up)
     # Output that goes to no terminal may go to a log that others read.
     assert "rml_" not in first
-    told = Path(json.loads(first)["message"].partition("sign in by the link in ")[2])
+    told = Path(json.loads(first)["message"].partition("sign in with the link in ")[2])
     assert stat.S_IMODE(told.stat().st_mode) == 0o600
     link = told.read_text().strip()
     assert re.fullmatch(re.escape(address) + r"/sign-in/rml_[\w-]+", link)
@@ -133,7 +133,7 @@ def test_all_of_it_comes_up_grades_tells_and_ends(tmp_path: Path) -> None:
         out, err = up.communicate(timeout=60)
         assert (up.returncode, err) == (0, "")
         # Running jobs were finished within the time allowed, or requeued.
-        assert re.fullmatch(r"ended; jobs in flight that went back: [01]", json.loads(out)["message"])
+        assert re.fullmatch(r"stopped; running jobs returned to the queue: [01]", json.loads(out)["message"])
         assert not any(map(alive, below))
         assert _jobs(store, JobState.RUNNING) == 0
         with store.reading() as session:

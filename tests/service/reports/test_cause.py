@@ -22,7 +22,7 @@ from service.reports.formats.rich_text import rich_report
 from service.reports.formats.text import plain_text
 from service.reports.html import report
 from service.reports.page import page_of
-from service.reports.verdict_sentences import FULL_MARKS
+from service.reports.verdict_sentences import FULL_MARKS, verdict_words
 from service.reports.view import gradebook_view, staff_view, student_view
 from sim.recording import Fault, Verdict
 
@@ -101,7 +101,7 @@ def test_time_that_was_up_is_the_cause_only_where_it_cost_marks() -> None:
     ended = replace(grade, trials=(replace(grade.trials[0], recording=recording),))
     cost = replace(ended, criteria=(criterion("ends", missed(0, 10.0, f"Expected an end, but {words}.")),))
     other = replace(ended, criteria=(criterion("line", missed(0, 1.5, "Expected 65 mm, but it was 72 mm off.")),))
-    assert diagnose(cost).cause == "Your program was still running when the simulated time was up."
+    assert diagnose(cost).cause == "Your program was still running at the end of the simulated time."
     assert diagnose(other).cause == "Expected 65 mm, but it was 72 mm off, at 1.50 s."
 
 
@@ -138,19 +138,21 @@ def test_the_dearest_criterion_is_the_cause_with_those_that_failed_where_it_did(
 
 def test_what_was_set_by_hand_is_no_cause_and_keeps_its_words() -> None:
     by_hand = SetByHand(Decimal(0), Decimal(2), "It drove well.", excused=False)
-    dear = replace(criterion("dear", missed(0, 1.5), message="Set by hand from 0 to 1."), set_by_hand=by_hand)
-    full = replace(dear, id="full", marks=Decimal(2), message="Set by hand from 0 to 2.")
+    dear = replace(criterion("dear", missed(0, 1.5), message="Adjusted by staff from 0 to 1."), set_by_hand=by_hand)
+    full = replace(dear, id="full", marks=Decimal(2), message="Adjusted by staff from 0 to 2.")
     grade = replace(build.line_follower_grade(), criteria=(replace(dear, marks=Decimal(1)), full, criterion("cheap")))
     assert diagnose(grade).lost == {2}
     for line, marks in zip(page_of(staff_view(grade)).others, (1, 2), strict=True):
-        assert line.told.startswith(f"Set by hand from 0 to {marks}: It drove well.")
+        assert line.told.startswith(f"Adjusted by staff from 0 to {marks}: It drove well.")
 
 
 def test_the_same_confusions_are_the_same_cause() -> None:
     grade = build.shape_grade()
     first = grade.criteria[0]
     told = diagnose(replace(grade, criteria=(first, replace(first, id="again"), grade.criteria[1])))
-    assert told.cause == "5 of 6 images were named rightly: “upwards facing triangle” was taken for “diamond”."
+    assert (
+        told.cause == "5 of 6 images were identified correctly: “upwards facing triangle” was identified as “diamond”."
+    )
     assert told.lost == {0, 1}
 
 
@@ -159,7 +161,7 @@ def test_what_is_ours_is_told_before_any_hint(verdict: Verdict) -> None:
     grade = hinted(HINT)
     broken = replace(grade.trials[0], recording=replace(grade.trials[0].recording, verdict=verdict))
     told = diagnose(replace(grade, trials=(broken,)))
-    assert "need not do anything" in told.next_step
+    assert told.next_step == verdict_words(verdict).next_step
     assert told.lost == frozenset()
 
 

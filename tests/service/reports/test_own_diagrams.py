@@ -65,18 +65,18 @@ def talk_grade(*messages: Message, calls: tuple[Call, ...] = ()) -> Grade:
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        (TRUE, "It shows what happened."),
+        (TRUE, "The diagram matches the events."),
         (
             SEED,
             "agent → parser and parser → agent did not happen. responder → parser happened and is not drawn.",
         ),
         ("robot -> responder", "parser, agent, MLP and logger took part and are not drawn. "
          "responder → robot happened and is not drawn."),
-        (TRUE.replace("MLP", "digit_net [label = 'a network']"), "It shows what happened."),
+        (TRUE.replace("MLP", "digit_net [label = 'a network']"), "The diagram matches the events."),
         (TRUE + "; teacher -> robot", "teacher took no part."),
         (TRUE + "; responder -> MLP", "responder → MLP did not happen."),
-        (TRUE + "; responder -> responder [label = think]", "It shows what happened."),
-        (TRUE.replace("responder <- parser;", ""), "It shows what happened."),
+        (TRUE + "; responder -> responder [label = think]", "The diagram matches the events."),
+        (TRUE.replace("responder <- parser;", ""), "The diagram matches the events."),
         ("bot [label = Robot]; a [label = 'Python message\\nhandler']; bot -> a; a -> bot",
          "parser, agent, MLP and logger took part and are not drawn."),
     ],

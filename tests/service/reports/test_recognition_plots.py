@@ -74,7 +74,7 @@ def test_a_misread_image_stands_beside_the_nearest_right_ones() -> None:
     assert found.like_answer is not None
     assert found.like_answer.truth == "diamond"
     shown = _texts(draw_misread([found], 6, "t"))
-    assert {"misread", "right,\nsame truth", "right, same\nanswer", "none", "5. ✗ wrong"} <= set(shown)
+    assert {"misread", "correct,\nsame truth", "correct,\nsame answer", "none", "5. ✗ wrong"} <= set(shown)
     assert any("1 misread of n = 6 images" in text for text in shown)
     # Of two correct images of a class, the nearer one is shown.
     far = replace(found.like_answer, image=replace(found.like_answer.image, left=b"\x80" * 1600))
@@ -96,8 +96,8 @@ def test_a_track_shows_every_image_and_the_share_along_the_way() -> None:
     assert sum(curve.n) == len(predictions)
     assert all(low <= share <= high for low, share, high in zip(curve.low, curve.share, curve.high, strict=True))
     shown = _texts(draw_track(predictions, grade.trials, "t", floor("Simple_Shapes").pixels))
-    assert {"x, mm", "y, mm", "way driven, mm", "share right"} <= set(shown)
-    assert any(f"of n = {len(predictions)} images right, 2 trials" in text for text in shown)
+    assert {"x, mm", "y, mm", "distance driven, mm", "accuracy"} <= set(shown)
+    assert any(f"of n = {len(predictions)} images correct, 2 trials" in text for text in shown)
 
 
 def test_standing_still_is_no_track() -> None:
@@ -109,7 +109,7 @@ def test_standing_still_is_no_track() -> None:
 def test_the_page_has_the_figures(make: object) -> None:
     grade = make()  # type: ignore[operator]
     page = report(student_view(grade), {})
-    assert "Class by class" in page
+    assert "Results by class" in page
     if make is build.swept_grade:
         assert "Images sent: 7 = 5 answered + 1 late + 0 malformed + 1 unanswered; duplicate answers: 2." in page
-        assert "Mean confidence 0.90 when right (n = 5)." in page
+        assert "Mean confidence 0.90 when correct (n = 5)." in page

@@ -347,7 +347,7 @@ def test_the_other_trial_is_switched_off_and_on_by_keyboard(browser: Browser, re
         told = page.locator(".moment").get_attribute("aria-valuetext")
         assert told is not None
         assert "attempt 1 " in told
-        box = page.get_by_role("checkbox", name="Show attempt 1 over it")
+        box = page.get_by_role("checkbox", name="Overlay attempt 1")
         box.focus()
         page.keyboard.press("Space")
         expect(box).not_to_be_checked()
@@ -366,7 +366,7 @@ def test_where_they_part_is_a_link_to_the_moment(browser: Browser, report_of_two
     assert moment is not None
     with opened(browser, report_of_two, "#trial=2&t=0", **DESKTOP) as found:
         page = found.page
-        page.get_by_role("link", name="Here they part: 3.13 s").focus()
+        page.get_by_role("link", name="First difference: 3.13 s").focus()
         page.keyboard.press("Enter")
         assert moment <= now(page) < moment + 0.001
         expect(page.locator(".moment")).to_be_focused()

@@ -46,8 +46,9 @@ def test_json_has_exactly_the_keys_of_the_schema() -> None:
 
 
 LOST = (
-    "The channel lost 5 of 6 messages: 1 by chance, 1 because the robot was out of range, 2 because it faced away, "
-    "1 because a wall or an obstacle stood between. What was lost by chance is held against nobody."
+    "The channel lost 5 of 6 messages: 1 by chance, 1 because the robot was out of range, 2 because the robot faced "
+    "away, "
+    "1 because of a wall or an obstacle between them. Messages lost by chance do not cost marks."
 )
 
 
@@ -222,7 +223,7 @@ def _on_a_terminal(view: View) -> str:
 
 
 COSTLY = replace(build.shape_grade(), cost=Cost(JobLimits(64 << 20, 240.0, 20.0), Spent(150_000, 3.21, 0.04)))
-FIGURES = "Used 3.2 of 240 s of CPU, 0 of 20 s of sleep, 0.1 of 64 MB of output."
+FIGURES = "CPU time: 3.2 of 240 s. Sleep: 0 of 20 s. Output: 0.1 of 64 MB."
 
 
 def test_staff_read_what_was_used_and_students_nothing_that_grows_with_hidden_trials() -> None:
@@ -248,10 +249,10 @@ def test_students_read_how_many_of_the_criteria_that_they_see_could_not_be_judge
         replace(second, id="third", visibility="visible"),
     )
     grade = replace(build.shape_grade(), criteria=criteria, notes=("a note", *unjudged_notes(criteria)))
-    assert "2 of 3 criteria could not be judged; staff will look at it" in staff_view(grade).grade.notes
+    assert "2 of 3 criteria could not be judged; staff will review them" in staff_view(grade).grade.notes
     assert student_view(grade).grade.notes == (
         "a note",
-        "1 of 2 criteria could not be judged; staff will look at it",
+        "1 of 2 criteria could not be judged; staff will review them",
     )
     all_hidden = replace(grade, criteria=tuple(replace(each, visibility="hidden") for each in criteria))
     assert student_view(all_hidden).grade.notes == ("a note",)

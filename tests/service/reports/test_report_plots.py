@@ -45,7 +45,7 @@ def test_names_of_all_plots() -> None:
 
 def test_of_a_robot_that_stood_still_the_page_says_so_and_nothing_is_drawn() -> None:
     for scene in page_of(staff_view(build.shape_grade())).scenes:
-        assert scene.notes[0] == "the robot stood still, so neither its path nor its sensors are drawn"
+        assert scene.notes[0] == "the robot did not move, so its path and sensors are not drawn"
     for scene in page_of(staff_view(build.line_follower_grade())).scenes:
         assert {plot.kind for plot in scene.plots} >= {"path", "sensors"}
         assert not any("stood still" in note for note in scene.notes)
@@ -114,7 +114,7 @@ def test_a_path_that_leaves_the_floor_says_so() -> None:
     )
     ticks = replace(far.ticks, y=np.full(90, 800.0))
     shown = _texts(draw_path(TrialResult("a", 0, 1, 0, 0, "visible", replace(far, ticks=ticks)), "t", None))
-    assert "the path goes on outside this image" in shown
+    assert "the path continues outside this image" in shown
     draw_path(TrialResult("a", 0, 1, 0, 0, "visible", far), "t", None)  # no finite tick except the start
 
 

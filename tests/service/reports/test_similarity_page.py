@@ -33,12 +33,12 @@ def text_of(assignment: str, student: str, file: str) -> str:
 
 @pytest.fixture(scope="module")
 def page() -> str:
-    return similarity_page(staff_similarity([FOUND]), text_of, "Alike in <class>", 100)
+    return similarity_page(staff_similarity([FOUND]), text_of, "Similar submissions in <class>", 100)
 
 
 def test_the_page_shows_both_sources_side_by_side_with_their_lines(page: str) -> None:
     text = " ".join(Reader(page).text.split())
-    assert "for staff only" in text
+    assert "staff only" in text
     assert "robot.py, 75% of 80 tokens" in text
     assert "<i>.py, 50% of 120 tokens" in text
     assert "last of robot.py" in text
@@ -56,7 +56,7 @@ def test_nothing_that_a_student_wrote_becomes_markup_or_is_endless(page: str) ->
 
 def test_pairs_beyond_the_most_are_counted() -> None:
     many = dataclasses.replace(FOUND, pairs=FOUND.pairs * 5)
-    assert "And 3 pairs more." in similarity_page(staff_similarity([many]), text_of, "Alike", 2)
+    assert "3 more pairs are not shown." in similarity_page(staff_similarity([many]), text_of, "Alike", 2)
 
 
 def test_json_has_everything() -> None:
@@ -69,7 +69,9 @@ def test_json_has_everything() -> None:
 
 
 def test_the_table_says_how_much_and_where() -> None:
-    assert what_it_says(FOUND).startswith("shape-recognition: 1 pair is alike among 12 students; 1 has too little code")
+    assert what_it_says(FOUND).startswith(
+        "shape-recognition: 1 similar pair among 12 students; 1 student has too little code"
+    )
     assert similarity_rows(FOUND) == [(*BOTH, "75%", "robot.py and <i>.py", "1 trial")]
 
 

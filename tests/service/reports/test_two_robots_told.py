@@ -106,6 +106,6 @@ def test_plots_are_drawn_and_name_both(relayed: Grade) -> None:
         told = {plot.kind: plot.alt for plot in plots_of(pair)}
         assert told.keys() == kinds
         assert draw_all(pair).keys() == {plot.name for plot in plots_of(pair)}
-    assert "The second robot's from (2000, 200) mm to (2000, 200) mm." in told["path"]
+    assert "Path of the second robot from (2000, 200) mm to (2000, 200) mm." in told["path"]
     talk = page_of(staff_view(relayed)).scenes[0].talk
     assert "robot to responder 1, responder to robot 1, robot 2 to responder 4, responder to robot 2 4." in talk

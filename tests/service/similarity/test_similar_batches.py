@@ -96,7 +96,7 @@ def test_one_way_in_three_spellings_is_no_pair(runner: TrialRunner, others: int)
     assert found.same == ()
     assert found.same_recordings == (tuple(squares),)
     assert "no pairs" not in what_it_says(found)
-    assert "1 group has a file or all recordings in common" in what_it_says(found)
+    assert "1 group with a common file or common recordings" in what_it_says(found)
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,8 @@ def test_an_open_home_is_repaired_and_said_so_once(tmp_path: Path) -> None:
     first, second = (_robomark(home, 0o022, "batch", "list") for _ in range(2))
     assert first.returncode == second.returncode == 0
     assert first.stderr == (
-        f"robomark: the home {home} was open to other users (9 of its files and folders); now it is this user's alone\n"
+        f"robomark: the home {home} was open to other users (9 of its files and folders); now only this user has "
+        "access\n"
     )
     assert second.stderr == ""
     assert _open(home) == []

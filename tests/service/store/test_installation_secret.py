@@ -94,7 +94,7 @@ def test_a_home_is_opened_once_for_its_secret(tmp_path: Path, monkeypatch: pytes
 
 def test_a_home_that_cannot_be_made_is_said(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(HostError, match=r"secret that trials depend on cannot be kept: .* or ROBOMARK_SECRET\.$"):
+    with pytest.raises(HostError, match=r"secret for trials cannot be saved: .* or ROBOMARK_SECRET\.$"):
         secret_here(Settings(home=tmp_path / "file" / "home"))
 
 
@@ -103,7 +103,9 @@ def test_one_that_is_too_short_is_refused_without_being_told(monkeypatch: pytest
     monkeypatch.setenv("ROBOMARK_SECRET", text)
     with pytest.raises(UsageError) as caught:
         load_settings()
-    assert str(caught.value) == ("ROBOMARK_SECRET is not usable: expected at least 16 characters that nobody can guess")
+    assert str(caught.value) == (
+        "ROBOMARK_SECRET is not usable: expected at least 16 characters that are hard to guess"
+    )
 
 
 def test_settings_do_not_tell_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -192,7 +194,7 @@ def test_only_its_hash_is_told(tmp_path: Path) -> None:
         assert done[-1].returncode == 0, done[-1]
     told = "".join(each.stdout + each.stderr for each in done)
     name = Secret(SECRET).name
-    assert f"that of ROBOMARK_SECRET, called {name} by its hash" in told
+    assert f"the secret in ROBOMARK_SECRET, hash {name}" in told
     assert f"secret: {name}" in told
     assert SECRET not in told
     files = [path for folder in (home, tmp_path / "out") for path in folder.rglob("*") if path.is_file()]
@@ -206,8 +208,8 @@ def test_only_its_hash_is_told(tmp_path: Path) -> None:
     environment.pop("ROBOMARK_SECRET")
     other = robomark("verify", found[1], **environment)
     assert other.returncode == 3
-    assert f"cannot be verified with this secret: its worlds are of {name}" in other.stderr
-    assert "set ROBOMARK_SECRET to the one that it was graded with" in other.stderr
+    assert f"cannot be verified with this secret: it was graded with {name}" in other.stderr
+    assert "set ROBOMARK_SECRET to the original secret" in other.stderr
     wrong = robomark("doctor", **environment)
     assert wrong.returncode == 3
     assert f"the newest grade has {name}: every machine needs the same" in " ".join(wrong.stdout.split())

@@ -226,7 +226,7 @@ def test_what_could_not_be_judged_gets_its_marks_and_is_published(store: Store) 
         (line,) = batches.job_lines(session, batch)
         told = staff_view(results.load(session, job_id)).grade.criteria[0]
     assert (line.unjudged, line.set_by_hand) == (0, 1)
-    assert told.message == "Set by hand to 5: seen again."
+    assert told.message == "Adjusted by staff to 5: seen again."
     assert acting.publish(store, batch, actor="staff").published == 1
     _change(store, job_id, _withdraw(SHAPE))
     with store.reading() as session:
@@ -298,9 +298,9 @@ def test_a_report_says_what_was_set_why_and_what_was_written(store: Store) -> No
         line = batches.job_line(session, job_id)
     told = json_document(staff_view(grade))
     first, second = told["criteria"]
-    assert first["message"].startswith("Set by hand from 5 to 6: seen again. 5 of 6 images")
+    assert first["message"].startswith("Adjusted by staff from 5 to 6: seen again. 5 of 6 images")
     assert first["set_by_hand"] == {"from": 5, "of": 6, "excused": False, "reason": "seen again"}
-    assert second["message"].startswith("Excused, so that it does not count (it had 2 of 2): was ill. It asked")
+    assert second["message"].startswith("Excused, does not count (before: 2 of 2): was ill. It asked")
     assert told["comments"] == [
         {"criterion": "", "text": "Well <b>done</b>."}, {"criterion": SHAPE, "text": "Line 3 was right."},
     ]  # fmt: skip
@@ -326,7 +326,7 @@ def test_what_was_set_is_told_where_the_message_is_of_visible_trials_alone() -> 
     said = replace(shape, set_by_hand=by_hand, marks=Decimal(6))
     trials = tuple(replace(trial, visibility="hidden") for trial in GRADE.trials)
     told = student_view(replace(GRADE, criteria=(said,), trials=trials)).grade.criteria[0].message
-    assert told.startswith("Set by hand from 5 to 6: seen again.")
+    assert told.startswith("Adjusted by staff from 5 to 6: seen again.")
     assert "5 of 6 images" not in told
 
 

@@ -284,7 +284,7 @@ def test_what_is_nearly_the_same_is_shown_with_its_lines_across_the_batches_of_a
     grade_all(web, report_builders.faulty_grade())
     path = f"{HOME}/batches/{made.id}/similar"
     page = grace.get(path).text
-    assert "1 pair is alike among 2 students" in words(page)
+    assert "1 similar pair among 2 students" in words(page)
     # Groups with the same file, groups with the same recordings, and the pair.
     assert len(re.findall(rf'href="{HOME}/grades/\w+">ada', page)) == 3
     assert page.count("<details open>") == page.count("<details") == 1
@@ -294,7 +294,7 @@ def test_what_is_nearly_the_same_is_shown_with_its_lines_across_the_batches_of_a
         open_assignments.prepare(session, 1, freeze(echo()))
         open_assignments.hide_names(session, 1, "echo-responder", hidden=True)
     hidden = words(grace.get(path).text)
-    assert "1 pair is alike" in hidden
+    assert "1 similar pair" in hidden
     assert not is_named("ada", hidden)
     answer = grace.get(f"/api/v1{path}", headers=web.token(web.instructor(), "read"))
     (found,) = answer.json()["assignments"]
@@ -345,14 +345,14 @@ def test_a_grade_is_shown_to_staff_with_its_neighbours(web: Web, grace: TestClie
     made = a_batch(web, "ada", "bob", "cid")
     ids = {job.student: job.job_id for job in made.jobs}
     shown = grace.get(f"{HOME}/grades/{ids['bob']}").text
-    assert "staff copy" in shown
+    assert "staff only" in shown
     assert f'href="{HOME}/grades/{ids["ada"]}" rel="prev"' in shown
     assert f'href="{HOME}/grades/{ids["cid"]}" rel="next"' in shown
     assert 'rel="prev"' not in grace.get(f"{HOME}/grades/{ids['ada']}").text
     german = grace.get(f"{HOME}/grades/{ids['bob']}", headers={"accept-language": "de"}).text
     assert '<p class="next" data-before="Als Nächstes:">Beheben Sie das in Ihrem Antwortprogramm' in german
     assert '"play": "Abspielen"' in german
-    assert "staff copy" not in german
+    assert "staff only" not in german
 
 
 def test_hidden_names_are_nowhere_on_the_pages_of_who_marks(web: Web, grace: TestClient) -> None:

@@ -79,8 +79,8 @@ def test_from_the_upload_to_the_second_that_failed(browser: Browser, running: Se
     page.wait_for_selector("section.replay[data-ready]", timeout=PATIENCE)
     assert_in_order(page)
     expect(page.locator(".score")).to_contain_text("of 10 marks")
-    watch = page.get_by_role("link", name="Watch it at").first
-    second = (watch.text_content() or "").removeprefix("Watch it at ").removesuffix(" s")
+    watch = page.get_by_role("link", name="Watch at").first
+    second = (watch.text_content() or "").removeprefix("Watch at ").removesuffix(" s")
     watch.click()
     page.wait_for_function(SOUGHT)
     moment, slider = page.evaluate(MOMENT)
