@@ -59,7 +59,7 @@ def end_credential(service: Service, actor: Actor, credential_id: str) -> None:
     person_id = _person(actor)
     with service.store.transaction() as session:
         if not credentials.revoke(session, credential_id, person_id, actor.reach):
-            raise NotFound("you have no session and no token of this id")
+            raise NotFound("you have no session or token with this id")
         audit.note(session, actor.name, "sign out", "person", str(person_id), ended=1)
 
 
@@ -78,13 +78,13 @@ def check_scopes(
     """Raise Invalid unless a person with these roles can use the scopes. An empty ``limit`` means no limit."""
     offered = offered_scopes(roles, operator=operator, limit=limit or None)
     if not scopes or not scopes <= offered.keys():
-        raise Invalid("Say what the token may do: %(scopes)s.", scopes=", ".join(offered))
+        raise Invalid("Select at least one of these scopes: %(scopes)s.", scopes=", ".join(offered))
 
 
 def check_number(session: Session, person_id: int) -> None:
     """Raise Conflict if a person has the maximum number of tokens."""
     if credentials.count_tokens(session, person_id) >= MOST_TOKENS:
-        raise Conflict("There are %(count)s tokens already. Revoke one first.", count=MOST_TOKENS)
+        raise Conflict("The limit of %(count)s tokens is reached. Revoke a token first.", count=MOST_TOKENS)
 
 
 def _person(actor: Actor) -> int:

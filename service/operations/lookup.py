@@ -24,7 +24,7 @@ def check_operator(actor: Actor) -> None:
 def check_machine(actor: Actor) -> None:
     """Raise Forbidden unless the actor is a command on the machine."""
     if not actor.is_machine:
-        raise Forbidden("only a command on the machine itself does this")
+        raise Forbidden("this is possible only with a command on the server")
 
 
 def course_for(session: Session, actor: Actor, course_id: int, *roles: Role) -> Course:
@@ -99,7 +99,7 @@ def student_in(session: Session, actor: Actor, course_id: int, enrolment_id: int
     if row is None or row.course_id != course_id:
         raise _nothing()
     if row.role is not Role.STUDENT:
-        raise NotFound("%(id)s is no student of this course", id=row.student)
+        raise NotFound("%(id)s is not a student of this course", id=row.student)
     return row
 
 
@@ -118,4 +118,4 @@ def names_for(service: Service, actor: Actor, course_id: int) -> HiddenNames:
 
 
 def _nothing() -> NotFound:
-    return NotFound("There is nothing here, or nothing that you may see.")
+    return NotFound("Not found. It does not exist, or you have no access to it.")

@@ -233,4 +233,4 @@ def _view(session: Session, found: OwnSubmission, language: Language) -> View:
 
 
 def _nothing() -> NotFound:
-    return NotFound("There is nothing here, or nothing that you may see.")
+    return NotFound("Not found. It does not exist, or you have no access to it.")

@@ -11,11 +11,11 @@ from service.store.states import Role
 #: By name; a token has its owner's permissions, limited to its scopes.
 SCOPES: Mapping[str, str] = MappingProxyType(
     {
-        "read": translatable("read what its owner may see"),
-        "submit": translatable("submit, for oneself as a student, or batches as an instructor"),
-        "mark": translatable("override, comment, publish, regrade"),
-        "manage": translatable("open assignments, set policies, enrol, delete"),
-        "sign-in": translatable("sign a browser in, as far as the other scopes reach; end sessions and tokens"),
+        "read": translatable("read everything that its owner can see"),
+        "submit": translatable("submit as a student, or submit batches as an instructor"),
+        "mark": translatable("adjust marks, comment, publish and regrade"),
+        "manage": translatable("open assignments, change policies, enrol and delete"),
+        "sign-in": translatable("sign in a browser with the same scopes; end sessions and tokens"),
     }
 )
 _OF_STAFF = frozenset({"mark", "manage"})

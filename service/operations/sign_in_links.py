@@ -25,7 +25,7 @@ from submissions.student_identity import Student
 
 #: Lifetime in days of links for a whole course, which are distributed by other means.
 DAYS, MOST_DAYS = 7, 30
-_ELSEWHERE = "is in other courses, too, and signs in by whoever runs Robomark"
+_ELSEWHERE = "is also in other courses, so only the operator can create a sign-in link"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class UnusedLink:
 def make_links(service: Service, actor: Actor, course_id: int, days: int = DAYS) -> list[StudentLink]:
     """Create a new link for each student of the course, replacing earlier ones. Raises NotFound, Invalid."""
     if not 1 <= days <= MOST_DAYS:
-        raise Invalid("sign-in links last from 1 to %(most)s days", most=MOST_DAYS)
+        raise Invalid("sign-in links can be valid for 1 to %(most)s days", most=MOST_DAYS)
     lifetime = timedelta(days=days)
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)

@@ -54,7 +54,7 @@ class Sending:
     def read(self, sent: Sequence[SentFile]) -> GradingRequest:
         """Read the submission in these files. Raises UsageError if they are not a valid one."""
         if not sent:
-            raise UsageError("nothing was sent; choose a file, or paste a program.")
+            raise UsageError("no files were submitted; select a file, or paste a program.")
         source = shown(", ".join(dict.fromkeys(each.flat_name for each in sent)))
         asked = self.assignment
         submission = submission_of(read_sent(sent, source), source, self.student.id, asked.id, asked.parts)
@@ -72,9 +72,9 @@ def sending(service: Service, actor: Actor, course_id: int, assignment: str) -> 
         enrolment = own_enrolment(session, actor, course_id, Role.STUDENT)
         opened = {each.assignment: each for each in open_assignments.of_course(session, course_id)}.get(assignment)
         if opened is None or opened.opened_at is None:
-            raise NotFound("There is nothing here, or nothing that you may see.")
+            raise NotFound("Not found. It does not exist, or you have no access to it.")
         if not opened.open:
-            raise UsageError("%(title)s is closed; nothing can be submitted to it any more.", title=opened.title)
+            raise UsageError("%(title)s is closed; you can no longer submit to it.", title=opened.title)
         found = open_assignments.load(session, course_id, assignment)
         course = session.get_one(Course, course_id).name
         return Sending(course, enrolment.id, Student(enrolment.written), opened, found)
@@ -93,7 +93,7 @@ def submit(service: Service, actor: Actor, course_id: int, request: SendRequest)
     lacking = missing_part(asked.submission, way.assignment.parts)
     if lacking is not None and not request.even_in_part:
         raise LacksPart(
-            "there is no %(name)s: add it, or say below that you submit without it, which uses an attempt.",
+            "there is no %(name)s; add it, or confirm below that you want to submit without it, which uses an attempt.",
             name=PART_FILES[lacking],
         )
     accepted = intake.accept(

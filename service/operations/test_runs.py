@@ -44,7 +44,7 @@ def start(service: Service, actor: Actor, course_id: int, assignment: str, sent:
     """
     way = sending(service, actor, course_id, assignment)
     if tryout_assignment(way.assignment) is None:
-        raise UsageError("there is nothing to try here: no robot is run that you would see.")
+        raise UsageError("test runs are not available for this assignment; submit your files instead.")
     packed = pack_submission(way.read(sent).submission)
     with service.store.transaction() as session:
         made = tryouts.ask(session, way.enrolment_id, way.opened.version_id, packed)
@@ -84,12 +84,12 @@ def show_replay(service: Service, actor: Actor, course_id: int, tryout_id: str) 
     with service.store.reading() as session:
         replay = tryouts.replay_of(session, _own(session, actor, course_id, tryout_id).id)
     if replay is None:
-        raise NotFound("There is nothing here, or nothing that you may see.")
+        raise NotFound("Not found. It does not exist, or you have no access to it.")
     return replay
 
 
 def _own(session: Session, actor: Actor, course_id: int, tryout_id: str) -> TryoutLine:
     line = tryouts.line(session, own_enrolment(session, actor, course_id, Role.STUDENT).id, tryout_id)
     if line is None:
-        raise NotFound("There is nothing here, or nothing that you may see.")
+        raise NotFound("Not found. It does not exist, or you have no access to it.")
     return line

@@ -99,7 +99,7 @@ def erase_student(session: Session, enrolment_id: int, actor: str) -> Purged:
     """
     enrolment = session.get_one(Enrolment, enrolment_id)
     if enrolment.role is not Role.STUDENT:
-        raise UsageError(f"{enrolment.student} is no student of this course")
+        raise UsageError(f"{enrolment.student} is not a student of this course")
     running = (Job.enrolment_id == enrolment_id, Job.state == JobState.RUNNING)
     if session.scalar(select(Job.id).where(*running).limit(1)) is not None:
         raise UsageError(f"a submission of {enrolment.student} is being graded; wait until it is, or cancel it")

@@ -109,7 +109,10 @@ def _signed_in(request: Request, reader: MaybeReader, context: Context) -> Reade
     context.limits.page_calls.spend(str(reader.identity.person_id))
     needed = scope_of_page(request.method, request.scope["route"].path)
     if reader.identity.scopes is not None and needed is not None and needed not in reader.identity.scopes:
-        raise HTTPException(403, translatable("You signed in with a token whose scopes do not include this."))
+        raise HTTPException(
+            403,
+            translatable("Your sign-in token does not have the scope for this action. Use another token or a link."),
+        )
     return reader
 
 
@@ -125,7 +128,9 @@ async def same_site(request: Request, reader: MaybeReader) -> None:
     if request.method in _SAFE:
         return
     if not _is_from_here(request):
-        raise HTTPException(403, translatable("This came from another site; open the page here and send it again."))
+        raise HTTPException(
+            403, translatable("This request came from another website. Open the page in Robomark, and try again.")
+        )
     if reader is None:
         return
     word = request.headers.get(CSRF_HEADER)
@@ -133,7 +138,10 @@ async def same_site(request: Request, reader: MaybeReader) -> None:
         word = str((await request.form()).get(CSRF_FIELD, ""))
     if not secrets.compare_digest(word.encode(), reader.csrf.encode()):
         raise HTTPException(
-            403, translatable("This page was open for too long, or came from another site; load it and send again.")
+            403,
+            translatable(
+                "The page has expired, or the request came from another website. Reload the page, and try again."
+            ),
         )
 
 
@@ -155,7 +163,7 @@ def _is_from_here(request: Request) -> bool:
 
 def nothing_here() -> HTTPException:
     """Return the 404 response for objects that do not exist or that the reader may not see."""
-    return HTTPException(404, translatable("There is nothing here, or nothing that you may see."))
+    return HTTPException(404, translatable("Not found. It does not exist, or you have no access to it."))
 
 
 def _instructing(course_id: RowNumber, reader: SignedIn, context: Context) -> InCourse:

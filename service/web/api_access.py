@@ -57,10 +57,10 @@ def caller_of(request: Request, context: Context) -> Caller:
     """
     scheme, secret = get_authorization_scheme_param(request.headers.get("authorization"))
     if scheme.lower() != "bearer" or not secret:
-        raise SignInNeeded("a token is needed")
+        raise SignInNeeded("a token is required")
     identity = sign_in.identify(context.service, secret, CredentialKind.TOKEN)
     if identity is None:
-        raise SignInNeeded("the token does not count")
+        raise SignInNeeded("the token is invalid or has expired")
     context.limits.api_calls.spend(identity.credential_id)
     if not identity.use_is_noted:
         sign_in.note_use(context.service, identity)
@@ -80,7 +80,7 @@ def with_scope(scope: str) -> Callable[[Caller], Caller]:
 
     def caller(caller: Called) -> Caller:
         if caller.identity.scopes is None or scope not in caller.identity.scopes:
-            raise HTTPException(403, f"This token may not do that: it lacks the scope {scope}.")
+            raise HTTPException(403, f"This token does not have the scope {scope}.")
         return caller
 
     return caller

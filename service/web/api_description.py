@@ -14,61 +14,62 @@ from service.web.api_routes import KEY_HEADER, LONGEST_KEY
 from service.web.request_bodies import LARGEST_FORM, MEGABYTE
 
 _ABOUT = f"""
-Everything that the pages do, for programs.
+All functions of the pages, for programs.
 
-**Sign in** with a token of `/account` or of `robomark user token`: `Authorization: Bearer rmt_...`. A token does what
-its owner may do, and of that what its scopes name. What somebody may not see answers 404, as what there is not.
+**Authentication**: send a token from `/account` or `robomark user token` as `Authorization: Bearer rmt_...`. A token
+has the permissions of its owner, limited to its scopes. Objects that the owner cannot see return 404.
 
-**Ask again** without harm: a POST with an `Idempotency-Key` is done once, and answered the same for 24 hours.
+**Repeated requests**: a POST with an `Idempotency-Key` runs once. Repetitions within 24 hours return the same response.
 
-**Lists** come in pages: `limit` says how long, `after` where to go on, `next` of an answer what to say there.
+**Lists** have pages: `limit` is the maximum number of items. Send `next` of a response as `after` for the next page.
 
-**Errors** are `application/problem+json`, with a sentence in `detail`.
+**Errors** are `application/problem+json`, with a message in `detail`.
 
-**Limits**: {LARGEST_FORM // MEGABYTE} MB for a request that is no upload; a number of calls a minute for each token,
-then 429 with `Retry-After`.
+**Limits**: {LARGEST_FORM // MEGABYTE} MB for a request that is not an upload, and a number of calls per minute for each
+token. Further calls return 429 with `Retry-After`.
 
-Moments are ISO 8601 with their zone, marks numbers, times seconds, lengths millimetres, angles degrees.
+Timestamps are ISO 8601 with a time zone, marks are numbers, times are seconds, lengths are millimetres, and angles are
+degrees.
 """
 _PROBLEM = {
     "type": "object",
     "title": "Problem",
-    "description": "What is wrong, as RFC 9457 has it.",
+    "description": "An error in the format of RFC 9457.",
     "required": ["type", "title", "status", "detail"],
     "properties": {
         "type": {"type": "string"},
         "title": {"type": "string"},
         "status": {"type": "integer"},
-        "detail": {"type": "string", "description": "A sentence for people."},
+        "detail": {"type": "string", "description": "A message for people."},
     },
     "examples": [
         {
             "type": "about:blank",
             "title": "Not Found",
             "status": 404,
-            "detail": "There is nothing here, or nothing that you may see.",
+            "detail": "Not found. It does not exist, or you have no access to it.",
         }
     ],
 }
 _ALWAYS = {
-    "400": "The body is not what its type says.",
-    "401": "No token, or one that does not count.",
-    "403": "The token lacks the scope.",
-    "404": "There is nothing here, or nothing that the token's owner may see.",
-    "422": "What was sent is not what was expected, or cannot be done.",
-    "429": "Too often; `Retry-After` says when to come again.",
-    "503": "The database does not answer, or the service failed; check what is stored before you try again.",
+    "400": "The body does not match its content type.",
+    "401": "The token is missing, invalid or expired.",
+    "403": "The token does not have the scope.",
+    "404": "It does not exist, or the owner of the token does not have access to it.",
+    "422": "The request is invalid, or the action is not possible.",
+    "429": "Too many requests; wait for the seconds in `Retry-After`.",
+    "503": "The database or the service failed; check whether the change was saved before you try again.",
 }
 _OF_CHANGES = {
-    "409": "The first request with this key is not answered yet.",
-    "413": "The body is longer than is read.",
-    "415": "The body has another type than is expected.",
+    "409": "The first request with this key is still in progress.",
+    "413": "The body is too large.",
+    "415": "The body has an unexpected content type.",
 }
 _KEY = {
     "name": KEY_HEADER.title(),
     "in": "header",
     "required": False,
-    "description": "Any text of your own; the same request with the same key is done once.",
+    "description": "Any text that you choose; a request with the same key runs only once.",
     "schema": {"type": "string", "minLength": 1, "maxLength": LONGEST_KEY, "pattern": "^[ -~]+$"},
 }
 

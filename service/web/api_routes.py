@@ -42,17 +42,15 @@ _Item = TypeVar("_Item")
 #: Responses of a route for the OpenAPI document, by status.
 Described = dict[int | str, dict[str, Any]]
 
-Limit = Annotated[int, Query(ge=1, le=200, description="How many at most.")]
-After = Annotated[
-    str, Query(max_length=1000, description="Where the page before ended: its `next`. Empty: from the first.")
-]
+Limit = Annotated[int, Query(ge=1, le=200, description="Maximum number of items.")]
+After = Annotated[str, Query(max_length=1000, description="The `next` of the previous page. Empty for the first page.")]
 
 
 class Listed(BaseModel, Generic[_Item]):
     """One page of a list."""
 
     items: list[_Item]
-    next: str | None = Field(description="Ask for `after=` this to have what follows; null at the end.", default=None)
+    next: str | None = Field(description="Value of `after` for the next page; null on the last page.", default=None)
 
 
 def page_of(
@@ -82,7 +80,7 @@ def place_after(after: str, *kinds: type) -> tuple[Any, ...] | None:
         place = read_json(base64.b64decode(after + "=" * (-len(after) % 4), altchars=b"-_", validate=True))
         return tuple(_part(part, kind) for part, kind in zip(place, kinds, strict=True))
     except (ValueError, TypeError, OverflowError):
-        raise HTTPException(422, "after: expected the `next` of the page before.") from None
+        raise HTTPException(422, "after: expected the `next` of the previous page.") from None
 
 
 def _part(part: object, kind: type) -> object:
@@ -150,11 +148,11 @@ async def _once(request: Request, key: str, run: Callable[[Request], Awaitable[R
         known = await run_in_threadpool(replies.begin, *mine)
     except InProgress:
         raise HTTPException(
-            409, "The first request with this Idempotency-Key is not answered yet.", {"retry-after": "5"}
+            409, "The first request with this Idempotency-Key is still in progress.", {"retry-after": "5"}
         ) from None
     if known is not None:
         if await hashed.whole() != known.request_sha256:
-            raise HTTPException(422, "Idempotency-Key: another request had this key; expected a new one.")
+            raise HTTPException(422, "Idempotency-Key: another request used this key; expected a new key.")
         media_type = "application/json" if known.body else None
         return Response(known.body, known.status, {"idempotent-replay": "true"}, media_type)
     try:

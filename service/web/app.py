@@ -60,7 +60,7 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
     def static(name: str) -> Response:
         """Return a static file. Its name contains its hash, so caches can store it for ever."""
         if name not in static_files():
-            raise HTTPException(404, translatable("There is no such file."))
+            raise HTTPException(404, translatable("This file does not exist."))
         media_type, data = static_files()[name]
         return Response(data, media_type=media_type, headers={"cache-control": "public, max-age=31536000, immutable"})
 
@@ -104,4 +104,4 @@ def _add_probes(app: FastAPI, service: Service) -> None:
         try:
             return Response(metrics_text(service), media_type=CONTENT_TYPE_LATEST)
         except DatabaseError:
-            return PlainTextResponse("the database does not answer\n", status_code=503)
+            return PlainTextResponse("the database does not respond\n", status_code=503)

@@ -38,7 +38,7 @@ def read_upload(
     asked = assignment_for(context.service, actor, course_id, assignment)
     # One at a time, because an upload may need gigabytes of temporary disk space.
     if not context.unpacking.acquire(timeout=_UNPACKING_SECONDS):
-        raise Declined(503, Sentence("Another upload is being read; try again in a minute."), {"retry-after": "60"})
+        raise Declined(503, Sentence("Another upload is in progress. Try again in a minute."), {"retry-after": "60"})
     try:
         return read_batch_for(path, asked, people)
     finally:

@@ -28,22 +28,20 @@ from sim.sentences import Sentence
 _log = structlog.get_logger(__name__)
 #: Messages for the router's own errors: unknown paths and methods.
 _OF_THE_ROUTER = {
-    (404, "Not Found"): Sentence("There is nothing here, or nothing that you may see."),
-    (405, "Method Not Allowed"): Sentence(
-        "This address only takes what a form sends; go back to the page with the form."
-    ),
+    (404, "Not Found"): Sentence("Not found. It does not exist, or you have no access to it."),
+    (405, "Method Not Allowed"): Sentence("This address accepts only forms. Go back to the form and submit it again."),
 }
-_OURS = Sentence("Something went wrong here, not with you; it is written down. Try again in a minute.")
+_OURS = Sentence(
+    "The server could not process this request. This is not your fault. The error was logged. Try again in a minute."
+)
 #: HTTP status of each kind of UsageError; all others give 422.
 _STATUS: dict[type[UsageError], int] = {NotFound: 404, Forbidden: 403, Conflict: 409}
-_NO_DATABASE = Sentence("The database does not answer. Try again in a minute.")
+_NO_DATABASE = Sentence("The database does not respond. Try again in a minute.")
 #: The change may be saved even if the database failed afterwards.
 _NO_DATABASE_CHANGING = Sentence(
-    "The database does not answer. Before you try again in a minute, check whether your change was saved."
+    "The database does not respond. Check whether your change was saved, then try again in a minute."
 )
-_CONFLICT = Sentence(
-    "Somebody else changed the same thing at the same moment. Load the page again to see it, then try again."
-)
+_CONFLICT = Sentence("Another user changed this at the same time. Reload the page to see the change, then try again.")
 
 
 def add_error_pages(app: FastAPI) -> None:
@@ -60,7 +58,7 @@ def add_error_pages(app: FastAPI) -> None:
 
 async def _sign_in_needed(request: Request, _error: Exception) -> Response:
     if request.url.path.startswith(API):
-        return problem(401, "A token is needed: Authorization: Bearer rmt_...", {"www-authenticate": "Bearer"})
+        return problem(401, "A token is required: Authorization: Bearer rmt_...", {"www-authenticate": "Bearer"})
     target = f"{request.url.path}?{request.url.query}" if request.url.query else request.url.path
     where = f"/sign-in?next={quote(target)}" if request.method == "GET" else "/sign-in"
     if request.headers.get("hx-request") == "true":

@@ -84,7 +84,7 @@ class KeptUploads:
         for path in own[: max(0, len(own) - _MOST_OF_ONE + 1)]:
             shutil.rmtree(path, ignore_errors=True)
         if len(list(self._folder.iterdir())) >= _MOST_OF_ALL:
-            raise UsageError("too many uploads wait to be confirmed here; try again later")
+            raise UsageError("too many uploads are waiting for confirmation; try again later")
         made = KeptUpload(secrets.token_hex(16), person_id, course_id, "", assignment, "", "")
         (self._folder / made.id).mkdir(mode=0o700)
         self.write(made)
@@ -127,7 +127,7 @@ class KeptUploads:
             UsageError: There are too many files, or a name is invalid or occurs twice.
         """
         if len(files) > _MOST_FILES:
-            raise UsageError(f"{len(files)} files were sent, expected at most {_MOST_FILES}, or one zip of them")
+            raise UsageError(f"{len(files)} files were uploaded, expected at most {_MOST_FILES}, or one zip of them")
         folder = self._folder / upload.id / into
         folder.mkdir(mode=0o700)
         names = []
@@ -137,7 +137,9 @@ class KeptUploads:
                 with (folder / name).open("xb") as sink:
                     shutil.copyfileobj(file.stream, sink)
             except FileExistsError:
-                raise UsageError(f"two files are called {shown(name)}, expected a name for each student") from None
+                raise UsageError(
+                    f"two files have the name {shown(name)}, expected a different name for each student"
+                ) from None
             names.append(name)
         return names
 
@@ -157,7 +159,7 @@ def file_name(sent: SentFile) -> str:
     """Return a safe file name without folders. Raises UsageError if it is empty or too long."""
     name = "".join("?" if unicodedata.category(c)[0] == "C" else c for c in sent.flat_name).strip().lstrip(".")
     if not name:
-        raise UsageError("a file without a name was sent, expected one that names its student")
+        raise UsageError("a file without a name was uploaded, expected a name that identifies its student")
     if len(name.encode()) > _LONGEST_NAME:
         raise UsageError(f"the name {shown(name)} is too long, expected at most {_LONGEST_NAME} bytes")
     return name

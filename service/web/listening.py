@@ -26,7 +26,7 @@ def listen(host: str, port: int) -> socket.socket:
             return listening
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise UsageError(f"{host}:{port} cannot be listened on: {reason}; name another with --port or --host") from None
+        raise UsageError(f"cannot listen on {host}:{port}: {reason}; choose another with --port or --host") from None
 
 
 def check_reach(host: str, settings: Settings) -> None:
@@ -38,8 +38,8 @@ def check_reach(host: str, settings: Settings) -> None:
     if settings.public_url or all(ip_address(str(each[4][0]).partition("%")[0]).is_loopback for each in found):
         return
     raise UsageError(
-        f"--host {host} lets other machines reach this server, which speaks no TLS: put a proxy that does before it, "
-        "and set ROBOMARK_PUBLIC_URL to what browsers are to write, like https://robomark.example.org"
+        f"--host {host} makes this server reachable from other machines, but it does not support TLS: run it behind a "
+        "proxy with TLS, and set ROBOMARK_PUBLIC_URL to the public address, like https://robomark.example.org"
     )
 
 

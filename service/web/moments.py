@@ -24,7 +24,7 @@ def written_moment(text: str) -> datetime | None:
     except (ValueError, OverflowError):
         read = None
     if read is None or not 2000 <= read.year < 2200:
-        raise UsageError(f"{text[:40]!r} is no date, expected one like 2026-11-30 or 2026-11-30T17:00")
+        raise UsageError(f"{text[:40]!r} is not a date, expected a date like 2026-11-30 or 2026-11-30T17:00")
     return read
 
 

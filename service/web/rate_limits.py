@@ -43,7 +43,7 @@ class RateLimit:
 
     def _refuse(self, left: float) -> NoReturn:
         seconds = max(1, round((1 - left) / self._per_second))
-        said = Sentence("That is too often; come again in %(seconds)s s.", {"seconds": seconds})
+        said = Sentence("Too many requests. Try again in %(seconds)s s.", {"seconds": seconds})
         raise Declined(429, said, {"retry-after": str(seconds)})
 
 

@@ -16,7 +16,6 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import iter_route_contexts
 from fastapi.security.utils import get_authorization_scheme_param
 from starlette.datastructures import Headers
-from starlette.exceptions import HTTPException
 from starlette.routing import compile_path
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -26,6 +25,8 @@ from service.operations.types import CredentialKind, Role
 from service.web.access import SESSION_COOKIE, SignInNeeded, nothing_here
 from service.web.context import WebContext
 from service.web.problems import API
+from service.web.refusing import Declined
+from sim.sentences import Sentence
 
 MEGABYTE = 2**20
 #: Maximum size of a form or JSON body, for routes that declare no upload.
@@ -38,12 +39,12 @@ _MARK = "robomark_upload"
 _Endpoint = TypeVar("_Endpoint", bound=Callable[..., object])
 
 
-class TooMuch(HTTPException):
+class TooMuch(Declined):
     """The request body is too large."""
 
     def __init__(self, most: int) -> None:
         amount = f"{most // MEGABYTE} MB" if most >= MEGABYTE else f"{most // 1024} kB"
-        super().__init__(413, f"This is too much: at most {amount} are read.")
+        super().__init__(413, Sentence("The request is too large. The limit is %(limit)s.", {"limit": amount}))
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +119,7 @@ def _check_sender(request: Request, upload: Upload | None, course: str) -> None:
     """Raise the exception that the route would raise for this sender."""
     identity = _identity(request)
     if identity is None:
-        raise SignInNeeded("who sends this is not known")
+        raise SignInNeeded("sign in first")
     if upload is not None and not (course.isdecimal() and identity.roles.get(int(course)) is upload.role):
         raise nothing_here()
 

@@ -54,7 +54,7 @@ class Guarded:
             return
         headers = Headers(scope=scope)
         if not self._answers_to(_host(headers.get("host", "")), scope["path"]):
-            sentence = "This is not a name of this server; ROBOMARK_PUBLIC_URL says which is."
+            sentence = "This host name is unknown. ROBOMARK_PUBLIC_URL defines the host name of this server."
             await _refusal(scope["path"], 400, sentence)(scope, receive, send)
             return
         await self._app(scope, receive, self._headed(send))

@@ -120,7 +120,7 @@ def accept(
         if enrolment_id is None:
             enrolment_id = students.enrol(grading_request.student, at)
         elif not students.is_enrolled(enrolment_id, grading_request.student):
-            raise UsageError("you are not a student of this course any more; nothing was submitted.")
+            raise UsageError("you are no longer a student of this course, so nothing was submitted.")
         return _accept(session, _Item(packed, enrolment_id), terms)
 
 
@@ -431,8 +431,8 @@ def _check_quota(session: Session, of_student: tuple[ColumnElement[bool], ...], 
     used = session.scalar(select(func.coalesce(func.sum(SubmissionRow.size), 0)).where(*of_student)) or 0
     if used + size > most:
         raise UsageError(
-            "your submissions to this assignment would have %(size)s MB, expected at most %(most)s MB in all; "
-            "leave out files that are not needed, or ask your instructor.",
+            "your submissions to this assignment would need %(size)s MB, but the limit is %(most)s MB in total; "
+            "remove unneeded files, or ask your instructor.",
             size=-(-(used + size) // MEGABYTE),
             most=most // MEGABYTE,
         )

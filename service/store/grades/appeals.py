@@ -54,15 +54,15 @@ def ask(session: Session, submission_id: int, text: str) -> int:
     text = text.replace("\r\n", "\n").strip()
     if not 0 < len(text) <= LONGEST_TEXT:
         raise UsageError(
-            "the text has %(count)s characters, expected 1 to %(most)s", count=len(text), most=LONGEST_TEXT
+            "the appeal has %(count)s characters, expected 1 to %(most)s", count=len(text), most=LONGEST_TEXT
         )
     # Serialises concurrent appeals, so that the second one finds the first open.
     lock_submissions(session, SubmissionRow.id == submission_id)
     if not may_appeal(session, submission_id):
-        raise UsageError("there is no grade yet that could be looked at again")
+        raise UsageError("you can appeal after your grade is visible")
     still_open = select(Appeal.id).where(Appeal.submission_id == submission_id, Appeal.answered_at.is_(None))
     if session.scalar(still_open) is not None:
-        raise UsageError("you have asked already; expected one question at a time, and the answer to it first")
+        raise UsageError("you already have an open appeal; wait for the answer before you appeal again")
     row = Appeal(submission_id=submission_id, text=text, asked_at=now(session))
     session.add(row)
     session.flush()

@@ -75,11 +75,14 @@ def ask(session: Session, enrolment_id: int, version_id: int, packed: bytes) -> 
     of_student = Tryout.enrolment_id == enrolment_id
     session.execute(delete(Tryout).where(Tryout.queued_at < at - _KEPT, Tryout.state.not_in(_UNFINISHED)))
     if session.scalar(select(func.count()).where(of_student, Tryout.state.in_(_UNFINISHED))):
-        raise UsageError("one that you try is not through yet; wait for it, then try the next.")
+        raise UsageError("your previous test run is not completed yet; wait for it before you start another one.")
     if (session.scalar(select(func.count()).where(of_student, Tryout.queued_at > at - timedelta(hours=1))) or 0) >= (
         MOST_AN_HOUR
     ):
-        raise UsageError("you have tried %(count)s within an hour; wait a while, or submit it.", count=MOST_AN_HOUR)
+        raise UsageError(
+            "%(count)s test runs within an hour is the limit; wait a few minutes, or submit your files.",
+            count=MOST_AN_HOUR,
+        )
     _forget_programs(session, enrolment_id, version_id)
     row = Tryout(
         enrolment_id=enrolment_id,

@@ -117,7 +117,7 @@ def sent_files(sheet: TaskSheet, files: Sequence[UploadFile], texts: Sequence[st
     names = {each.flat_name.lower() for each in chosen}
     for each in typed:
         if each.flat_name in names:
-            raise UsageError("%(name)s was chosen as a file and typed as well; keep one of them.", name=each.flat_name)
+            raise UsageError("%(name)s was both selected as a file and typed. Remove one of them.", name=each.flat_name)
     return [*chosen, *typed]
 
 

@@ -18,8 +18,8 @@ from service.web.language import COOKIE as LANGUAGE_COOKIE
 from service.web.rendering import page
 
 router = APIRouter()
-_REFUSED = translatable("This link or token does not count, or not any more; ask for a new one.")
-_SIGNED_IN = translatable("This link does not count, or not any more; but you are signed in.")
+_REFUSED = translatable("This link or token is invalid, expired or already used. Ask for a new one.")
+_SIGNED_IN = translatable("This link is invalid, expired or already used, but you are signed in.")
 
 
 @router.get("/sign-in")
@@ -78,7 +78,7 @@ def choose_language(
 ) -> Response:
     """Set the language of pages in this browser."""
     if code not in languages():
-        raise HTTPException(422, translatable("There are no pages in this language."))
+        raise HTTPException(422, translatable("This language is not available."))
     answer = RedirectResponse(inside(target), 303)
     answer.set_cookie(
         LANGUAGE_COOKIE, code, max_age=365 * 86_400, httponly=True, samesite="lax", secure=_secure(context)

@@ -283,7 +283,7 @@ ROWS = {
     ),
     "add a webhook": _webhook(_HOOK),
     "add a webhook at no address": _webhook("ftp://x", (422, "expected http")),
-    "add too many webhooks": _webhook(_HOOK, (422, "revoke one first"), "many webhooks"),
+    "add too many webhooks": _webhook(_HOOK, (422, "revoke a token first"), "many webhooks"),
     "remove a webhook": _no_webhook("{webhook_id}"),
     "remove no webhook": _no_webhook("nothing", (404, "nothing")),
     "register a platform": _platform("2, 1"),

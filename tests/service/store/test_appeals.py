@@ -50,7 +50,7 @@ def _answer(store: Store, number: int, text: str = "Because.", course: int = 1) 
 def test_one_asks_is_answered_and_may_ask_again(store: Store) -> None:
     _graded(store)
     first = _ask(store, " Why?\r\nLine 3 prints it. ")
-    with pytest.raises(UsageError, match="you have asked already"):
+    with pytest.raises(UsageError, match="you already have an open appeal"):
         _ask(store, "And why?")
     with store.reading() as session:
         (line,) = appeals.open_in_course(session, 1, NONE_HIDDEN)
@@ -71,7 +71,7 @@ def test_one_asks_is_answered_and_may_ask_again(store: Store) -> None:
 
 def test_what_cannot_be_asked_or_answered_is_refused(store: Store) -> None:
     _submitted(store)
-    with pytest.raises(UsageError, match="no grade yet"):
+    with pytest.raises(UsageError, match="after your grade is visible"):
         _ask(store)
     _grade(store)
     for text in ("", " \n ", "x" * (LONGEST_TEXT + 1)):
@@ -89,7 +89,7 @@ def test_a_grade_for_staff_alone_cannot_be_asked_about(store: Store) -> None:
     _graded(store)
     with store.transaction() as session:
         session.execute(update(SubmissionRow).values(staff_only="2 days late, allowed: 0"))
-    with pytest.raises(UsageError, match="no grade yet"):
+    with pytest.raises(UsageError, match="after your grade is visible"):
         _ask(store)
 
 

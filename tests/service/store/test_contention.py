@@ -265,7 +265,7 @@ def test_one_student_tries_one_program_at_a_time(server: Store) -> None:
             tryouts.ask(session, enrolment_id, version_id, b"")
 
     asked = _second_waits(server, lambda session: tryouts.ask(session, enrolment_id, version_id, b""), second)
-    with pytest.raises(UsageError, match="not through yet"):
+    with pytest.raises(UsageError, match="not completed yet"):
         asked.result()
 
 

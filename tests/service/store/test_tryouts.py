@@ -71,7 +71,7 @@ def test_they_are_run_in_turn_and_each_student_sees_their_own(store: Store) -> N
 def test_a_student_has_one_at_a_time_and_so_many_an_hour(store: Store) -> None:
     ada = _enrolled(store)
     _ask(store, ada)
-    with pytest.raises(UsageError, match="is not through yet"):
+    with pytest.raises(UsageError, match="is not completed yet"):
         _ask(store, ada)
     for number in range(MOST_AN_HOUR):
         claimed = tryouts.claim(store, 60)

@@ -70,7 +70,7 @@ def test_a_program_is_tried_by_its_owner_alone(programs: Programs) -> None:
     asked = programs.ask("ada", "POST", f"{path}?assignment=echo-responder", files=files)
     assert (asked.status_code, asked.json()["state"], asked.json()["said"]) == (201, "queued", None), asked.text
     again = programs.ask("ada", "POST", f"{path}?assignment=echo-responder", files=files)
-    assert (again.status_code, "not through yet" in again.json()["detail"]) == (422, True)
+    assert (again.status_code, "not completed yet" in again.json()["detail"]) == (422, True)
     own = f"{path}/{asked.json()['id']}"
     assert programs.ask("ada", "GET", f"{own}/replay").status_code == 404
     claimed = tryouts.claim(programs.web.store, 60)

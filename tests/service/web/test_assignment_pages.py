@@ -40,9 +40,9 @@ def test_an_assignment_is_prepared_opened_and_closed(web: Web, grace: TestClient
     submit(grace, f"{HOME}/policy", policy | {"due": "2020-11-30T17:00"})
     told = words(grace.get(f"{path}/echo-responder?done=policy").text)
     assert "Set." in told
-    assert "This date has passed" in told
+    assert "This deadline has passed" in told
     submit(grace, f"{path}/echo-responder/no-policy")
-    assert "It has no dates and attempts of its own" in words(grace.get(f"{path}/echo-responder").text)
+    assert "This assignment uses the default policy" in words(grace.get(f"{path}/echo-responder").text)
     assert done == ["prepare", "open", "close", "open", "policy"]
     assert submit(grace, f"{HOME}/policy", {"due": "soon"}).status_code == 422
     assert submit(grace, path, {"assignment": "/etc"}).status_code == 422
@@ -54,19 +54,19 @@ def test_an_assignment_that_nobody_was_shown_is_taken_out(web: Web, grace: TestC
     submit(grace, path, {"assignment": "echo-responder"})
     submit(grace, f"{HOME}/policy", {"assignment": "echo-responder", "due": "2026-11-30T17:00"})
     submit(grace, f"{one}/names", {"hidden": "true"})
-    assert "Take out of the course" not in grace.get(one).text
+    assert "Remove from course" not in grace.get(one).text
     assert "names that are hidden would be shown" in words(submit(grace, f"{one}/remove").text)
     submit(grace, f"{one}/names", {"hidden": "false"})
-    assert "Take out of the course" in grace.get(one).text
+    assert "Remove from course" in grace.get(one).text
     assert submit(grace, f"{one}/remove").headers["location"] == path
-    assert "There is none yet" in grace.get(path).text
+    assert "No assignments yet" in grace.get(path).text
     assert submit(grace, f"{one}/remove").status_code == 422
     with web.store.reading() as session:
         assert policies.policies(session, 1) == {}
     submit(grace, path, {"assignment": "echo-responder"})
     submit(grace, f"{one}/open")
     submit(grace, f"{one}/close")
-    assert "Take out of the course" not in grace.get(one).text
+    assert "Remove from course" not in grace.get(one).text
     refused = submit(grace, f"{one}/remove")
     assert (refused.status_code, "it can be closed" in words(refused.text)) == (422, True)
 

@@ -65,7 +65,7 @@ def test_a_batch_is_looked_at_before_it_is_taken_in(web: Web, grace: TestClient)
             archive.writestr(name, text)
     place = sent(grace, sink.getvalue())
     shown = grace.get(place).text
-    assert "2 submissions can be taken in. 2 are refused." in words(shown)
+    assert "2 submissions can be accepted. 2 submissions are rejected." in words(shown)
     assert "eve" in shown
     assert "<script>alert" not in shown
     with web.store.reading() as session:
@@ -83,7 +83,7 @@ def test_a_batch_is_looked_at_before_it_is_taken_in(web: Web, grace: TestClient)
         assert entry.detail["refused"] == 2
     assert grace.get(place).status_code == 404
     again = submit(grace, f"{sent(grace, sink.getvalue())}/confirm")
-    assert "Nothing of it is new" in words(again.text)
+    assert "No new submissions." in words(again.text)
 
 
 def test_what_is_missing_known_and_new_is_said_before_it_is_taken_in(web: Web, grace: TestClient) -> None:
@@ -101,7 +101,7 @@ def test_what_is_missing_known_and_new_is_said_before_it_is_taken_in(web: Web, g
     alike = {f"{who}/{name}": f"{text}# ada\n" for who in ("ada", "bob") for name, text in ECHO.items()}
     shown = words(grace.get(sent(grace, zipped(alike | {"eve/robot.py": "print(1)\n"}))).text)
     assert "1 has no responder.py, and what needs it has no marks: eve" in shown
-    assert "1 is not in the course yet, and will be: eve" in shown
+    assert "1 student is not enrolled yet and will be enrolled: eve" in shown
     assert "1 was submitted before just so" in shown
     assert "1 is identical to one that is graded" in shown
 
@@ -112,7 +112,7 @@ def test_files_of_their_own_and_a_table_of_people(web: Web, grace: TestClient) -
     data = {"assignment": "echo-responder"}
     answer = submit(grace, f"{HOME}/batches/uploads", data, files=[*parts, people])
     shown = words(grace.get(answer.headers["location"]).text)
-    assert "1 submission can be taken in. 1 is refused." in shown
+    assert "1 submission can be accepted. 1 submission is rejected." in shown
     assert "Ada Lovelace" in shown
     assert "bob is not in class.csv" in shown
 
@@ -257,7 +257,7 @@ def test_what_a_newer_submission_took_the_place_of_leads_to_it(web: Web, grace: 
     batch, grade = (grace.get(f"{HOME}/{path}").text for path in (f"batches/{old.id}", f"grades/{old.jobs[0].job_id}"))
     assert f'href="{newer}"' in batch
     assert "submitted in another batch" in batch
-    assert f'<a href="{newer}">a newer submission took its place</a>' in grade
+    assert f'<a href="{newer}">replaced by a newer submission</a>' in grade
     assert "superseded by" not in batch + grade
 
 
@@ -308,7 +308,7 @@ def test_publishing_all_and_publishing_one(web: Web, grace: TestClient) -> None:
     made = a_batch(web, "ada", "bob")
     one, other = (job.job_id for job in made.jobs)
     answer = submit(grace, f"{HOME}/grades/{one}/publish")
-    assert "This grade is published" in grace.get(answer.headers["location"]).text
+    assert "Grade published" in grace.get(answer.headers["location"]).text
     with web.store.reading() as session:
         assert session.get_one(Job, one).published_by == "Grace (person 1)"
         assert session.get_one(Job, other).published_at is None
@@ -329,11 +329,11 @@ def test_a_batch_and_one_of_it_are_graded_again_and_stand_when_published(web: We
     first = made.jobs[0].job_id
     answer = submit(grace, f"{HOME}/grades/{first}/regrade", {"assignment": "echo-responder"})
     second = answer.headers["location"].rpartition("/")[2]
-    assert "It waits to be graded." in grace.get(answer.headers["location"]).text
+    assert "This submission is queued." in grace.get(answer.headers["location"]).text
     grade_all(web, report_builders.faulty_grade())
     shown = words(grace.get(answer.headers["location"]).text)
-    assert "Graded again:" in shown
-    assert "Graded more than once" in shown
+    assert "Regraded:" in shown
+    assert "Grading history" in shown
     submit(grace, f"{HOME}/grades/{second}/publish")
     with web.store.reading() as session:
         assert session.get_one(Job, second).standing is Standing.STANDS

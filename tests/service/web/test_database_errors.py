@@ -37,17 +37,17 @@ def _raise(error: Exception) -> Callable[..., Any]:
 @pytest.mark.parametrize(
     ("error", "status", "sentence"),
     [
-        (OperationalError("SELECT 1", {}, OSError("refused")), 503, "The database does not answer."),
-        (PoolTimeoutError("all connections are used"), 503, "The database does not answer."),
-        (OperationalError("UPDATE job", {}, _Failure("40P01")), 409, "Somebody else changed the same thing"),
-        (IntegrityError("INSERT", {}, _Failure("23505")), 409, "Somebody else changed the same thing"),
-        (IntegrityError("DELETE", {}, _Failure("23503")), 409, "Somebody else changed the same thing"),
-        (IntegrityError("INSERT", {}, _Failure("23502")), 500, "Something went wrong here"),
-        (OperationalError("INSERT", {}, _Failure("54000")), 500, "Something went wrong here"),
-        (NoResultFound("no row"), 409, "Somebody else changed the same thing"),
-        (StaleDataError("0 rows matched"), 409, "Somebody else changed the same thing"),
-        (MultipleResultsFound("several rows"), 500, "Something went wrong here"),
-        (IntegrityError("INSERT", {}, ValueError("not unique")), 500, "Something went wrong here"),
+        (OperationalError("SELECT 1", {}, OSError("refused")), 503, "The database does not respond."),
+        (PoolTimeoutError("all connections are used"), 503, "The database does not respond."),
+        (OperationalError("UPDATE job", {}, _Failure("40P01")), 409, "Another user changed this"),
+        (IntegrityError("INSERT", {}, _Failure("23505")), 409, "Another user changed this"),
+        (IntegrityError("DELETE", {}, _Failure("23503")), 409, "Another user changed this"),
+        (IntegrityError("INSERT", {}, _Failure("23502")), 500, "The server could not process this request"),
+        (OperationalError("INSERT", {}, _Failure("54000")), 500, "The server could not process this request"),
+        (NoResultFound("no row"), 409, "Another user changed this"),
+        (StaleDataError("0 rows matched"), 409, "Another user changed this"),
+        (MultipleResultsFound("several rows"), 500, "The server could not process this request"),
+        (IntegrityError("INSERT", {}, ValueError("not unique")), 500, "The server could not process this request"),
     ],
 )
 def test_what_is_wrong_with_the_database_is_told_as_what_it_is(

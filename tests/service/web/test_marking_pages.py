@@ -130,7 +130,7 @@ def test_a_comment_is_shown_and_withdrawn(marked: Marked) -> None:
 
 def test_a_student_asks_and_an_instructor_answers(marked: Marked) -> None:
     path = "/courses/1/mine/submissions/1/appeal"
-    assert "waits for an answer" in marked.ada.get(path).text
+    assert "not answered yet" in marked.ada.get(path).text
     assert "<textarea" not in marked.ada.get(path).text
     assert submit(marked.ada, path, {"text": "again"}).status_code == 422
     assert "Please look again." in marked.grace.get("/courses/1/appeals").text

@@ -100,7 +100,7 @@ def test_a_task_tells_nothing_that_is_hidden_and_gives_what_is_given(web: Web, a
     browser = web.browser(ada)
     shown = browser.get(f"{MINE}/open").text
     assert "The responder echoes each message" in shown
-    assert "7 more marks are for checks that are not shown here." in shown
+    assert "Marks for hidden checks: 7" in shown
     for secret in ("Secret criterion", "secret-scenario", "do not tell", "key.py"):
         assert secret not in shown
     given = browser.get(f"{MINE}/open/given/notes.txt")
@@ -159,15 +159,15 @@ def test_a_refusal_keeps_what_was_typed_as_it_was(web: Web, ada: Member, path: s
     assert "<script>alert" not in answer.text
     assert "\n\n\tprint(&#39;\u202e&#39;)  # &lt;/textarea&gt;&lt;script&gt;" in answer.text
     assert 'role="alert"' in answer.text
-    assert "robot.py was chosen as a file and typed as well" in answer.text
+    assert "robot.py was both selected as a file and typed" in answer.text
     empty = submit(browser, path)
-    assert "Nothing was sent; choose a file, or paste a program." in empty.text
+    assert "No files were submitted; select a file, or paste a program." in empty.text
 
 
 @pytest.mark.parametrize(
     ("files", "texts", "german"),
     [
-        ([], [], "Es wurde nichts gesendet; wählen Sie eine Datei, oder fügen Sie ein Programm ein."),
+        ([], [], "Es wurden keine Dateien abgegeben; wählen Sie eine Datei aus, oder fügen Sie ein Programm ein."),
         ([("essay.pdf", b"%PDF")], [], "hat kein robot.py oder responder.py (gefunden: essay.pdf)"),
         ([("robot.py", b"x" * (17 << 20))], [], "ist zu groß, erwartet waren höchstens 16 MB je Datei"),
         (
@@ -177,8 +177,8 @@ def test_a_refusal_keeps_what_was_typed_as_it_was(web: Web, ada: Member, path: s
         ),
         ([("robot.py", b"\x00"), ("responder.py", RESPONDER.encode())], [], "hat ein NUL-Zeichen in Zeile 1"),
         ([("all.zip", b"PK\x03\x04 torn")], [], "ist kein lesbares Zip-Archiv"),
-        ([("robot.py", PROGRAM.encode())], [PROGRAM], "robot.py wurde als Datei gewählt und auch getippt"),
-        ([("robot.py", PROGRAM.encode())], [], "Es gibt kein responder.py: Fügen Sie es hinzu"),
+        ([("robot.py", PROGRAM.encode())], [PROGRAM], "robot.py wurde als Datei ausgewählt und auch eingegeben"),
+        ([("robot.py", PROGRAM.encode())], [], "Es gibt kein responder.py; fügen Sie es hinzu"),
     ],
 )
 def test_a_german_page_refuses_in_german(
@@ -197,7 +197,7 @@ def test_a_part_that_is_missing_is_asked_for_once(web: Web, ada: Member) -> None
     browser = web.browser(ada)
     answer = submit(browser, f"{MINE}/open", {"texts": [PROGRAM, ""]})
     assert answer.status_code == 422
-    assert "There is no responder.py: add it" in answer.text
+    assert "There is no responder.py; add it" in answer.text
     assert 'name="even_in_part"' in answer.text
     assert 'name="even_in_part"' not in browser.get(f"{MINE}/open").text
     again = submit(browser, f"{MINE}/open", {"texts": [PROGRAM, ""], "even_in_part": "true"})
@@ -209,7 +209,7 @@ def test_too_many_are_told_when_to_come_again(web: Web, ada: Member) -> None:
     answers = [submit(browser, f"{MINE}/open") for _ in range(11)]
     assert [answer.status_code for answer in answers] == [422] * 10 + [429]
     assert int(answers[-1].headers["retry-after"]) > 0
-    assert "come again in" in answers[-1].text
+    assert "Try again in" in answers[-1].text
 
 
 def test_no_marks_are_shown_that_are_not_published_and_none_that_are_for_staff(web: Web, ada: Member) -> None:
@@ -232,14 +232,14 @@ def test_no_marks_are_shown_that_are_not_published_and_none_that_are_for_staff(w
     finally:
         with web.store.transaction() as session:
             policies.set_policy(session, 1, "open", PolicyLimits())
-    assert "all attempts were used" in shown
-    assert "Attempt 1 still counts." in shown
+    assert "no attempts left" in shown
+    assert "Your current grade is still from attempt 1." in shown
     assert "4 of 4 marks" not in shown
     assert "division by zero" not in shown
     card = browser.get(MINE).text
     assert "4 of 4 marks" not in card
-    assert re.search(r"<b>Counts:</b> <a [^>]*>Attempt 1</a>: 2 of 8 marks", card)
-    assert "kept without marks: all attempts were used" in card
+    assert re.search(r"<b>Current grade:</b> <a [^>]*>Attempt 1</a>: 2 of 8 marks", card)
+    assert "not marked: no attempts left" in card
 
 
 def test_attempts_are_shown_with_how_the_marks_moved(web: Web, ada: Member) -> None:
@@ -253,7 +253,7 @@ def test_attempts_are_shown_with_how_the_marks_moved(web: Web, ada: Member) -> N
     assert "3 of 4 marks" in shown
     newer = _send(browser, "print(5)").headers["location"]
     _send(browser, "print(6)")
-    assert "A newer one took its place." in browser.get(newer).text
+    assert "Replaced by a newer submission." in browser.get(newer).text
     _grade(web)
 
 
@@ -263,9 +263,9 @@ def test_the_attempt_that_counts_and_the_same_files_are_marked(web: Web, ada: Me
         last = _send(browser, program).headers["location"]
         _grade(web, marks)
     shown = browser.get(last).text
-    assert "the same files as attempt 1: no further attempt" in shown
+    assert "same files as attempt 1; no attempt used" in shown
     rows = re.findall(r"<tr><th scope=\"row\">.*?</tr>", shown.partition("<h2>Your attempts</h2>")[2], re.DOTALL)
-    assert ["counts</span>" in row for row in rows] == [True, False, False]
+    assert ["current grade</span>" in row for row in rows] == [True, False, False]
 
 
 def test_a_limit_that_is_reached_is_named_and_invites_no_more(web: Web, ada: Member) -> None:
@@ -278,19 +278,19 @@ def test_a_limit_that_is_reached_is_named_and_invites_no_more(web: Web, ada: Mem
         _grade(web)
         shown = browser.get(late).text
         assert "9 hours late" in shown
-        assert "submit again" not in shown
+        assert "Submit again" not in shown
         shown = browser.get(f"{MINE}/open").text
-        assert "Your attempts are used up" in shown
+        assert "You have used all your attempts" in shown
         assert '<button class="second">Submit</button>' in shown
         with web.store.transaction() as session:
             policies.set_policy(session, 1, "open", PolicyLimits(due - timedelta(days=2), attempts=1))
         first = web.browser(web.student("comes too late"))
-        assert "The last date has passed" in first.get(f"{MINE}/open").text
+        assert "The last date for submissions has passed" in first.get(f"{MINE}/open").text
         over = _send(first, "print('too late')").headers["location"]
         _grade(web)
         shown = first.get(over).text
-        assert "it came after the last date" in shown
-        assert "still counts" not in shown
+        assert "submitted after the last date" in shown
+        assert "is still from attempt" not in shown
     finally:
         with web.store.transaction() as session:
             policies.set_policy(session, 1, "open", PolicyLimits())
@@ -319,7 +319,7 @@ def test_what_failed_by_our_fault_says_so_and_tells_no_more(web: Web, ada: Membe
         dead = {"state": JobState.DEAD, "error": "the worker secret-host fell silent"}
         session.execute(update(Job).where(Job.enrolment_id == ada.enrolment_id).values(**dead))
     shown = browser.get(mine).text
-    assert "Could not be graded, through no fault of yours." in shown
+    assert "Failed; this is not your fault." in shown
     assert "secret-host" not in shown
 
 
@@ -327,15 +327,15 @@ def test_the_place_in_the_queue_and_the_time_left_are_told(web: Web, ada: Member
     first, second = web.browser(ada), web.browser(web.student("somebody else"))
     mine = _send(first, "print('a')").headers["location"]
     theirs = _send(second, "print('b')").headers["location"]
-    assert "nothing grades at the moment" in first.get(mine).text
+    assert "The grading service is not running." in first.get(mine).text
     workers.beat(web.store, WorkerDescription("worker", "here", 1, "1", "all"))
-    assert "It is the next to be graded." in first.get(mine).text
-    assert "One is graded before it." in second.get(theirs).text
+    assert "Your submission is next in the queue." in first.get(mine).text
+    assert "1 submission is ahead of yours in the queue." in second.get(theirs).text
     assert first.get(theirs).status_code == 404
     assert first.get(f"{MINE}/submissions/{10**30}").status_code in (404, 422)
     claim = jobs.claim(web.store, "worker", 60)
     assert claim is not None
     jobs.heartbeat(web.store, claim, 60, 0.5)
-    assert "It is being graded." in first.get(mine).text
+    assert "This submission is being graded." in first.get(mine).text
     jobs.finish(web.store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
     _grade(web)

@@ -128,7 +128,7 @@ def test_a_token_opens_no_browser_that_may_more(web: Web) -> None:
     # The browser has no more rights than the token's scopes.
     answer = submit(browser, f"/courses/{course.course_id}/people", {"who": "new"})
     assert answer.status_code == 403
-    assert "scopes do not include this" in answer.text
+    assert "does not have the scope" in answer.text
     offered = browser.get("/account").text
     assert [scope for scope in SCOPES if f'value="{scope}"' in offered] == ["read", "sign-in"]
     wider = {"name": "t", "word": "w", "scopes": ["read", "manage"]}
@@ -278,7 +278,7 @@ def test_the_number_of_sessions_and_tokens_is_bounded(web: Web, ada: Member) -> 
         asked = {"name": "t", "word": f"w{number}", "scopes": ["read"]}
         answer = submit(browser, "/account/tokens", asked)
         assert answer.status_code == (303 if number < MOST_TOKENS else 409)
-    assert "Revoke one first" in answer.text
+    assert "Revoke a token first" in answer.text
     # The same form again creates nothing new, so it gets the same answer.
     assert submit(browser, "/account/tokens", {"name": "t", "word": "w0", "scopes": ["read"]}).status_code == 303
 

@@ -87,7 +87,7 @@ def test_from_the_upload_to_the_second_that_failed(browser: Browser, running: Se
     assert moment.startswith("#trial=1&t=")
     assert float(slider) == pytest.approx(float(second), abs=0.01)
 
-    page.get_by_role("link", name="submit again").click()
+    page.get_by_role("link", name="Submit again").click()
     page.locator("summary").click()
     page.get_by_label("robot.py").fill(REFERENCE)
     page.get_by_role("button", name="Submit", exact=True).click()
@@ -100,10 +100,10 @@ def test_from_the_upload_to_the_second_that_failed(browser: Browser, running: Se
     expect(page.locator(".cards")).to_contain_text("Attempt 2: 10 of 10 marks")
     page.go_back()
 
-    page.get_by_role("link", name="Ask for a second look").click()
-    page.get_by_label("Your question").fill("Does the other circle count, too?")
-    page.get_by_role("button", name="Ask").click()
-    expect(page.locator("main")).to_contain_text("waits for an answer")
+    page.get_by_role("link", name="Appeal this grade").click()
+    page.get_by_label("Your appeal").fill("Does the other circle count, too?")
+    page.get_by_role("button", name="Appeal this grade").click()
+    expect(page.locator("main")).to_contain_text("not answered yet")
     assert_in_order(page)
     grace = browser.new_context(**DESKTOP).new_page()
     grace.goto(f"{running.address}/sign-in/{running.web.link(running.web.instructor())}")
@@ -124,17 +124,17 @@ def test_a_program_is_tried_without_a_mark(browser: Browser, running: Served) ->
     follow(page.get_by_role("link", name="Ignore the bands"))
     page.locator("summary").click()
     page.get_by_label("robot.py").fill(FAILS)
-    page.get_by_role("button", name="Only try it").click()
+    page.get_by_role("button", name="Run without submitting").click()
     page.wait_for_selector("section.replay[data-ready]", timeout=PATIENCE)
     assert_in_order(page)
     expect(page.locator("#tried")).to_contain_text("NameError: name 'undefined' is not defined")
     expect(page.locator("#tried pre").first).to_contain_text("begun")
     expect(page.get_by_label("robot.py")).to_have_value(FAILS)
-    page.get_by_role("link", name="Watch it").first.click()
+    page.get_by_role("link", name="Watch the replay").first.click()
     page.wait_for_function(SOUGHT)
     assert page.evaluate(MOMENT) == ["#trial=1&t=2.000", "2"]
     page.goto(f"{running.address}/courses/1/mine")
-    expect(page.locator(".cards")).to_contain_text("nothing submitted yet")
+    expect(page.locator(".cards")).to_contain_text("No submissions yet.")
 
 
 def test_all_of_it_works_without_javascript(browser: Browser, running: Served) -> None:
@@ -144,8 +144,8 @@ def test_all_of_it_works_without_javascript(browser: Browser, running: Served) -
     page.get_by_role("button", name="Submit", exact=True).click()
     # The page reloads every few seconds.
     expect(page.locator(".score")).to_contain_text("of 10 marks", timeout=PATIENCE)
-    page.get_by_role("link", name="submit again").click()
+    page.get_by_role("link", name="Submit again").click()
     page.locator("summary").click()
     page.get_by_label("robot.py").fill(FAILS)
-    page.get_by_role("button", name="Only try it").click()
+    page.get_by_role("button", name="Run without submitting").click()
     expect(page.locator("#tried")).to_contain_text("NameError", timeout=PATIENCE)

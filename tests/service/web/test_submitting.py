@@ -116,7 +116,7 @@ def test_a_submission_is_whose_session_it_is_whatever_its_files_say(web: Web, ad
 @pytest.mark.parametrize(
     ("files", "sentence"),
     [
-        ((), "nothing was sent"),
+        ((), "no files were submitted"),
         ((("notes.txt", "x"),), "notes.txt: has no robot.py"),
         ((*BOTH, ("a/robot.py", PROGRAM)), "has robot.py twice"),
         ((("robot.py", b"\0"),), "has a NUL character"),
@@ -197,7 +197,7 @@ def test_over_a_limit_the_newest_is_kept_and_graded_when_staff_ask(once: Web) ->
     assert jobs.claim(once.store, "worker", 60) is None
     path = f"/courses/1/grades/{made[-1].job_id}"
     shown = words(once.browser(ada).get(f"/courses/1/mine/submissions/{made[-1].submission_id}").text)
-    assert "all attempts were used" in shown
+    assert "no attempts left" in shown
     browser = once.browser(grace)
     assert "Grade this submission" in browser.get(path).text
     assert submit_form(browser, f"{path}/grade-over-limit").status_code == 303
@@ -240,7 +240,7 @@ def test_a_student_fills_no_more_than_the_quota(once: Web) -> None:
         grade_all(once, faulty_grade())
     # One submission over the limit is kept. The next one replaces it and needs no additional space.
     _submit(once, ada, ("robot.py", PROGRAM), ("responder.py", RESPONDER), ("model.bin", noise + b"x"))
-    with pytest.raises(UsageError, match="at most 1 MB in all"):
+    with pytest.raises(UsageError, match="limit is 1 MB in total"):
         _submit(once, ada, ("robot.py", PROGRAM), ("responder.py", RESPONDER), ("model.bin", noise * 2))
     assert sum(size for size in _sizes(once, ada)) <= 2**20
     _submit(once, bob, ("robot.py", PROGRAM), ("responder.py", RESPONDER), ("model.bin", noise))

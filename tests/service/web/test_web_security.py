@@ -246,7 +246,7 @@ def test_a_bucket_fills_with_time() -> None:
 def test_others_reach_it_only_when_that_was_said(host: str, public_url: str, is_refused: bool, tmp_path: Path) -> None:
     settings = Settings(home=tmp_path, public_url=public_url)
     if is_refused:
-        with pytest.raises(UsageError, match=r"speaks no TLS.*ROBOMARK_PUBLIC_URL"):
+        with pytest.raises(UsageError, match=r"does not support TLS.*ROBOMARK_PUBLIC_URL"):
             check_reach(host, settings)
     else:
         check_reach(host, settings)
