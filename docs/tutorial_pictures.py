@@ -89,7 +89,7 @@ def _photograph_instructor(browser: Browser, link: str, work: Path, folder: Path
     page.locator("form[action$='/uploads'] > button").click()
     _photograph(page, folder / "tutorial-preview.png", 780)
     page.locator("form[action$='/confirm'] button").click()
-    page.locator("a[href$='/publish']").wait_for(timeout=1000 * _WAIT)
+    page.locator("a[href$='/publish']").wait_for()
     batch = page.url.partition("?")[0]
     page.goto(f"{batch}/overview")
     _photograph(page, folder / "tutorial-overview.png", 1000)
@@ -110,12 +110,13 @@ def _photograph_student(browser: Browser, link: str, work: Path, folder: Path) -
     page.goto(f"{address}/courses/1/mine/{_ASSIGNMENT}")
     page.locator("input[type=file]").set_input_files([work / "class/ada/robot.py", work / "class/ada/responder.py"])
     page.locator("main form.stack button:not([formaction])").first.click()
-    page.wait_for_selector("section.replay[data-ready]", timeout=1000 * _WAIT)
+    page.wait_for_selector("section.replay[data-ready]")
     _photograph(page, folder / "tutorial-student.png", 900)
 
 
 def _sign_in(browser: Browser, link: str) -> Page:
     context = browser.new_context(viewport={"width": _WIDTH, "height": 800}, locale="en-GB", timezone_id="UTC")
+    context.set_default_timeout(1000 * _WAIT)
     page = context.new_page()
     page.goto(link)
     page.locator("main button").click()
