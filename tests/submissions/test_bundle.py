@@ -272,7 +272,7 @@ def test_zip_with_links_devices_nested_or_double_entries_is_refused(tmp_path: Pa
     link = zipped(tmp_path / "l.zip", [*BOTH.items(), (entry("x", stat.S_IFLNK | 0o777), "/etc/passwd")])
     assert "link" in refusal(link)
     device = zipped(tmp_path / "d.zip", [*BOTH.items(), (entry("x", stat.S_IFCHR | 0o666), "")])
-    assert "no file" in refusal(device)
+    assert "not a file" in refusal(device)
     assert "a folder" in refusal(zipped(tmp_path / "n.zip", {**BOTH, "sub/x.py": ""}))
     assert "a folder" in refusal(zipped(tmp_path / "m.zip", {"top/robot.py": PROGRAM, "top/sub/x.py": ""}))
     with pytest.warns(UserWarning, match="Duplicate"):

@@ -265,7 +265,7 @@ def test_tables_of_people_of_many_makes(tmp_path: Path, text: str, found: set[tu
     [
         ("grade,file\n1,a\n", "no column id, name or email"),
         ("id,name\ns1,Ada\nS1,Bob\n", r"lines 2 and 3: s1 is the id of several"),
-        ("id,grade\ns1,2\n,3\n", "line 3 names nobody"),
+        ("id,grade\ns1,2\n,3\n", "line 3 has no id, name or e-mail address"),
         ("id,student\ns1,Ada\n", "two columns id and student"),
     ],
 )

@@ -56,7 +56,7 @@ def test_a_second_pose_stands_for_all_and_has_a_jitter_of_its_own(tmp_path: Path
         (HEAD + WORLD.replace("2", "3") + SCENARIO + SECOND + CRITERION, "robots is 3, expected 1 or 2"),
         (HEAD + WORLD + PARTS.replace("same", "none") + SCENARIO + SECOND + CRITERION, 'expected "student", "same"'),
         (HEAD + WORLD + PARTS.replace("same", "x.py") + SCENARIO + SECOND + CRITERION, 'second_program is "x.py"'),
-        (HEAD + SCENARIO + CRITERION + "robot = 2\n", ":10: robot is 2, but there is one"),
+        (HEAD + SCENARIO + CRITERION + "robot = 2\n", ":10: robot is 2, but there is only one robot"),
         (HEAD + SCENARIO + APART, "check is about two robots, but there is one"),
         (HEAD + WORLD + SCENARIO + SECOND + APART + "robot = 2\n", "check looks at both robots"),
         (HEAD + WORLD + SCENARIO + SECOND + APART + "at_least = 300\n", "has an at_most below at_least"),

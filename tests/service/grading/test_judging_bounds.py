@@ -291,7 +291,7 @@ def _computes_in_c() -> None:
 _ANYWHERE: Sequence[tuple[Callable[[], None], str]] = [
     (_sleeps, "it took more than 2 s"),
     (_loops, "it took more than 1 s of computing"),
-    (_eats, "it took more than 64 MB of memory"),
+    (_eats, "it used more than 64 MB of memory"),
     (_raises, "ValueError: no number: 1e999"),
     (_recurses, "RecursionError"),
 ]
