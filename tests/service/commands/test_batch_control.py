@@ -69,7 +69,7 @@ def test_a_roster_is_graded_and_the_same_again_changes_nothing(graded: tuple[Pat
     assert marked is not None, ended
     again = robomark(home, "batch", "submit", roster, "-a", "echo-responder", "--wait")
     assert f"already submitted as {marked[1]}" in again.out
-    assert "nothing new" in again.out
+    assert "no new submissions" in again.out
     assert marked[0] in again.out
     assert len(robomark(home, "batch", "list").out.strip().splitlines()) == 2
 

@@ -57,7 +57,7 @@ def test_a_course_is_archived_purged_and_brought_back(
     assert "revision" in _answer("db", "upgrade", **used)
     marks = _answer("batch", "export", batch, **used)
     assert "ada" in marks
-    assert "2 submissions, 2 grades, 2 students would go" in _answer("db", "purge", "--before", tomorrow, **used)
+    assert "2 submissions, 2 grades, 2 students to remove" in _answer("db", "purge", "--before", tomorrow, **used)
     gone = _answer("db", "purge", "--before", tomorrow, "--archive", archive, **used)
     assert "removed: 2 submissions, 2 grades, 2 students" in gone
     assert archive.stat().st_mode & 0o077 == 0
