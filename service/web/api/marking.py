@@ -128,7 +128,7 @@ class CommentAsked(BaseModel):
 
 
 class AppealShape(Shape):
-    """One question for a second look, answered or open."""
+    """An appeal, answered or open."""
 
     id: int
     submission_id: int
@@ -240,7 +240,7 @@ def own_appeals(here: StudentReads, context: Context, submission_id: RowNumber) 
 
 @router.post("/courses/{course_id}/mine/submissions/{submission_id}/appeals", status_code=201)
 def ask(here: Owns, context: Context, submission_id: RowNumber, asked: TextAsked) -> Listed[AppealShape]:
-    """Ask for a second look at a grade."""
+    """Appeal a grade."""
     appeals.ask(context.service, here.acting, here.course_id, submission_id, asked.text)
     return _own(context, here, submission_id)
 

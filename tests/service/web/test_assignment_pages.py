@@ -39,7 +39,7 @@ def test_an_assignment_is_prepared_opened_and_closed(web: Web, grace: TestClient
     assert (allowed.late_days, allowed.attempts) == (2, 3)
     submit(grace, f"{HOME}/policy", policy | {"due": "2020-11-30T17:00"})
     told = words(grace.get(f"{path}/echo-responder?done=policy").text)
-    assert "Set." in told
+    assert "Changes saved." in told
     assert "This deadline has passed" in told
     submit(grace, f"{path}/echo-responder/no-policy")
     assert "This assignment uses the default policy" in words(grace.get(f"{path}/echo-responder").text)

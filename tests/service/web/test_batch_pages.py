@@ -100,10 +100,10 @@ def test_what_is_missing_known_and_new_is_said_before_it_is_taken_in(web: Web, g
             trial.verdict = "finished"
     alike = {f"{who}/{name}": f"{text}# ada\n" for who in ("ada", "bob") for name, text in ECHO.items()}
     shown = words(grace.get(sent(grace, zipped(alike | {"eve/robot.py": "print(1)\n"}))).text)
-    assert "1 has no responder.py, and what needs it has no marks: eve" in shown
+    assert "1 submission has no responder.py and gets no marks for the criteria that need it: eve" in shown
     assert "1 student is not enrolled yet and will be enrolled: eve" in shown
-    assert "1 was submitted before just so" in shown
-    assert "1 is identical to one that is graded" in shown
+    assert "1 submission was submitted before and stays unchanged" in shown
+    assert "1 submission is identical to a graded submission" in shown
 
 
 def test_files_of_their_own_and_a_table_of_people(web: Web, grace: TestClient) -> None:
