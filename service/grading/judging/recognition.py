@@ -226,7 +226,9 @@ def _that_count(
 ) -> Sequence[Sample]:
     """Return a trial's images or patterns. Missing ones are replaced by wrong answers."""
     if criterion.each_pattern is None:
-        counted = by_pattern(own, trial.recording, "majority", _SAME_PLACE)
+        # Near the start there is one thing to see. Otherwise a robot could send more images of what it is sure of.
+        apart = max(_SAME_PLACE, 2 * (criterion.near_start or 0.0))
+        counted = by_pattern(own, trial.recording, "majority", apart)
     else:
         # Grey patches are read by the right sensor.
         side: Side = "right" if criterion.truth == "grey" else "left"

@@ -444,6 +444,15 @@ def test_images_taken_elsewhere_do_not_count_near_the_start() -> None:
     assert "the robot sent none from within 20 mm of where it started" in left.message
 
 
+def test_more_images_near_the_start_do_not_weigh_more() -> None:
+    """A robot that is sure of its answer may not raise the accuracy by sending many images from places nearby."""
+    sure = talk(*[("square", "square")] * 9)
+    walked = tuple(replace(image, pose=Pose(100 + 1.5 * n, 800, 0)) for n, image in enumerate(sure.images))
+    unsure = talk(("diamond", "square"))
+    result = judged(asked(near_start=30), replace(sure, images=walked), unsure)
+    assert (accuracy(result).n, result.marks) == (2, 2), result.message
+
+
 def test_precision_and_recall_of_each_class() -> None:
     said = [("square", "square"), ("square", "diamond"), ("diamond", "diamond"), ("diamond", None)]
     scores = {score.label: score for score in class_scores(accuracy(judged(asked(), talk(*said))))}
