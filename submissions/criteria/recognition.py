@@ -47,8 +47,9 @@ class Recognition(Criterion):
     gets a wrong answer for each missing pattern.
 
     With ``near_start``, only images count whose sensor was at most that many mm from its place at the start, so that
-    the robot cannot move to an easier pattern. All of a trial's images with the same truth then count as one. With ``near_spot``, only images at most that many mm from the middle of
-    their pattern count. A trial without counting images has one wrong answer, so that sending nothing is no advantage.
+    the robot cannot move to an easier pattern. All of a trial's images with the same truth then count as one. With
+    ``near_spot``, only images at most that many mm from the middle of their pattern count. A trial without counting
+    images has one wrong answer, so that sending nothing is no advantage.
     """
 
     truth: Annotated[Literal["label", "grey", "places"] | tuple[str, ...], NOT_EMPTY] = "label"

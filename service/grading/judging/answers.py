@@ -42,7 +42,7 @@ def at_path(value: Any, path: str) -> Any:
     for part in path.split("."):
         if isinstance(value, dict) and part in value:
             value = value[part]
-        elif isinstance(value, list) and part.lstrip("-").isdecimal() and part.isascii():
+        elif isinstance(value, list) and part.removeprefix("-").isdecimal() and part.isascii():
             index = int(part[:6])
             if not -len(value) <= index < len(value):
                 return NOTHING
