@@ -14,7 +14,7 @@ from importlib import resources
 from pathlib import Path
 
 from sim.errors import UsageError
-from submissions.assignment.folder import FILE_NAME, assignment_folder
+from submissions.assignment.folder import FILE_NAME, assignment_folder, files_below
 from submissions.assignment.reader import ASIDE, read_assignment
 from submissions.assignment.task_sheet import TaskSheet, task_sheet
 
@@ -95,13 +95,8 @@ def _template() -> Path:
 
 
 def _files(folder: Path) -> Mapping[str, bytes]:
-    """Return all files in the folder, except dot files and Python's caches."""
-    files = {}
-    for path in sorted(folder.rglob("*")):
-        parts = path.relative_to(folder).parts
-        if path.is_file() and not any(part.startswith(".") or part == "__pycache__" for part in parts):
-            files["/".join(parts)] = path.read_bytes()
-    return files
+    """Return all files in the folder."""
+    return {"/".join(parts): path.read_bytes() for parts, path in files_below(folder)}
 
 
 def _write(target: Path, files: Mapping[str, bytes]) -> int:

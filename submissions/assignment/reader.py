@@ -16,7 +16,7 @@ from sim.readers.toml_text import TOMLDecodeError, read_toml
 from sim.readers.unreadable import Unreadable
 from submissions.assignment.assignment_parts import build_assignment
 from submissions.assignment.definition import Assignment
-from submissions.assignment.folder import FILE_NAME, assignment_folder, catalogue
+from submissions.assignment.folder import FILE_NAME, assignment_folder, catalogue, files_below
 from submissions.assignment.problems import AssignmentProblems, Problems, find_lines
 from submissions.nearest import did_you_mean
 
@@ -115,13 +115,11 @@ def _syntax_problem(message: str, where: str, text: str) -> str:
 
 
 def _folder_files(folder: Path) -> Mapping[str, bytes]:
-    """Return the files that decide the marks, by path in the folder. Dot files and Python's caches are omitted."""
+    """Return the files that decide the marks, by path in the folder."""
     files: dict[str, bytes] = {}
     size = 0
-    for path in sorted(folder.rglob("*")):
-        parts = path.relative_to(folder).parts
-        hidden = any(part.startswith(".") or part == "__pycache__" for part in parts)
-        if hidden or parts[0] in ASIDE or not path.is_file():
+    for parts, path in files_below(folder):
+        if parts[0] in ASIDE:
             continue
         size += path.stat().st_size
         if size > _MAX_FOLDER_BYTES:

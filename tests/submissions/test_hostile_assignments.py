@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from sim.errors import AssignmentError
 from sim.recording import Pose
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
+from submissions.assignment.export import export_for_students
 from submissions.assignment.problems import AssignmentProblems, find_lines
 from submissions.assignment.reader import find_assignment, read_assignment
 from submissions.sweep import Sweep
@@ -121,3 +122,25 @@ def test_lines_are_found_of_keys_and_entries() -> None:
 
 def test_an_ordinary_assignment_has_no_problem() -> None:
     assert find_assignment("echo-responder").trial_count == len(list(find_assignment("echo-responder").trials()))
+
+
+@pytest.mark.parametrize("name", ["notes.txt", "starter/notes.txt", "starter"])
+def test_a_link_out_of_the_folder_is_refused(name: str, tmp_path: Path) -> None:
+    """An author could otherwise read files of whoever uses the assignment, for example in what students receive."""
+    (tmp_path / "secret.txt").write_text("secret")
+    folder = tmp_path / "task"
+    (folder / name).parent.mkdir(parents=True)
+    (folder / name).symlink_to(tmp_path / "secret.txt")
+    (folder / "assignment.toml").write_text(_HEAD + _scenario("") + _FINISHES)
+    with pytest.raises(AssignmentProblems, match="link that leads out of the folder"):
+        export_for_students(str(folder), tmp_path / "students")
+    assert not (tmp_path / "students").exists()
+
+
+def test_a_link_within_the_folder_is_a_file(tmp_path: Path) -> None:
+    (tmp_path / "starter").mkdir()
+    (tmp_path / "notes.txt").write_text("notes")
+    (tmp_path / "starter" / "notes.txt").symlink_to(tmp_path / "notes.txt")
+    (tmp_path / "assignment.toml").write_text(_HEAD + _scenario("") + _FINISHES)
+    export_for_students(str(tmp_path), tmp_path / "students")
+    assert (tmp_path / "students" / "notes.txt").read_text() == "notes"
