@@ -5,7 +5,9 @@ The caller's ``RunPlanner`` decides what each magic does: floor, pose, noise, an
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -32,6 +34,9 @@ _UNMARKED_CPU = 4
 #: Limits on the simulated time of all unmarked runs together: seconds, and multiples of the trial's time limit. The
 #: larger one applies.
 _UNMARKED_SECONDS, _UNMARKED_RUNS = 600, 20
+#: The worker's own processor time for a notebook's requests that is free. Drawing another floor takes hundredths of a
+#: second.
+_FREE_REQUEST_SECONDS = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,11 +194,28 @@ class _Execution:
         self._sandboxes = sandboxes
         self._meter = meter
         self._unmarked_cpu = self._unmarked_seconds = 0.0
+        self._marked_cpu = 0.0  # of the worker, for the marked run
+        self._free_cpu = _FREE_REQUEST_SECONDS
         self._missing: str | None = None  # reason for the missing responder of a run that needs one
         self.runs: list[Run] = []
 
     def perform(self, frame: wire.Frame) -> dict[str, Any]:
         """Perform the request of a magic, or report the robot's state. Return the frame that resumes the notebook."""
+        with self._charged():
+            return self._perform(frame)
+
+    @contextlib.contextmanager
+    def _charged(self) -> Iterator[None]:
+        """Charge the worker's processor time to the job, except the free seconds and the marked run."""
+        began = time.thread_time() - self._marked_cpu
+        try:
+            yield
+        finally:
+            spent = time.thread_time() - self._marked_cpu - began
+            self._meter.charge_cpu(max(0.0, spent - self._free_cpu))
+            self._free_cpu = max(0.0, self._free_cpu - spent)
+
+    def _perform(self, frame: wire.Frame) -> dict[str, Any]:
         if frame["do"] == "state":
             return {"do": "state", "state": self._state()}
         cell, line = self._process.place(frame["line"])
@@ -246,6 +268,7 @@ class _Execution:
         since = self._agents.position() if self._agents is not None else Position()
         arena, camera = self._ground(spec, planned.obstacles)
         program = self._sandboxes.spawn(spec.program.role, spec.program.limits, meter=self._meter)
+        began = time.thread_time()
         try:
             bridge = Bridge(spec, arena, camera, program, process if answers else None, self._meter)
             fault = bridge.run()
@@ -254,6 +277,8 @@ class _Execution:
                 self._unmarked_seconds += bridge.now / SECOND
         finally:
             program.close()
+            if planned.marked:
+                self._marked_cpu += time.thread_time() - began
         bridge.conversation.finish()
         if self._agents is not None:
             self._agents.seal(bridge.chain, bridge.now)

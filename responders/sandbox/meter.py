@@ -92,6 +92,10 @@ class JobMeter:
                 f"all trials together said more than {self._limits.kept_bytes >> 20} MB, counting messages and images",
             )
 
+    def charge_cpu(self, seconds: float) -> None:
+        """Charge processor time of the worker itself. The limit is checked while a child runs."""
+        self._cpu += seconds
+
     def check_cpu(self, running: float) -> None:
         """Check the limit on processor time. ``running`` is the time of the current child.
 

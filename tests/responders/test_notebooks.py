@@ -15,6 +15,7 @@ from command import robomark
 from graded_notebooks import PROGRAM, RESPONDER, answers, assignment, graded, recorded, spoken, two_programs
 from models import weights_bytes
 from notebook_builder import MESSAGING, MESSAGING_SCRIPT, notebook
+from responders import notebook_executor
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
@@ -231,6 +232,22 @@ def test_what_is_no_cell_is_refused(tmp_path: Path, cell: str) -> None:
 
 
 # Parts.
+
+
+@pytest.mark.parametrize(
+    ("cell", "verdict"), [("roboSim.look()\n" * 3, Verdict.FINISHED), ("while True: roboSim.look()", Verdict.CPU_LIMIT)]
+)
+def test_the_workers_own_time_for_requests_is_charged(
+    cell: str, verdict: Verdict, tmp_path: Path, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A request costs the notebook's process almost nothing and the worker a new floor or camera image."""
+    seconds = iter(range(0, 10**6, 2))
+    monkeypatch.setattr(notebook_executor.time, "thread_time", lambda: float(next(seconds)))
+    look = f"from nbev3devsim.load_nbev3devwidget import roboSim\n{cell}"
+    recording = recorded(tmp_path, runner, [look, RESPONDER, PROGRAM])
+    assert recording.verdict is verdict
+    if verdict is Verdict.CPU_LIMIT:
+        assert "all trials together computed for longer" in recording.faults[0].message
 
 
 def test_a_given_program_meets_the_responder_that_the_notebook_ends_with(tmp_path: Path, runner: TrialRunner) -> None:
