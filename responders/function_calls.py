@@ -31,11 +31,15 @@ _NEEDED = {"value": "text", "error": "error", "other": "type"}
 
 @dataclass(frozen=True, slots=True)
 class FunctionCall:
-    """A function's name and its arguments, which must be JSON-serialisable."""
+    """A function's name and its arguments, which must be JSON-serialisable.
+
+    The statements that a ``hidden`` call executes are not collected, because they depend on its arguments.
+    """
 
     function: str
     arguments: Sequence[Any] = ()
     named: Mapping[str, Any] = field(default_factory=dict)
+    hidden: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +130,7 @@ class _Caller(ResponderProcess):
         """
         if self._child is None:
             return Returned(fault=self._ended)
+        self._watches = not call.hidden
         try:
             self._child.send(
                 {"do": "call", "function": call.function, "arguments": list(call.arguments), "named": dict(call.named)}

@@ -69,6 +69,7 @@ class ResponderProcess:
         self._message = -1  # index of the message that is being answered
         self._asked_at = 0  # time of the request for that answer
         self._slept = 0  # time slept since then
+        self._watches = True  # whether executed statements are collected now
         for name, data in spec.files.items():
             (folder / name).write_bytes(data)
         self._child: ServedChild | None = sandboxes.spawn(spec.role, spec.limits, folder, meter)
@@ -187,7 +188,7 @@ class ResponderProcess:
             case "refused":
                 self._note(refusal(self._who, frame))
             case "ran":
-                if self._spec.ran is not None:
+                if self._spec.ran is not None and self._watches:
                     self._spec.ran.add(frame)
             case "sleep":
                 self._slept += frame["units"]

@@ -24,7 +24,7 @@ from sim.recording import Recording
 from submissions.assignment.definition import Assignment
 from submissions.assignment.other_parts import SAME
 from submissions.bundle import missing_part
-from submissions.criteria.code import SourceRules
+from submissions.criteria.code import Functions, SourceRules
 from submissions.diagram_cells import diagrams_in
 from submissions.magics import Flags, setup, split_program, without_magic
 from submissions.marked_run import RunChoice, choose_run
@@ -134,7 +134,8 @@ def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PU
 def _watched(plan: RunPlan) -> RunPlan:
     """Return the plan with recording of executed statements for the parts that rules on used code check.
 
-    Notebooks and trained models are not watched. For these, reachable code counts.
+    Notebooks and trained models are not watched, and no responder with a function that has only hidden calls. For
+    these, reachable code counts.
     """
     asked = {
         criterion.part
@@ -143,6 +144,8 @@ def _watched(plan: RunPlan) -> RunPlan:
     }
     if isinstance(plan.trial, NotebookTrial) or plan.assignment.training is not None:
         return plan
+    if _has_function_with_hidden_calls_only(plan.assignment):
+        asked.discard("responder")
     ran: dict[Part, RanStatements] = {part: RanStatements() for part in sorted(asked) if part in plan.read_as}
     program, answers, functions = plan.program, plan.answers, plan.functions
     return replace(
@@ -152,6 +155,14 @@ def _watched(plan: RunPlan) -> RunPlan:
         functions=functions and replace(functions, ran=ran.get("responder")),
         ran=MappingProxyType(ran),
     )
+
+
+def _has_function_with_hidden_calls_only(assignment: Assignment) -> bool:
+    called: dict[bool, set[str]] = {True: set(), False: set()}  # names of functions in hidden and in visible calls
+    for criterion in assignment.criteria:
+        for call in criterion.calls if isinstance(criterion, Functions) else ():
+            called[call.hidden].add(call.function or criterion.function)
+    return not called[True] <= called[False]
 
 
 def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:

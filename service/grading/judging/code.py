@@ -126,7 +126,8 @@ _MOST_MEASURES = 20
 def calls_of(criterion: Functions) -> tuple[FunctionCall, ...]:
     """Return the calls that the criterion needs."""
     return tuple(
-        FunctionCall(call.function or criterion.function, call.arguments, call.named) for call in criterion.calls
+        FunctionCall(call.function or criterion.function, call.arguments, call.named, call.hidden)
+        for call in criterion.calls
     )
 
 

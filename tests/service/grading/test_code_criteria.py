@@ -361,6 +361,27 @@ def test_what_a_called_function_uses_is_what_it_ran(text: str, holds: bool, runn
     assert [each.marks == 4 for each in result.criteria] == [holds, True], result.criteria[0].message
 
 
+@pytest.mark.parametrize(
+    ("text", "calls", "holds"),
+    [
+        ("def f(n):\n    while n: n -= 1\n    return 0", [(1, False), (2, True)], True),
+        ("def f(n):\n    if n > 1:\n        while n: n -= 1\n    return 0", [(1, False), (2, True)], False),
+        ("def f(n):\n    if n > 1:\n        while n: n -= 1\n    return 0", [(2, True)], True),
+        ("def f(n):\n    if n > 9:\n        while n: n -= 1\n    return 0", [(2, True)], True),
+    ],
+)
+def test_rules_about_code_tell_nothing_about_hidden_calls(
+    text: str, calls: list[tuple[int, bool]], holds: bool, runner: TrialRunner
+) -> None:
+    """A construct that runs only for some arguments would otherwise reveal the arguments of hidden calls."""
+    rule = criterion("source", part="responder", uses=["while"])
+    asked = [{"arguments": [number], "returns": 0, "hidden": hidden} for number, hidden in calls]
+    called = criterion("functions", function="f", calls=asked).model_copy(update={"id": "f"})
+    submission = Submission("ada", responder=Code("responder.py", text))
+    result = grade(submission, without_robot(rule, called), runner=runner)
+    assert [each.marks == 4 for each in result.criteria] == [holds, True], result.criteria[0].message
+
+
 def test_what_is_run_in_hidden_trials_is_not_looked_at(runner: TrialRunner) -> None:
     dead = f"{DRIVES}while time.time() < 0: say('x')"
     assert driven_by(dead, runner, visibility="hidden", uses=["while"]).marks == 4
