@@ -34,6 +34,10 @@ _REASONS = {
         "versions"
     ),
 }
+_REASON_AT_A_LIMIT = (
+    "a limit stops the program in some gradings in fresh processes and not in others, so the program is close to this "
+    "limit or depends on outside values"
+)
 #: The machine and its load decide when such a trial ends, so its hash can differ.
 _CUT = frozenset({Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR})
 
@@ -47,7 +51,8 @@ def verify_grade(grade: str) -> None:
     rows = list(zip(stored.trials, again.trials, strict=False))
     marks = _compare_marks(stored, again, rows, grading_request.assignment.criteria)
     cause = _cause_of(rows, marks, again, grading_request, secret)
-    same = len(stored.trials) == len(again.trials) and "differs" not in (*marks, *itertools.starmap(_compared, rows))
+    differs = len(stored.trials) != len(again.trials) or "differs" in (*marks, *itertools.starmap(_compared, rows))
+    same = not differs and cause is None
     document(**_told(grading.job_id, stored, again, rows), same=same, cause=cause)
     compared = table("scenario", "trial", "stored", "again", "")
     for before, after in rows:
@@ -63,7 +68,7 @@ def verify_grade(grade: str) -> None:
         if compared_marks != "same":
             note(f"the marks of {result.title} differ ({compared_marks})")
     if not same:
-        reason = f": {_REASONS[cause]}" if cause else ""
+        reason = "" if cause is None else f": {_REASONS[cause] if differs else _REASON_AT_A_LIMIT}"
         raise HostError(f"grade {grading.job_id} does not match its regrade{reason}")
     tell(f"grade {grading.job_id} matches its regrade")
 
@@ -85,11 +90,11 @@ def _cause_of(
     """Return the cause of the differences, ``program`` or ``grader``, or None if nothing differs.
 
     Grades the submission twice more, each time in fresh processes. If these gradings also differ, the program uses its
-    own
-    randomness. Robomark itself is deterministic.
+    own randomness. Robomark itself is deterministic. Marks that differ where a limit cut a trial have no cause if these
+    gradings agree: the machine was slow once.
     """
     trials = [number for number, row in enumerate(rows) if _compared(*row) == "differs"]
-    criteria = [number for number, compared in enumerate(marks) if compared == "differs"]
+    criteria = [number for number, compared in enumerate(marks) if compared != "same"]
     if not trials and not criteria:
         return None
     repeated = (_grade_again(request, secret), _grade_again(request, secret, earlier=1))
@@ -98,7 +103,9 @@ def _cause_of(
         or any(again.criteria[number].marks != grade.criteria[number].marks for number in criteria)
         for grade in repeated
     )
-    return "program" if differs else "grader"
+    if differs:
+        return "program"
+    return "grader" if trials or "differs" in marks else None
 
 
 def _told(job_id: str, stored: Grade, again: Grade, rows: Sequence[Row]) -> dict[str, object]:

@@ -8,6 +8,7 @@ from decimal import Decimal
 import pytest
 
 from responders.code import Code
+from service.commands import verifying
 from service.commands.verifying import _cause_of, _compare_marks, _compared
 from service.grading.grade import Grade, TrialResult
 from service.grading.grader import grade
@@ -74,6 +75,23 @@ def test_only_criteria_that_look_at_a_cut_trial_may_differ(runner: TrialRunner) 
     assert set(_compare_marks(stored, again, cut, elsewhere)) == {"differs"}
     whole = [(each, each) for each in again.trials]
     assert set(_compare_marks(stored, again, whole, criteria)) == {"differs"}
+
+
+@pytest.mark.parametrize(("others", "cause"), [((5, 2), "program"), ((2, 5), "program"), ((5, 5), None)])
+def test_a_limit_hides_no_chance_of_a_program(
+    others: tuple[int, int], cause: str | None, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A program can run into a limit by chance. Marks that differ there are repeated as well."""
+    request, again = _graded(runner)
+
+    def with_marks(marks: int) -> Grade:
+        return replace(again, criteria=tuple(replace(each, marks=Decimal(marks)) for each in again.criteria))
+
+    grades = iter(map(with_marks, others))
+    monkeypatch.setattr(verifying, "_grade_again", lambda *args, **named: next(grades))
+    rows = [(_cut(each), each) for each in again.trials]
+    marks = ["cut by a limit"] * len(again.criteria)
+    assert _cause_of(rows, marks, with_marks(5), request, PUBLIC) == cause
 
 
 def test_marks_that_differ_have_a_cause_without_trials(runner: TrialRunner) -> None:
