@@ -230,8 +230,11 @@ def read_file(path: Path) -> bytes:
         UsageError: It cannot be read.
     """
     try:
-        if not stat.S_ISREG(path.stat().st_mode):
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode):
             raise UsageError(f"{path} is not a file; expected one that can be read")
+        if found.st_size > _FILES_BYTES:
+            raise UsageError(f"{path} is too large; expected at most {_FILES_BYTES >> 20} MB")
         return path.read_bytes()
     except OSError as error:
         raise UsageError(f"{path} cannot be read: {error.strerror}") from error
@@ -276,7 +279,7 @@ def _modules_beside(path: Path, text: str) -> Mapping[str, str]:
 
     def read(name: str) -> bytes | None:
         beside = path.parent / name
-        if beside.is_symlink() or not beside.is_file() or name == path.name:
+        if beside.is_symlink() or not beside.is_file() or name == path.name or beside.stat().st_size > _FILES_BYTES:
             return None
         return beside.read_bytes()
 
