@@ -14,6 +14,9 @@ from sim.readers.unreadable import Unreadable
 from sim.readers.zip_archive import ZipFile, entry_chunks, open_zip
 from submissions.raw_files import shown
 
+#: Maximum number of folders above a file. Each folder costs time, and the time to create them grows with their depth.
+_DEEPEST = 20
+
 
 def unzip(path: Path, folder: Path, most_entries: int, most_bytes: int) -> None:
     """Extract a zip into a folder, as regular files and folders only.
@@ -55,6 +58,8 @@ def _target(folder: Path, name: str, archive: str) -> Path:
     parts = PurePosixPath(name.replace("\\", "/")).parts
     if not parts or parts[0] == "/" or ".." in parts or any(os.fsencode(part)[-1:] == b":" for part in parts):
         raise UsageError(f"{archive}: holds a file that would lie outside it: {shown(name)}.")
+    if len(parts) - 1 > _DEEPEST:
+        raise UsageError(f"{archive}: holds a file in more than {_DEEPEST} folders: {shown(name)}.")
     return folder.joinpath(*parts)
 
 

@@ -18,6 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim.errors import UsageError
+from submissions import unzipping
 from submissions.bundle import read_submission
 from submissions.raw_files import MAX_FILE_BYTES, MAX_TOTAL_BYTES, unzip
 
@@ -203,3 +204,16 @@ def _unzipped(data: bytes) -> tuple[dict[str, bytes] | None, str]:
         return unzip(data, "x.zip").files, ""
     except UsageError as error:
         return None, str(error)
+
+
+@pytest.mark.parametrize("depth", [900, 1500])
+def test_a_file_in_very_many_folders_is_refused(depth: int, tmp_path: Path) -> None:
+    """A few kilobytes of folder names would take seconds to create, or end in an error of Python."""
+    archive, folder = tmp_path / "class.zip", tmp_path / "class"
+    folder.mkdir()
+    with zipfile.ZipFile(archive, "w") as written:
+        written.writestr("ada/robot.py", "print(1)")
+        written.writestr("/".join(["d"] * depth) + "/robot.py", "print(1)")
+    with pytest.raises(UsageError, match="in more than 20 folders"):
+        unzipping.unzip(archive, folder, 100, 10**6)
+    assert not (folder / "d").exists()
