@@ -159,8 +159,8 @@ def _watched(plan: RunPlan) -> RunPlan:
 
 def _has_function_with_hidden_calls_only(assignment: Assignment) -> bool:
     called: dict[bool, set[str]] = {True: set(), False: set()}  # names of functions in hidden and in visible calls
-    for criterion in assignment.criteria:
-        for call in criterion.calls if isinstance(criterion, Functions) else ():
+    for criterion in (each for each in assignment.criteria if isinstance(each, Functions)):
+        for call in criterion.calls:
             called[call.hidden].add(call.function or criterion.function)
     return not called[True] <= called[False]
 
