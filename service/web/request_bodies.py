@@ -15,10 +15,12 @@ from fastapi import Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import iter_route_contexts
 from fastapi.security.utils import get_authorization_scheme_param
+from python_multipart.multipart import parse_options_header
 from starlette.datastructures import Headers
 from starlette.routing import compile_path
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.language import translatable
 from service.operations import sign_in
 from service.operations.sign_in import Identity
 from service.operations.types import CredentialKind, Role
@@ -92,7 +94,8 @@ class BodyGate:
         try:
             if scope["method"] not in _WITHOUT_BODY and scope["path"] not in _FOR_ANYBODY:
                 await run_in_threadpool(_check_sender, request, upload, course)
-            _check_length(Headers(scope=scope), most)
+            _check_charset(request.headers)
+            _check_length(request.headers, most)
         except Exception as error:
             handlers = scope["app"].exception_handlers
             handler = next(handlers[kind] for kind in type(error).__mro__ if kind in handlers)
@@ -141,6 +144,17 @@ def _check_length(headers: Headers, most: int) -> None:
     length = headers.get("content-length", "0")
     if not length.isdecimal() or len(length) > 18 or int(length) > most:
         raise TooMuch(most)
+
+
+def _check_charset(headers: Headers) -> None:
+    """Reject forms in another charset than UTF-8.
+
+    The form parser decodes with any codec of Python, on the thread that serves all requests. Some take time
+    proportional to the square of the length, others return text that cannot be encoded again.
+    """
+    kind, options = parse_options_header(headers.get("content-type"))
+    if kind == b"multipart/form-data" and options.get(b"charset", b"utf-8").lower() not in (b"utf-8", b"utf8"):
+        raise HTTPException(415, translatable("Forms are read in UTF-8 only."))
 
 
 def _counted(receive: Receive, most: int) -> Receive:

@@ -191,3 +191,29 @@ def test_json_is_parsed_in_another_thread_and_within_bounds(
     assert LARGEST_FORM == 2**20
     assert threads
     assert not any("MainThread" in name or "asyncio" in name for name in threads)
+
+
+@pytest.mark.parametrize("route", _UNSAFE)
+def test_forms_in_another_charset_are_not_read(
+    route: str, world: tuple[Web, dict[str, str], dict[str, Member]]
+) -> None:
+    web, values, members = world
+    headers = {"content-type": "Multipart/Form-Data; boundary=x; charset=punycode"}
+    if ROUTES[route].split()[0] != "anybody":
+        headers |= _signed(web, route, members)
+    assert _asked(web, route, values, headers, 1) == _Seen(415, 0)
+
+
+@pytest.mark.parametrize("charset", ['"idna"', "unicode_escape", "utf-7", "utf-16", "latin-1", "utf-8; charset=idna"])
+def test_forms_in_any_other_charset_are_not_read(
+    charset: str, world: tuple[Web, dict[str, str], dict[str, Member]]
+) -> None:
+    headers = {"content-type": f"multipart/form-data; boundary=x; charset={charset}"}
+    assert _asked(world[0], "POST /language", {}, headers, 1) == _Seen(415, 0)
+
+
+@pytest.mark.parametrize("charset", ["", "; charset=UTF-8", '; charset="utf-8"'])
+def test_forms_in_utf8_are_read(charset: str, world: tuple[Web, dict[str, str], dict[str, Member]]) -> None:
+    headers = {"content-type": f"multipart/form-data; boundary=x{charset}"}
+    body = b'--x\r\ncontent-disposition: form-data; name="code"\r\n\r\nde\r\n--x--\r\n'
+    assert world[0].browser().post("/language", content=body, headers=headers).status_code == 303
