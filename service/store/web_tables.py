@@ -33,7 +33,7 @@ class Credential(Base):
     course_id: Mapped[int | None] = mapped_column(ForeignKey("course.id"))
     role: Mapped[Role | None]
     platform_id: Mapped[int | None] = mapped_column(ForeignKey("lti_platform.id"))
-    token_id: Mapped[str | None] = mapped_column(ForeignKey("credential.id"), index=True)  # that started the session
+    token_id: Mapped[str | None] = mapped_column(ForeignKey("credential.id"), index=True)  # it ends with this one
     created_at: Mapped[datetime]
     expires_at: Mapped[datetime]
     used_at: Mapped[datetime | None]

@@ -125,12 +125,25 @@ def issue(
 
 
 def make_token(
-    session: Session, person_id: int, lifetime: timedelta, word: str, *, name: str, reach: Reach = EVERYWHERE
+    session: Session,
+    person_id: int,
+    lifetime: timedelta,
+    word: str,
+    *,
+    name: str,
+    reach: Reach = EVERYWHERE,
+    made_with: str = "",
 ) -> None:
-    """Create a token of this person from an unguessable word. Repeating the call creates no second token."""
+    """Create a token of this person from an unguessable word. Repeating the call creates no second token.
+
+    If ``made_with`` is the id of a session that was started with a token, the new token ends with that token.
+    """
     at = now(session)
     _forget_expired(session, at)
     _note_sign_in(session, person_id, at)
+    expires_at, token = at + lifetime, _token_behind(session, made_with)
+    if token is not None:
+        expires_at = min(expires_at, token.expires_at)
     insert_if_new(
         session,
         Credential,
@@ -140,9 +153,16 @@ def make_token(
         sha256=_sha256(_PREFIXES[CredentialKind.TOKEN] + word),
         name=name,
         created_at=at,
-        expires_at=at + lifetime,
+        expires_at=expires_at,
+        token_id=None if token is None else token.id,
         **_columns(reach),
     )
+
+
+def _token_behind(session: Session, credential_id: str) -> Credential | None:
+    """Return the token that a session was started with; None if it was started in another way."""
+    row = session.get(Credential, credential_id)
+    return None if row is None or row.token_id is None else session.get_one(Credential, row.token_id)
 
 
 def unused_token(session: Session, person_id: int, word: str) -> str:
@@ -265,7 +285,12 @@ def revoke_reaching(session: Session, person_id: int, course_id: int) -> int:
 
 
 def _revoke(session: Session, *which: ColumnElement[bool]) -> int:
-    ended = session.execute(update(Credential).where(*which).values(revoked_at=now(session)))
+    """Revoke credentials and everything made with them. Returns the number without what was made with them."""
+    at = now(session)
+    ended = session.execute(update(Credential).where(*which).values(revoked_at=at))
+    made = update(Credential).where(Credential.revoked_at.is_(None), _has_lost_token()).values(revoked_at=at)
+    while session.execute(made, execution_options={"synchronize_session": False}).rowcount:  # type: ignore[attr-defined]
+        pass
     return int(ended.rowcount)  # type: ignore[attr-defined]
 
 
@@ -339,9 +364,12 @@ def _within(reach: Reach) -> list[ColumnElement[bool]]:
 
 def _counts(at: datetime) -> tuple[ColumnElement[bool], ...]:
     is_unused = or_(Credential.kind != CredentialKind.LINK, Credential.used_at.is_(None))
+    return Credential.revoked_at.is_(None), Credential.expires_at > at, is_unused, ~_has_lost_token()
+
+
+def _has_lost_token() -> ColumnElement[bool]:
     token = aliased(Credential)
-    has_lost_token = exists().where(token.id == Credential.token_id, token.revoked_at.is_not(None))
-    return Credential.revoked_at.is_(None), Credential.expires_at > at, is_unused, ~has_lost_token
+    return exists().where(token.id == Credential.token_id, token.revoked_at.is_not(None))
 
 
 def _note_sign_in(session: Session, person_id: int, at: datetime) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import tomllib
@@ -9,7 +10,7 @@ import zipfile
 from datetime import timedelta
 
 import pytest
-from sqlalchemy import update
+from sqlalchemy import select, update
 from starlette.testclient import TestClient
 
 from paths import DATA
@@ -24,7 +25,7 @@ from service.store.people.lti import Registration
 from service.store.people.membership import Member
 from service.store.people.students import Students
 from service.store.states import CredentialKind, Role
-from service.store.web_tables import LtiCourse, LtiPerson
+from service.store.web_tables import Credential, LtiCourse, LtiPerson
 from service.web.access import SESSION_COOKIE
 from service.web.page_scopes import scope_of_page
 from sim.errors import UsageError
@@ -205,6 +206,38 @@ def test_owners_see_and_end_their_sessions_and_tokens(web: Web, ada: Member) -> 
     assert third.get("/account").status_code == 303
     assert browser.get("/account").status_code == 200
     assert web.browser().get("/api/v1/me", headers=token).status_code == 401
+
+
+def test_what_is_made_with_a_token_lasts_no_longer_than_the_token(web: Web, ada: Member) -> None:
+    """Also tokens made in a browser that a token signed in, and browsers and tokens of these, at any depth."""
+    with web.store.transaction() as session:
+        reach = Reach(scopes=frozenset({"sign-in", "read"}))
+        day = timedelta(days=1)
+        first = credentials.issue(session, ada.person_id, CredentialKind.TOKEN, day, name="first", reach=reach)
+    made = []
+    secret = first
+    for _ in range(3):
+        bearer = token_of(sign_in(web, secret), "sign-in", "read")
+        secret = bearer["authorization"].removeprefix("Bearer ")
+        made.append(bearer)
+    browser, other = sign_in(web, secret), token_of(web.browser(ada), "read")
+    with web.store.transaction() as session:
+        row = credentials.identify(session, first, CredentialKind.TOKEN)
+        assert row is not None
+        until = session.get_one(Credential, row.credential_id).expires_at
+        for bearer in made:
+            own = session.scalars(select(Credential).where(Credential.sha256 == _sha256(bearer))).one()
+            assert own.expires_at == until
+    assert all(web.browser().get("/api/v1/me", headers=each).status_code == 200 for each in (*made, other))
+    with web.store.transaction() as session:
+        credentials.revoke(session, row.credential_id, ada.person_id)
+    assert {web.browser().get("/api/v1/me", headers=each).status_code for each in made} == {401}
+    assert web.browser().get("/api/v1/me", headers=other).status_code == 200
+    assert browser.get("/account").status_code == 303
+
+
+def _sha256(bearer: dict[str, str]) -> str:
+    return hashlib.sha256(bearer["authorization"].removeprefix("Bearer ").encode()).hexdigest()
 
 
 def test_programs_end_sessions_and_tokens(web: Web, ada: Member) -> None:
