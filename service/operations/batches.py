@@ -179,10 +179,10 @@ def assignment_for(service: Service, actor: Actor, course_id: int, name: str) ->
 
 def foresee(service: Service, actor: Actor, course_id: int, contents: BatchContents) -> list[ForeseenSubmission]:
     """Return a preview of each submission of an upload. Raises NotFound."""
-    secret = secret_of(service.store).sha256
+    secret, hidden = secret_of(service.store).sha256, names_for(service, actor, course_id)
     with service.store.reading() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
-        foreseen = preflight.foresee(session, course_id, contents.grading_requests, secret)
+        foreseen = preflight.foresee(session, course_id, contents.grading_requests, secret, hidden.assignments)
         names = {each.id: each.name for each in membership.members(session, course_id)}
     return [
         ForeseenSubmission(asked, _known_name(asked, names), ahead)

@@ -5,7 +5,7 @@ Rejections are found when the batch is read, or by ``intake.py`` when it is acce
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from sqlalchemy.orm import Session
@@ -28,22 +28,47 @@ class Foreseen:
 
 
 def foresee(
-    session: Session, course_id: int, grading_requests: Sequence[GradingRequest], secret_sha256: str
+    session: Session,
+    course_id: int,
+    grading_requests: Sequence[GradingRequest],
+    secret_sha256: str,
+    nameless: Collection[str] = (),
 ) -> list[Foreseen]:
-    """Return a preview of each grading request, in their order."""
+    """Return a preview of each grading request, in their order.
+
+    For the assignments in ``nameless``, whose students' names are hidden, it does not depend on what the student
+    submitted. Otherwise the files of a row under each name in turn would tell whose row it is.
+    """
     students = Students(session, course_id)
     versions = {id(each.assignment): each.assignment for each in grading_requests}
     frozen = {key: freeze(assignment).sha256 for key, assignment in versions.items()}
     return [
-        _one(session, students.known(each.student), each, frozen[id(each.assignment)], secret_sha256)
+        _one(
+            session,
+            students.known(each.student),
+            each,
+            frozen[id(each.assignment)],
+            secret_sha256,
+            may_be_known=each.assignment.id not in nameless,
+        )
         for each in grading_requests
     ]
 
 
 def _one(
-    session: Session, enrolment_id: int | None, asked: GradingRequest, assignment_sha256: str, secret_sha256: str
+    session: Session,
+    enrolment_id: int | None,
+    asked: GradingRequest,
+    assignment_sha256: str,
+    secret_sha256: str,
+    *,
+    may_be_known: bool,
 ) -> Foreseen:
-    if enrolment_id is not None and intake.already_submitted(session, asked, enrolment_id, assignment_sha256):
+    if (
+        may_be_known
+        and enrolment_id is not None
+        and intake.already_submitted(session, asked, enrolment_id, assignment_sha256)
+    ):
         return Foreseen(enrolled=True, known=True, copied=False)
     key = result_cache.key_of(asked.submission.sha256, assignment_sha256, grader_sha256(), secret_sha256)
     return Foreseen(enrolment_id is not None, known=False, copied=result_cache.find(session, key) is not None)

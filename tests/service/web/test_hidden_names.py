@@ -114,6 +114,17 @@ def test_an_upload_that_is_not_new_names_nobody_beside_a_grade(web: Web, grace: 
     assert [who for who in STUDENTS if is_named(who, words(answer.text))] == []
 
 
+def test_a_preview_does_not_tell_who_submitted_the_files_of_a_row(web: Web, grace: Member, regrade: str) -> None:
+    """An instructor who sends the files of one row under every name learns nothing."""
+    everybody = [*STUDENTS, web.student("newcomer").id]
+    sent = zipped({f"{who}/{name}": text for who in everybody for name, text in _files(STUDENTS[0]).items()})
+    headers = {**web.token(grace, "submit"), "content-type": "application/zip"}
+    path = f"{HERE}/batches/preflight?assignment=echo-responder"
+    ahead = web.browser().post(path, headers=headers, content=sent).json()["submissions"]
+    assert sorted(each["student"] for each in ahead) == sorted(everybody)
+    assert len({(each["known"], each["copied"], each["enrolled"]) for each in ahead}) == 1
+
+
 def _files(who: str) -> dict[str, str]:
     submission = grading_request(who).submission
     assert submission.program is not None
