@@ -150,7 +150,8 @@ def own_assignments(session: Session, course_id: int, enrolment_id: int) -> list
 
 def own_attempts(session: Session, enrolment_id: int, assignment: str) -> OwnAttempts:
     """Return a student's submissions to an assignment."""
-    return _listed(_read(session, _attempts(enrolment_id, literal(assignment))))
+    # The column's type makes any text storable; a bare literal would not.
+    return _listed(_read(session, _attempts(enrolment_id, literal(assignment, SubmissionRow.assignment.type))))
 
 
 def own_attempts_beside(

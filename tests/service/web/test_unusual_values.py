@@ -1,4 +1,4 @@
-"""Every page with values that no page sends, in path, query and form: none causes a server error."""
+"""Every page and API route with values that nobody sends, in path, query and form: none causes a server error."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from urllib.parse import quote
 import pytest
 from fastapi.routing import iter_route_contexts
 
+from service.operations.scopes import SCOPES
 from service.settings import Settings
 from web import Web, csrf, web_in
 from web_world import World, filled, make_world
@@ -53,11 +54,29 @@ def test_no_page_fails_by_an_unusual_value(asked: tuple[Web, World]) -> None:
     assert failed == set()
 
 
+def test_no_route_of_the_api_fails_by_an_unusual_value(asked: tuple[Web, World]) -> None:
+    web, world = asked
+    members = {"student": world.ada, "instructor": world.grace, "operator": web.operator()}
+    tokens = {who: web.token(member, *SCOPES) for who, member in members.items()}
+    browser = web.browser(raise_server_exceptions=False)
+    failed = set()
+    for route in iter_route_contexts(web.app.routes):
+        path = route.path or ""
+        if not path.startswith("/api/v1/"):
+            continue
+        who = _reader(path.removeprefix("/api/v1"))
+        for method in (route.methods or set()) - {"HEAD"}:
+            for name, address, _ in _requests(route, path, world.values):
+                if browser.request(method, address, headers=tokens[who]).status_code >= 500:
+                    failed.add((method, path, name))
+    assert failed == set()
+
+
 def _reader(path: str) -> str:
     """Return a reader who may open a page, so that the values reach the store."""
     if path.startswith("/operator"):
         return "operator"
-    return "student" if "/mine" in path or path.startswith("/account") else "instructor"
+    return "student" if "/mine" in path or path.startswith(("/account", "/me")) else "instructor"
 
 
 def _requests(route: Any, path: str, values: dict[str, str]) -> Iterator[tuple[str, str, dict[str, str]]]:
