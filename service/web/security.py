@@ -1,4 +1,4 @@
-"""Security headers and the check of the Host header, for all responses.
+"""Security headers, and checks of the Host and Cookie headers, for all responses.
 
 This is plain ASGI middleware, so that no route can omit it. ``access.py`` checks permissions.
 """
@@ -36,7 +36,7 @@ _PROBES = ("/health/", "/metrics")
 
 
 class Guarded:
-    """ASGI middleware that sets the headers and checks the Host header.
+    """ASGI middleware that sets the headers, checks the Host header and drops cookies of others.
 
     ``public_url`` is empty if only this machine can reach the server.
     """
@@ -52,6 +52,7 @@ class Guarded:
         """Handle one ASGI request."""
         if scope["type"] != "http":
             return
+        scope["headers"] = [_without_quoted_cookies(*header) for header in scope["headers"]]
         headers = Headers(scope=scope)
         if not self._answers_to(_host(headers.get("host", "")), scope["path"]):
             sentence = "This host name is unknown. ROBOMARK_PUBLIC_URL defines the host name of this server."
@@ -81,6 +82,17 @@ class Guarded:
 
 def _refusal(path: str, status: int, sentence: str) -> Response:
     return problem(status, sentence) if path.startswith(API) else PlainTextResponse(f"{sentence}\n", status)
+
+
+def _without_quoted_cookies(name: bytes, value: bytes) -> tuple[bytes, bytes]:
+    """Return a header; of a Cookie header, only the cookies without quotation marks. Robomark's own have none.
+
+    Older versions of Python 3.11 take time proportional to the square of the length of a quoted cookie with
+    backslashes, so that one header would stop the server for seconds (CVE-2024-7592).
+    """
+    if name.lower() != b"cookie":
+        return name, value
+    return name, b";".join(each for each in value.split(b";") if b'"' not in each)
 
 
 def _is_address(host: str) -> bool:

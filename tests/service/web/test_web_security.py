@@ -9,7 +9,9 @@ from typing import Any
 import anyio
 import pytest
 from sqlalchemy.exc import OperationalError
+from starlette import requests
 from starlette.exceptions import HTTPException
+from starlette.requests import cookie_parser
 
 from service.settings import Settings, load_settings
 from service.web.api_uploads import LARGEST_BATCH
@@ -192,6 +194,28 @@ def test_another_sites_form_changes_nothing(web: Web) -> None:
         assert browser.post("/account/tokens", data={**data, "csrf": word}).status_code == 403
     assert "stolen" not in browser.get("/account").text
     assert submit(browser, "/account/tokens", {"name": "own", "scopes": "read", "word": "w"}).status_code == 303
+
+
+def test_only_cookies_without_quotation_marks_are_parsed(web: Web, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Unquoting a long cookie takes seconds in some versions of Python, and pages need no quoted cookie."""
+    parsed = []
+
+    def parse(header: str) -> dict[str, str]:
+        parsed.append(header)
+        return cookie_parser(header)
+
+    monkeypatch.setattr(requests, "cookie_parser", parse)
+    session = web.browser(web.instructor()).cookies["robomark"]
+    quoted = '"' + '\\"' * 1000 + '"'
+    cookies = f"a={quoted}; robomark={session};language = {quoted} ; language=de; b={quoted}"
+    answer = web.browser().get("/account", headers={"cookie": cookies})
+    assert answer.status_code == 200
+    assert 'lang="de"' in answer.text
+    for path in ("/", "/nonsense", "/sign-in", "/lti/login", "/sign-in/rml_wrong"):
+        web.browser().get(path, headers={"cookie": cookies})
+        web.browser().post(path, headers={"cookie": f"robomark={quoted}"})
+    assert len(parsed) > 5
+    assert not any('"' in header for header in parsed)
 
 
 def test_our_own_faults_say_nothing_of_themselves(web: Web, monkeypatch: pytest.MonkeyPatch) -> None:
