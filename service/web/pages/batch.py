@@ -38,12 +38,12 @@ from sim.recording import Verdict
 
 router = APIRouter(prefix="/courses/{course_id}/batches/{batch_id}")
 _STATES = {
-    "queued": translatable("waits"),
-    "running": translatable("is being graded"),
+    "queued": translatable("queued"),
+    "running": translatable("running"),
     "done": translatable("graded"),
-    "dead": translatable("could not be graded"),
+    "dead": translatable("failed"),
     "cancelled": translatable("cancelled"),
-    "refused": translatable("refused"),
+    "refused": translatable("rejected"),
 }
 _COLUMNS = {
     "student": translatable("Student"),
@@ -59,9 +59,9 @@ _ACTIONS = {
     "pause": translatable("paused"),
     "resume": translatable("resumed"),
     "cancel": translatable("cancelled"),
-    "retry": translatable("queued again what could not be graded"),
+    "retry": translatable("retried failed jobs"),
     "publish": translatable("published"),
-    "regrade": translatable("graded it again"),
+    "regrade": translatable("regraded"),
 }
 
 

@@ -195,5 +195,5 @@ def _find(context: WebContext, here: InCourse, upload_id: str) -> KeptUpload:
     kept_uploads = KeptUploads(context.settings.home)
     found = kept_uploads.find(upload_id, here.reader.identity.person_id, here.course_id)
     if found is None:
-        raise HTTPException(404, translatable("This upload is not there: it was taken in, discarded, or is a day old."))
+        raise HTTPException(404, translatable("This upload no longer exists. It was confirmed or discarded, or it is more than a day old."))
     return found

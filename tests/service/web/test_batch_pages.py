@@ -74,7 +74,7 @@ def test_a_batch_is_looked_at_before_it_is_taken_in(web: Web, grace: TestClient)
     assert answer.status_code == 303
     batch = answer.headers["location"].partition("?")[0]
     told = words(grace.get(batch).text)
-    for each in ("week one", "2 waits", "2 refused", "ada", "bob", "eve"):
+    for each in ("week one", "2 queued", "2 rejected", "ada", "bob", "eve"):
         assert each in told
     with web.store.reading() as session:
         assert session.scalar(select(func.count()).select_from(Job).where(Job.state == JobState.QUEUED)) == 2
@@ -265,11 +265,11 @@ def test_the_overview_says_what_was_lost_by_whom_and_who_is_missing(web: Web, gr
     web.student("zoe")
     made = a_batch(web, "ada", "bob", refusals=(Refusal("x.zip", "is broken, expected a zip."),))
     told = words(grace.get(f"{HOME}/batches/{made.id}/overview").text)
-    for each in ("Graded 2", "Commonest causes", "Not submitted Zoe", "x.zip is broken", "nearly the same"):
+    for each in ("Graded 2", "Most common causes", "Not submitted Zoe", "x.zip is broken", "Find similar submissions"):
         assert each in told, told
     assert "Grace" not in told.partition("Not submitted")[2][:40]
     everybody = grace.get(f"{HOME}/batches/{made.id}/overview?pass=0").text
-    assert "With 0 per cent or more 2 (100 %)" in words(everybody)
+    assert "Passed (0 per cent or more) 2 (100 %)" in words(everybody)
 
 
 def test_what_is_nearly_the_same_is_shown_with_its_lines_across_the_batches_of_a_course(
@@ -314,7 +314,7 @@ def test_publishing_all_and_publishing_one(web: Web, grace: TestClient) -> None:
         assert session.get_one(Job, other).published_at is None
         assert [entry.action for entry in audit.entries(session, "job", one)] == ["publish"]
     answer = submit(grace, f"{HOME}/batches/{made.id}/publish")
-    assert "1 grade is published now" in words(grace.get(answer.headers["location"]).text)
+    assert "1 grade published." in words(grace.get(answer.headers["location"]).text)
     with web.store.reading() as session:
         assert session.get_one(Job, other).published_at is not None
 
@@ -325,7 +325,7 @@ def test_a_batch_and_one_of_it_are_graded_again_and_stand_when_published(web: We
     changes = answer.headers["location"]
     assert changes.endswith("/changes")
     grade_all(web, report_builders.faulty_grade())
-    assert "0 of 2 have other marks" in words(grace.get(changes).text)
+    assert "For 0 of 2 submissions, the marks changed" in words(grace.get(changes).text)
     first = made.jobs[0].job_id
     answer = submit(grace, f"{HOME}/grades/{first}/regrade", {"assignment": "echo-responder"})
     second = answer.headers["location"].rpartition("/")[2]

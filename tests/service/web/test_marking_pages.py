@@ -55,7 +55,7 @@ def test_marks_are_set_excused_and_withdrawn_and_all_is_told(marked: Marked) -> 
     assert (answer.status_code, answer.headers["location"]) == (303, marked.marking)
     assert marked.marks() == (before[0] + float(most - CRITERION.marks), before[1])
     shown = marked.grace.get(marked.marking).text
-    assert "set by hand" in shown
+    assert "adjusted by staff" in shown
     assert "<script>alert" not in shown
     with marked.web.store.reading() as session:
         entry = audit.entries(session, "submission", "1")[-1]

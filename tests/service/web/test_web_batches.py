@@ -107,7 +107,7 @@ def test_what_is_over_a_limit_counts_where_there_is_nothing_else(web: Web, grace
 def test_nobody_has_submitted_yet(web: Web, grace: TestClient) -> None:
     web.student("ada")
     overview = grace.get(f"/courses/1/batches/{batch_of(web)}/overview").text
-    assert "Nothing is graded yet." in overview
+    assert "No grades yet." in overview
     assert "Ada" in overview
 
 
@@ -154,13 +154,13 @@ def test_a_regrade_is_of_the_attempts_that_count_and_publishing_of_all(web: Web,
     grade_with(web, 2)
     page = grace.get(f"/courses/1/batches/{batch}/publish").text
     assert "This releases 3 grades to their students" in page
-    assert "They are of 1 student." in page
+    assert "They belong to 1 student." in page
     with web.store.reading() as session:
         planned = publishing.would_publish(session, batch).counts
         assert all(job.published_at is None for job in session.query(Job))
     assert (planned.published, planned.replaced) == (3, 1)
     assert acting.publish(web.store, batch, actor="grace") == planned
-    assert "There is nothing to release" in grace.get(f"/courses/1/batches/{batch}/publish").text
+    assert "No grades to release." in grace.get(f"/courses/1/batches/{batch}/publish").text
 
 
 def test_it_outlives_what_was_in_it_and_is_called_as_the_assignment(web: Web, grace: TestClient) -> None:
