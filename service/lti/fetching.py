@@ -38,13 +38,13 @@ def fetch(
     try:
         answer = ask(url, method=method, body=body, headers=told, others=ALL_OTHERS, most_bytes=_MOST_BYTES)
     except NotReached as error:
-        raise PlatformError(f"The platform at {host} cannot be asked: {error}") from None
+        raise PlatformError(f"The platform at {host} cannot be reached: {error}") from None
     # Requests contain our token, which no other host may get, so a redirection is an error, too.
     if not 200 <= answer.status < 300:
-        raise PlatformError(f"The platform at {host} answered {answer.status} to a {method}")
+        raise PlatformError(f"The platform at {host} returned status {answer.status} for a {method} request")
     if len(answer.body) > _MOST_BYTES:
-        raise PlatformError(f"The platform at {host} answered more than {_MOST_BYTES} bytes")
+        raise PlatformError(f"The platform at {host} returned more than {_MOST_BYTES} bytes")
     try:
         return Fetched(read_json(answer.body) if answer.body.strip() else None, answer.headers.get("link", ""))
     except ValueError:
-        raise PlatformError(f"The platform at {host} answered something that is not JSON") from None
+        raise PlatformError(f"The platform at {host} returned a response that is not JSON") from None

@@ -70,17 +70,17 @@ def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
     """
     claims = _claims(pending, id_token)
     if claims.get(f"{CLAIM}version") != "1.3.0":
-        raise UsageError("this launch is not of LTI 1.3")
+        raise UsageError("this launch does not use LTI 1.3")
     if claims.get(f"{CLAIM}message_type") != "LtiResourceLinkRequest":
-        raise UsageError("this launch is not one of a link in a course; Robomark answers no other")
+        raise UsageError("this launch does not come from a link in a course; open Robomark from a course link")
     deployment = claims.get(f"{CLAIM}deployment_id")
     if not isinstance(deployment, str) or deployment not in pending.platform.deployments:
-        raise UsageError(f"this launch comes from a deployment that is not registered here: {str(deployment)[:80]!r}")
+        raise UsageError(f"the deployment of this launch is not registered: {str(deployment)[:80]!r}")
     context = _table(claims, f"{CLAIM}context")
     context_id = context.get("id")
     subject = claims.get("sub")
     if not isinstance(context_id, str) or not isinstance(subject, str) or not context_id or not subject:
-        raise UsageError("this launch names no course or nobody; the platform has to send both")
+        raise UsageError("this launch has no course or no user; the platform must send both")
     title = context.get("title") or context.get("label") or context_id
     return Launch(
         subject=subject,
@@ -124,12 +124,12 @@ def _claims(pending: PendingLaunch, id_token: str) -> dict[str, Any]:
             options={"require": ["exp", "iat", "aud", "iss", "sub", "nonce"]},
         )
     except (PyJWTError, KeyError, TypeError, AttributeError) as error:
-        raise UsageError(f"the platform's word cannot be trusted: {error}") from None
+        raise UsageError(f"the platform's token is invalid: {error}") from None
     audience = claims["aud"]
     if isinstance(audience, list) and len(audience) > 1 and claims.get("azp") != platform.client_id:
-        raise UsageError("the platform's word is meant for somebody else")
+        raise UsageError("the platform's token is for another tool")
     if claims["nonce"] != pending.nonce:
-        raise UsageError("this launch was used already, or was begun elsewhere; open the link in the course again")
+        raise UsageError("this launch was already used or started elsewhere; open the link in the course again")
     return claims
 
 

@@ -29,7 +29,7 @@ def send_marks(store: Store, link: CourseLink, course_id: int, assignment: str) 
             .limit(1)
         )
         if title is None:
-            raise UsageError(f"nobody of this course has submitted to {assignment!r}")
+            raise UsageError(f"no student of this course has submitted to {assignment!r}")
         scores = _published(session, link, course_id, assignment)
     return send_scores(store, link, assignment, title, scores)
 

@@ -62,7 +62,7 @@ class Score:
 def members(store: Store, link: CourseLink) -> list[PlatformMember]:
     """Return the active members of the course. Raises PlatformError if the platform returns no list."""
     if link.members_url is None:
-        raise PlatformError("The platform has told no address of its list of members")
+        raise PlatformError("The platform did not send the address of its member list")
     _check_origin(link.platform, link.members_url)
     headers = {"accept": _MEMBERS, "authorization": f"Bearer {_token(store, link.platform, _MEMBERS_SCOPE)}"}
     found = []
@@ -85,7 +85,7 @@ def send_scores(store: Store, link: CourseLink, assignment: str, title: str, sco
     Raises PlatformError if the platform does not accept them.
     """
     if link.lineitems_url is None:
-        raise PlatformError("The platform has told no address of its marks")
+        raise PlatformError("The platform did not send the address for marks")
     _check_origin(link.platform, link.lineitems_url)
     if not scores:
         return 0
@@ -126,7 +126,7 @@ def _column(platform: Platform, lineitems_url: str, token: str, assignment: str,
         headers={"content-type": _LINEITEM, "accept": _LINEITEM, "authorization": f"Bearer {token}"},
     ).value
     if not isinstance(made, dict) or not isinstance(made.get("id"), str):
-        raise PlatformError("The platform made no column for the marks")
+        raise PlatformError("The platform did not create a column for the marks")
     return str(made["id"])
 
 
@@ -153,7 +153,7 @@ def _token(store: Store, platform: Platform, scopes: str) -> str:
     answer = fetch(platform.token_url, method="POST", body=urlencode(asked).encode(), headers=headers).value
     token = answer.get("access_token") if isinstance(answer, dict) else None
     if not isinstance(token, str):
-        raise PlatformError("The platform gave no access token")
+        raise PlatformError("The platform did not return an access token")
     return token
 
 
@@ -166,8 +166,8 @@ def _ask(platform: Platform, url: str, **request: Any) -> Fetched:
 def _check_origin(platform: Platform, url: str) -> None:
     if not platform.may_be_asked(url):
         raise PlatformError(
-            f"The platform names {origin_of(url) or 'something that is no address'} for a service, which is not "
-            "registered for it; ask whoever runs Robomark to add this address to the platform's services"
+            f"The platform uses {origin_of(url) or 'an invalid address'} for a service, which is not "
+            "registered for it; ask an operator of Robomark to add this address to the platform's services"
         )
 
 

@@ -85,7 +85,7 @@ def preview(service: Service, actor: Actor, course_id: int, assignment: str) -> 
     reference = reference_of(found)
     if reference is None:
         raise UsageError(
-            "there is no reference solution of this version of %(assignment)s; upload its folder again",
+            "this version of %(assignment)s has no reference solution; upload its folder again",
             assignment=assignment,
         )
     return _grade(service, actor, course_id, found, reference)
@@ -104,8 +104,8 @@ def _refuse_replacement(service: Service, course_id: int, found: Assignment) -> 
         there = [each for each in open_assignments.of_course(session, course_id) if each.assignment == found.id]
     if any(each.opened_at is not None and each.version != found.version for each in there):
         raise StudentsKnowAnother(
-            "%(id)s: students have been shown another assignment of this id, %(title)s; "
-            "give yours another id, or say that it takes that one's place",
+            "%(id)s: students have already seen another assignment with this ID, %(title)s; "
+            "use another ID, or confirm that yours replaces it",
             id=found.id,
             title=repr(there[0].title),
         )
@@ -137,6 +137,8 @@ def _unpacked(path: Path) -> Path:
     folder = found[0] if len(found) == 1 and found[0].is_dir() else inside
     if not (folder / FILE_NAME).is_file():
         raise UsageError(
-            "%(zip)s: has no %(file)s at its top or in its only folder, expected one", zip=path.name, file=FILE_NAME
+            "%(zip)s: has no %(file)s, expected it at the top level or in the only folder",
+            zip=path.name,
+            file=FILE_NAME,
         )
     return folder

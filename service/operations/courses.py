@@ -120,12 +120,12 @@ def add_member(service: Service, actor: Actor, request: MemberRequest) -> AddedM
     """
     check_operator(actor)
     if request.operator and not actor.is_machine:
-        raise Forbidden("only a command on the machine itself makes operators")
+        raise Forbidden("operators can be added only with a command on the server")
     course, who = request.course.strip(), Student(request.id.strip(), request.name.strip(), request.email.strip())
     if not course or not who.id:
-        raise Invalid("a course and its members need a name that can be seen")
+        raise Invalid("names of courses and members must contain visible characters")
     if len(course) > LONGEST_NAME:
-        raise Invalid("the name of a course has at most %(most)s characters", most=LONGEST_NAME)
+        raise Invalid("the course name is too long; use at most %(most)s characters", most=LONGEST_NAME)
     check_lengths([who])
     is_student = request.role is Role.STUDENT
     if is_student:

@@ -99,7 +99,7 @@ def export(
     nameless = sorted({line.assignment for line in lines} & hidden.assignments)
     if nameless and (chosen.packed is not None or chosen.filled_in is not None):
         raise Invalid(
-            "%(form)s needs the names of the students, which are hidden for %(assignment)s; show them first",
+            "%(form)s needs student names, but names are hidden for %(assignment)s; show the names first",
             form=request.form,
             assignment=nameless[0],
         )
@@ -143,9 +143,7 @@ def _format(request: ExportRequest) -> Format:
     chosen = FORMATS.get(request.form)
     if chosen is None or (chosen.filled_in is not None) != (request.worksheet is not None):
         others = sorted(name for name, each in FORMATS.items() if each.filled_in is None)
-        raise Invalid(
-            "expected a format of %(formats)s, or a worksheet that is to be filled in", formats=", ".join(others)
-        )
+        raise Invalid("expected one of the formats %(formats)s, or a worksheet to fill in", formats=", ".join(others))
     return chosen
 
 

@@ -62,7 +62,7 @@ def begin(service: Service, request: LaunchRequest) -> BegunLaunch:
         platform = lti.find_platform(session, request.issuer, request.client_id or None)
     if platform is None:
         raise UnknownPlatform(
-            "no platform %(issuer)s with this client is registered here", issuer=repr(request.issuer[:100])
+            "the platform %(issuer)s is not registered with this client ID", issuer=repr(request.issuer[:100])
         )
     with service.store.transaction() as session:
         state, nonce = lti.begin_launch(session, platform, request.target)
@@ -82,7 +82,7 @@ def complete(service: Service, state: str, id_token: str) -> CompletedLaunch:
     with service.store.transaction() as session:
         pending = lti.take_launch(session, state)
     if pending is None:
-        raise Invalid("this launch was begun too long ago, or used already; open the link in the course again")
+        raise Invalid("this launch has expired or was already used; open the link in the course again")
     told = launch.read_launch(pending, id_token)
     with service.store.transaction() as session:
         launched = lti.meet(
@@ -98,7 +98,9 @@ def complete(service: Service, state: str, id_token: str) -> CompletedLaunch:
             told.lineitems_url,
         )
         if launched is None:
-            raise Invalid("no instructor has opened Robomark from this course yet; ask yours to do it first")
+            raise Invalid(
+                "no instructor has opened Robomark from this course yet; ask your instructor to open it first"
+            )
         # A platform identifies people in its own courses only.
         kind, reach = CredentialKind.SESSION, Reach(platform_id=pending.platform.id)
         secret = credentials.issue(session, launched.person_id, kind, SESSION_LIFETIME, reach=reach)

@@ -105,19 +105,21 @@ def join(service: Service, actor: Actor, request: JoinRequest) -> Member:
         row, other = _enrolment(session, request.enrolment_id), _enrolment(session, request.other_id)
         person_id, other_person = row.person_id, other.person_id
         if person_id == other_person:
-            raise Conflict("these two are one person already")
+            raise Conflict("these two accounts already belong to one person")
         lock_persons(session, person_id, other_person)
         ours, theirs = (
             {each.enrolment_id: name for name, each in membership.enrolments(session, which)}
             for which in (person_id, other_person)
         )
         if shared := sorted(set(ours.values()) & set(theirs.values())):
-            raise Conflict("both are in the course %(course)s, so they cannot be one person", course=shared[0])
+            raise Conflict(
+                "both accounts are in the course %(course)s, so they cannot belong to one person", course=shared[0]
+            )
         vouched = any(membership.is_from_platform(session, each) for each in (person_id, other_person))
         if vouched and not request.from_platform:
             raise Invalid(
-                "a learning platform signs one of them in, and would sign in the person whom you join; "
-                "say explicitly that it may"
+                "one of the accounts signs in through a learning platform; "
+                "confirm that the platform may sign in the joined person"
             )
         membership.join(session, person_id, other_person)
         detail = {"joined": other_person, "enrolments": sorted(theirs)}
@@ -155,7 +157,7 @@ def check_lengths(students: Sequence[Student]) -> None:
     for each in students:
         if max(map(len, (each.id, each.name, each.email))) > _LONGEST:
             raise Invalid(
-                "%(id)s: an id, a name and an address have at most %(most)s characters",
+                "%(id)s: the ID, name or address is too long, expected at most %(most)s characters",
                 id=each.id[:_LONGEST],
                 most=_LONGEST,
             )
@@ -174,7 +176,7 @@ def remove(service: Service, actor: Actor, course_id: int, enrolment_id: int) ->
         is_ours = row.course_id == course_id
         may = actor.roles.get(course_id) is Role.INSTRUCTOR and row.role is Role.STUDENT
         if not is_ours or not (actor.operator or may):
-            raise NotFound("there is no such member of this course")
+            raise NotFound("this person is not a member of the course")
         removed = row.student
         membership.set_role(session, row, Role.STUDENT)
         remove_student(session, row.id, actor.name)
@@ -213,12 +215,12 @@ def _already_there(known: Member) -> Conflict:
     called = Sentence(", as %(name)s", {"name": known.name}) if has_name else ""
     if known.role is Role.INSTRUCTOR:
         return Conflict(
-            "%(id)s is an instructor of this course%(called)s; expected the id of a student.",
+            "%(id)s is an instructor of this course%(called)s; expected the ID of a student.",
             id=known.id,
             called=called,
         )
     return Conflict(
-        "%(id)s is in this course already%(called)s; a table gives other names and addresses.",
+        "%(id)s is already enrolled in this course%(called)s; to change the name or address, upload a table.",
         id=known.id,
         called=called,
     )
@@ -227,5 +229,5 @@ def _already_there(known: Member) -> Conflict:
 def _enrolment(session: Session, enrolment_id: int) -> Enrolment:
     row = session.get(Enrolment, enrolment_id)
     if row is None:
-        raise NotFound("there is no such member of a course")
+        raise NotFound("this person is not a member of any course")
     return row

@@ -53,9 +53,9 @@ def register(service: Service, actor: Actor, request: Registration) -> list[Plat
     """
     check_operator(actor)
     if not request.name.strip():
-        raise Invalid("a platform needs a name that can be seen")
+        raise Invalid("the platform name must contain visible characters")
     if not request.deployments:
-        raise Invalid("a platform needs the id of a deployment")
+        raise Invalid("enter at least one deployment ID of the platform")
     with service.store.transaction() as session:
         platform_id = lti.register(session, request)
         audit.note(session, actor.name, "register", "lti_platform", str(platform_id), issuer=request.issuer)
@@ -112,5 +112,5 @@ def _link(session: Session, actor: Actor, course_id: int) -> CourseLink:
     course_for(session, actor, course_id, Role.INSTRUCTOR)
     link = lti.course_link(session, course_id)
     if link is None:
-        raise Invalid("this course is launched from no learning platform")
+        raise Invalid("this course is not linked to a learning platform")
     return link

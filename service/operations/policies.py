@@ -43,12 +43,13 @@ def set_policy(service: Service, actor: Actor, course_id: int, assignment: str, 
     """
     _check_due(limits.due_at)
     if not 0 <= limits.late_days <= _MOST_LATE_DAYS:
-        raise Invalid("the days late have to be from 0 to %(most)s", most=_MOST_LATE_DAYS)
+        raise Invalid("the days for late submissions must be from 0 to %(most)s", most=_MOST_LATE_DAYS)
     if limits.attempts is not None and not 1 <= limits.attempts <= _MOST_ATTEMPTS:
-        raise Invalid("attempts have to be from 1 to %(most)s, or empty for any number", most=_MOST_ATTEMPTS)
+        raise Invalid("attempts must be from 1 to %(most)s, or empty for no limit", most=_MOST_ATTEMPTS)
     if not 0 <= limits.cool_down_seconds <= _MOST_COOL_DOWN_SECONDS:
         raise Invalid(
-            "the time between two submissions has to be from 0 to %(most)s minutes", most=_MOST_COOL_DOWN_SECONDS // 60
+            "the minimum time between submissions must be from 0 to %(most)s minutes",
+            most=_MOST_COOL_DOWN_SECONDS // 60,
         )
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
@@ -87,10 +88,10 @@ def extend(
         UsageError: The assignment does not exist.
     """
     if request.due_at is None and not request.more_attempts:
-        raise Invalid("say what to allow: a later date, more attempts, or both")
+        raise Invalid("an extension needs a later deadline, additional attempts, or both")
     _check_due(request.due_at)
     if not 0 <= request.more_attempts <= _MOST_ATTEMPTS:
-        raise Invalid("additional attempts have to be from 0 to %(most)s", most=_MOST_ATTEMPTS)
+        raise Invalid("additional attempts must be from 0 to %(most)s", most=_MOST_ATTEMPTS)
     with service.store.transaction() as session:
         row = student_in(session, actor, course_id, enrolment_id)
         check_assignment(session, request.assignment)
@@ -118,7 +119,9 @@ def show_limits(service: Service, actor: Actor, course_id: int, enrolment_id: in
 
 def _check_due(due_at: datetime | None) -> None:
     if due_at is not None and not 2000 <= due_at.year < 2200:
-        raise Invalid("%(date)s is no deadline, expected a year from 2000 to 2199", date=due_at.date().isoformat())
+        raise Invalid(
+            "%(date)s is not a valid deadline, expected a year from 2000 to 2199", date=due_at.date().isoformat()
+        )
 
 
 def _written(due_at: datetime | None) -> str | None:

@@ -91,7 +91,7 @@ def purge(service: Service, actor: Actor, course_id: int, request: PurgeRequest)
     """
     check_machine(actor)
     if not 1 <= request.older_than_days <= _MOST_DAYS:
-        raise Invalid("the age has to be from 1 to %(most)s days", most=_MOST_DAYS)
+        raise Invalid("the age must be from 1 to %(most)s days", most=_MOST_DAYS)
     with service.store.reading() as session:
         course_for(session, actor, course_id)
         before = now(session) - timedelta(days=request.older_than_days)

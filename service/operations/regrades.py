@@ -118,7 +118,7 @@ def grade_over_limit(service: Service, actor: Actor, course_id: int, job_id: str
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         job_in(session, course_id, job_id)
         if not jobs.ask_for(session, job_id, now(session)):
-            raise Conflict("this submission does not wait for staff to ask for its grade")
+            raise Conflict("this submission is not waiting for staff to start grading")
         audit.note(session, actor.name, "grade over limit", "job", job_id)
     service.notifier.grade(Lane.BATCH)
 

@@ -50,8 +50,8 @@ def list_similar(service: Service, actor: Actor, course_id: int, batch_id: str) 
     shown = show_similar(service, actor, course_id, batch_id)
     if shown.found is None:
         raise Invalid(
-            "%(count)s submissions are too many to compare while you wait, expected %(most)s at most; "
-            "robomark batch similar %(batch)s compares those of this batch",
+            "%(count)s submissions are too many for an immediate comparison, expected at most %(most)s; "
+            "to compare the submissions of this batch, run robomark batch similar %(batch)s",
             count=len(shown.lines),
             most=MOST_AT_ONCE,
             batch=batch_id,

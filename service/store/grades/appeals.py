@@ -82,9 +82,9 @@ def answer(session: Session, course_id: int, appeal_id: int, text: str, actor: s
         )
     row = session.get(Appeal, appeal_id, with_for_update={"key_share": True})
     if row is None or _course_of(session, row) != course_id:
-        raise UsageError("there is no appeal %(appeal_id)s in this course", appeal_id=appeal_id)
+        raise UsageError("this course has no appeal %(appeal_id)s", appeal_id=appeal_id)
     if row.answered_at is not None:
-        raise UsageError("appeal %(appeal_id)s is answered already", appeal_id=appeal_id)
+        raise UsageError("appeal %(appeal_id)s already has an answer", appeal_id=appeal_id)
     row.answer, row.actor, row.answered_at = text, actor, now(session)
     audit.note(session, actor, "answer appeal", "submission", str(row.submission_id), appeal=appeal_id)
 

@@ -84,7 +84,7 @@ def set_marks(
     submission_id, line = _criterion(session, job_id, criterion, seen)
     if not marks.is_finite() or not _NONE <= marks <= line.worth or marks != marks.quantize(_FINEST):
         raise UsageError(
-            "marks for %(title)s are %(marks)s, expected 0 to %(worth)s, with at most four digits after the point",
+            "marks for %(title)s are %(marks)s, expected 0 to %(worth)s with at most four decimal places",
             title=line.title,
             marks=marks,
             worth=f"{line.worth:f}",
@@ -107,7 +107,7 @@ def withdraw(session: Session, job_id: str, criterion: str, actor: str, *, seen:
     before = of_jobs(session, [job_id]).get(job_id, {}).get(criterion)
     if before is None:
         raise UsageError(
-            "nothing is set by hand for %(criterion)s in grade %(job)s", criterion=repr(criterion), job=job_id
+            "the marks of %(criterion)s in grade %(job)s are not adjusted", criterion=repr(criterion), job=job_id
         )
     _check_seen(before, seen, criterion)
     _end(session, before, now(session))
@@ -207,7 +207,7 @@ def _check_seen(override: OverrideLine | None, seen: int | None, title: str) -> 
     """Compare ``seen`` under the lock of the grade, so that the second of two concurrent changes is rejected."""
     if seen is not None and seen != (0 if override is None else override.id):
         raise MarksChanged(
-            "Somebody else changed the marks of %(title)s. Look at them again, then repeat your change.", title=title
+            "Another person changed the marks of %(title)s. Check the marks, then repeat your change.", title=title
         )
 
 
@@ -217,7 +217,7 @@ def _replace(
     reason = reason.strip()
     if not 0 < len(reason) <= LONGEST_REASON:
         raise UsageError(
-            "the reason has %(count)s characters, expected 1 to %(most)s: students read it",
+            "the reason has %(count)s characters, expected 1 to %(most)s because students can read it",
             count=len(reason),
             most=LONGEST_REASON,
         )

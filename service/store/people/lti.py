@@ -242,7 +242,7 @@ def enrol(session: Session, platform: Platform, course_id: int, subject: str, st
     """
     _check_id("subject", subject)
     if len(student.id) > _LONGEST_STUDENT:
-        raise UsageError("the platform's id of a person is longer than %(most)s characters", most=_LONGEST_STUDENT)
+        raise UsageError("the platform's user ID is longer than %(most)s characters", most=_LONGEST_STUDENT)
     _lock(session, platform)
     session.get_one(Course, course_id, with_for_update={"key_share": True})
     of_subject = (LtiPerson.platform_id == platform.id, LtiPerson.subject == subject)
@@ -266,7 +266,8 @@ def _new_enrolment(session: Session, course_id: int, student: Student, person_id
     row = session.get_one(Enrolment, Students(session, course_id).enrol(student, now(session)))
     if not _is_nobodys(session, row):
         raise UsageError(
-            "somebody else is called '%(id)s' in this course; ask whoever runs Robomark", id=student.id[:LONGEST_ID]
+            "another person already has the ID '%(id)s' in this course; ask an operator of Robomark",
+            id=student.id[:LONGEST_ID],
         )
     # Existing links to it would sign in another user as this person.
     credentials.revoke_all(session, row.person_id)
@@ -324,7 +325,7 @@ def _lock(session: Session, platform: Platform) -> None:
 
 def _check_id(kind: str, value: str) -> None:
     if len(value) > LONGEST_ID:
-        raise UsageError("the platform's %(kind)s id is longer than %(most)s characters", kind=kind, most=LONGEST_ID)
+        raise UsageError("the platform's %(kind)s ID is longer than %(most)s characters", kind=kind, most=LONGEST_ID)
 
 
 def course_link(session: Session, course_id: int) -> CourseLink | None:

@@ -115,8 +115,8 @@ def _refuse_of_the_web(session: Session, batch_id: str) -> None:
     assignment = session.scalar(select(OpenAssignment.assignment).where(OpenAssignment.batch_id == batch_id))
     if assignment is not None:
         raise UsageError(
-            f"batch {batch_id} is what students submit on the web, which is not held back; "
-            f"close {assignment}, and nobody submits to it any more"
+            f"batch {batch_id} contains web submissions and cannot be paused or cancelled; "
+            f"to stop submissions, close {assignment}"
         )
 
 

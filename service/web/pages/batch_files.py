@@ -50,7 +50,7 @@ def worksheet(
     try:
         given = file.file.read().decode("utf-8")
     except UnicodeDecodeError:
-        raise UsageError("the worksheet is not UTF-8; expected it as Moodle wrote it") from None
+        raise UsageError("the worksheet is not in UTF-8; upload the original file from Moodle") from None
     return _file(here, context, batch_id, ExportRequest(_WORKSHEET, published, given))
 
 

@@ -168,11 +168,11 @@ def _sent(files: list[UploadFile]) -> list[SentFile]:
 def _laid(kept_uploads: KeptUploads, begun: KeptUpload, files: list[SentFile], people: list[SentFile]) -> KeptUpload:
     """Store the files in the upload and return it with their names. Raises UsageError for unsuitable files."""
     if not files:
-        raise UsageError("nothing was sent, expected a .zip, or a file for each student")
+        raise UsageError("no files were uploaded, expected a .zip, or a file for each student")
     suffixes = {Path(file.flat_name).suffix.lower() for file in files}
     if not suffixes <= set(_SINGLE):
         wrong = next(file.flat_name for file in files if Path(file.flat_name).suffix.lower() not in _SINGLE)
-        raise UsageError(f"{shown(wrong)} was sent, expected a .zip, or a .py, .ipynb or .zip for each student")
+        raise UsageError(f"{shown(wrong)} was uploaded, expected a .zip, or a .py, .ipynb or .zip for each student")
     names = kept_uploads.lay(begun, files, "batch")
     one_archive = len(names) == 1 and names[0].lower().endswith(_ARCHIVES)
     table = kept_uploads.lay(begun, people, "people") if people else [""]
@@ -195,5 +195,8 @@ def _find(context: WebContext, here: InCourse, upload_id: str) -> KeptUpload:
     kept_uploads = KeptUploads(context.settings.home)
     found = kept_uploads.find(upload_id, here.reader.identity.person_id, here.course_id)
     if found is None:
-        raise HTTPException(404, translatable("This upload no longer exists. It was confirmed or discarded, or it is more than a day old."))
+        raise HTTPException(
+            404,
+            translatable("This upload no longer exists. It was confirmed or discarded, or it is more than a day old."),
+        )
     return found

@@ -75,7 +75,7 @@ def end_launch(
         raise UsageError(f"the platform refused the launch: {(error_description or error)[:200]}")
     began_here = request.cookies.get(_STATE_COOKIE, "")
     if not began_here or not hmac.compare_digest(began_here.encode(), state.encode()):
-        raise UsageError("this launch was begun in another browser, or too long ago; open the link in the course again")
+        raise UsageError("this launch started in another browser or has expired; open the link in the course again")
     done = launches.complete(context.service, state, id_token)
     target = done.target if done.target != "/" else course_path(done.launched.course_id, done.launched.role)
     answer = RedirectResponse(target, 303)

@@ -25,7 +25,7 @@ _LANES = {
     Lane.INTERACTIVE: translatable("interactive: single submissions"),
     Lane.BATCH: translatable("batch: whole classes"),
 }
-_TRYOUTS = translatable("tryouts: programs that are run and not marked")
+_TRYOUTS = translatable("test runs: programs that run without marks")
 
 
 @router.get("/operator")

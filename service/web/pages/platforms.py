@@ -8,9 +8,9 @@ from fastapi import APIRouter, Form, Request
 from fastapi.responses import RedirectResponse, Response
 
 from service.operations import platforms as operations
-from service.operations.platforms import Registration
-from service.web.access import Instructing, Operating
-from service.web.context import Context
+from service.operations.platforms import EnrolledMembers, Registration
+from service.web.access import InCourse, Instructing, Operating
+from service.web.context import Context, WebContext
 from service.web.rendering import page
 
 router = APIRouter()
@@ -50,16 +50,14 @@ def register(
 @router.get("/courses/{course_id}/platform")
 def course_platform(request: Request, here: Instructing, context: Context) -> Response:
     """Show the course's platform, with buttons to fetch members and send marks."""
-    return _course_page(request, here, context, "")
+    return _course_page(request, here, context)
 
 
 @router.post("/courses/{course_id}/platform/members")
 def fetch_members(request: Request, here: Instructing, context: Context) -> Response:
     """Enrol all members of the course on the platform."""
     enrolled = operations.enrol_members(context.service, here.acting, here.course_id)
-    told = f"{enrolled.members} of the platform's members are in the course."
-    refused = enrolled.refused
-    return _course_page(request, here, context, f"{told} {len(refused)} not: {refused[0]}." if refused else told)
+    return _course_page(request, here, context, enrolled=enrolled)
 
 
 @router.post("/courses/{course_id}/platform/marks")
@@ -68,10 +66,25 @@ def pass_back(
 ) -> Response:
     """Send the published marks of an assignment to the platform's gradebook."""
     sent = operations.pass_back(context.service, here.acting, here.course_id, assignment)
-    return _course_page(request, here, context, f"{sent} published marks were sent.")
+    return _course_page(request, here, context, sent=sent)
 
 
-def _course_page(request: Request, here: Instructing, context: Context, told: str) -> Response:
+def _course_page(
+    request: Request,
+    here: InCourse,
+    context: WebContext,
+    *,
+    enrolled: EnrolledMembers | None = None,
+    sent: int | None = None,
+) -> Response:
     view = operations.show_course_platform(context.service, here.acting, here.course_id)
-    link, assignments = view.link, view.assignments
-    return page(request, here.reader, "course_platform.html", here=here, link=link, assignments=assignments, told=told)
+    return page(
+        request,
+        here.reader,
+        "course_platform.html",
+        here=here,
+        link=view.link,
+        assignments=view.assignments,
+        enrolled=enrolled,
+        sent=sent,
+    )

@@ -145,7 +145,7 @@ ROWS = {
     "publish one anyway": _publish_one(anyway=True),
     "publish no such grade": _publish_one(job="nothing", refused=_NOTHING),
     "grade what is over a limit": _grade_over_limit("over a limit"),
-    "grade what is over no limit": _grade_over_limit("graded", refused=(409, "does not wait for staff")),
+    "grade what is over no limit": _grade_over_limit("graded", refused=(409, "is not waiting for staff")),
     "grade no such submission": _grade_over_limit("graded", "nothing", _NOTHING),
     "submit a batch": _submit("week"),
     "submit an unreadable batch": _submit("notes", refused=(422, "")),

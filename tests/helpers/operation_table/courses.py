@@ -170,7 +170,7 @@ def _platform(deployment: str, refused: tuple[int, str] | None = None, **changes
 
 
 def _of_platform(operation: Any, action: str, sent: dict[str, str], command: str) -> Row:
-    refused = (422, "launched from no learning platform")
+    refused = (422, "not linked to a learning platform")
     path = f"platform/{action}"
     return Row(operation, (path, sent), ("POST", path, sent or None), f"platform {command}", refused=refused)
 
@@ -209,7 +209,7 @@ ROWS = {
     ),
     "extend": _extension(assignment="echo-responder", due=DUE, more=2),
     "extend for all assignments": _extension(more=1),
-    "extend by nothing": _extension((422, "later date")),
+    "extend by nothing": _extension((422, "later deadline")),
     "extend for no assignment": _extension((422, "echo-typo"), assignment="echo-typo", more=1),
     "extend till another century": _extension((422, ""), due="2999-01-02T10:00"),
     "extend for an instructor": _extension((404, "no student"), who="grace", more=1),
@@ -240,7 +240,7 @@ ROWS = {
         ("POST", "/operator/people/{ada}/join", {"other": "{grace}"}),
         "user join ada --same-as grace --of default",
         who="root",
-        refused=(409, "both are in the course default"),
+        refused=(409, "both accounts are in the course default"),
     ),
     "remove a student": Row(
         people.remove,

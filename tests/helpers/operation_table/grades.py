@@ -12,7 +12,7 @@ _BOTH = {
     "files:robot.py": "print('hello')\n",
     "files:responder.py": "def responder(msg):\n    return msg\n",
 }
-_CHANGED = (409, "somebody else changed the marks")
+_CHANGED = (409, "another person changed the marks")
 
 
 def _set(marks: str, reason: str, seen: int, refused: tuple[int, str] | None = None, state: str = "course") -> Row:
@@ -123,7 +123,7 @@ ROWS = {
     "excuse what has changed": _excuse(_CRITERION, 0, _CHANGED, "marked"),
     "withdraw": _withdraw(1),
     "withdraw what has changed": _withdraw(7, _CHANGED),
-    "withdraw nothing": _withdraw(0, (422, "is set by hand"), "course"),
+    "withdraw nothing": _withdraw(0, (422, "are not adjusted"), "course"),
     "withdraw before there is a grade": _withdraw(1, (409, "has no grade"), "queued"),
     "comment": _comment("Well done."),
     "comment on a criterion": _comment("Look there.", _CRITERION),
@@ -133,8 +133,8 @@ ROWS = {
     "withdraw a comment": _uncomment(1),
     "withdraw no comment": _uncomment(7, (422, "has no comment 7")),
     "answer an appeal": _answer(1),
-    "answer an appeal again": _answer(1, (422, "is answered already"), "answered"),
-    "answer no appeal": _answer(7, (422, "there is no appeal 7")),
+    "answer an appeal again": _answer(1, (422, "already has an answer"), "answered"),
+    "answer no appeal": _answer(7, (422, "this course has no appeal 7")),
     "answer without text": _answer(1, (422, "0 characters"), text="  "),
     "appeal": _ask("answered"),
     "appeal twice": _ask("course", (422, "you already have an open appeal")),

@@ -56,7 +56,7 @@ def test_one_asks_is_answered_and_may_ask_again(store: Store) -> None:
         (line,) = appeals.open_in_course(session, 1, NONE_HIDDEN)
     assert (line.who, line.text, line.answer) == ("ada", "Why?\nLine 3 prints it.", None)
     _answer(store, first)
-    with pytest.raises(UsageError, match="is answered already"):
+    with pytest.raises(UsageError, match="already has an answer"):
         _answer(store, first, "Really.")
     second = _ask(store, "And why?")
     with store.reading() as session:
@@ -81,7 +81,7 @@ def test_what_cannot_be_asked_or_answered_is_refused(store: Store) -> None:
     with pytest.raises(UsageError, match="the answer has 0 characters"):
         _answer(store, number, "")
     for course, which in ((2, number), (1, number + 1)):
-        with pytest.raises(UsageError, match=f"there is no appeal {which} in this course"):
+        with pytest.raises(UsageError, match=f"this course has no appeal {which}"):
             _answer(store, which, course=course)
 
 

@@ -191,13 +191,13 @@ def test_of_two_who_change_the_same_marks_at_once_the_second_is_refused(
             later(session, job_id, "hopper", seen)
 
     asked = _second_waits(server, lambda session: first(session, job_id, "grace", seen), second)
-    with pytest.raises(UsageError, match="Somebody else changed the marks"):
+    with pytest.raises(UsageError, match="Another person changed the marks"):
         asked.result()
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("change", "refused"), [(_withdraw, "nothing is set by hand"), (_answer_appeal, "answered already")]
+    ("change", "refused"), [(_withdraw, "are not adjusted"), (_answer_appeal, "already has an answer")]
 )
 def test_what_two_do_at_once_that_is_done_once_the_second_is_refused(
     server: Store, change: Callable[..., None], refused: str

@@ -236,12 +236,12 @@ def test_what_could_not_be_judged_gets_its_marks_and_is_published(store: Store) 
 
 
 REFUSED: list[tuple[Change, str]] = [
-    (_set(SHAPE, "6.01"), "are 6.01, expected 0 to 6, with at most four digits after the point"),
+    (_set(SHAPE, "6.01"), "are 6.01, expected 0 to 6 with at most four decimal places"),
     (_set(SHAPE, "-1"), "are -1, expected 0 to 6"),
     (_set(SHAPE, "NaN"), "are NaN, expected 0 to 6"),
     (_set(SHAPE, "1E-7"), "are 1E-7, expected 0 to 6"),
     (_set("names-the-right-shap", "1"), "has no criterion 'names-the-right-shap'; did you mean"),
-    (_withdraw(SHAPE), "nothing is set by hand"),
+    (_withdraw(SHAPE), "are not adjusted"),
     (lambda session, _: overrides.excuse(session, "nowhere", SHAPE, "why", "staff"), "nowhere has no grade"),
     (lambda session, job: overrides.excuse(session, job, SHAPE, "  ", "staff"), "the reason has 0 characters"),
     (lambda session, job: overrides.excuse(session, job, SHAPE, "x" * 501, "staff"), "the reason has 501"),

@@ -117,7 +117,7 @@ def test_what_students_have_been_shown_is_replaced_by_an_upload_where_that_is_sa
     submit(grace, f"{path}/echo-responder/open")
     refused = upload("Another")
     assert refused.status_code == 422
-    assert "students have been shown another assignment of this id, 'Nobody saw the other'" in words(refused.text)
+    assert "students have already seen another assignment with this ID, 'Nobody saw the other'" in words(refused.text)
     assert 'name="replace"' in refused.text
     assert upload("Nobody saw the other").status_code == 303
     assert "Nobody saw the other" in grace.get(path).text

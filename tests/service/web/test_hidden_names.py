@@ -142,7 +142,7 @@ def test_a_file_that_is_matched_by_names_is_refused(web: Web, grace: Member, reg
     else:
         answer = web.browser().get(f"{path}/export?format={form}", headers=token)
     assert answer.status_code == 422
-    assert "which are hidden for echo-responder; show them first" in answer.json()["detail"]
+    assert "but names are hidden for echo-responder; show the names first" in answer.json()["detail"]
 
 
 def test_numbers_of_submissions_are_not_in_the_order_of_the_names(web: Web) -> None:

@@ -105,20 +105,20 @@ _NOW = int(time.time())
 @pytest.mark.parametrize(
     ("changes", "header", "said"),
     [
-        pytest.param({"aud": "somebody else"}, {}, "trusted", id="for another client"),
-        pytest.param({"aud": [CLIENT, "other"], "azp": "other"}, {}, "somebody else", id="for another party"),
-        pytest.param({"iss": "https://evil.example.org"}, {}, "trusted", id="of another issuer"),
-        pytest.param({"exp": _NOW - 3600, "iat": _NOW - 7200}, {}, "trusted", id="expired"),
-        pytest.param({"nonce": "another"}, {}, "used already", id="another nonce"),
-        pytest.param({"nonce": None}, {}, "trusted", id="no nonce"),
-        pytest.param({"sub": None}, {}, "trusted", id="nobody"),
+        pytest.param({"aud": "somebody else"}, {}, "token is invalid", id="for another client"),
+        pytest.param({"aud": [CLIENT, "other"], "azp": "other"}, {}, "another tool", id="for another party"),
+        pytest.param({"iss": "https://evil.example.org"}, {}, "token is invalid", id="of another issuer"),
+        pytest.param({"exp": _NOW - 3600, "iat": _NOW - 7200}, {}, "token is invalid", id="expired"),
+        pytest.param({"nonce": "another"}, {}, "already used", id="another nonce"),
+        pytest.param({"nonce": None}, {}, "token is invalid", id="no nonce"),
+        pytest.param({"sub": None}, {}, "token is invalid", id="nobody"),
         pytest.param({f"{CLAIM}deployment_id": "2"}, {}, "deployment", id="another deployment"),
         pytest.param({f"{CLAIM}deployment_id": ["1"]}, {}, "deployment", id="a list for a deployment"),
-        pytest.param({f"{CLAIM}version": "1.1"}, {}, "not of LTI 1.3", id="another version"),
-        pytest.param({f"{CLAIM}message_type": "LtiDeepLinkingRequest"}, {}, "no other", id="another message"),
+        pytest.param({f"{CLAIM}version": "1.1"}, {}, "does not use LTI 1.3", id="another version"),
+        pytest.param({f"{CLAIM}message_type": "LtiDeepLinkingRequest"}, {}, "link in a course", id="another message"),
         pytest.param({f"{CLAIM}context": None}, {}, "no course", id="no course"),
-        pytest.param({}, {"key": _OTHER_KEY}, "trusted", id="another key"),
-        pytest.param({}, {"kid": "k9"}, "trusted", id="an unknown key"),
+        pytest.param({}, {"key": _OTHER_KEY}, "token is invalid", id="another key"),
+        pytest.param({}, {"kid": "k9"}, "token is invalid", id="an unknown key"),
     ],
 )
 def test_a_word_that_is_not_to_be_trusted_signs_nobody_in(
@@ -218,7 +218,7 @@ def test_nobody_becomes_somebody_else_by_an_id_that_a_platform_tells(
     for subject, taken in (("eve", "ada"), ("eve", "alan"), ("eve", "grace")):
         browser, refused = _launch(web, platform, subject, LEARNER, **{f"{CLAIM}lis": {"person_sourcedid": taken}})
         assert refused.status_code == 422, taken
-        assert "Somebody else is called" in refused.text
+        assert "Another person already has the ID" in refused.text
         assert browser.get("/account").status_code == 303
     with web.store.reading() as session:
         assert {each.id: each.name for each in membership.members(session, 1)}["alan"] == "Alan"
@@ -235,7 +235,7 @@ def test_what_a_platform_lists_wrongly_is_passed_over(launched: tuple[Web, Learn
     ]
     answer = grace.post("/courses/1/platform/members", data={CSRF_FIELD: csrf(grace.get("/account"))})
     assert answer.status_code == 200, answer.text
-    assert "1 of the platform&#39;s members are in the course. 1 not:" in answer.text
+    assert "1 platform member is enrolled. 1 member is not enrolled:" in answer.text
 
 
 def test_members_are_enrolled_and_published_marks_sent(launched: tuple[Web, LearningPlatform]) -> None:
@@ -250,7 +250,7 @@ def test_members_are_enrolled_and_published_marks_sent(launched: tuple[Web, Lear
     ]
     word = csrf(grace.get("/account"))
     answer = grace.post("/courses/1/platform/members", data={CSRF_FIELD: word})
-    assert "3 of the platform&#39;s members" in answer.text, answer.text
+    assert "3 platform members are enrolled" in answer.text, answer.text
     with web.store.reading() as session:
         assert [each.name for each in membership.members(session, 1)] == ["Bob Example", "Ada Example", "Grace Example"]
     requests = [grading_request("ada"), grading_request("unknown")]

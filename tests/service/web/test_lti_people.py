@@ -80,7 +80,7 @@ def test_a_person_known_from_one_course_takes_nobodys_place_in_another(store: St
     victim = launch(store, platform, "victim", context="c2")
     launch(store, platform, "mallory", context="c1")
     for id in ("victim", "grace"):
-        with pytest.raises(UsageError, match="somebody else is called"):
+        with pytest.raises(UsageError, match="another person already has the ID"):
             launch(store, platform, "mallory", context="c2", id=id)
     with store.reading() as session:
         assert victim is not None
@@ -137,7 +137,7 @@ def test_who_has_a_place_keeps_it(store: Store, platform: Platform, who: str) ->
         other_platform = register(store, name="Canvas")
         with store.transaction() as session:
             session.add(LtiPerson(platform_id=other_platform.id, subject="ada", person_id=person_id))
-    with pytest.raises(UsageError, match="somebody else is called 'ada'"):
+    with pytest.raises(UsageError, match="another person already has the ID 'ada'"):
         launch(store, platform, "new", id="ada")
     with store.reading() as session:
         row = session.scalars(select(Enrolment).where(Enrolment.course_id == 1, Enrolment.student == "ada")).one()
@@ -197,7 +197,7 @@ def test_long_ids_are_refused_and_never_cut(store: Store, platform: Platform, ki
     names = {"subject": "grace", "context": "c1", "deployment": "1", "id": "grace"}
     assert launch(store, platform, role=INSTRUCTOR, **{**names, kind: "x" * 250})
     for end in "ab":
-        with pytest.raises(UsageError, match=f"{kind} id is longer than 250 characters"):
+        with pytest.raises(UsageError, match=f"{kind} ID is longer than 250 characters"):
             launch(store, platform, role=INSTRUCTOR, **{**names, kind: "x" * 250 + end})
     with pytest.raises(UsageError, match="deployment id is longer"), store.transaction() as session:
         lti.register(session, Registration("n", "i", "c", ("x" * 251,), *URLS))
@@ -303,7 +303,7 @@ def test_what_a_platform_names_itself_is_only_asked_where_it_is_registered(
         "next page": lambda: services.members(store, link),
         "column": lambda: services.send_scores(store, link, "a", "A", [SCORE]),
     }
-    with pytest.raises(PlatformError, match=r"names http://127\.0\.0\.1:9 for a service"):
+    with pytest.raises(PlatformError, match=r"uses http://127\.0\.0\.1:9 for a service"):
         ask[where]()
     assert not [each for each in asked if "127.0.0.1" in each]
 

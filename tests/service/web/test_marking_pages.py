@@ -73,7 +73,7 @@ def test_a_form_that_was_shown_before_another_change_changes_nothing(marked: Mar
     assert submit(marked.grace, f"{marked.marking}/set", {**form, "marks": "0"}).status_code == 303
     for action in ("set", "excuse"):
         stale = submit(marked.grace, f"{marked.marking}/{action}", {**form, "marks": f"{CRITERION.max_marks}"})
-        assert (stale.status_code, "Somebody else changed the marks" in stale.text) == (409, True)
+        assert (stale.status_code, "Another person changed the marks" in stale.text) == (409, True)
     submit(marked.grace, f"{marked.marking}/withdraw", {"criterion": CRITERION.id})
     assert marked.marks() == before
 
@@ -92,8 +92,8 @@ def test_it_says_whose_work_is_marked_unless_names_are_hidden(marked: Marked) ->
 
 def test_the_course_says_how_many_appeals_wait(marked: Marked) -> None:
     for path in ("batches", "people"):
-        assert '1<span class="hidden"> wait for an answer' in marked.grace.get(f"/courses/1/{path}").text
-    assert "wait for an answer" not in marked.ada.get("/courses/1/mine").text
+        assert '1<span class="hidden"> unanswered' in marked.grace.get(f"/courses/1/{path}").text
+    assert "unanswered" not in marked.ada.get("/courses/1/mine").text
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def test_the_course_says_how_many_appeals_wait(marked: Marked) -> None:
         ("set", {"criterion": CRITERION.id, "marks": "1000", "reason": "x"}, "expected 0 to"),
         ("set", {"criterion": CRITERION.id, "marks": "1", "reason": ""}, "the reason has 0 characters"),
         ("excuse", {"criterion": "other", "reason": "x"}, "has no criterion"),
-        ("withdraw", {"criterion": CRITERION.id}, "nothing is set by hand"),
+        ("withdraw", {"criterion": CRITERION.id}, "are not adjusted"),
         ("comment", {"text": ""}, "the comment has 0 characters"),
         ("uncomment", {"comment_id": "7"}, "has no comment 7"),
     ],
@@ -137,7 +137,7 @@ def test_a_student_asks_and_an_instructor_answers(marked: Marked) -> None:
     number = marked.world.values["appeal_id"]
     answer = submit(marked.grace, f"/courses/1/appeals/{number}/answer", {"text": f"Line 3 {HOSTILE}"})
     assert answer.headers["location"] == "/courses/1/appeals"
-    assert "Nobody waits for an answer." in marked.grace.get("/courses/1/appeals").text
+    assert "No open appeals." in marked.grace.get("/courses/1/appeals").text
     shown = marked.ada.get(path).text
     assert "Line 3 &lt;script&gt;" in shown
     assert "person" not in shown

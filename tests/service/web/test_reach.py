@@ -406,10 +406,10 @@ def test_an_operator_joins_two_whom_the_form_names(web: Web) -> None:
     browser = web.browser(first)
     where = submit(root, "/operator/courses", {"course": "two", "who": "grace", "name": "G. Hopper"})
     shown = root.get(where.headers["location"]).text
-    assert "Grace (grace) instructs one, too." in words(shown)
+    assert "Grace (grace) is also an instructor of one." in words(shown)
     target = shown.partition('href="/operator/people/')[2].partition('"')[0].replace("&amp;", "&")
     both = root.get(f"/operator/people/{target}").text
-    assert "This makes G. Hopper and Grace one person with all these courses" in words(both)
+    assert "This joins G. Hopper and Grace into one person with all these courses" in words(both)
     second = int(target.partition("?")[0])
     data = {"other_id": str(first.enrolment_id), "csrf": csrf(root.get("/account"))}
     assert root.post(f"/operator/people/{second}/join", data=data).status_code == 303

@@ -40,7 +40,7 @@ def test_a_link_is_shown_again_until_it_is_used(web: Web, grace: TestClient) -> 
         assert secret not in [kept for row in session.scalars(select(Credential)) for kept in (row.sha256, row.name)]
     assert signs_in(web, secret)
     assert shown_at(grace, where) is None
-    assert "was used, or is over" in grace.get(where).text
+    assert "was used or has expired" in grace.get(where).text
 
 
 def test_a_newer_link_takes_the_place_of_one_that_was_not_used(web: Web, grace: TestClient) -> None:
