@@ -49,9 +49,9 @@ class CatalogueShape(Shape):
 
     id: str
     title: str
-    section: str = Field(description="Of the course's materials; empty for what stands in none.")
-    topic: str = Field(description="The number of the part that the section is of.")
-    sentence: str = Field(description="What is to be done, in one sentence of its description.")
+    section: str = Field(description="Section of the course materials; empty if there is none.")
+    topic: str = Field(description="Number of the part that contains the section.")
+    sentence: str = Field(description="The task, in one sentence of the description.")
     max_marks: float = Field(validation_alias="marks")
     trials: int
 
@@ -109,7 +109,7 @@ class ScenarioShape(Shape):
 
     id: str
     title: str
-    seconds: float = Field(description="Simulated, at most.")
+    seconds: float = Field(description="Maximum simulated time.")
     trials: int
     visibility: str
 
@@ -123,12 +123,12 @@ class AskedShape(Shape):
     version: str
     description: str
     background: str = Field(description="The floor.")
-    program: str = Field(description="Who has the robot program: student, none, or a given file.")
+    program: str = Field(description="Source of the robot program: student, none, or a given file.")
     responder: str
-    given: list[str] = Field(description="Files that students are given.")
+    given: list[str] = Field(description="Files that students receive.")
     criteria: list[MarkedLineShape]
     scenarios: list[ScenarioShape]
-    has_reference: bool = Field(description="Whether there is a reference solution to be graded as a preview.")
+    has_reference: bool = Field(description="Whether a reference solution can be graded as a preview.")
 
     model_config = like(**_ASKED_EXAMPLE)
 
@@ -165,8 +165,10 @@ def list_catalogue(
     _here: Reads,
     limit: Limit = 50,
     after: After = "",
-    q: Annotated[str, Query(max_length=100, description="Words that all have to be in what is said of one.")] = "",
-    topic: Annotated[str, Query(max_length=10, description="The number of a part of the course's materials.")] = "",
+    q: Annotated[
+        str, Query(max_length=100, description="Words that the description of an assignment must contain.")
+    ] = "",
+    topic: Annotated[str, Query(max_length=10, description="Number of a part of the course materials.")] = "",
 ) -> Listed[CatalogueShape]:
     """The assignments that come with Robomark, of which a course can have any."""
     place = place_after(after, str)
@@ -203,7 +205,7 @@ def upload(
     here: Manages,
     context: Context,
     sent: Uploaded,
-    replace: Annotated[bool, Query(description="Also in place of another that students have been shown.")] = True,
+    replace: Annotated[bool, Query(description="Replace another assignment that students have already seen.")] = True,
 ) -> AssignmentShape:
     """Upload an assignment as a zip of its folder; its reference solution is graded as a preview.
 

@@ -31,7 +31,7 @@ class ProgressShape(Shape):
 
     jobs: int
     ended: int
-    partial: float = Field(description="What the running ones have done, in jobs.")
+    partial: float = Field(description="Progress of the running jobs, in jobs.")
     plots_due: int
 
 
@@ -48,7 +48,7 @@ class CriterionStatisticsShape(Shape):
     id: str
     title: str
     n: int
-    mean_share: float = Field(description="The mean of what was got of its marks, from 0 to 1.")
+    mean_share: float = Field(description="Mean share of its marks, from 0 to 1.")
 
 
 class CauseShape(Shape):
@@ -70,7 +70,7 @@ class StatisticsShape(Shape):
     median: float
     highest: float
     criteria: list[CriterionStatisticsShape]
-    causes: list[CauseShape] = Field(description="The commonest first.")
+    causes: list[CauseShape] = Field(description="Most common first.")
 
 
 class WholeBatchShape(BatchShape):
@@ -109,9 +109,9 @@ class ForStaffShape(Shape):
 class TakenShape(Shape):
     """The accepted and rejected submissions of an upload."""
 
-    batch: str | None = Field(description="None where nothing was new.")
+    batch: str | None = Field(description="Null if no submission is new.")
     queued: int
-    copied: int = Field(description="Identical to a graded one, and so graded already.")
+    copied: int = Field(description="Identical to a graded submission, and therefore already graded.")
     known: list[KnownShape]
     for_staff: list[ForStaffShape]
     refusals: list[RefusalShape]
@@ -161,9 +161,13 @@ def submit_batch(
     here: Submits,
     context: Context,
     upload: Uploaded,
-    name: Annotated[str, Query(min_length=1, max_length=200, description="What the batch is called.")] = "upload",
+    name: Annotated[str, Query(min_length=1, max_length=200, description="Name of the batch.")] = "upload",
     assignment: Annotated[
-        str, Query(max_length=100, description="An assignment of the course or catalogue; else each names its own.")
+        str,
+        Query(
+            max_length=100,
+            description="An assignment of the course or catalogue; if empty, each submission names its assignment.",
+        ),
     ] = "",
     again: Annotated[bool, Query(description="Grade again what was submitted already.")] = False,
 ) -> TakenShape:

@@ -26,8 +26,8 @@ class CredentialShape(Shape):
     id: str
     kind: CredentialKind
     name: str
-    scopes: list[str] = Field(description="Empty for a session that may do all its owner may.")
-    course_id: int | None = Field(description="The only course that it reaches; null where it has no such limit.")
+    scopes: list[str] = Field(description="Empty for a session with all rights of its owner.")
+    course_id: int | None = Field(description="The only course that it can access; null without this limit.")
     created_at: datetime
     expires_at: datetime
     used_at: datetime | None

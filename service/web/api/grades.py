@@ -23,7 +23,9 @@ from service.web.language import language_of
 
 router = api_router("grades")
 Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
-HTML: Described = {200: {"content": {"text/html": {"schema": {"type": "string"}}}, "description": "A page of its own."}}
+HTML: Described = {
+    200: {"content": {"text/html": {"schema": {"type": "string"}}}, "description": "A self-contained page."}
+}
 ZIP: Described = {
     200: {"content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}}, "description": "A zip."}
 }

@@ -25,7 +25,7 @@ Marks = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "mark"))]
 StudentReads = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "read"))]
 StudentSubmits = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "submit"))]
 CriterionId = Annotated[str, Path(min_length=1, max_length=200)]
-_SEEN = "The id of the override that you have seen, 0 for none; 409 where it is another by now."
+_SEEN = "The ID of the override that you saw, 0 for none; 409 if it has changed since."
 
 
 def _owning(here: StudentSubmits, context: Context, submission_id: RowNumber) -> CallerInCourse:
@@ -41,7 +41,7 @@ GRADE = "/courses/{course_id}/grades/{job_id}"
 class OverrideShape(Shape):
     """Marks that replace the grader's marks; null excuses the criterion."""
 
-    id: int = Field(description="To be sent as `seen` with the next change, so that a change in between is noticed.")
+    id: int = Field(description="Send it as `seen` with the next change, so that a change in between is detected.")
     marks: float | None
     reason: str
     actor: str
@@ -53,8 +53,8 @@ class CriterionMarksShape(Shape):
 
     criterion: str
     title: str
-    graded: float | None = Field(description="Null where it could not be judged.")
-    worth: float = Field(description="The most that the assignment gives.")
+    graded: float | None = Field(description="Null if it could not be judged.")
+    worth: float = Field(description="Maximum marks in the assignment.")
     marks: float
     max_marks: float
     override: OverrideShape | None
@@ -64,7 +64,7 @@ class CommentShape(Shape):
     """A comment of an instructor to the student."""
 
     id: int
-    criterion: str = Field(description="Empty: for all of the submission.")
+    criterion: str = Field(description="Empty for the whole submission.")
     text: str
     actor: str
     made_at: datetime
@@ -209,7 +209,9 @@ def uncomment(here: Marks, context: Context, job_id: RowName, comment_id: RowNum
 def list_appeals(
     here: Reads,
     context: Context,
-    answered: Annotated[bool, Query(description="Those with an answer, the newest first; else the open ones.")] = False,
+    answered: Annotated[
+        bool, Query(description="Return answered appeals, newest first; otherwise open appeals.")
+    ] = False,
     limit: Limit = 100,
     after: After = "",
 ) -> Listed[AppealShape]:

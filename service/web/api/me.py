@@ -20,8 +20,8 @@ class MeShape(Shape):
     """The owner of the token."""
 
     name: str
-    operator: bool = Field(description="Whether they run the installation.")
-    scopes: list[str] = Field(description="What the token may do of what its owner may.")
+    operator: bool = Field(description="Whether this person is an operator of the installation.")
+    scopes: list[str] = Field(description="Scopes of the token.")
     courses: list[CourseShape]
 
     model_config = like(

@@ -46,10 +46,10 @@ class OpenShape(Shape):
     id: str
     title: str
     max_marks: float
-    open: bool = Field(description="Whether it may be submitted to.")
-    limits: LimitsShape = Field(description="What holds for the token's owner.")
-    attempts_left: int | None = Field(description="Null where there is no limit.")
-    days_left: int = Field(description="Until the due date, the last one counted; 0 where there is none.")
+    open: bool = Field(description="Whether students can submit to it.")
+    limits: LimitsShape = Field(description="Limits for the token's owner.")
+    attempts_left: int | None = Field(description="Null if there is no limit.")
+    days_left: int = Field(description="Days until the deadline, including the last day; 0 without a deadline.")
 
     model_config = like(
         id="shape-recognition",
@@ -76,20 +76,20 @@ class SubmissionShape(Shape):
     id: int
     assignment: str
     attempt: int
-    source: str = Field(description="The name that it came under.")
+    source: str = Field(description="Name of the submitted file or folder.")
     submitted_at: datetime
     days_late: int
     over: str | None = Field(
         validation_alias="staff_only",
-        description="The limit that it was over: staff see it, and it counts by their leave.",
+        description="The exceeded limit: staff see it, and it counts only with their permission.",
     )
     job: str = Field(validation_alias="job_id")
     state: JobState
-    progress: float = Field(description="Of the grading, from 0 to 1, by the time that it usually takes.", default=1.0)
+    progress: float = Field(description="Grading progress from 0 to 1, estimated from the usual duration.", default=1.0)
     place: PlaceShape | None = Field(description="In the queue; null once nothing is to come.", default=None)
-    marks: float | None = Field(description="As far as they may be seen now; null while there are none.")
+    marks: float | None = Field(description="The visible part of the marks; null if there are none.")
     max_marks: float | None
-    published: bool = Field(description="Whether the grade is released; until then it may lack what is kept back.")
+    published: bool = Field(description="Whether the grade is published; until then, parts of it can be hidden.")
 
     model_config = like(
         id=3,
@@ -123,14 +123,14 @@ class TaskSheetShape(Shape):
     title: str
     section: str
     description: str
-    asked: list[str] = Field(description="Files, by name.")
-    notebook: bool = Field(description="Whether one notebook will do for all that is asked.")
+    asked: list[str] = Field(description="Required files by name.")
+    notebook: bool = Field(description="Whether one notebook can replace all files.")
     criteria: list[CriterionAskedShape]
     max_marks: float
     more_marks: float
     background: str = Field(description="The floor.")
-    seconds: float | None = Field(description="Simulated, of the longest trial that is shown.")
-    given: list[str] = Field(description="Files that are given.")
+    seconds: float | None = Field(description="Simulated time of the longest visible trial.")
+    given: list[str] = Field(description="Files that students receive.")
 
     model_config = like(
         id="shape-recognition",

@@ -29,7 +29,7 @@ class LaneShape(Shape):
     lane: Lane
     queued: int
     running: int
-    oldest_seconds: float = Field(description="How long the oldest job that could be claimed has waited.")
+    oldest_seconds: float = Field(description="Waiting time of the oldest job that a worker can claim.")
 
 
 class TryoutLaneShape(Shape):
@@ -37,7 +37,7 @@ class TryoutLaneShape(Shape):
 
     queued: int
     running: int
-    oldest_seconds: float = Field(description="How long the oldest that waits has waited.")
+    oldest_seconds: float = Field(description="Waiting time of the oldest queued test run.")
 
 
 class FindingShape(Shape):
@@ -56,8 +56,8 @@ class ServiceShape(Shape):
     lanes: list[LaneShape]
     findings: list[FindingShape]
     tryouts: TryoutLaneShape
-    dead: int = Field(description="Jobs that could not be graded.")
-    host_faults: int = Field(description="Attempts that ended through no fault of a student's, of all jobs.")
+    dead: int = Field(description="Failed jobs.")
+    host_faults: int = Field(description="Grading attempts of all jobs that failed because of the system.")
     paused_batches: int
 
     model_config = like(
@@ -82,9 +82,9 @@ class WorkerShape(Shape):
     sandbox: str
     started_at: datetime
     seen_at: datetime
-    lately: bool = Field(description="Whether it was heard of just now.")
-    quarantine: str | None = Field(description="What it got wrong, where it may grade no more.")
-    problem: str = Field(description="Why it must be restarted; empty where nothing is wrong.")
+    lately: bool = Field(description="Whether it reported recently.")
+    quarantine: str | None = Field(description="The self-test failure that stopped it from grading.")
+    problem: str = Field(description="Why it must be restarted; empty if there is no problem.")
 
     model_config = like(
         name="worker@host",
@@ -127,7 +127,7 @@ class DeadShape(Shape):
 class RetryAsked(BaseModel):
     """The dead jobs to queue again."""
 
-    batch_id: str | None = Field(None, max_length=32, pattern="^[0-9a-z]+$", description="None: of all batches.")
+    batch_id: str | None = Field(None, max_length=32, pattern="^[0-9a-z]+$", description="Null for all batches.")
 
 
 class NamedCourseShape(Shape):
@@ -166,7 +166,9 @@ class NewInstructorShape(Shape):
     course: int
     enrolment: int
     link: LinkShape
-    elsewhere: list[SameIdShape] = Field(description="Other persons, until an operator joins them with this one.")
+    elsewhere: list[SameIdShape] = Field(
+        description="Other persons with the same ID, until an operator joins them with this person."
+    )
 
     model_config = like(id="grace", course=1, enrolment=9, link=example_of(LinkShape), elsewhere=[])
 

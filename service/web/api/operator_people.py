@@ -39,7 +39,7 @@ class PersonShape(Shape):
 
     enrolments: list[PersonEnrolmentShape]
     credentials: list[CredentialShape]
-    from_platform: bool = Field(description="Whether a learning platform signs them in.")
+    from_platform: bool = Field(description="Whether this person signs in through a learning platform.")
 
     model_config = like(
         enrolments=[example_of(PersonEnrolmentShape)], credentials=[example_of(CredentialShape)], from_platform=False
@@ -49,7 +49,9 @@ class PersonShape(Shape):
 class SignOutAsked(BaseModel):
     """Options for signing a person out."""
 
-    release: bool = Field(False, description="A student's next launch with this id may take this account.")
+    release: bool = Field(
+        False, description="Allow the next launch by a student with this ID to take over this account."
+    )
 
 
 class SignedOutShape(Shape):
@@ -64,7 +66,7 @@ class JoinAsked(BaseModel):
     """The other person."""
 
     other: int = Field(ge=1, le=2**31 - 1, description="One of their enrolments.", examples=[4])
-    from_platform: bool = Field(False, description="Also if a learning platform signs one of them in.")
+    from_platform: bool = Field(False, description="Join even if one of them signs in through a learning platform.")
 
 
 @router.get("/operator/people")

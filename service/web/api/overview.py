@@ -34,11 +34,11 @@ class ExpectedShape(Shape):
 
     student: str
     name: str
-    source: str = Field(description="The name that it came under.")
+    source: str = Field(description="Name of the submitted file or folder.")
     assignment: str
-    enrolled: bool = Field(description="Whether the student is in the course already.")
-    known: bool = Field(description="Whether it was submitted already and would stay as it is.")
-    copied: bool = Field(description="Whether an identical one is graded, whose grade it would get.")
+    enrolled: bool = Field(description="Whether the student is already enrolled.")
+    known: bool = Field(description="Whether it was submitted before and would stay unchanged.")
+    copied: bool = Field(description="Whether an identical submission is graded; it would get the same grade.")
 
 
 class PreflightShape(Shape):
@@ -90,9 +90,9 @@ class ClassShape(Shape):
 
     statistics: StatisticsShape
     distribution: list[BinShape]
-    passed: int = Field(description="How many have the share of marks that was asked for, or more.")
+    passed: int = Field(description="Number of students who reach the pass mark.")
     outliers: list[OutlierShape]
-    identical: list[list[str]] = Field(description="Groups of students whose submissions are the very same.")
+    identical: list[list[str]] = Field(description="Groups of students with identical submissions.")
     missing: list[MissingShape]
 
 
@@ -120,7 +120,11 @@ def look_first(
     context: Context,
     upload: Uploaded,
     assignment: Annotated[
-        str, Query(max_length=100, description="An assignment of the course or catalogue; else each names its own.")
+        str,
+        Query(
+            max_length=100,
+            description="An assignment of the course or catalogue; if empty, each submission names its assignment.",
+        ),
     ] = "",
 ) -> PreflightShape:
     """Check a zip with a submission for each student, without submitting it."""

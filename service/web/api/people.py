@@ -37,8 +37,8 @@ Moment = Annotated[AwareDatetime, AfterValidator(_of_these_times)]
 class MemberShape(Shape):
     """A member of a course."""
 
-    enrolment: int = Field(validation_alias="enrolment_id", description="What paths call them by.")
-    id: str = Field(description="What the course knows them by.")
+    enrolment: int = Field(validation_alias="enrolment_id", description="ID for use in paths.")
+    id: str = Field(description="ID in the course.")
     name: str
     email: str
     role: Role
@@ -62,7 +62,7 @@ class GradingShape(Shape):
 class ExtensionShape(Shape):
     """An extension of the policy for one student."""
 
-    assignment: str = Field(description="Empty: every one.")
+    assignment: str = Field(description="Empty for all assignments.")
     due_at: datetime | None
     more_attempts: int
 
@@ -72,8 +72,8 @@ class ExtensionShape(Shape):
 class StudentShape(MemberShape):
     """A student with their newest submissions."""
 
-    gradings: list[GradingShape] = Field(description="The newest first.")
-    some_hidden: bool = Field(description="Whether there are assignments whose submissions are shown without names.")
+    gradings: list[GradingShape] = Field(description="Newest first.")
+    some_hidden: bool = Field(description="Whether the course has assignments with hidden names.")
     extensions: list[ExtensionShape]
 
     model_config = like(
@@ -114,10 +114,10 @@ class PolicyShape(Shape):
     """The policy of an assignment, or, with an empty assignment, the default policy of the course."""
 
     assignment: str = ""
-    due_at: Moment | None = Field(None, description="Later it is late.")
-    late_days: int = Field(0, ge=0, le=365, description="So many days late is still marked.")
-    attempts: int | None = Field(None, ge=1, le=1000, description="Different submissions that are marked.")
-    cool_down_seconds: float = Field(0.0, ge=0, le=600_000, description="Between two submissions.")
+    due_at: Moment | None = Field(None, description="Deadline; later submissions are late.")
+    late_days: int = Field(0, ge=0, le=365, description="Number of days for which late submissions are accepted.")
+    attempts: int | None = Field(None, ge=1, le=1000, description="Maximum number of different submissions.")
+    cool_down_seconds: float = Field(0.0, ge=0, le=600_000, description="Minimum time between submissions.")
 
     model_config = like(assignment="", due_at="2026-11-30T17:00:00Z", late_days=2, attempts=5, cool_down_seconds=600)
 
@@ -131,7 +131,7 @@ class PolicyAsked(PolicyShape):
 class ExtensionAsked(BaseModel):
     """An extension for one student, which replaces an earlier one."""
 
-    assignment: str = Field("", max_length=100, description="Empty: every one.")
+    assignment: str = Field("", max_length=100, description="Empty for all assignments.")
     due_at: Moment | None = Field(None, examples=["2026-12-07T17:00:00Z"])
     more_attempts: int = Field(0, ge=0, le=1000)
 
@@ -140,7 +140,7 @@ class LimitsShape(Shape):
     """The limits that apply to one student now."""
 
     due_at: datetime | None
-    closed_at: datetime | None = Field(description="After this moment a submission is over the limit.")
+    closed_at: datetime | None = Field(description="Submissions after this time are over the limit.")
     late_days: int
     attempts: int | None
     cool_down_seconds: float

@@ -25,7 +25,7 @@ Registered = Annotated[str, Field(min_length=1, max_length=platforms.LONGEST_REG
 _SILENT: Described = {
     502: {
         "content": {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}},
-        "description": "The platform does not do what it is asked.",
+        "description": "The platform did not complete the request.",
     }
 }
 _MOODLE = {
@@ -50,7 +50,7 @@ class PlatformShape(Shape):
     authorization_url: str
     token_url: str
     keys_url: str
-    service_origins: list[str] = Field(description="Where else its services are asked for members and marks.")
+    service_origins: list[str] = Field(description="Other addresses of its services for members and marks.")
 
     model_config = like(id=1, **_MOODLE, service_origins=[])
 
@@ -68,7 +68,7 @@ class PlatformAsked(BaseModel):
     service_origins: list[Address] = Field(
         [],
         max_length=20,
-        description="Where else its services may be asked than at the three addresses.",
+        description="Other addresses of its services, in addition to the three addresses.",
         examples=[["https://school.instructure.com"]],
     )
 
@@ -76,9 +76,9 @@ class PlatformAsked(BaseModel):
 class CoursePlatformShape(Shape):
     """The platform that a course is launched from."""
 
-    name: str | None = Field(description="Null where there is none.")
-    members: bool = Field(description="Whether it tells who its members are.")
-    marks: bool = Field(description="Whether it takes marks.")
+    name: str | None = Field(description="Null if there is none.")
+    members: bool = Field(description="Whether it provides its members.")
+    marks: bool = Field(description="Whether it accepts marks.")
 
     model_config = like(name="Moodle", members=True, marks=True)
 

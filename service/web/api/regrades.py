@@ -33,7 +33,7 @@ _CSV = {"requestBody": {"required": True, "content": {"text/csv": {"schema": {"t
 Form = Annotated[
     str, Query(alias="format", max_length=40, description=f"One of {', '.join(sorted(FORMATS))}.", examples=["csv"])
 ]
-Published = Annotated[bool, Query(description="Only grades that are published.")]
+Published = Annotated[bool, Query(description="Published grades only.")]
 
 
 class RegradeAsked(BaseModel):
@@ -42,7 +42,7 @@ class RegradeAsked(BaseModel):
     assignment: str = Field(
         "",
         max_length=100,
-        description="An assignment as the course or the catalogue has it now; empty: as each was graded before.",
+        description="Use the current version of this assignment; if empty, use the version of each earlier grade.",
         examples=["shape-recognition"],
     )
 
@@ -72,7 +72,7 @@ class CriterionChangeShape(Shape):
     title: str
     before: tuple[float, float] | None
     after: tuple[float, float] | None
-    by_hand: bool = Field(description="What somebody set counts in place of the new grade's marks.")
+    by_hand: bool = Field(description="Whether staff adjustments replace the new marks.")
 
 
 class ChangeShape(Shape):
@@ -110,7 +110,9 @@ class ChangeShape(Shape):
 class PublishAsked(BaseModel):
     """How grades are published."""
 
-    anyway: bool = Field(False, description="Also where a criterion could not be judged: it gives no marks.")
+    anyway: bool = Field(
+        False, description="Also publish grades with a criterion that could not be judged; it gives no marks."
+    )
 
 
 class PublishedShape(Shape):
@@ -191,12 +193,12 @@ def export(
 async def worksheet(
     request: Request, here: Reads, context: Context, batch_id: RowName, published: Published = False
 ) -> Response:
-    """Moodle's grading worksheet, which is sent, with the grades in it; changes nothing here."""
+    """The uploaded Moodle grading worksheet with the grades filled in; stored data stays unchanged."""
     given = await request.body()
     try:
         text = given.decode("utf-8")
     except UnicodeDecodeError:
-        raise HTTPException(422, "The worksheet is not UTF-8; expected it as Moodle wrote it.") from None
+        raise HTTPException(422, "The worksheet is not in UTF-8; upload the original file from Moodle.") from None
     asked = ExportRequest("moodle-worksheet", published, text)
     return await run_in_threadpool(_file, context, here, batch_id, asked)
 

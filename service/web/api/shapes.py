@@ -61,7 +61,7 @@ class CourseShape(Shape):
 class RefusalShape(Shape):
     """A rejected submission of a batch, and the reason."""
 
-    source: str = Field(description="The name that it came under.")
+    source: str = Field(description="Name of the submitted file or folder.")
     sentence: str
     assignment: str = ""
 
@@ -70,12 +70,12 @@ class JobShape(Shape):
     """One grading of one submission, as a table of a batch has it."""
 
     id: str
-    student: str = Field(description="What the course knows them by; a number where names are hidden.")
+    student: str = Field(description="ID in the course; a number if names are hidden.")
     name: str
-    source: str = Field(description="The name that it came under.")
+    source: str = Field(description="Name of the submitted file or folder.")
     assignment: str
     state: JobState
-    standing: Standing = Field(description="Of a submission's grades the one that `stands` counts.")
+    standing: Standing = Field(description="The current grade of a submission is the one that `stands`.")
     verdict: str | None
     marks: float | None
     max_marks: float
@@ -85,11 +85,11 @@ class JobShape(Shape):
     finished_at: datetime | None
     published_at: datetime | None
     days_late: int
-    staff_only: str | None = Field(description="The limit that the submission was over; it is shown to no student.")
-    suspect: str | None = Field(description="Why the grade is not to be trusted.")
-    missing: str = Field(description="The part that was asked for and not submitted.")
-    copied_from: str | None = Field(description="The identical grade that was run.")
-    unjudged: int = Field(description="Criteria that could not be judged; somebody has to look.")
+    staff_only: str | None = Field(description="The limit that the submission exceeds; hidden from students.")
+    suspect: str | None = Field(description="Why the grade can be wrong.")
+    missing: str = Field(description="The required part that was not submitted.")
+    copied_from: str | None = Field(description="The original of an identical grade.")
+    unjudged: int = Field(description="Criteria that could not be judged and need review.")
 
     model_config = like(
         id="7xk2v9q4m0ab",
@@ -127,8 +127,8 @@ class BatchShape(Shape):
     states: dict[JobState, int]
     refusals: list[RefusalShape]
     regrade_of: str | None = Field(description="The batch whose submissions these are.")
-    web_assignment: str | None = Field(description="The assignment that students submitted these to on the web.")
-    takes_in: bool = Field(description="More may come: the assignment is open.")
+    web_assignment: str | None = Field(description="The assignment of these web submissions.")
+    takes_in: bool = Field(description="Whether the assignment is open for more submissions.")
 
     model_config = like(**BATCH_EXAMPLE)
 
@@ -141,8 +141,8 @@ class CriterionShape(Shape):
     marks: float
     max_marks: float
     message: str
-    for_staff: str = Field(description="Where somebody should look; told to staff alone.", default="")
-    set_by_hand: dict[str, Any] | None = Field(description="What an instructor set, and why.", default=None)
+    for_staff: str = Field(description="Notes for staff about parts that need review.", default="")
+    set_by_hand: dict[str, Any] | None = Field(description="The adjustment by staff, and the reason.", default=None)
 
 
 class TrialShape(Shape):
@@ -151,10 +151,10 @@ class TrialShape(Shape):
     scenario: str
     seed: int
     verdict: str
-    sha256: str = Field(description="Of the recording; the same work gives the same.")
+    sha256: str = Field(description="Hash of the recording; the same submission gives the same hash.")
     spoken: list[str]
     messages: list[dict[str, Any]]
-    partner: dict[str, Any] | None = Field(description="The same of a second robot.", default=None)
+    partner: dict[str, Any] | None = Field(description="The same for the second robot.", default=None)
     notes: list[str]
 
     model_config = ConfigDict(extra="allow")
@@ -183,10 +183,10 @@ class GradeShape(Shape):
     trials: list[TrialShape]
     accuracy: AccuracyShape | None
     notes: list[str]
-    comments: list[dict[str, Any]] = Field(description="What instructors wrote.", default=[])
+    comments: list[dict[str, Any]] = Field(description="Comments by instructors.", default=[])
     missing: str = ""
     cost: dict[str, Any] | None = None
-    withheld: bool = Field(description="Whether there is more to it than is shown to the token's owner now.")
+    withheld: bool = Field(description="Whether parts of it are hidden from the token's owner.")
 
     model_config = ConfigDict(
         json_schema_extra={

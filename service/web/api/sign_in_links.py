@@ -19,7 +19,7 @@ from service.web.context import Context, WebContext
 
 router = api_router("people")
 Manages = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "manage"))]
-_WHERE = "Where ROBOMARK_PUBLIC_URL says how browsers reach the server."
+_WHERE = "Empty unless ROBOMARK_PUBLIC_URL is set."
 
 
 class LinkShape(Shape):
@@ -47,7 +47,7 @@ class StudentLinkShape(Shape):
     path: str | None
     url: str | None = Field(description=_WHERE)
     expires_at: datetime | None
-    reason: str = Field(description="Why there is no link; empty where there is one.")
+    reason: str = Field(description="Why there is no link; empty if there is a link.")
 
 
 class StudentLinksShape(Shape):

@@ -34,7 +34,9 @@ class AlikeSourcesShape(Shape):
     """Two sources that are alike."""
 
     files: tuple[str, str]
-    shares: tuple[float, float] = Field(description="The part of each one's own code that the other has too.")
+    shares: tuple[float, float] = Field(
+        description="The share of each student's own code that the other student also has."
+    )
     stretches: list[StretchShape]
 
 
@@ -43,7 +45,7 @@ class TrialNameShape(Shape):
 
     scenario: str
     index: int
-    noisy: bool = Field(description="Whether light, motors or the channel had chance in them.")
+    noisy: bool = Field(description="Whether light, motors or the channel had random noise.")
 
 
 class SameInTrialShape(Shape):
@@ -51,15 +53,15 @@ class SameInTrialShape(Shape):
 
     trial: TrialNameShape
     aspect: Aspect
-    sharing: int = Field(description="How many students did so.")
-    students: int = Field(description="How many did anything there.")
+    sharing: int = Field(description="Number of students with this behaviour.")
+    students: int = Field(description="Number of students with any behaviour in this trial.")
 
 
 class SimilarPairShape(Shape):
     """Two students whose work is alike."""
 
     students: tuple[str, str]
-    share: float = Field(description="The largest part of a source that is in the other's.")
+    share: float = Field(description="The largest share of a source that is also in the other source.")
     sources: list[AlikeSourcesShape]
     trials: list[SameInTrialShape]
 
@@ -70,10 +72,10 @@ class SimilarityShape(Shape):
     assignment: str
     students: int
     pairs: list[SimilarPairShape]
-    too_short: list[str] = Field(description="Who has too little of their own code to compare.")
-    same: list[list[str]] = Field(description="Groups who have a whole file in common, however many they are.")
+    too_short: list[str] = Field(description="Students with too little own code to compare.")
+    same: list[list[str]] = Field(description="Groups of any size with a whole file in common.")
     same_recordings: list[list[str]] = Field(description="Groups whose recordings of all trials are the same.")
-    not_compared: int = Field(description="Pairs of sources that were too many to compare.")
+    not_compared: int = Field(description="Number of pairs that were not compared because there were too many.")
 
 
 class SimilaritiesShape(Shape):

@@ -36,12 +36,12 @@ class TryoutShape(Shape):
     assignment: str
     state: TryoutState
     queued_at: datetime
-    before: int = Field(description="How many are run before it.")
+    before: int = Field(description="Number of test runs ahead in the queue.")
     said: dict[str, Any] | None = Field(
         description="What came of it, once it is done: `happened`, `whose`, `seconds`, `lines` as [time, text], "
         "`faults`; or `refused`, why it cannot be run."
     )
-    error: str = Field(description="Why it could not be run, through no fault of the program.")
+    error: str = Field(description="Why the system could not run it.")
 
     model_config = like(
         id="7xk2v9q4m0ab",

@@ -41,7 +41,7 @@ class WebhookShape(Shape):
 class NewWebhookShape(WebhookShape):
     """A new webhook, with what its deliveries are signed with."""
 
-    secret: str = Field(description="Told this once.")
+    secret: str = Field(description="Shown only once.")
 
     model_config = like(
         id="5h2n8q0v3w7x",
@@ -66,7 +66,9 @@ class DeliveryShape(Shape):
     webhook_id: str
     event: WebhookEvent
     made_at: datetime
-    due_at: datetime | None = Field(description="When it is tried next; null when it has arrived or was given up.")
+    due_at: datetime | None = Field(
+        description="Time of the next delivery attempt; null if it was delivered or abandoned."
+    )
     attempts: int
     delivered_at: datetime | None
     error: str | None

@@ -263,7 +263,7 @@ def test_members_are_enrolled_and_published_marks_sent(launched: tuple[Web, Lear
     with web.store.transaction() as session:
         session.execute(update(Job).values(published_at=datetime.now(UTC), published_by="grace"))
     for _ in range(2):
-        assert "1 published marks" in grace.post("/courses/1/platform/marks", data=send).text
+        assert "1 published mark sent" in grace.post("/courses/1/platform/marks", data=send).text
     assert len(platform.columns) == 1
     graded = report_builders.faulty_grade()
     assert [(each["userId"], each["scoreGiven"], each["scoreMaximum"]) for each in platform.scores] == [
@@ -281,4 +281,4 @@ def test_a_platform_that_does_not_answer_is_said_so(launched: tuple[Web, Learnin
         session.execute(update(LtiCourse).values(members_url=f"{platform.url}/nowhere"))
     answer = grace.post("/courses/1/platform/members", data={CSRF_FIELD: csrf(grace.get("/account"))})
     assert answer.status_code == 502
-    assert re.search(r"The platform at 127.0.0.1:\d+ answered 403", answer.text)
+    assert re.search(r"The platform at 127.0.0.1:\d+ returned status 403", answer.text)
