@@ -270,7 +270,7 @@ def retry_dead(service: Service, actor: Actor, batch_id: str | None) -> Retried:
 
 def _none_taken_in(refusals: Sequence[Refusal]) -> UsageError:
     first = refusals[0].sentence if refusals else "there are none"
-    return UsageError(f"none of {len(refusals)} submissions can be taken in; {first}")
+    return UsageError(f"none of {len(refusals)} submissions can be accepted; {first}")
 
 
 def _record_submission(actor: str, refused: int, session: Session, accepted: AcceptedNew) -> None:

@@ -78,7 +78,7 @@ def remove_student(session: Session, enrolment_id: int, actor: str) -> None:
     """
     if has_submitted(session, enrolment_id):
         student = session.get_one(Enrolment, enrolment_id).student
-        raise UsageError(f"{student} has submitted something; robomark course delete-student removes that, too")
+        raise UsageError(f"{student} has submissions; to delete them too, use robomark course delete-student")
     erase_student(session, enrolment_id, actor)
 
 
@@ -102,7 +102,9 @@ def erase_student(session: Session, enrolment_id: int, actor: str) -> Purged:
         raise UsageError(f"{enrolment.student} is not a student of this course")
     running = (Job.enrolment_id == enrolment_id, Job.state == JobState.RUNNING)
     if session.scalar(select(Job.id).where(*running).limit(1)) is not None:
-        raise UsageError(f"a submission of {enrolment.student} is being graded; wait until it is, or cancel it")
+        raise UsageError(
+            f"a submission of {enrolment.student} is being graded; wait until grading is completed, or cancel it"
+        )
     _TEMPORARY.create_all(session.connection())
     own = select(SubmissionRow.id).where(SubmissionRow.enrolment_id == enrolment_id)
     session.execute(insert(_GOING).from_select(["id"], own))

@@ -261,7 +261,7 @@ def test_only_who_is_there_is_found(store: Store) -> None:
         assert students.find(" Ada  Lovelace") == known
         with pytest.raises(UsageError, match='did you mean "Ada Lovelace"'):
             students.find("Ada Lovelance")
-        with pytest.raises(UsageError, match="there is no student 'bob' in this course; robomark course enrol"):
+        with pytest.raises(UsageError, match="there is no student 'bob' in this course; to enrol a student"):
             students.find("bob")
 
 

@@ -147,7 +147,7 @@ def accept_batch(
         terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at, secret, anew=True)
         items, refused = _enrolled(session, packed, terms)
         if refused and not items:
-            raise UsageError(f"none can be taken in; {refused[0].source}: {refused[0].reason}")
+            raise UsageError(f"no submission can be accepted; {refused[0].source}: {refused[0].reason}")
         made = replace(_accept_batch(session, items, name, [*refusals, *refused], terms), refused=refused)
         if record is not None:
             record(session, AcceptedNew(made, (), refused))

@@ -89,9 +89,9 @@ def remove(session: Session, course_id: int, assignment: str) -> None:
     """
     row = _there(session, course_id, assignment)
     if row.opened_at is not None:
-        raise UsageError(f"{assignment}: students have been shown it, so it stays; it can be closed")
+        raise UsageError(f"{assignment}: students have already seen it, so it cannot be removed; close it instead")
     if row.names_hidden:
-        raise UsageError(f"{assignment}: without it, names that are hidden would be shown; show them first")
+        raise UsageError(f"{assignment}: removing it would show hidden names; show the names first")
     session.delete(row)
     session.flush()
     policies.drop_policy(session, course_id, assignment)

@@ -65,7 +65,7 @@ class Exceeded:
             case "date":
                 return f"{in_days(self.actual)} late, allowed: {self.allowed}"
             case "cool-down":
-                return f"submitted {self.actual} min after the one before, asked for: {self.allowed} min"
+                return f"submitted {self.actual} min after the previous submission, required: {self.allowed} min"
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,7 +46,7 @@ class Students:
         """
         own, written = shown_name(student.id), unicodedata.normalize("NFC", student.id)
         if not own:
-            raise UsageError("this names no student, expected a name that can be seen.")
+            raise UsageError("the name of the student is empty, expected visible characters.")
         found = self._enrolled(own)
         if found is None:
             others = self._near(own)
@@ -90,7 +90,7 @@ class Students:
         if found is not None:
             return found.id
         known = self._session.scalars(select(Enrolment.student).where(Enrolment.course_id == self._course_id))
-        hint = did_you_mean(written, known) or "; robomark course enrol lets in who has not submitted anything"
+        hint = did_you_mean(written, known) or "; to enrol a student without submissions, use robomark course enrol"
         raise UsageError(f"there is no student {shown(written)!r} in this course{hint}")
 
     def _enrolled(self, own: str) -> Enrolment | None:

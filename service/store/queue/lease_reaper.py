@@ -42,7 +42,7 @@ def requeue_lost(store: Store, retry: Retry) -> int:
         query = select(Job.id, Job.lease, Job.attempt, Job.max_attempts, Job.worker).where(*lost)
         rows = session.execute(query.order_by(Job.id).with_for_update(skip_locked=True, key_share=True)).all()
         for job_id, lease, attempt, max_attempts, worker in rows:
-            reason = f"the worker {worker} fell silent while it graded; its log may tell why"
+            reason = f"the worker {worker} stopped responding during grading; see its log for details"
             jobs.fault(session, Claim(job_id, lease or "", attempt, max_attempts, at), reason, retry, at)
         return len(rows)
 

@@ -24,7 +24,7 @@ MOST_AN_HOUR = 30
 #: The first death of a worker is retried; a second one is attributed to the program.
 MOST_ATTEMPTS = 2
 _KEPT = timedelta(days=1)
-_SILENT = "Whatever ran it fell silent twice; whoever runs the installation finds more in its log."
+_SILENT = "The worker stopped responding twice. An operator can find details in the log of the worker."
 _UNFINISHED = (TryoutState.QUEUED.value, TryoutState.RUNNING.value)
 
 

@@ -19,7 +19,7 @@ from service.web.context import Context, WebContext
 
 router = api_router("people")
 Manages = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "manage"))]
-_WHERE = "Empty unless ROBOMARK_PUBLIC_URL is set."
+_WHERE = "Null unless ROBOMARK_PUBLIC_URL is set."
 
 
 class LinkShape(Shape):

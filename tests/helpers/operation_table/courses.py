@@ -268,7 +268,7 @@ ROWS = {
     "close none": _assignment("close", assignments.close, "echo-typo", (422, "echo-typo")),
     "remove an assignment": _assignment("remove", assignments.remove, "json-queue"),
     "remove what students have been shown": _assignment(
-        "remove", assignments.remove, "echo-responder", (422, "have been shown it")
+        "remove", assignments.remove, "echo-responder", (422, "have already seen it")
     ),
     "hide names": _names("hide", True),
     "show names": _names("show", False),

@@ -158,7 +158,7 @@ def test_lost_workers_cost_attempts_and_end_with_a_reason(store: Store) -> None:
         assert requeue_lost(store, NO_WAIT) == 1
     job = _job(store, job_id)
     assert job.state is JobState.DEAD
-    assert "the worker two fell silent" in (job.error or "")
+    assert "the worker two stopped responding" in (job.error or "")
     assert requeue_lost(store, NO_WAIT) == 0
 
 

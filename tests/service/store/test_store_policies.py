@@ -142,7 +142,7 @@ def test_a_cool_down_counts_from_the_one_before(store: Store) -> None:
     assert _request(store, 1, DUE).staff_only == ""
     _grade_all(store)
     over = _request(store, 2, DUE + timedelta(minutes=9))
-    assert over.staff_only == "submitted 9 min after the one before, asked for: 10 min"
+    assert over.staff_only == "submitted 9 min after the previous submission, required: 10 min"
     # A submission over the limit does not count itself.
     assert _request(store, 3, DUE + timedelta(minutes=10)).staff_only == ""
 
