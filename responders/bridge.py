@@ -23,15 +23,16 @@ from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.chance import Stream
 from sim.drive import Wheel
-from sim.recording import MILLISECOND, SECOND, STAND_IN, Fault, Image, Line, Verdict
+from sim.recording import MILLISECOND, SECOND, STAND_IN, Fault, Image, Line, ProgramLine, Verdict
 from sim.world import Chain, World
 
 _READ = 10 * MILLISECOND
 _WORDS_A_MINUTE = 130
 #: Maximum number of actions without a wait. The child counts too and can report the line. One motor action there may
-#: arrive here as two.
-_FREE_ACTS = 200_100
+#: arrive here as two, after the line that it is on.
+_FREE_ACTS = 300_100
 _MOST_NOTES = 200
+_MOST_PLACES = 20_000
 
 
 class _Cut(Exception):
@@ -68,6 +69,7 @@ class Bridge:
         self.images: list[Image] = []
         self.image_log: list[tuple[str, str, int]] = []
         self.notes: list[str] = []
+        self.places: list[ProgramLine] = []
         self._limit = round(spec.seconds * SECOND)
         self._said_until = 0
         self._arrived: list[str] = []
@@ -173,6 +175,10 @@ class Bridge:
                     wheel.run(command, self.world.clock)
             elif type(kind) is packed.Read:
                 self._read(kind.what, int(number) * _READ)
+            elif type(kind) is packed.Place:
+                self._free_act()
+                if len(self.places) < _MOST_PLACES:
+                    self.places.append(ProgramLine(self.now / SECOND, *packed.lines_of(number)))
             else:
                 self._advance(int(number))
                 self._reply(None)

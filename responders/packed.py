@@ -33,7 +33,11 @@ class MotorCommand(NamedTuple):
     command: str | None
 
 
-Kind = Read | Wait | MotorCommand
+class Place(NamedTuple):
+    """The program has come to another line. The number contains two lines: the innermost and the outermost."""
+
+
+Kind = Read | Wait | MotorCommand | Place
 Act = tuple[Kind, float]
 
 #: First byte of a packet. A line begins with a brace.
@@ -46,7 +50,9 @@ HEADER_BYTES = _HEADER.size
 _PORTS = ("outB", "outC")
 _SET_POINTS = ("", "speed_sp", "position_sp", "position", "time_sp")
 _COMMANDS = (None, "", "reset", "run-forever", "run-timed", "run-to-rel-pos", "run-to-abs-pos", "run-direct")
-_READ, _WAIT, _MOVE = range(3)
+_READ, _WAIT, _MOVE, _LINE = range(4)
+#: The factor of the outermost line in the number of a place.
+_MOST_LINES = 1 << 20
 
 
 def _code(what: int, part: int = 0, set_point: int = 0, command: int = 0) -> int:
@@ -56,6 +62,7 @@ def _code(what: int, part: int = 0, set_point: int = 0, command: int = 0) -> int
 #: All actions by code: kind, smallest and largest number, and whether the number must be whole.
 _KINDS: dict[int, tuple[Kind, float, float, bool]] = {
     _code(_WAIT): (Wait(), 0, MOST_UNITS, True),
+    _code(_LINE): (Place(), 1, _MOST_LINES**2, True),
     **{_code(_READ, part): (Read(what), 1, 2, True) for part, what in enumerate(SENSORS)},
     **{
         _code(_MOVE, part, place, number): (MotorCommand(port, set_point, command), -LARGEST, LARGEST, False)
@@ -95,6 +102,12 @@ def acts_of(packet: bytes) -> list[Act]:
             raise WireError("an act that there is not")
         acts.append((kind, number))
     return acts
+
+
+def lines_of(place: float) -> tuple[int, int]:
+    """Return the innermost and the outermost line in the number of a place."""
+    outer, inner = divmod(int(place), _MOST_LINES)
+    return inner, outer
 
 
 def pack_readings(units: int, values: Sequence[float], number: int) -> bytes:

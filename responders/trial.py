@@ -98,4 +98,5 @@ def recording_of(spec: TrialSpec, bridge: Bridge, faults: tuple[Fault, ...], san
         pen=((0, True),) if spec.pen_down else (),
         sandbox=sandbox,
         notes=tuple(bridge.notes)[:MOST_NOTES],
+        places=tuple(bridge.places),
     )

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 
 from sim.columns import Panel, column, columns_of
 
@@ -158,6 +158,17 @@ class Line:
 
     t: float
     text: str
+
+
+class ProgramLine(NamedTuple):
+    """The program came to another line at a time in seconds.
+
+    ``line`` is the innermost line of its file, ``outer`` the line outside all functions that led there, or 0.
+    """
+
+    t: float
+    line: int
+    outer: int
 
 
 #: Prefix of the simulator's answers when there is no responder; the text itself follows.
@@ -338,3 +349,4 @@ class Recording:
     agent_outputs: tuple[AgentOutput, ...] = ()  # of every agent, in the assignment's order
     partner: Recording | None = None
     cell_errors: tuple[Fault, ...] = ()  # of a notebook: the first cells that failed, even if the run continued
+    places: tuple[ProgramLine, ...] = field(default=(), compare=False, repr=False)  # for hints; neither hashed nor stored

@@ -24,7 +24,7 @@ _WAITS = frozenset({"until", "until_said", "paid_motor"})
 
 #: Packed format for frequent actions: kind, part of the robot, set point and command of a motor, and a value.
 _packed = struct.Struct("<BBBBd").pack
-_READ, _WAIT, _MOTOR = range(3)
+_READ, _WAIT, _MOTOR, _LINE = range(4)
 _PORTS = {"outB": 0, "outC": 1}
 _SET_POINTS = {"speed_sp": 1, "position_sp": 2, "position": 3, "time_sp": 4}
 _COMMANDS = {
@@ -72,14 +72,23 @@ class Link:
         self._seen: list[float] = []  # sensor readings, valid until _seen_until
         self._seen_until = 0
         self._tick = SECOND
+        self._place: Callable[[], int] = int
+        self._told_place = 0
 
-    def connect(self, wire: Wire, stuck: Callable[[], None], sensors: Mapping[str, int], tick: int) -> None:
-        """Connect to the world. ``stuck`` ends a program that never waits.
+    def connect(
+        self,
+        wire: Wire,
+        stuck: Callable[[], None],
+        sensors: Mapping[str, int],
+        tick: int,
+        place: Callable[[], int] = int,
+    ) -> None:
+        """Connect to the world. ``stuck`` ends a program that never waits. ``place`` returns the current line.
 
         For each read of one of ``sensors``, the world sends the values of all sensors in this order. The number given
         for a sensor is the length of its list of values; 0 means a single value. Values change every ``tick``.
         """
-        self._wire, self._stuck, self._tick = wire, stuck, tick
+        self._wire, self._stuck, self._tick, self._place = wire, stuck, tick, place
         start = 0
         for index, (name, width) in enumerate(sensors.items()):
             where = slice(start, start + width) if width else start
@@ -90,6 +99,7 @@ class Link:
     def tell(self, frame: Frame) -> None:
         """Send a notification that needs no answer."""
         self.read_freely()
+        self._tell_place()
         self._wire.send(frame)
 
     def set_motor(
@@ -97,6 +107,7 @@ class Link:
     ) -> None:
         """Send set points and a command with the next wait. They take effect only when the world moves."""
         self.read_freely()
+        self._tell_place()
         if command not in _COMMANDS:
             raise ValueError(
                 f"a motor has no command {command!r}: expected one of {', '.join(filter(None, _COMMANDS))}"
@@ -115,6 +126,7 @@ class Link:
     def run_forever(self, port: str, speed: float) -> None:
         """Set a speed and run. This is a fast path of ``set_motor`` for programs that steer all the time."""
         self.read_freely()
+        self._tell_place()
         self._wire.act_later(_packed(_MOTOR, _PORTS[port], _SET_POINTS["speed_sp"], _COMMANDS["run-forever"], speed))
 
     def ask(self, frame: Frame) -> Any:
@@ -123,8 +135,16 @@ class Link:
             self._free = 0
         else:
             self.read_freely()
+        self._tell_place()
         self._wire.send(frame)
         return self._answer()
+
+    def _tell_place(self) -> None:
+        """Send the line of the program that is running, if it has changed since the last action."""
+        place = self._place()
+        if place != self._told_place:
+            self._told_place = place
+            self._wire.act_later(_packed(_LINE, 0, 0, 0, place))
 
     def _answer(self) -> Any:
         answer = self._wire.receive()
@@ -143,6 +163,7 @@ class Link:
         """
         packed, lasts, where = self._sensors[what, times]
         self._free = 0
+        self._tell_place()
         end = self.units + lasts
         if end < self._seen_until:
             self.units = end
@@ -171,6 +192,7 @@ class Link:
     def wait_units(self, units: int) -> None:
         """Let the world move for this time in thirds of a microsecond, at most the maximum wait."""
         self._free = 0
+        self._tell_place()
         self._wire.act(_packed(_WAIT, 0, 0, 0, min(units, MOST_UNITS)))
         self._answer()
 

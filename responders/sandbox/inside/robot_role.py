@@ -66,7 +66,7 @@ def run(wire: Wire, grants: Grants) -> None:
 
     signal.signal(signal.SIGXCPU, busy)
     link.number = spec.get("number", 1)
-    link.connect(wire, stuck, spec["sensors"], spec["tick"])
+    link.connect(wire, stuck, spec["sensors"], spec["tick"], files.lines_in_main)
     student_code.install_output(emit)
     student_code.install_warnings(told)
     determinism.install_clock(now, sleep)

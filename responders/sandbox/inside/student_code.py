@@ -20,6 +20,8 @@ from .near_names import meant_by
 from .statement_watch import StatementWatch
 
 _MOST_WARNINGS, _LONGEST_WARNING = 20, 180
+#: The factor of the outermost line in a packed place, and how many frames are searched for it.
+MOST_LINES, _MOST_FRAMES = 1 << 20, 40
 Namespace = dict[str, Any]
 
 
@@ -66,6 +68,19 @@ class StudentFiles:
                 return frame.f_lineno
             frame = frame.f_back
         return None
+
+    def lines_in_main(self) -> int:
+        """Return the innermost and the outermost running line of the main file, packed into one positive number."""
+        inner = outer = 0
+        frame: FrameType | None = sys._getframe(1)
+        for _ in range(_MOST_FRAMES):
+            if frame is None:
+                break
+            if frame.f_code.co_filename == self.main:
+                outer = frame.f_lineno
+                inner = inner or outer
+            frame = frame.f_back
+        return max(inner, 1) + outer * MOST_LINES
 
     def described(self, error: BaseException) -> Frame:
         """Return the error as a frame: type, text, last student line on its way, and a hint."""

@@ -64,7 +64,7 @@ def to_bytes(recording: Recording) -> bytes:
     words: dict[str, Any] = {
         field.name: encode(getattr(recording, field.name))
         for field in fields(recording)
-        if field.name not in ("ticks", "images", "partner")
+        if field.name not in ("ticks", "images", "partner", "places")
     }
     words["ticks"] = _of_all_ticks(ticks)
     words["images"] = [encode(replace(image, left=b"", right=b"")) for image in recording.images]
