@@ -6,8 +6,8 @@ Student code is split into tokens, not parsed, so the cost is bounded by the len
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence, Set
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from service.grading.grade import CriterionResult, TrialResult
@@ -15,6 +15,7 @@ from service.grading.hint_code import CodeStatements, read_code
 from service.grading.run_plan import RunPlan
 from sim.recorded import faults_of, stood_still
 from sim.recording import Fault, Message, Recording
+from submissions.assignment.definition import Assignment
 from submissions.criteria import Criterion
 from submissions.raw_files import shown
 from submissions.source_text import is_program_magic, magic_place
@@ -74,6 +75,9 @@ class Clues:
         ignored_magic: Why its magic line is ignored.
         idle_responder: The first line of a Raw cell that contains a responder.
         assignment: The id of the assignment.
+        definition: The assignment.
+        shown: The visible trials.
+        by_trial: Their recordings, by the index of the trial in the grade.
     """
 
     listings: tuple[Listing, ...]
@@ -92,6 +96,9 @@ class Clues:
     idle_responder: str = ""
     agents: frozenset[str] = frozenset()
     assignment: str = ""
+    definition: Assignment | None = None
+    shown: tuple[TrialResult, ...] = ()
+    by_trial: Mapping[int, Recording] = field(default_factory=dict)
 
     @property
     def cell_errors(self) -> tuple[Fault, ...]:
@@ -128,6 +135,12 @@ class Clues:
             for each in self.lost
         )
         return asked or any(listing.find(_QUEUE) for listing in self.of("program"))
+
+    @property
+    def dearest(self) -> list[Criterion]:
+        """The visible criteria that lost marks, the costliest first."""
+        results = {each.id: each for each in self.results}
+        return sorted(self.lost, key=lambda each: results[each.id].marks - results[each.id].max_marks)
 
     @property
     def stood_still(self) -> bool:
@@ -212,6 +225,9 @@ def clues_of(
         submission.notebook.raw_responders[0] if submission.notebook and submission.notebook.raw_responders else "",
         frozenset(plan.agents),
         plan.assignment.id,
+        plan.assignment,
+        tuple(trial for trial in trials if trial.visibility == "visible"),
+        {index: trials[index].recording for index in seen},
     )
 
 
@@ -255,6 +271,12 @@ def _different(texts: Iterator[str]) -> tuple[str, ...]:
         if len(found) == _MOST_TEXTS:
             break
     return tuple(found)
+
+
+def finding_of(clues: Clues, criterion: Criterion) -> str:
+    """Return the message of the first failure of a criterion that lost marks."""
+    result = next(each for each in clues.results if each.id == criterion.id)
+    return next((each.message for each in result.evidence if not each.passed and each.message), result.message)
 
 
 def listing_of(fault: Fault, clues: Clues) -> Listing | None:

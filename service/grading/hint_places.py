@@ -8,9 +8,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from service.grading.grade import CriterionResult
 from service.grading.hint_advice import MOVES_FOR, PROPERTIES
-from service.grading.hint_clues import Clues
+from service.grading.hint_clues import Clues, finding_of
 from service.grading.hint_functions import of_wrong_values
 from service.grading.hint_motion import STOPPED
 from service.grading.hint_structure import DRIVEN, moves, statements_of
@@ -31,20 +30,14 @@ _EXPECTED = re.compile(r"Expected ")
 
 def of_places(clues: Clues) -> Iterator[str]:
     """Yield the result of the criterion that lost most, prefixed with its line."""
-    results = {each.id: each for each in clues.results}
-    dearest = sorted(clues.lost, key=lambda each: results[each.id].marks - results[each.id].max_marks)
-    for criterion in dearest[:1]:
-        found = _finding(results[criterion.id])
+    for criterion in clues.dearest[:1]:
+        found = finding_of(clues, criterion)
         if isinstance(criterion, Functions) and _EXPECTED.match(found):
             yield of_wrong_values(criterion.function, found)
             return
         where = _place(criterion, found, clues) if _EXPECTED.match(found) else ""
         if where:
             yield f"{where}: {found[0].lower()}{found[1:].rstrip('.')}"
-
-
-def _finding(result: CriterionResult) -> str:
-    return next((each.message for each in result.evidence if not each.passed and each.message), result.message)
 
 
 def _place(criterion: Criterion, told: str, clues: Clues) -> str:

@@ -27,6 +27,7 @@ from service.grading.hint_files import of_ignored_magic, of_redefined, of_severa
 from service.grading.hint_formulas import of_division, of_gain, of_gyro_direction, of_radius, of_reversed_distance
 from service.grading.hint_functions import of_functions, of_no_return
 from service.grading.hint_loops import of_limits
+from service.grading.hint_moments import of_moments
 from service.grading.hint_motion import (
     of_curves,
     of_distances,
@@ -101,6 +102,7 @@ from service.grading.hint_unused import (
     of_swapped_ports,
     of_unread,
 )
+from service.grading.hint_what_if import of_what_if
 from service.grading.judging.bounded import sentences_within
 from service.grading.judging.message_parts import quoted
 from service.grading.run_plan import RunPlan
@@ -196,6 +198,8 @@ _OF_RESULTS: Sequence[Rule] = (
     of_single_round,
     of_unread,
 )
+#: Rules for failures without a known mistake. The first that applies is used.
+_IF_NOTHING_ELSE: Sequence[Rule] = (of_other_cell_errors, of_several_programs, of_what_if, of_moments, of_places)
 _QUOTED = re.compile(r'"([^"]{6,60})"')
 _KEY = re.compile(r'"(\w+)"\s*:')
 _VARIES = re.compile(r"\d|[{}<>:]")
@@ -235,7 +239,7 @@ def near_misses(clues: Clues) -> tuple[str, ...]:
     still = () if errors or slips or limits or structure else tuple(of_stillness(clues))
     first = (*explained, *sent) if explained else (*sent, *errors)
     found = (*_found(_OF_FILES, clues), *first, *slips, *limits, *structure, *still, *_found(_OF_RESULTS, clues))
-    found = found or tuple(of_other_cell_errors(clues)) or tuple(of_several_programs(clues)) or tuple(of_places(clues))
+    found = found or next(filter(None, (tuple(rule(clues)) for rule in _IF_NOTHING_ELSE)), ())
     return tuple(dict.fromkeys(found))[:_MOST]
 
 
