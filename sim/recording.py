@@ -349,4 +349,6 @@ class Recording:
     agent_outputs: tuple[AgentOutput, ...] = ()  # of every agent, in the assignment's order
     partner: Recording | None = None
     cell_errors: tuple[Fault, ...] = ()  # of a notebook: the first cells that failed, even if the run continued
-    places: tuple[ProgramLine, ...] = field(default=(), compare=False, repr=False)  # for hints; neither hashed nor stored
+    places: tuple[ProgramLine, ...] = field(
+        default=(), compare=False, repr=False
+    )  # for hints; neither hashed nor stored

@@ -282,6 +282,8 @@ def finding_of(clues: Clues, criterion: Criterion) -> str:
 def listing_of(fault: Fault, clues: Clues) -> Listing | None:
     """Return the text that contains the fault; None if it is not one of the student's texts."""
     name = name_of(fault)
+    if name == SECOND_PROGRAM and not any(each.name == name for each in clues.texts):
+        name = "robot.py"  # one program runs on both robots
     return next((each for each in clues.texts if each.name == name), None)
 
 

@@ -10,8 +10,9 @@ import re
 from collections.abc import Iterator
 
 from service.grading.hint_clues import Clues, Listing
-from service.grading.hint_code import LOOPS, Statement, result_of
+from service.grading.hint_code import LOOPS, Statement, joined, result_of
 from service.grading.hint_errors import advised
+from service.grading.hint_relations import advice_on, read_value
 from sim.recording import Fault, Verdict
 from submissions.criteria.code import Functions
 from submissions.raw_files import shown
@@ -25,6 +26,59 @@ _CALLED = re.compile(r"Expected (\w+)\(")
 _LISTS = re.compile(r"to return (\[[^\]]+\]), but it returned (\[[^\]]*\])")
 _FAILED = re.compile(r"(?:but it did not|to be loaded, but): (\w+: .{1,300}?) \(line (\d+)\)")
 _NEAR = 0.75
+
+
+#: The expected value and the returned value.
+_VALUES = re.compile(r"to return (.+?), but it returned (.+?)(?: \(\d+ of \d+ calls right\))?\.?\Z", re.DOTALL)
+
+
+def of_returned_values(clues: Clues) -> Iterator[str]:
+    """Yield the line that makes a wrong value, and how the value differs from the expected one."""
+    messages = {each.id: each.message for each in clues.results}
+    for criterion in clues.dearest:
+        told = messages.get(criterion.id, "") if isinstance(criterion, Functions) else ""
+        called, values = _CALLED.search(told), _VALUES.search(told)
+        if called is None or values is None:
+            continue
+        advice = advice_on(read_value(values[1]), read_value(values[2]))
+        if not advice and values[2].startswith("[["):
+            advice = advice_on([], [[]])
+        making = _making(called[1], clues)
+        if making is not None:
+            listing, each = making
+            fix = advice or "Work this call out by hand, line by line, and compare"
+            yield f"{listing.at(each.line)}, {joined(each.tokens)}: {told[0].lower()}{told[1:].rstrip('.')}. {fix}"
+            return
+
+
+def of_narrow_except(clues: Clues) -> Iterator[str]:
+    """Yield a hint on an ``except`` that catches too few errors, if only hidden calls failed."""
+    for criterion in clues.dearest:
+        told = next((each.message for each in clues.results if each.id == criterion.id), "")
+        if not isinstance(criterion, Functions) or _HIDDEN not in told:
+            continue
+        for listing in clues.responders:
+            for each in listing.code.statements:
+                if each.keyword == "except" and len(each.tokens) > 2 and not each.has("Exception"):
+                    yield (
+                        f"{listing.at(each.line)} catches only {joined(each.tokens[1:]).rstrip(':')}. Another error, "
+                        "such as KeyError or TypeError, ends the function. Write except Exception:"
+                    )
+                    return
+
+
+def _making(name: str, clues: Clues) -> tuple[Listing, Statement] | None:
+    """Return the statement that makes the value of a function: its only append, otherwise its only computed return."""
+    for listing in clues.responders:
+        for head in listing.code.functions():
+            body = listing.code.body(head) if head.tokens[1] == name else ()
+            appends = [each for each in body if any(call.name.endswith(".append") for call in each.calls)]
+            returns = [each for each in body if each.keyword == "return" and len(each.tokens) > 1]
+            computed = [each for each in returns if len(each.tokens) > 2 or not each.tokens[1][0].isdigit()]
+            for found in (appends, computed, returns):
+                if len(found) == 1:
+                    return listing, found[0]
+    return None
 
 
 def of_functions(clues: Clues) -> Iterator[str]:

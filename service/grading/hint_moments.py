@@ -7,7 +7,7 @@ loop that ended, or the line that wrote the text.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from service.grading.grade import Evidence
@@ -69,6 +69,11 @@ def of_moments(clues: Clues) -> Iterator[str]:
             if hint:
                 yield hint
                 return
+
+
+def _rules() -> Sequence[Callable[[_Moment], str]]:
+    texts = _of_unwanted_text, _of_resending
+    return _of_duration, *texts, _of_other_sensor, _of_crossing, _of_loop_end, _of_steering
 
 
 def _moment(clues: Clues, criterion: Criterion) -> _Moment | None:

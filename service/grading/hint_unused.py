@@ -95,7 +95,9 @@ def _is_source(criterion: object) -> bool:
 
 def of_few_samples(clues: Clues) -> Iterator[str]:
     """Yield a hint on a log with too few samples, which may explain its other errors."""
-    for criterion in clues.lost:
+    # A robot that stopped too early could not log enough.
+    stopped = any(isinstance(each, StopOn) for each in clues.lost)
+    for criterion in () if stopped else clues.lost:
         told = next((each.message for each in clues.results if each.id == criterion.id), "")
         found = _FEW.search(told) if isinstance(criterion, Datalog) else None
         if found is None or found[2] == "0":

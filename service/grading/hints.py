@@ -25,7 +25,7 @@ from service.grading.hint_clues import LONGEST_TEXT, Clues, clues_of
 from service.grading.hint_errors import of_cell_errors, of_errors, of_other_cell_errors
 from service.grading.hint_files import of_ignored_magic, of_redefined, of_several_programs, of_starter, of_swapped_parts
 from service.grading.hint_formulas import of_division, of_gain, of_gyro_direction, of_radius, of_reversed_distance
-from service.grading.hint_functions import of_functions, of_no_return
+from service.grading.hint_functions import of_functions, of_narrow_except, of_no_return, of_returned_values
 from service.grading.hint_loops import of_limits
 from service.grading.hint_moments import of_moments
 from service.grading.hint_motion import (
@@ -199,7 +199,15 @@ _OF_RESULTS: Sequence[Rule] = (
     of_unread,
 )
 #: Rules for failures without a known mistake. The first that applies is used.
-_IF_NOTHING_ELSE: Sequence[Rule] = (of_other_cell_errors, of_several_programs, of_what_if, of_moments, of_places)
+_IF_NOTHING_ELSE: Sequence[Rule] = (
+    of_other_cell_errors,
+    of_several_programs,
+    of_returned_values,
+    of_narrow_except,
+    of_what_if,
+    of_moments,
+    of_places,
+)
 _QUOTED = re.compile(r'"([^"]{6,60})"')
 _KEY = re.compile(r'"(\w+)"\s*:')
 _VARIES = re.compile(r"\d|[{}<>:]")
