@@ -194,6 +194,19 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (r"^ValueError: negative seconds|sleep length must be non-negative", "Wait for 0 seconds or more."),
         (r"^RecursionError", "A function calls itself without end: use a loop, or return before it calls itself."),
         (r"^NameError: name '(\w+)'", "Assign a value to \\g<1> above this line, or correct its spelling."),
+        (
+            r"invalid literal for int\(\) with base 10: '[^']*\d[^']*'",
+            "The text contains more than the number: send the number alone, or remove the other words before int().",
+        ),
+        (r"module 'math' has no attribute 'PI'", "Did you mean math.pi?"),
+        (
+            r"inconsistent numbers of samples: \[(\d+), (\d+)\]",
+            r"There are \g<1> images and \g<2> labels: repeat the labels in the same way as the images.",
+        ),
+        (
+            r"did not contain a loop with signature matching types \(dtype\('<U",
+            "The labels are texts: use a classifier, such as MLPClassifier, and no regressor.",
+        ),
     )
 )
 

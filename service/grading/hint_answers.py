@@ -30,6 +30,8 @@ _NOTHING = re.compile(r"\bNone\b|\bnull\b")
 _TEXT_NUMBER = re.compile(r'"(\w+)"\s*:\s*"(-?\d+(?:\.\d+)?)"')
 _IMAGE_LOG = re.compile(r"image_data (?:left|right|both)\Z")
 _NEAR = 0.6
+#: The number of answers that show a constant shift.
+_ENOUGH = 2
 
 
 def of_other_keys(clues: Clues) -> Iterator[str]:
@@ -83,6 +85,32 @@ def of_none_answers(clues: Clues) -> Iterator[str]:
         )
 
 
+def of_shifted_numbers(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a number of the answers that is too large or too small by the same amount in every trial."""
+    reports = {each.id for each in clues.lost if isinstance(each, Reports) and each.source == "reply"}
+    for result in clues.results:
+        failed = [each.message for each in result.evidence if not each.passed] if result.id in reports else []
+        pairs = {found for each in failed if (found := _shift(each)) is not None}
+        if len(failed) < _ENOUGH or len(pairs) != 1:
+            continue
+        key, shift = pairs.pop()
+        where = _line_of_key([key], clues)
+        if where and shift:
+            fix = f"add {shift}" if shift > 0 else f"subtract {-shift}"
+            size = "small" if shift > 0 else "large"
+            yield f"{where}: {quoted(key)} is {abs(shift)} too {size} in every answer. Correct how it is counted: {fix}"
+            return
+
+
+def _shift(told: str) -> tuple[str, int] | None:
+    """Return the key and expected minus actual value of an answer; None if they are no whole numbers."""
+    asked, answer = _AFTER.search(told), told.partition(JSON)[2].rpartition('"')[0]
+    value = _object_of(JSON + answer).get(asked[2]) if asked is not None else None
+    if asked is None or not isinstance(value, int) or not asked[1].isdigit():
+        return None
+    return asked[2], int(asked[1]) - value
+
+
 def of_swapped_values(clues: Clues) -> Iterator[str]:
     """Yield a hint on a number that belongs to another key of the answer."""
     reports = {each.id for each in clues.lost if isinstance(each, Reports) and each.source == "reply"}
@@ -92,6 +120,8 @@ def of_swapped_values(clues: Clues) -> Iterator[str]:
             values = _object_of(answer)
             number, key = asked.groups() if asked else ("", "")
             other = next((each for each, value in values.items() if each != key and str(value) == number), None)
+            if any(True for _ in of_shifted_numbers(clues)):
+                return
             if other is None or key not in values or str(values[key]) == number:
                 continue
             where = _line_of_key([key], clues)

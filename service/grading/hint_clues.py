@@ -76,6 +76,7 @@ class Clues:
         idle_responder: The first line of a Raw cell that contains a responder.
         assignment: The id of the assignment.
         definition: The assignment.
+        practice: The results of visible criteria without marks, which show what the marked ones look at.
         shown: The visible trials.
         by_trial: Their recordings, by the index of the trial in the grade.
     """
@@ -97,6 +98,7 @@ class Clues:
     agents: frozenset[str] = frozenset()
     assignment: str = ""
     definition: Assignment | None = None
+    practice: tuple[CriterionResult, ...] = ()
     shown: tuple[TrialResult, ...] = ()
     by_trial: Mapping[int, Recording] = field(default_factory=dict)
 
@@ -226,6 +228,7 @@ def clues_of(
         frozenset(plan.agents),
         plan.assignment.id,
         plan.assignment,
+        tuple(_as_shown(each, seen) for each in results if each.visibility == "visible" and not each.max_marks),
         tuple(trial for trial in trials if trial.visibility == "visible"),
         {index: trials[index].recording for index in seen},
     )

@@ -17,6 +17,7 @@ from service.grading.hint_answers import (
     of_missing_key,
     of_none_answers,
     of_other_keys,
+    of_shifted_numbers,
     of_swapped_values,
     of_text_numbers,
 )
@@ -163,6 +164,7 @@ _OF_RESULTS: Sequence[Rule] = (
     of_division,
     of_image_command,
     of_none_answers,
+    of_shifted_numbers,
     of_swapped_values,
     of_texts,
     of_unspoken,
