@@ -20,7 +20,6 @@ from starlette.datastructures import Headers
 from starlette.routing import compile_path
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.language import translatable
 from service.operations import sign_in
 from service.operations.sign_in import Identity
 from service.operations.types import CredentialKind, Role
@@ -154,7 +153,7 @@ def _check_charset(headers: Headers) -> None:
     """
     kind, options = parse_options_header(headers.get("content-type"))
     if kind == b"multipart/form-data" and options.get(b"charset", b"utf-8").lower() not in (b"utf-8", b"utf8"):
-        raise HTTPException(415, translatable("Forms are read in UTF-8 only."))
+        raise Declined(415, Sentence("Forms are read in UTF-8 only."))
 
 
 def _counted(receive: Receive, most: int) -> Receive:
