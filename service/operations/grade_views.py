@@ -117,7 +117,7 @@ def show_files(service: Service, actor: Actor, course_id: int, submission_id: in
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         row = submission_in(session, course_id, submission_id)
         if row.assignment in hidden.assignments:
-            raise NotFound("Not found. It does not exist, or you have no access to it.")
+            raise NotFound("There is no such page or item, or you have no access to it.")
         return SubmittedFiles(row.packed, f"submission-{row.id}.zip")
 
 
@@ -148,7 +148,7 @@ def _result(service: Service, actor: Actor, course_id: int, job_id: str, languag
         _grade(session, actor, course_id, job_id)
         line = batches.job_line(session, job_id).hidden_by(hidden)
         if line.state is not JobState.DONE:
-            raise NotFound("Not found. It does not exist, or you have no access to it.")
+            raise NotFound("There is no such page or item, or you have no access to it.")
         return line, _view(session, line, language)
 
 

@@ -118,4 +118,4 @@ def names_for(service: Service, actor: Actor, course_id: int) -> HiddenNames:
 
 
 def _nothing() -> NotFound:
-    return NotFound("Not found. It does not exist, or you have no access to it.")
+    return NotFound("There is no such page or item, or you have no access to it.")

@@ -233,4 +233,4 @@ def _view(session: Session, found: OwnSubmission, language: Language) -> View:
 
 
 def _nothing() -> NotFound:
-    return NotFound("Not found. It does not exist, or you have no access to it.")
+    return NotFound("There is no such page or item, or you have no access to it.")

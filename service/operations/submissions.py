@@ -72,7 +72,7 @@ def sending(service: Service, actor: Actor, course_id: int, assignment: str) -> 
         enrolment = own_enrolment(session, actor, course_id, Role.STUDENT)
         opened = {each.assignment: each for each in open_assignments.of_course(session, course_id)}.get(assignment)
         if opened is None or opened.opened_at is None:
-            raise NotFound("Not found. It does not exist, or you have no access to it.")
+            raise NotFound("There is no such page or item, or you have no access to it.")
         if not opened.open:
             raise UsageError("%(title)s is closed; you can no longer submit to it.", title=opened.title)
         found = open_assignments.load(session, course_id, assignment)

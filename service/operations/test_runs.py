@@ -84,12 +84,12 @@ def show_replay(service: Service, actor: Actor, course_id: int, tryout_id: str) 
     with service.store.reading() as session:
         replay = tryouts.replay_of(session, _own(session, actor, course_id, tryout_id).id)
     if replay is None:
-        raise NotFound("Not found. It does not exist, or you have no access to it.")
+        raise NotFound("There is no such page or item, or you have no access to it.")
     return replay
 
 
 def _own(session: Session, actor: Actor, course_id: int, tryout_id: str) -> TryoutLine:
     line = tryouts.line(session, own_enrolment(session, actor, course_id, Role.STUDENT).id, tryout_id)
     if line is None:
-        raise NotFound("Not found. It does not exist, or you have no access to it.")
+        raise NotFound("There is no such page or item, or you have no access to it.")
     return line

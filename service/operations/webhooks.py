@@ -42,7 +42,7 @@ def revoke(service: Service, actor: Actor, course_id: int, webhook_id: str) -> N
     with service.store.transaction() as session:
         course_for(session, actor, course_id, Role.INSTRUCTOR)
         if not webhooks.revoke(session, course_id, webhook_id):
-            raise NotFound("Not found. It does not exist, or you have no access to it.")
+            raise NotFound("There is no such page or item, or you have no access to it.")
         audit.note(session, actor.name, "revoke webhook", "course", str(course_id), webhook=webhook_id)
 
 

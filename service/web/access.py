@@ -163,7 +163,7 @@ def _is_from_here(request: Request) -> bool:
 
 def nothing_here() -> HTTPException:
     """Return the 404 response for objects that do not exist or that the reader may not see."""
-    return HTTPException(404, translatable("Not found. It does not exist, or you have no access to it."))
+    return HTTPException(404, translatable("There is no such page or item, or you have no access to it."))
 
 
 def _instructing(course_id: RowNumber, reader: SignedIn, context: Context) -> InCourse:

@@ -47,7 +47,7 @@ _PROBLEM = {
             "type": "about:blank",
             "title": "Not Found",
             "status": 404,
-            "detail": "Not found. It does not exist, or you have no access to it.",
+            "detail": "There is no such page or item, or you have no access to it.",
         }
     ],
 }

@@ -28,7 +28,7 @@ from sim.sentences import Sentence
 _log = structlog.get_logger(__name__)
 #: Messages for the router's own errors: unknown paths and methods.
 _OF_THE_ROUTER = {
-    (404, "Not Found"): Sentence("Not found. It does not exist, or you have no access to it."),
+    (404, "Not Found"): Sentence("There is no such page or item, or you have no access to it."),
     (405, "Method Not Allowed"): Sentence("This address accepts only forms. Go back to the form and submit it again."),
 }
 _OURS = Sentence(

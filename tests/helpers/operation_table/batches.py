@@ -15,7 +15,7 @@ FOLDERS = {
     "week": {"eve/robot.py": "print('eve')\n", "eve/responder.py": _RESPONDER},
     "notes": {"notes.txt": "nothing"},
 }
-_NOTHING = (404, "nothing")
+_NOTHING = (404, "there is no")
 _STUDENTS = ("cat", "dan")
 
 

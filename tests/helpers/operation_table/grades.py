@@ -129,7 +129,7 @@ ROWS = {
     "comment on a criterion": _comment("Look there.", _CRITERION),
     "comment on what there is not": _comment("Look there.", "other", (422, "has no criterion")),
     "comment without text": _comment("  ", refused=(422, "the comment has 0 characters")),
-    "comment on no such grade": _comment("Well done.", refused=(404, "nothing"), job="nothing"),
+    "comment on no such grade": _comment("Well done.", refused=(404, "there is no"), job="nothing"),
     "withdraw a comment": _uncomment(1),
     "withdraw no comment": _uncomment(7, (422, "has no comment 7")),
     "answer an appeal": _answer(1),

@@ -259,7 +259,7 @@ def test_what_is_not_graded_and_other_assignments_are_left_out(store: Store) -> 
         acting.regrade(store, batch, other, max_attempts=3, actor="staff")
     made = acting.regrade(store, batch, None, max_attempts=3, actor="staff")
     assert (made.jobs, made.other_assignment, made.unfinished) == (2, 0, 1)
-    with pytest.raises(UsageError, match="Not found"):
+    with pytest.raises(UsageError, match="There is no such"):
         acting.publish(store, "nowhere", actor="staff")
 
 
