@@ -38,8 +38,15 @@ def make_token(service: Service, actor: Actor, request: TokenRequest) -> None:
         if not credentials.unused_token(session, person_id, request.word):
             check_number(session, person_id)
         lifetime = timedelta(days=request.days)
-        made = {"name": request.name, "reach": reach, "made_with": actor.credential_id}
-        credentials.make_token(session, person_id, lifetime, request.word, **made)
+        credentials.make_token(
+            session,
+            person_id,
+            lifetime,
+            request.word,
+            name=request.name,
+            reach=reach,
+            made_with=actor.credential_id,
+        )
         audit.note(session, actor.name, "token", "person", str(person_id), scopes=sorted(request.scopes))
 
 
