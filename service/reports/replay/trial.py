@@ -32,6 +32,8 @@ _LONGEST_TEXT, _MOST_LINES = 600, 12
 #: Steps in one unit of a column. A canvas shows nothing smaller.
 _FINE = frozenset({"x", "y", "heading"})
 _STEPS_OF_FINE, _STEPS = 100, 10
+#: The largest number of steps. A program can set the position of a wheel to any number.
+_MOST_STEPS = 2.0**52
 
 
 def told_columns(ticks: Ticks) -> dict[str, dict[str, Any]]:
@@ -48,7 +50,8 @@ def told_columns(ticks: Ticks) -> dict[str, dict[str, Any]]:
 def _added(values: NDArray[np.float64], per: int) -> list[int | None]:
     """Return the difference of each value from the previous one, the first from 0; None for missing values."""
     known = np.isfinite(values)
-    steps = np.rint(np.where(known, values, 0) * per).astype(np.int64)
+    within = np.clip(np.where(known, values, 0), -_MOST_STEPS / per, _MOST_STEPS / per)
+    steps = np.rint(within * per).astype(np.int64)
     added: list[int | None] = [None] * len(values)
     differences = np.diff(steps[known], prepend=0).tolist()
     for place, difference in zip(np.flatnonzero(known).tolist(), differences, strict=True):

@@ -279,3 +279,12 @@ def test_the_line_of_a_text_is_looked_up_and_not_searched_for() -> None:
     assert time.process_time() - began < 5
     assert found[2999] == found[-1] == Place(0, 3000)
     assert set(found) == {None, Place(0, 3000)}
+
+
+def test_a_wheel_position_of_any_size_is_told() -> None:
+    """A program may set a wheel's position to any number. Numbers beyond a browser's whole numbers are cut."""
+    recording = build.line_follower_recording(4)
+    ticks = replace(recording.ticks, left_position=np.full(4, 1.7e308), right_position=np.full(4, -1.7e308))
+    columns = run(replace(recording, ticks=ticks))["trials"][0]["robots"][0]["columns"]
+    added = [columns[name]["added"][0][0] for name in ("left_position", "right_position")]
+    assert added == pytest.approx([2**52, -(2**52)], abs=10)
