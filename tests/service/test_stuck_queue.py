@@ -36,7 +36,7 @@ def _queue(settings: Settings, store: Store) -> tuple[bool, str]:
 def test_a_queue_that_stands_still_is_not_well(
     service_settings: Settings, store: Store, minutes: int, is_begun: bool, well: bool
 ) -> None:
-    assert _queue(service_settings, store) == (True, "0 waiting")
+    assert _queue(service_settings, store) == (True, "0 queued")
     workers.beat(store, WorkerDescription("worker", "host", 1, "0", "all of it"))
     accept_one(store, "ada")
     accept_one(store, "bob")

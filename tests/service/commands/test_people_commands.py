@@ -98,7 +98,7 @@ def test_submitting_says_whether_a_worker_runs(download: Path, tmp_path: Path) -
         for name in ("one", "two"):
             workers.beat(store, WorkerDescription(name, "here", 3, "0", "all"))
     helped = robomark(home, "batch", "submit", download, "-a", ECHO, "--again")
-    assert "2 workers grade them, 6 at a time" in helped.err
+    assert "2 workers grade them, concurrency 6" in helped.err
 
 
 def test_several_are_one_document_that_names_student_and_file(tmp_path: Path) -> None:
