@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
@@ -15,7 +16,6 @@ from command import robomark
 from graded_notebooks import PROGRAM, RESPONDER, answers, assignment, graded, recorded, spoken, two_programs
 from models import weights_bytes
 from notebook_builder import MESSAGING, MESSAGING_SCRIPT, notebook
-from responders import notebook_executor
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
@@ -242,7 +242,7 @@ def test_the_workers_own_time_for_requests_is_charged(
 ) -> None:
     """A request costs the notebook's process almost nothing and the worker a new floor or camera image."""
     seconds = iter(range(0, 10**6, 2))
-    monkeypatch.setattr(notebook_executor.time, "thread_time", lambda: float(next(seconds)))
+    monkeypatch.setattr(time, "thread_time", lambda: float(next(seconds)))
     look = f"from nbev3devsim.load_nbev3devwidget import roboSim\n{cell}"
     recording = recorded(tmp_path, runner, [look, RESPONDER, PROGRAM])
     assert recording.verdict is verdict
