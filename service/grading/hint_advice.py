@@ -198,6 +198,7 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
             r"invalid literal for int\(\) with base 10: '[^']*\d[^']*'",
             "The text contains more than the number: send the number alone, or remove the other words before int().",
         ),
+        (r"'list' object has no attribute '(?:add|push|insert_end)'", "To add a value to a list, write append(...)."),
         (r"module 'math' has no attribute 'PI'", "Did you mean math.pi?"),
         (
             r"inconsistent numbers of samples: \[(\d+), (\d+)\]",

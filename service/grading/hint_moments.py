@@ -71,6 +71,28 @@ def of_moments(clues: Clues) -> Iterator[str]:
                 return
 
 
+def of_loops_that_never_run(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a ``while`` loop whose body should have had an effect and was never run."""
+    runs = [each for each in clues.recordings if each.places and not each.faults]
+    listing = next(iter(clues.programs), None)
+    if not clues.lost or listing is None or len(clues.by_trial) != len(clues.recordings) or not runs:
+        return
+    ran = {place.line for each in runs for place in each.places if place.outer}
+    for each in listing.code.statements:
+        body = listing.code.body(each) if each.keyword == "while" and not each.parent >= 0 else ()
+        acting = [one for one in body if any(_acts(call) for call in one.calls)]
+        if acting and not any(one.line in ran for one in body):
+            yield (
+                f"{listing.at(each.line)}: the loop never ran, because {joined(each.condition)} was false from the "
+                "start. Check the sign of the comparison and the values in it"
+            )
+            return
+
+
+def _acts(call: CallInCode) -> bool:
+    return call.name.rpartition(".")[2] in _WRITES | MOVES_FOR | MOVES_ON
+
+
 def _rules() -> Sequence[Callable[[_Moment], str]]:
     texts = _of_unwanted_text, _of_resending
     return _of_duration, *texts, _of_other_sensor, _of_crossing, _of_loop_end, _of_steering

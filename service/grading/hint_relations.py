@@ -44,11 +44,11 @@ def _of_numbers(expected: float, actual: float) -> str:
     if actual and expected == -actual:
         return "Only the sign is wrong"
     if abs(difference) == 1:
-        size = "small: add 1" if difference > 0 else "large: subtract 1"
-        return f"It is 1 too {size}, or begin to count with another number"
+        size, fix = ("small", "add 1") if difference > 0 else ("large", "subtract 1")
+        return f"It is 1 too {size}: check where the count begins and when it is increased, or {fix}"
     factor = expected / actual if actual else math.inf
     for one in (factor, 1 / factor if factor else math.inf):
-        if 1 < one < 1e7 and abs(one - round(one)) < 1e-3 * one:
+        if 1.5 < one < 1000.5 and abs(one - round(one)) < 1e-6 * one:
             size = "small: multiply" if one == factor else "large: divide"
             return f"It is {round(one)} times too {size} by {round(one)}"
     return ""

@@ -12,6 +12,7 @@ from service.grading.hint_advice import ACTIONS, MOVES_FOR, MOVES_ON, PROPERTIES
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import LOOPS, Statement, is_name, joined
 from service.grading.hint_loops import fix_effect, without_effect
+from submissions.criteria.code import Functions
 from submissions.criteria.drawing import Drawing
 from submissions.criteria.line import Follows, Laps
 from submissions.criteria.motion import Displacement, Encounters, Excursions, Moves
@@ -85,7 +86,9 @@ def _effect(name: str) -> str:
 
 def of_no_effect(clues: Clues) -> Iterator[str]:
     """Yield a hint on a statement that computes a value and discards it."""
-    for listing, each in statements_of(clues):
+    called = clues.answering if any(isinstance(each, Functions) for each in clues.lost) else ()
+    answering = ((listing, each) for listing in called for each in listing.code.statements)
+    for listing, each in (*statements_of(clues), *answering):
         effect = without_effect(each, listing.code)
         if effect:
             yield f"{listing.at(each.line)}: {effect}. {fix_effect(each)}"

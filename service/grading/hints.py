@@ -28,7 +28,7 @@ from service.grading.hint_files import of_ignored_magic, of_redefined, of_severa
 from service.grading.hint_formulas import of_division, of_gain, of_gyro_direction, of_radius, of_reversed_distance
 from service.grading.hint_functions import of_functions, of_narrow_except, of_no_return, of_returned_values
 from service.grading.hint_loops import of_limits
-from service.grading.hint_moments import of_moments
+from service.grading.hint_moments import of_loops_that_never_run, of_moments
 from service.grading.hint_motion import (
     of_curves,
     of_distances,
@@ -204,6 +204,7 @@ _OF_RESULTS: Sequence[Rule] = (
 _IF_NOTHING_ELSE: Sequence[Rule] = (
     of_other_cell_errors,
     of_several_programs,
+    of_loops_that_never_run,
     of_returned_values,
     of_narrow_except,
     of_what_if,
