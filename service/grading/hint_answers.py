@@ -12,8 +12,9 @@ from collections.abc import Iterator
 
 from responders.message_format import JSON
 from service.grading.grade import CriterionResult
-from service.grading.hint_clues import Clues
+from service.grading.hint_clues import Clues, finding_of
 from service.grading.hint_code import joined
+from service.grading.hint_relations import advice_on
 from service.grading.hint_rules import RETURNS, where_returned
 from service.grading.judging.message_parts import quoted
 from sim.readers.json_text import read_json
@@ -30,6 +31,7 @@ _NOTHING = re.compile(r"\bNone\b|\bnull\b")
 _TEXT_NUMBER = re.compile(r'"(\w+)"\s*:\s*"(-?\d+(?:\.\d+)?)"')
 _IMAGE_LOG = re.compile(r"image_data (?:left|right|both)\Z")
 _NEAR = 0.6
+_VALUE = re.compile(r'but it (?:answered|has) "([^"]{1,80})"')
 #: The number of answers that show a constant shift.
 _ENOUGH = 2
 
@@ -83,6 +85,23 @@ def of_none_answers(clues: Clues) -> Iterator[str]:
             f"{listing.at(each.line)} returns None, and the answer was {quoted(answer)}. Check the condition in line "
             f"{condition.line}: {joined(condition.condition)}"
         )
+
+
+def of_answer_values(clues: Clues) -> Iterator[str]:
+    """Yield the line that makes a wrong value of an answer, with how it differs from the expected one."""
+    for criterion in clues.dearest[:1]:
+        told = finding_of(clues, criterion)
+        found = _VALUE.search(told) if isinstance(criterion, Replies) and criterion.path else None
+        where = _line_of_key([(criterion.path or "").rpartition(".")[2]], clues) if found else ""
+        if found is None or not where or not isinstance(criterion, Replies):
+            continue
+        expected = next((each for each in criterion.expect.values() if str(each).endswith(found[1])), "")
+        advice = advice_on(expected, found[1]) if expected and isinstance(expected, str) else ""
+        if found[1].startswith("["):
+            advice = "It is a list or an array: take its first value with [0]"
+        if advice:
+            yield f"{where} answers {quoted(found[1])} at {criterion.path}. {advice}"
+            return
 
 
 def of_shifted_numbers(clues: Clues) -> Iterator[str]:

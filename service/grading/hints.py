@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from responders.message_format import JSON
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.hint_answers import (
+    of_answer_values,
     of_image_command,
     of_missing_key,
     of_none_answers,
@@ -205,6 +206,7 @@ _IF_NOTHING_ELSE: Sequence[Rule] = (
     of_other_cell_errors,
     of_several_programs,
     of_loops_that_never_run,
+    of_answer_values,
     of_returned_values,
     of_narrow_except,
     of_what_if,
