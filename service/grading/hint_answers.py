@@ -90,9 +90,9 @@ def of_none_answers(clues: Clues) -> Iterator[str]:
 def of_answer_values(clues: Clues) -> Iterator[str]:
     """Yield the line that makes a wrong value of an answer, with how it differs from the expected one."""
     for criterion in clues.dearest[:1]:
-        told = finding_of(clues, criterion)
-        found = _VALUE.search(told) if isinstance(criterion, Replies) and criterion.path else None
-        where = _line_of_key([(criterion.path or "").rpartition(".")[2]], clues) if found else ""
+        path = (criterion.path or "") if isinstance(criterion, Replies) else ""
+        found = _VALUE.search(finding_of(clues, criterion)) if path else None
+        where = _line_of_key([path.rpartition(".")[2]], clues) if found else ""
         if found is None or not where or not isinstance(criterion, Replies):
             continue
         expected = next((each for each in criterion.expect.values() if str(each).endswith(found[1])), "")
@@ -100,7 +100,7 @@ def of_answer_values(clues: Clues) -> Iterator[str]:
         if found[1].startswith("["):
             advice = "It is a list or an array: take its first value with [0]"
         if advice:
-            yield f"{where} answers {quoted(found[1])} at {criterion.path}. {advice}"
+            yield f"{where} answers {quoted(found[1])} at {path}. {advice}"
             return
 
 
