@@ -29,7 +29,7 @@ _NEAR = 0.75
 
 
 #: The expected value and the returned value.
-_VALUES = re.compile(r"to return (.+?), but it returned (.+?)(?: \(\d+ of \d+ calls right\))?\.?\Z", re.DOTALL)
+_VALUES = re.compile(r"to return (.+?), but it returned (.+?)(?: \(\d+ of \d+ calls correct\))?\.?\Z", re.DOTALL)
 
 
 def of_returned_values(clues: Clues) -> Iterator[str]:
@@ -74,8 +74,9 @@ def _making(name: str, clues: Clues) -> tuple[Listing, Statement] | None:
             body = listing.code.body(head) if head.tokens[1] == name else ()
             appends = [each for each in body if any(call.name.endswith(".append") for call in each.calls)]
             returns = [each for each in body if each.keyword == "return" and len(each.tokens) > 1]
-            computed = [each for each in returns if len(each.tokens) > 2 or not each.tokens[1][0].isdigit()]
-            for found in (appends, computed, returns):
+            # A returned name says nothing about the line that went wrong.
+            computed = [each for each in returns if len(each.tokens) > 2]
+            for found in (appends, computed):
                 if len(found) == 1:
                     return listing, found[0]
     return None

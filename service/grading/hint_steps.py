@@ -88,7 +88,7 @@ def of_first_value(clues: Clues) -> Iterator[str]:
 
 def of_first_message(clues: Clues) -> Iterator[str]:
     """Yield a hint on code that reads the first message of the queue, if the last is required."""
-    if not any(isinstance(each, Says) and "last thing" in _message(clues, each.id) for each in clues.lost):
+    if not any(isinstance(each, Says) and "last text that" in _message(clues, each.id) for each in clues.lost):
         return
     for listing, each in statements_of(clues):
         for place, token in enumerate(each.tokens):

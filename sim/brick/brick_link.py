@@ -25,6 +25,8 @@ _WAITS = frozenset({"until", "until_said", "paid_motor"})
 #: Packed format for frequent actions: kind, part of the robot, set point and command of a motor, and a value.
 _packed = struct.Struct("<BBBBd").pack
 _READ, _WAIT, _MOTOR, _LINE = range(4)
+#: Limits the processor time that a program pays for these.
+_MOST_PLACE_CHECKS = 5_000
 _PORTS = {"outB": 0, "outC": 1}
 _SET_POINTS = {"speed_sp": 1, "position_sp": 2, "position": 3, "time_sp": 4}
 _COMMANDS = {
@@ -74,6 +76,7 @@ class Link:
         self._tick = SECOND
         self._place: Callable[[], int] = int
         self._told_place = 0
+        self._place_checks = 0
 
     def connect(
         self,
@@ -141,6 +144,9 @@ class Link:
 
     def _tell_place(self) -> None:
         """Send the line of the program that is running, if it has changed since the last action."""
+        if self._place_checks >= _MOST_PLACE_CHECKS:
+            return
+        self._place_checks += 1
         place = self._place()
         if place != self._told_place:
             self._told_place = place

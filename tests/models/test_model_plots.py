@@ -85,7 +85,7 @@ def test_robustness_has_a_panel_for_each_condition_with_unit_and_n(evaluation: E
         "size of the image, %",
         "covered square, mm each way",
     ]
-    assert texts(figure).count("n = 6 to 120 images a point") == 4
+    assert texts(figure).count("n = 6 to 120 images per point") == 4
     line = figure.axes[1].lines[2]
     assert np.asarray(line.get_xdata()).tolist() == list(evaluation.measured.curves[1].values)
 
@@ -102,8 +102,8 @@ def test_all_plots_are_as_wide_as_a_phone_shows_and_come_out_the_same(evaluation
 def test_a_level_that_is_asked_for_and_a_single_point_are_drawn() -> None:
     curve = Curve("x", (3.0,), (0.5,), (0.2,), (0.8,), (12,))
     figure = draw_curves([AccuracyPanel("delay", "seconds", (curve,), level=0.8)], "A curve")
-    assert "asked for: 0.8" in texts(figure)
-    assert "n = 12 images a point" in texts(figure)
+    assert "required: 0.8" in texts(figure)
+    assert "n = 12 images per point" in texts(figure)
 
 
 def test_the_list_has_every_model_with_its_interval() -> None:

@@ -389,5 +389,5 @@ def test_packed_submission_can_be_submitted(tmp_path: Path) -> None:
 
 
 def test_bytes_that_were_not_packed_here_are_refused() -> None:
-    with pytest.raises(UsageError, match="kept submission"):
+    with pytest.raises(UsageError, match="stored submission"):
         unpack_submission(b"nonsense")

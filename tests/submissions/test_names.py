@@ -114,7 +114,7 @@ def test_in_a_batch_neither_of_two_who_are_alike_is_taken_in(
     checked = read_batch(batch(tmp_path, ada, "bob the third", eve), ASSIGNMENT)
     assert [each.submission.student for each in checked.grading_requests] == ["bob the third"]
     assert len(_refused(checked)) == 2
-    assert all("cannot be told from" in each or "too, and not the same" in each for each in _refused(checked))
+    assert all("cannot be distinguished from" in each or "too, and not the same" in each for each in _refused(checked))
 
 
 @PAIRS
@@ -131,8 +131,8 @@ def test_nobody_takes_the_place_of_who_is_in_the_course(tmp_path: Path, store: S
         return
     assert later.batch is None
     (refusal,) = later.refused
-    assert "cannot be told from" in refusal.reason
-    with pytest.raises(UsageError, match="cannot be told from"):
+    assert "cannot be distinguished from" in refusal.reason
+    with pytest.raises(UsageError, match="cannot be distinguished from"):
         intake.accept_batch(store, "b", batches[1].grading_requests, (), max_attempts=3)
 
 
@@ -204,7 +204,7 @@ def test_grade_keeps_reports_apart(tmp_path: Path) -> None:
     assert {path.name for path in reports.iterdir()} == {"eve.html"}
     sentences = ended.stderr.splitlines()
     for path in (ada, blank):
-        assert any(f"{path}: its student cannot be told from" in sentence for sentence in sentences)
+        assert any(f"{path}: its student cannot be distinguished from" in sentence for sentence in sentences)
     for path in (elsewhere, other):
         assert any(f"{path}: bob is named more than once" in sentence for sentence in sentences)
 
@@ -238,7 +238,7 @@ def test_who_was_first_written_with_a_blank_may_go_on_so_until_the_name_itself_c
         known = students.enrol(Student("ada "), at)
         assert students.enrol(Student("ada "), at) == known
         assert students.enrol(Student("ada"), at) == known
-        with pytest.raises(UsageError, match="cannot be told from"):
+        with pytest.raises(UsageError, match="cannot be distinguished from"):
             students.enrol(Student("ada "), at)
 
 
@@ -279,7 +279,7 @@ def test_students_of_an_older_database_go_on_under_their_names(store: Store) -> 
         assert (accepted.student, accepted.attempt) == (name, 1)
         with store.reading() as session:
             assert session.scalar(select(Job.enrolment_id).where(Job.id == accepted.job_id)) == expected
-    with pytest.raises(UsageError, match="cannot be told from"):
+    with pytest.raises(UsageError, match="cannot be distinguished from"):
         intake.accept(store, grading_request("ADA"), max_attempts=3)
 
 

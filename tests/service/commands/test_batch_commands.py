@@ -165,7 +165,7 @@ def test_a_stopped_wait_gives_back_what_was_begun(tmp_path: Path) -> None:
         waiting.send_signal(signal.SIGINT)
         _, err = waiting.communicate(timeout=60)
     assert waiting.returncode == 130
-    assert b"stays queued: robomark batch status" in err
+    assert b"stay queued: robomark batch status" in err
     with open_store(Settings(home=home)) as store, store.reading() as session:
         job = session.scalars(select(Job)).one()
         assert (job.state, job.attempt, job.lease) == (JobState.QUEUED, 0, None)

@@ -210,7 +210,7 @@ def test_a_policy_and_an_extension_are_said_back(tmp_path: Path) -> None:
     assert extended.out == "ada: json-queue may be submitted until 2026-12-02 12:00\n"
     for words, expected in [
         (("policy", "--due", "soon"), "expected a date"),
-        (("extend", "ada"), "say what to allow"),
+        (("extend", "ada"), "later deadline, additional attempts"),
         (("policy", "--attempts", "0"), "greater than or equal to 1"),
         (("extend", "adda", "--more-attempts", "1"), 'did you mean "ada"?'),
         (("extend", "ada", "-a", "json-que", "--more-attempts", "1"), 'did you mean "json-queue"?'),

@@ -120,7 +120,7 @@ def test_hostile_texts_are_read_or_refused_inside_the_sandbox(text: str, error: 
 def test_what_is_avoided_cannot_be_hidden_behind_many_names(runner: TrialRunner) -> None:
     many = "\n".join(f"name_{i}({i})" for i in range(9_000))
     assert judged(many, runner, avoids=["eval()"]).passed
-    assert "line 9001 has it" in judged(f"{many}\neval('1')", runner, avoids=["eval()"]).message
+    assert "line 9001 uses it" in judged(f"{many}\neval('1')", runner, avoids=["eval()"]).message
 
 
 LONG = "robot_" * 12
@@ -153,7 +153,7 @@ def test_another_name_does_not_hide_what_is_avoided(
 ) -> None:
     outcome = judged(text, runner, avoids=[rule])
     assert outcome.passed is (line is None), outcome.message
-    assert line is None or f"line {line} has it" in outcome.message
+    assert line is None or f"line {line} uses it" in outcome.message
 
 
 def test_what_a_text_cannot_show_is_told_to_staff(runner: TrialRunner) -> None:
@@ -223,7 +223,7 @@ def test_harmless_modules_are_no_doubt(text: str, runner: TrialRunner) -> None:
 @pytest.mark.parametrize(
     ("helper", "words"),
     [
-        ("import math\nfrom sklearn import svm", "line 2 of helper.py has it"),
+        ("import math\nfrom sklearn import svm", "line 2 of helper.py uses it"),
         ("x = 1\n" * 60_000, "helper.py cannot be read: it has more than 300000 characters"),
         ("print 'this was never Python 3'", ""),
         ("import math", ""),

@@ -47,7 +47,7 @@ def test_what_is_there_is_graded(
     assert set(lost) == {f"There is no {lacking}."}
     for told in (plain_text(staff_view(graded)), report(student_view(graded), {})):
         assert f"There is no {lacking}, so" in told
-        assert f"Submit {lacking} beside {part}" in told
+        assert f"Submit {lacking} together with {part}" in told
     assert json_document(staff_view(graded))["missing"] == lacking
 
 

@@ -397,7 +397,7 @@ def test_marks_by_steps(right: int, marks: str) -> None:
     answers = [("square", "square" if number < right else "diamond") for number in range(10)]
     result = judged(asked(steps=[[0.5, 2], [0.9, 4]]), talk(*answers))
     assert result.marks == Decimal(marks)
-    assert ("Marks: 2 from 0.5 on, 4 from 0.9 on." in result.message) is (result.marks < 4)
+    assert ("Marks: 2 from 0.5, 4 from 0.9." in result.message) is (result.marks < 4)
 
 
 @pytest.mark.parametrize(

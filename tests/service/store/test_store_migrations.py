@@ -220,18 +220,22 @@ def test_what_the_first_tables_called_superseded_is_cancelled(service_settings: 
 
 
 @pytest.mark.parametrize(
-    ("sentence", "exceeded"),
+    ("sentence", "exceeded", "now"),
     [
-        ("attempt 3, allowed: 2", Exceeded("attempts", 3, 2)),
-        ("1 day late, allowed: 0", Exceeded("date", 1, 0)),
-        ("12 days late, allowed: 3", Exceeded("date", 12, 3)),
-        ("submitted 0 min after the one before, asked for: 10 min", Exceeded("cool-down", 0, 10)),
+        ("attempt 3, allowed: 2", Exceeded("attempts", 3, 2), "attempt 3, allowed: 2"),
+        ("1 day late, allowed: 0", Exceeded("date", 1, 0), "1 day late, allowed: 0"),
+        ("12 days late, allowed: 3", Exceeded("date", 12, 3), "12 days late, allowed: 3"),
+        (
+            "submitted 0 min after the one before, asked for: 10 min",
+            Exceeded("cool-down", 0, 10),
+            "submitted 0 min after the previous submission, required: 10 min",
+        ),
     ],
 )
 def test_sentences_of_earlier_releases_become_data(
-    service_settings: Settings, tmp_path: Path, sentence: str, exceeded: Exceeded
+    service_settings: Settings, tmp_path: Path, sentence: str, exceeded: Exceeded, now: str
 ) -> None:
-    assert str(exceeded) == sentence
+    assert str(exceeded) == now
     engine = lay_first_release(service_settings.database, tmp_path)
     with engine.begin() as connection:
         command.upgrade(configuration(connection), "0017")

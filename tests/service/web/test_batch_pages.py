@@ -123,8 +123,8 @@ def test_files_of_their_own_and_a_table_of_people(web: Web, grace: TestClient) -
         ("week.zip", b"no zip at all", "cannot be unpacked"),
         ("week.zip", zipped({"../../evil/robot.py": "x"}), "outside"),
         ("week.zip", zipped(ECHO), "one submission"),
-        ("week.tar.gz", b"x", "week.tar.gz was sent"),
-        ("week.csv", b"student,file\nada,/etc/passwd\n", "week.csv was sent"),
+        ("week.tar.gz", b"x", "week.tar.gz was uploaded"),
+        ("week.csv", b"student,file\nada,/etc/passwd\n", "week.csv was uploaded"),
     ],
 )
 def test_what_is_no_batch_is_refused_in_a_sentence_and_not_kept(

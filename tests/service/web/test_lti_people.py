@@ -199,7 +199,7 @@ def test_long_ids_are_refused_and_never_cut(store: Store, platform: Platform, ki
     for end in "ab":
         with pytest.raises(UsageError, match=f"{kind} ID is longer than 250 characters"):
             launch(store, platform, role=INSTRUCTOR, **{**names, kind: "x" * 250 + end})
-    with pytest.raises(UsageError, match="deployment id is longer"), store.transaction() as session:
+    with pytest.raises(UsageError, match="deployment ID is longer"), store.transaction() as session:
         lti.register(session, Registration("n", "i", "c", ("x" * 251,), *URLS))
 
 

@@ -79,7 +79,7 @@ def test_each_student_is_in_the_table_once_with_the_attempt_that_counts(web: Web
     assert "<dt>Graded</dt><dd>2</dd>" in overview
     assert "Cyd" in overview
     grade = re.findall(r'href="(/courses/1/grades/\w+)">ada', page)[0]
-    assert grace.get(grade).text.count("attempt ") == 3
+    assert grace.get(grade).text.count("Attempt ") == 3
     exported = grace.get(f"{path}/export?format=csv").text
     assert len(exported.strip().splitlines()) == 3
     with web.store.reading() as session:
