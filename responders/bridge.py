@@ -70,6 +70,7 @@ class Bridge:
         self.image_log: list[tuple[str, str, int]] = []
         self.notes: list[str] = []
         self.places: list[ProgramLine] = []
+        self._places_complete = True
         self._limit = round(spec.seconds * SECOND)
         self._said_until = 0
         self._arrived: list[str] = []
@@ -177,8 +178,7 @@ class Bridge:
                 self._read(kind.what, int(number) * _READ)
             elif type(kind) is packed.Place:
                 self._free_act()
-                if len(self.places) < _MOST_PLACES:
-                    self.places.append(ProgramLine(self.now / SECOND, *packed.lines_of(number)))
+                self._note_place(number)
             else:
                 self._advance(int(number))
                 self._reply(None)
@@ -348,6 +348,14 @@ class Bridge:
         if self._output_left < 0:
             sentence = f"the program {did} more than {self._spec.program.output_bytes} bytes"
             raise _Cut(Fault(self.now / SECOND, Verdict.OUTPUT_LIMIT, "program", sentence))
+
+    def _note_place(self, number: float) -> None:
+        """Note a line of the program. Places that are not complete would mislead, so they are dropped."""
+        self._places_complete &= number > 0 and len(self.places) < _MOST_PLACES
+        if self._places_complete:
+            self.places.append(ProgramLine(self.now / SECOND, *packed.lines_of(number)))
+        else:
+            self.places.clear()
 
     def _free_act(self) -> None:
         self._free_acts += 1

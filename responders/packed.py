@@ -34,7 +34,10 @@ class MotorCommand(NamedTuple):
 
 
 class Place(NamedTuple):
-    """The program has come to another line. The number contains two lines: the innermost and the outermost."""
+    """The program has come to another line. The number contains two lines: the innermost and the outermost.
+
+    The number 0 says that no more lines follow, because the program has come to too many.
+    """
 
 
 Kind = Read | Wait | MotorCommand | Place
@@ -62,7 +65,7 @@ def _code(what: int, part: int = 0, set_point: int = 0, command: int = 0) -> int
 #: All actions by code: kind, smallest and largest number, and whether the number must be whole.
 _KINDS: dict[int, tuple[Kind, float, float, bool]] = {
     _code(_WAIT): (Wait(), 0, MOST_UNITS, True),
-    _code(_LINE): (Place(), 1, _MOST_LINES**2, True),
+    _code(_LINE): (Place(), 0, _MOST_LINES**2, True),
     **{_code(_READ, part): (Read(what), 1, 2, True) for part, what in enumerate(SENSORS)},
     **{
         _code(_MOVE, part, place, number): (MotorCommand(port, set_point, command), -LARGEST, LARGEST, False)

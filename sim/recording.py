@@ -351,4 +351,4 @@ class Recording:
     cell_errors: tuple[Fault, ...] = ()  # of a notebook: the first cells that failed, even if the run continued
     places: tuple[ProgramLine, ...] = field(
         default=(), compare=False, repr=False
-    )  # for hints; neither hashed nor stored
+    )  # for hints, complete or empty; neither hashed nor stored

@@ -7,7 +7,7 @@ loop that ended, or the line that wrote the text.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from service.grading.grade import Evidence
@@ -91,11 +91,6 @@ def of_loops_that_never_run(clues: Clues) -> Iterator[str]:
 
 def _acts(call: CallInCode) -> bool:
     return call.name.rpartition(".")[2] in _WRITES | MOVES_FOR | MOVES_ON
-
-
-def _rules() -> Sequence[Callable[[_Moment], str]]:
-    texts = _of_unwanted_text, _of_resending
-    return _of_duration, *texts, _of_other_sensor, _of_crossing, _of_loop_end, _of_steering
 
 
 def _moment(clues: Clues, criterion: Criterion) -> _Moment | None:

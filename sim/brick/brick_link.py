@@ -25,8 +25,9 @@ _WAITS = frozenset({"until", "until_said", "paid_motor"})
 #: Packed format for frequent actions: kind, part of the robot, set point and command of a motor, and a value.
 _packed = struct.Struct("<BBBBd").pack
 _READ, _WAIT, _MOTOR, _LINE = range(4)
-#: Limits the processor time that a program pays for these.
-_MOST_PLACE_CHECKS = 5_000
+#: Maximum number of lookups of the current line. A program pays processor time for them.
+_PLACE_LOOKUPS = 20_000
+_LOOKUPS_OF_A_NOTIFICATION = 4
 _PORTS = {"outB": 0, "outC": 1}
 _SET_POINTS = {"speed_sp": 1, "position_sp": 2, "position": 3, "time_sp": 4}
 _COMMANDS = {
@@ -76,7 +77,7 @@ class Link:
         self._tick = SECOND
         self._place: Callable[[], int] = int
         self._told_place = 0
-        self._place_checks = 0
+        self._place_lookups = _PLACE_LOOKUPS
 
     def connect(
         self,
@@ -102,7 +103,7 @@ class Link:
     def tell(self, frame: Frame) -> None:
         """Send a notification that needs no answer."""
         self.read_freely()
-        self._tell_place()
+        self._tell_place(_LOOKUPS_OF_A_NOTIFICATION)
         self._wire.send(frame)
 
     def set_motor(
@@ -142,12 +143,12 @@ class Link:
         self._wire.send(frame)
         return self._answer()
 
-    def _tell_place(self) -> None:
-        """Send the line of the program that is running, if it has changed since the last action."""
-        if self._place_checks >= _MOST_PLACE_CHECKS:
+    def _tell_place(self, lookups: int = 1) -> None:
+        """Send the line of the program that is running, if it has changed; 0 once if no more lines follow."""
+        if self._place_lookups < 0:
             return
-        self._place_checks += 1
-        place = self._place()
+        self._place_lookups -= lookups
+        place = self._place() if self._place_lookups >= 0 else 0
         if place != self._told_place:
             self._told_place = place
             self._wire.act_later(_packed(_LINE, 0, 0, 0, place))

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from responders import packed
-from responders.packed import MotorCommand, Read, Wait
+from responders.packed import MotorCommand, Place, Read, Wait
 from responders.wire import MOST, MOST_UNITS, WireError
 from running import run_program
 from service.grading.trial_runner import TrialRunner
@@ -55,7 +55,11 @@ def test_acts_come_in_order_with_the_number_of_their_packet() -> None:
         (2, 0, 0, 8, 1.0),
         (2, 0, 1, 0, math.nan),
         (2, 0, 1, 0, -math.inf),
-        (3, 0, 0, 0, 0.0),
+        (3, 0, 0, 0, -1.0),
+        (3, 0, 0, 0, 1.5),
+        (3, 0, 0, 0, 2.0**41),
+        (3, 1, 0, 0, 1.0),
+        (4, 0, 0, 0, 0.0),
         (255, 255, 255, 255, 0.0),
     ],
 )
@@ -84,6 +88,8 @@ def test_any_bytes_are_acts_or_refused(data: bytes) -> None:
                 assert (units % 1, 0 <= units <= MOST_UNITS) == (0, True)
             case MotorCommand(port, _, _), value:
                 assert (port in ("outB", "outC"), math.isfinite(value)) == (True, True)
+            case Place(), lines:
+                assert (lines % 1, 0 <= lines <= 2**40) == (0, True)
             case _:
                 pytest.fail(f"no act: {act}")
 
@@ -124,6 +130,20 @@ def test_thousands_of_acts_without_a_question_arrive(runner: TrialRunner) -> Non
     recording = run_program(runner, program, Pose(1000, 500, 0))
     assert [line.text for line in recording.printed] == ["there"]
     assert recording.faults == ()
+
+
+def test_a_recording_has_the_lines_that_the_program_came_to(runner: TrialRunner) -> None:
+    program = "def ahead():\n    tank_drive.on_for_seconds(20, 20, 1)\nahead()\nsay('there')\nahead()"
+    # Before the program begins, the kit resets the motors outside its lines.
+    places = [each for each in run_program(runner, program, Pose(1000, 500, 0)).places if each.outer]
+    assert [(line, outer) for _, line, outer in places] == [(2, 3), (4, 4), (2, 5)]
+    assert [round(t) for t, _, _ in places][:2] == [0, 1]
+
+
+def test_lines_are_complete_or_missing(runner: TrialRunner) -> None:
+    program = "tank_drive.on_for_seconds(20, 20, 1)\nfor n in range(COUNT): print(n)"
+    recordings = [run_program(runner, program.replace("COUNT", count), Pose(1000, 500, 0)) for count in ("9", "6000")]
+    assert [[line for _, line, outer in each.places if outer] for each in recordings] == [[1, 2], []]
 
 
 def test_a_busy_loop_is_named_though_acts_are_held_back(runner: TrialRunner) -> None:
