@@ -106,12 +106,17 @@ def _shared_options() -> list[Any]:
 def _shared(
     _as_json: Annotated[
         bool,
-        typer.Option("--json", is_eager=True, callback=want_json, expose_value=False, help="One JSON document."),
+        typer.Option("--json", is_eager=True, callback=want_json, expose_value=False, help="Print one JSON document."),
     ] = False,
     _quietly: Annotated[
         bool,
         typer.Option(
-            "-q", "--quiet", is_eager=True, callback=want_quiet, expose_value=False, help="Only results and mistakes."
+            "-q",
+            "--quiet",
+            is_eager=True,
+            callback=want_quiet,
+            expose_value=False,
+            help="Print only results and errors.",
         ),
     ] = False,
 ) -> None:

@@ -16,7 +16,7 @@ Course = Annotated[str, typer.Option(help="The course.")]
 
 def list_appeals(
     course: Course = DEFAULT_COURSE,
-    answered: Annotated[bool, typer.Option("--answered", help="Those that are answered, too.")] = False,
+    answered: Annotated[bool, typer.Option("--answered", help="Include answered appeals.")] = False,
 ) -> None:
     """List the open appeals of a course, the longest waiting first."""
     with operating() as (service, actor):
@@ -35,8 +35,8 @@ def list_appeals(
 
 
 def answer(
-    number: Annotated[int, typer.Argument(help="The appeal's, as robomark appeals list says.")],
-    text: Annotated[str, typer.Argument(help="What the student reads.")],
+    number: Annotated[int, typer.Argument(help="The number of the appeal, as shown by robomark appeals list.")],
+    text: Annotated[str, typer.Argument(help="The text for the student.")],
     course: Course = DEFAULT_COURSE,
 ) -> None:
     """Answer and close an appeal."""

@@ -25,22 +25,28 @@ from submissions.student_identity import read_people, students_of
 
 Assignment = Annotated[
     str,
-    typer.Option("-a", "--assignment", help="For this one only; else for all that have none of their own."),
+    typer.Option(
+        "-a", "--assignment", help="Only for this assignment. Default: all assignments without their own setting."
+    ),
 ]
 Own = Annotated[str, typer.Argument(help="The assignment's id in the course.")]
 InCourse = Annotated[str, typer.Option("--course", help="The course.")]
-Due = Annotated[str | None, typer.Option(help="A date (its end), or a date and time: 2026-11-30T17:00.")]
+Due = Annotated[str | None, typer.Option(help="A date (end of the day), or a date and time: 2026-11-30T17:00.")]
 
 
 def policy(
     assignment: Assignment = "",
     due: Due = None,
-    late_days: Annotated[int, typer.Option(min=0, max=365, help="So many days late is still marked.")] = 0,
-    attempts: Annotated[
-        int | None, typer.Option(min=1, max=1000, help="Different submissions that are marked.")
-    ] = None,
-    cool_down: Annotated[float, typer.Option(min=0, max=10_000, help="Minutes between two submissions.")] = 0.0,
-    drop: Annotated[bool, typer.Option("--drop", help="Let it have nothing of its own: what holds for all.")] = False,
+    late_days: Annotated[
+        int, typer.Option(min=0, max=365, help="Late submissions accepted for this number of days.")
+    ] = 0,
+    attempts: Annotated[int | None, typer.Option(min=1, max=1000, help="Maximum number of attempts.")] = None,
+    cool_down: Annotated[
+        float, typer.Option(min=0, max=10_000, help="Minimum time between submissions, in minutes.")
+    ] = 0.0,
+    drop: Annotated[
+        bool, typer.Option("--drop", help="Remove the policy. The policy for all assignments applies.")
+    ] = False,
     course: InCourse = DEFAULT_COURSE,
 ) -> None:
     """Set the policy, which replaces the earlier one; without options, show it."""
@@ -60,7 +66,7 @@ def extend(
     student: Annotated[str, typer.Argument(help="The student's name, as submitted.")],
     assignment: Assignment = "",
     due: Due = None,
-    more_attempts: Annotated[int, typer.Option(min=0, max=1000, help="Attempts beyond the policy's.")] = 0,
+    more_attempts: Annotated[int, typer.Option(min=0, max=1000, help="Additional attempts.")] = 0,
     course: InCourse = DEFAULT_COURSE,
 ) -> None:
     """Allow one student more time or attempts. Replaces an earlier extension.
@@ -81,7 +87,9 @@ def extend(
 
 
 def enrol(
-    people: Annotated[Path, typer.Argument(help="A .csv with id, name, email; Moodle's grading worksheet is one.")],
+    people: Annotated[
+        Path, typer.Argument(help="A .csv file with id, name and email, such as Moodle's grading worksheet.")
+    ],
     course: InCourse = DEFAULT_COURSE,
 ) -> None:
     """Enrol students before they submit, or add names and addresses to enrolled ids."""
@@ -93,7 +101,7 @@ def enrol(
 
 
 def prepare(
-    assignment: Annotated[str, typer.Argument(help="An id of the catalogue, or a folder.")],
+    assignment: Annotated[str, typer.Argument(help="An assignment's id in the catalogue, or a folder.")],
     course: InCourse = DEFAULT_COURSE,
 ) -> None:
     """Add an assignment to a course without opening it; run it again to use the current version."""
@@ -121,7 +129,7 @@ def close_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None
 
 
 def remove_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
-    """Let a course have an assignment no more that no student has been shown; graded batches stay."""
+    """Remove an assignment from a course if no student has seen it. Graded batches stay."""
     with operating() as (service, actor):
         assignments.remove(service, actor, courses.find(service, actor, course), assignment)
     document(assignment=assignment)

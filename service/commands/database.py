@@ -20,20 +20,22 @@ from submissions.roster import moment
 
 
 def upgrade_tables() -> None:
-    """Bring the tables up to this release; every command does it when it starts."""
+    """Upgrade the tables to this release. Every command does this when it starts."""
     revision = database.upgrade(load_settings())
     document(revision=revision)
     tell(f"the database is at revision {revision}")
 
 
-def backup_database(file: Annotated[Path, typer.Argument(help="The copy to make; it must not exist.")]) -> None:
+def backup_database(
+    file: Annotated[Path, typer.Argument(help="The backup file to create. It must not exist yet.")],
+) -> None:
     """Back up the database while it is in use, to a SQLite file that only you can read."""
     size = database.back_up(load_settings(), file)
     document(file=file, bytes=size)
     tell(f"{file}: {size} bytes")
 
 
-def restore_database(file: Annotated[Path, typer.Argument(help="What db backup made.")]) -> None:
+def restore_database(file: Annotated[Path, typer.Argument(help="A file created by db backup.")]) -> None:
     """Restore a backup into a database without submissions, SQLite or PostgreSQL."""
     with operating() as (service, actor):
         where = database.restore(service, actor, file)
@@ -42,9 +44,9 @@ def restore_database(file: Annotated[Path, typer.Argument(help="What db backup m
 
 
 def purge_database(
-    before: Annotated[str, typer.Option(help="A date, or a date and time: 2025-09-01.")],
-    archive: Annotated[Path | None, typer.Option(help="Back the whole database up into this file first.")] = None,
-    for_good: Annotated[bool, typer.Option("--for-good", help="Keep no copy.")] = False,
+    before: Annotated[str, typer.Option(help="A date, or a date and time, such as 2025-09-01.")],
+    archive: Annotated[Path | None, typer.Option(help="Back up the whole database to this file first.")] = None,
+    for_good: Annotated[bool, typer.Option("--for-good", help="Do not create a backup.")] = False,
 ) -> None:
     """Remove submissions before a date, with their grades and recordings, and students without other submissions.
 

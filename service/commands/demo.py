@@ -11,7 +11,7 @@ _ASSIGNMENT = "shape-recognition"
 
 
 def demo(
-    output: Annotated[Path, typer.Option("-o", "--output", help="Where the reports go.")] = Path("robomark-demo"),
+    output: Annotated[Path, typer.Option("-o", "--output", help="The folder for the reports.")] = Path("robomark-demo"),
 ) -> None:
     """Grade the example submissions of one assignment through a real worker, and print the path of the report."""
     from service.commands.batch.submit import submit_and_wait

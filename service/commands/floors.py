@@ -11,7 +11,7 @@ from service.commands.shown import document, progress, tell
 
 
 def floors(
-    output: Annotated[Path, typer.Option("-o", "--output", help="The folder to write index.html into.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The folder for index.html.")],
     sheet: Annotated[int, typer.Option(min=0, help="The seed of the handwriting on the digit sheets.")] = 0,
 ) -> None:
     """Draw every floor with its scale, the robot's start and its labels."""

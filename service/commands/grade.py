@@ -21,20 +21,22 @@ def _documents() -> tuple[str, ...]:
 
 @with_option_groups
 def grade(
-    submissions: Annotated[list[Path], typer.Argument(help="Submissions: a .py file, a folder or a .zip each.")],
+    submissions: Annotated[
+        list[Path], typer.Argument(help="Submissions. Each is a .py file, a folder or a .zip file.")
+    ],
     assignment: Annotated[
-        str | None, typer.Option("-a", "--assignment", help="Its id in the catalogue, or its folder.")
+        str | None, typer.Option("-a", "--assignment", help="The assignment's id in the catalogue, or its folder.")
     ] = None,
-    report: Annotated[Path | None, typer.Option(help="Write a report for each submission into this folder.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write a report for each submission to this folder.")] = None,
     form: Annotated[str, format_option("What to print; a wrong one names them all.", _documents)] = "text",
     language: LanguageOption = SOURCE,
     run: Annotated[
-        str | None, typer.Option(metavar="N|TAG", help="Of a notebook: which of its runs is marked, or the tag of one.")
+        str | None, typer.Option(metavar="N|TAG", help="For a notebook: the number of the run to mark, or its tag.")
     ] = None,
     *,
     channel: ChannelFlags,
     unsafe: Annotated[
-        bool, typer.Option("--unsafe-no-sandbox", help="Let submissions do anything on this machine; for development.")
+        bool, typer.Option("--unsafe-no-sandbox", help="Run submissions without a sandbox. For development only.")
     ] = False,
 ) -> None:
     """Grade submissions now. Exit status 0 if all were graded, whatever the marks.

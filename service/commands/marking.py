@@ -13,17 +13,17 @@ from service.commands.shown import document, show, table, tell
 if TYPE_CHECKING:
     from service.operations.grades import Marking
 
-GradeId = Annotated[str, typer.Argument(help="The grade's id, or the beginning of it.")]
-CriterionId = Annotated[str, typer.Argument(help="The criterion's id; robomark mark history names them.")]
-Reason = Annotated[str, typer.Option(help="Why; the student reads it.")]
+GradeId = Annotated[str, typer.Argument(help="The grade's id, or its first characters.")]
+CriterionId = Annotated[str, typer.Argument(help="The criterion's id, as shown by robomark mark history.")]
+Reason = Annotated[str, typer.Option(help="The reason, which the student can read.")]
 
 
 Seen = Annotated[
     int | None,
     typer.Option(
         min=0,
-        help="Refuse the change if somebody else changed these marks: the id of what is set by hand, as robomark mark "
-        "history --json has it, 0 for nothing.",
+        help="Reject the change if another person changed these marks. The id of the current override, as in "
+        "robomark mark history --json, or 0 if there is none.",
     ),
 ]
 
@@ -31,7 +31,7 @@ Seen = Annotated[
 def set_marks(
     grade: GradeId,
     criterion: CriterionId,
-    marks: Annotated[str, typer.Argument(help="From 0 to the most that the criterion gives.")],
+    marks: Annotated[str, typer.Argument(help="The new marks, from 0 to the criterion's maximum.")],
     reason: Reason,
     seen: Seen = None,
 ) -> None:
@@ -45,7 +45,7 @@ def set_marks(
 
 
 def excuse(grade: GradeId, criterion: CriterionId, reason: Reason, seen: Seen = None) -> None:
-    """Let neither the marks of a criterion count nor the most there are."""
+    """Exclude a criterion: neither its marks nor its maximum count."""
     from service.operations import batches, grades
 
     with operating() as (service, actor):
@@ -55,7 +55,7 @@ def excuse(grade: GradeId, criterion: CriterionId, reason: Reason, seen: Seen = 
 
 
 def withdraw(grade: GradeId, criterion: CriterionId, seen: Seen = None) -> None:
-    """Let the grader's marks of a criterion count again."""
+    """Remove an override, so that the grader's marks of a criterion count again."""
     from service.operations import batches, grades
 
     with operating() as (service, actor):
@@ -65,8 +65,8 @@ def withdraw(grade: GradeId, criterion: CriterionId, seen: Seen = None) -> None:
 
 def comment(
     grade: GradeId,
-    text: Annotated[str, typer.Argument(help="What the student reads.")],
-    criterion: Annotated[str, typer.Option(help="The criterion that it is about; else all of the submission.")] = "",
+    text: Annotated[str, typer.Argument(help="The text for the student.")],
+    criterion: Annotated[str, typer.Option(help="The criterion to comment on. Default: the whole submission.")] = "",
 ) -> None:
     """Write a comment for the student."""
     from service.operations import batches, grades
@@ -78,7 +78,8 @@ def comment(
 
 
 def uncomment(
-    grade: GradeId, number: Annotated[int, typer.Argument(help="The comment's, as robomark mark history says.")]
+    grade: GradeId,
+    number: Annotated[int, typer.Argument(help="The id of the comment, as shown by robomark mark history.")],
 ) -> None:
     """Remove a comment."""
     from service.operations import batches, grades

@@ -52,7 +52,7 @@ LanguageOption = Annotated[
         metavar="CODE",
         callback=_known_language,
         autocompletion=lambda: list(languages()),
-        help="The language of reports and replays, as de; what is printed stays English.",
+        help="The language of reports and replays, for example de. Printed output stays in English.",
     ),
 ]
 
@@ -64,7 +64,7 @@ def _is_gif(path: Path | None) -> Path | None:
 
 
 FilmOption = Annotated[
-    Path | None, typer.Option("--film", callback=_is_gif, help="Write a film of one trial to this file, a GIF.")
+    Path | None, typer.Option("--film", callback=_is_gif, help="Write a film of one trial to this file, as GIF.")
 ]
 
 
@@ -116,20 +116,27 @@ class ChannelFlags:
 
     link: Annotated[str | None, typer.Option("--link", help="cable or infrared.")] = None
     beacon: Annotated[
-        str | None, typer.Option("--beacon", help="Where an infrared link's other end stands, mm.", metavar="X,Y")
+        str | None, typer.Option("--beacon", help="Position of the other end of an infrared link, mm.", metavar="X,Y")
     ] = None
-    range: Annotated[float | None, typer.Option("--range", help="How far an infrared link reaches, mm.")] = None
+    range: Annotated[float | None, typer.Option("--range", help="Range of an infrared link, mm.")] = None
     facing: Annotated[
-        float | None, typer.Option("--facing", help="The angle in which it does, degrees, half to either side.")
+        float | None,
+        typer.Option("--facing", help="Opening angle of an infrared link in degrees, half of it on each side."),
     ] = None
     blocked_by: Annotated[str | None, typer.Option("--blocked-by", help="obstacles or nothing.")] = None
-    loss: Annotated[float | None, typer.Option("--loss", help="Share of messages that is lost, each way.")] = None
-    delay: Annotated[float | None, typer.Option("--delay", help="Seconds there and back.")] = None
-    jitter: Annotated[float | None, typer.Option("--jitter", help="Seconds more, at most.")] = None
-    duplication: Annotated[float | None, typer.Option("--duplication", help="Share that comes twice.")] = None
-    reordering: Annotated[float | None, typer.Option("--reordering", help="Share that others overtake.")] = None
+    loss: Annotated[
+        float | None, typer.Option("--loss", help="Share of messages that are lost, in each direction.")
+    ] = None
+    delay: Annotated[float | None, typer.Option("--delay", help="Round-trip time of a message, in seconds.")] = None
+    jitter: Annotated[float | None, typer.Option("--jitter", help="Maximum additional delay, in seconds.")] = None
+    duplication: Annotated[float | None, typer.Option("--duplication", help="Share of messages that arrive twice.")] = (
+        None
+    )
+    reordering: Annotated[
+        float | None, typer.Option("--reordering", help="Share of messages that others overtake.")
+    ] = None
     corruption: Annotated[
-        float | None, typer.Option("--corruption", help="Share that comes with other letters and digits.")
+        float | None, typer.Option("--corruption", help="Share of messages with changed letters and digits.")
     ] = None
 
     def given(self) -> dict[str, object]:

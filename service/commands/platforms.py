@@ -15,16 +15,18 @@ Course = Annotated[str, typer.Option(help="A course that the platform launches."
 
 
 def add(
-    name: Annotated[str, typer.Argument(help="The name that is shown for the platform.")],
+    name: Annotated[str, typer.Argument(help="The displayed name of the platform.")],
     issuer: Annotated[str, typer.Option(help="The platform's issuer, for example https://moodle.example.org.")],
     client_id: Annotated[str, typer.Option("--client", help="The client id that the platform gave to Robomark.")],
-    deployments: Annotated[list[str], typer.Option("--deployment", help="A deployment id; give it once for each.")],
-    authorization_url: Annotated[str, typer.Option("--login-url", help="The address of its logins.")],
-    token_url: Annotated[str, typer.Option("--token-url", help="The address of its access tokens.")],
-    keys_url: Annotated[str, typer.Option("--keys-url", help="The address of its public keys.")],
+    deployments: Annotated[
+        list[str], typer.Option("--deployment", help="A deployment id. Repeat the option for several.")
+    ],
+    authorization_url: Annotated[str, typer.Option("--login-url", help="The URL of its authentication requests.")],
+    token_url: Annotated[str, typer.Option("--token-url", help="The URL of its access tokens.")],
+    keys_url: Annotated[str, typer.Option("--keys-url", help="The URL of its public keys.")],
     service_origins: Annotated[
         list[str] | None,
-        typer.Option("--service", help="Another address of its services; give it once for each."),
+        typer.Option("--service", help="Another URL of its services. Repeat the option for several."),
     ] = None,
 ) -> None:
     """Register a learning platform, or update the one with the same issuer and client id."""

@@ -22,7 +22,7 @@ Who = Annotated[str, typer.Argument(help="The student's name, as submitted.")]
 
 
 def export_student(
-    student: Who, output: Annotated[Path, typer.Option("-o", "--output", help="The zip to write.")]
+    student: Who, output: Annotated[Path, typer.Option("-o", "--output", help="The .zip file to create.")]
 ) -> None:
     """Export all data of a student that the student may see: identity, submissions and results."""
     from service.home import for_the_user
@@ -41,7 +41,7 @@ def export_student(
 
 def delete_student(
     student: Who,
-    for_good: Annotated[bool, typer.Option("--for-good", help="Really; nothing of it comes back.")] = False,
+    for_good: Annotated[bool, typer.Option("--for-good", help="Confirm the deletion. It cannot be undone.")] = False,
 ) -> None:
     """Delete all data of a student: submissions, grades, recordings and identity.
 
@@ -57,9 +57,11 @@ def delete_student(
 
 
 def purge_course(
-    older_than: Annotated[int, typer.Option(min=1, max=36_500, help="Days since it was taken in.")],
-    archive: Annotated[Path | None, typer.Option(help="Back the whole database up into this file first.")] = None,
-    for_good: Annotated[bool, typer.Option("--for-good", help="Keep no copy.")] = False,
+    older_than: Annotated[
+        int, typer.Option(min=1, max=36_500, help="Remove submissions that are older than this number of days.")
+    ],
+    archive: Annotated[Path | None, typer.Option(help="Back up the whole database to this file first.")] = None,
+    for_good: Annotated[bool, typer.Option("--for-good", help="Do not create a backup.")] = False,
 ) -> None:
     """Remove old submissions, with their grades and recordings, and students without other submissions.
 

@@ -36,8 +36,8 @@ class MagicFlags:
     motor_noise: Annotated[str | None, typer.Option("-M", "--motornoise", help="Wheel noise, 0 to 500.")] = None
     pen_colour: Annotated[str | None, typer.Option("-P", "--pencolor", help="Colour of the pen.")] = None
     pen_down: Annotated[bool, typer.Option("-p", "--pendown", help="Draw the path.")] = False
-    collab: Annotated[bool, typer.Option("-L", "--collab", help="Pass PY:: texts on.")] = False
-    autorun: Annotated[bool, typer.Option("-R", "--autorun", help="Always so here.")] = False
+    collab: Annotated[bool, typer.Option("-L", "--collab", help="Forward texts that begin with PY::.")] = False
+    autorun: Annotated[bool, typer.Option("-R", "--autorun", help="No effect: always on in Robomark.")] = False
     move: Annotated[bool, typer.Option("-m", "--move", hidden=True)] = False
 
     @property
@@ -87,17 +87,21 @@ class PanelFlags:
 class Conditions:
     """Conditions of a run that the magic's flags do not cover."""
 
-    responder: Annotated[str | None, typer.Option(help="FILE[:NAME] that answers the program's messages.")] = None
+    responder: Annotated[
+        str | None, typer.Option(help="FILE[:NAME] of the responder that answers the program's messages.")
+    ] = None
     second: Annotated[
-        Path | None, typer.Option(help="A second robot's program; -x and -y in its first line say where it starts.")
+        Path | None, typer.Option(help="The program of a second robot. Its first line sets the start with -x and -y.")
     ] = None
     responder_cpu: Annotated[
-        float, typer.Option(min=0.1, max=3600, help="Seconds that the responder, or the notebook, may compute.")
+        float, typer.Option(min=0.1, max=3600, help="CPU limit of the responder or the notebook, in seconds.")
     ] = 10
     seconds: Annotated[float, typer.Option(min=0.1, max=3600, help="Stop after this much simulated time.")] = 60
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is left to chance.")] = 0
-    sheet: Annotated[int | None, typer.Option(min=0, help="Which digit sheet; the seed's unless given.")] = None
-    tick: Annotated[Tick, typer.Option(help="A thirtieth of a second, or 33 ms as in the original's browser.")] = (
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all random values.")] = 0
+    sheet: Annotated[
+        int | None, typer.Option(min=0, help="Number of the digit sheet. Default: depends on the seed.")
+    ] = None
+    tick: Annotated[Tick, typer.Option(help="Length of a tick: 1/30 s, or 33 ms as in RoboLab in the browser.")] = (
         Tick.THIRTIETH
     )
 
@@ -107,17 +111,21 @@ class Kept:
     """The files in which a run is saved."""
 
     replay: Annotated[
-        Path | None, typer.Option(help="Write a page that plays the run to this file; its data if it is a .json.")
+        Path | None, typer.Option(help="Write a replay page of the run to this file, or its data to a .json file.")
     ] = None
     over: Annotated[
         Path | None,
-        typer.Option(help="Run this program too, in the same world, and draw it over the first in --replay."),
+        typer.Option(help="Also run this program in the same world, and add it to the replay of --replay."),
     ] = None
     film: FilmOption = None
-    trace_file: Annotated[Path | None, typer.Option("--trace", help="Write everything that happened, as JSON.")] = None
-    picture: Annotated[Path | None, typer.Option("--picture", help="Draw the path over the floor, as PNG.")] = None
+    trace_file: Annotated[Path | None, typer.Option("--trace", help="Write the recording to this file, as JSON.")] = (
+        None
+    )
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="Write a plot of the path on the floor to this file, as PNG.")
+    ] = None
     diagrams: Annotated[
-        Path | None, typer.Option(help="Draw the diagrams of a notebook's cells into this folder, as PNG.")
+        Path | None, typer.Option(help="Write the diagrams of a notebook's cells to this folder, as PNG.")
     ] = None
 
     def check(self) -> None:
@@ -137,7 +145,7 @@ def run(
     channel: ChannelFlags,
     kept: Kept,
     unsafe: Annotated[
-        bool, typer.Option("--unsafe-no-sandbox", help="Let programs do anything on this machine; for development.")
+        bool, typer.Option("--unsafe-no-sandbox", help="Run programs without a sandbox. For development only.")
     ] = False,
 ) -> None:
     """Run a robot program or a notebook in the simulator, with the flags of %sim_magic, and print its output."""

@@ -8,7 +8,7 @@ from service.commands.shown import document, tell
 
 
 def check() -> None:
-    """Put up the sandbox, try it, and say which layers stand; exit status 3 and the reason when one cannot."""
+    """Test the sandbox and list its active layers. If a layer fails, show the reason and exit with status 3."""
     from responders.sandbox import control_group
     from responders.sandbox.manager import Sandboxes
 

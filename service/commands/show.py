@@ -24,26 +24,26 @@ _BEFORE = "before"
 
 
 def show(
-    grade: Annotated[str, typer.Argument(help="The grade's id, or the beginning of it.")],
+    grade: Annotated[str, typer.Argument(help="The grade's id, or its first characters.")],
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Write the report, and the plots as files, into this folder."),
+        typer.Option("-o", "--output", help="Write the report and its plots to this folder."),
     ] = None,
     replay: Annotated[
         Path | None,
-        typer.Option("--replay", help="Write a page that plays its trials to this file; their data if it is a .json."),
+        typer.Option("--replay", help="Write a replay page of the trials to this file, or their data to a .json file."),
     ] = None,
     over: Annotated[
         str | None,
         typer.Option(
-            help="Lay the trials of this grade over them there: an earlier one of the same student "
-            f"('{_BEFORE}': the last), or the reference's."
+            help="Add the trials of this grade to the replay: an earlier grade of the same student "
+            f"('{_BEFORE}': the previous one), or the grade of the reference."
         ),
     ] = None,
     language: LanguageOption = SOURCE,
     film: FilmOption = None,
     trial: Annotated[
-        int | None, typer.Option(help="Which trial the film shows, as the replay numbers them; else its first.")
+        int | None, typer.Option(help="The trial for the film, as numbered in the replay. Default: the first.")
     ] = None,
 ) -> None:
     """Show a stored grade: its marks and the evidence for them."""

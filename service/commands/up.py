@@ -9,17 +9,19 @@ import typer
 Host = Annotated[
     str,
     typer.Option(
-        help="Where the web server listens; only this machine reaches the default. For others, set ROBOMARK_PUBLIC_URL."
+        help="The address of the web server. The default accepts connections from this machine only. For other "
+        "machines, set ROBOMARK_PUBLIC_URL."
     ),
 ]
-Port = Annotated[int, typer.Option(min=0, max=65535, help="0 takes any that is free.")]
+Port = Annotated[int, typer.Option(min=0, max=65535, help="The port. 0 selects a free port.")]
 
 
 def up(
     workers: Annotated[
-        int, typer.Option(min=1, max=64, help="Worker processes; each grades ROBOMARK_CONCURRENCY at a time.")
+        int,
+        typer.Option(min=1, max=64, help="Number of workers. Each grades ROBOMARK_CONCURRENCY submissions at a time."),
     ] = 1,
-    serve: Annotated[bool, typer.Option("--serve/--no-serve", help="Bring up the web server, too.")] = True,
+    serve: Annotated[bool, typer.Option("--serve/--no-serve", help="Also start the web server.")] = True,
     host: Host = "127.0.0.1",
     port: Port = 8470,
 ) -> None:

@@ -18,17 +18,21 @@ from service.operations.types import Role
 from service.settings import Settings
 from sim.errors import UsageError
 
-Id = Annotated[str, typer.Argument(help="What the course knows them by.")]
+Id = Annotated[str, typer.Argument(help="The person's id in the course.")]
 Course = Annotated[str, typer.Option(help="The course.")]
 
 
 def add(
     who: Id,
-    name: Annotated[str, typer.Option(help="As it is shown.")] = "",
-    email: Annotated[str, typer.Option(help="An address.")] = "",
+    name: Annotated[str, typer.Option(help="The displayed name.")] = "",
+    email: Annotated[str, typer.Option(help="The e-mail address.")] = "",
     course: Course = DEFAULT_COURSE,
-    operator: Annotated[bool, typer.Option("--operator", help="Lets them run the installation, too.")] = False,
-    student: Annotated[bool, typer.Option("--student", help="Enrols a student and no instructor.")] = False,
+    operator: Annotated[
+        bool, typer.Option("--operator", help="Also make the person an operator of this installation.")
+    ] = False,
+    student: Annotated[
+        bool, typer.Option("--student", help="Enrol the person as a student instead of an instructor.")
+    ] = False,
 ) -> None:
     """Add an instructor or a student to a course, and print a sign-in link, which works once."""
     if student and operator:
@@ -56,7 +60,7 @@ def link(who: Id, course: Course = DEFAULT_COURSE) -> None:
 def links(
     course: Course = DEFAULT_COURSE,
     days: Annotated[
-        int, typer.Option(min=1, max=sign_in_links.MOST_DAYS, help="The links expire after so many days.")
+        int, typer.Option(min=1, max=sign_in_links.MOST_DAYS, help="Number of days until the links expire.")
     ] = sign_in_links.DAYS,
 ) -> None:
     """Print a new sign-in link for each student of a course. Earlier links expire."""
@@ -90,10 +94,10 @@ def links(
 
 def token(
     who: Id,
-    scopes: Annotated[list[str], typer.Option("--scope", help="What it may do: read, submit, mark, manage.")],
-    name: Annotated[str, typer.Option(help="What it is for.")] = "",
+    scopes: Annotated[list[str], typer.Option("--scope", help="A scope of the token: read, submit, mark or manage.")],
+    name: Annotated[str, typer.Option(help="The name of the token.")] = "",
     course: Course = DEFAULT_COURSE,
-    days: Annotated[int, typer.Option(min=1, max=366, help="It ends after so many.")] = 90,
+    days: Annotated[int, typer.Option(min=1, max=366, help="Number of days until the token expires.")] = 90,
 ) -> None:
     """Print a token for programs, valid in one course."""
     from service.operations.scopes import SCOPES
@@ -139,7 +143,7 @@ def join(
     of: Annotated[str, typer.Option("--of", help="The other course.")],
     course: Course = DEFAULT_COURSE,
     from_platform: Annotated[
-        bool, typer.Option("--from-platform", help="Also if a learning platform signs one of them in.")
+        bool, typer.Option("--from-platform", help="Also join a person whom a learning platform signs in.")
     ] = False,
 ) -> None:
     """Join the accounts of one person in different courses, and sign both out."""

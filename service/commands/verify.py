@@ -8,7 +8,7 @@ import typer
 
 
 def verify(
-    grade: Annotated[str, typer.Argument(help="The grade's id, or the beginning of it.")],
+    grade: Annotated[str, typer.Argument(help="The grade's id, or its first characters.")],
 ) -> None:
     """Repeat every trial of a stored grading and compare. Exit status 3 if a result differs that must not."""
     from service.commands.verifying import verify_grade

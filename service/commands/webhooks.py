@@ -25,7 +25,8 @@ def add(
     events: Annotated[
         list[str],
         typer.Option(
-            "--event", help="grade.finished, batch.finished, grades.published or appeal.opened; give it once for each."
+            "--event",
+            help="grade.finished, batch.finished, grades.published or appeal.opened. Repeat the option for several.",
         ),
     ],
     course: Course = DEFAULT_COURSE,
@@ -59,7 +60,7 @@ def list_webhooks(course: Course = DEFAULT_COURSE) -> None:
 
 
 def remove(
-    webhook: Annotated[str, typer.Argument(help="The webhook's id, as robomark webhook list shows it.")],
+    webhook: Annotated[str, typer.Argument(help="The webhook's id, as shown by robomark webhook list.")],
     course: Course = DEFAULT_COURSE,
 ) -> None:
     """Remove a webhook and its pending deliveries."""
@@ -73,7 +74,7 @@ def remove(
 
 def list_deliveries(
     course: Course = DEFAULT_COURSE,
-    limit: Annotated[int, typer.Option(min=1, max=1000, help="The most deliveries to list.")] = 50,
+    limit: Annotated[int, typer.Option(min=1, max=1000, help="Maximum number of deliveries to show.")] = 50,
 ) -> None:
     """List the newest deliveries to the webhooks of a course."""
     from service.operations import webhooks

@@ -11,7 +11,7 @@ from sim.errors import HostError
 
 def worker(
     unsafe: Annotated[
-        bool, typer.Option("--unsafe-no-sandbox", help="Let submissions do anything on this machine; for development.")
+        bool, typer.Option("--unsafe-no-sandbox", help="Run submissions without a sandbox. For development only.")
     ] = False,
 ) -> None:
     """Start a worker, which grades queued jobs. Starts the bundled broker if no other is configured or running."""

@@ -189,8 +189,8 @@ def _of_function(name: str, told: str, clues: Clues) -> str:
     early = early_return(listing, head)
     if early is not None:
         return (
-            f"{listing.at(early.line)}: return is in the loop, so {name} ends in the loop's first turn. Move return "
-            "below the loop: indent it less"
+            f"{listing.at(early.line)}: return is in the loop, so {name} ends in the first pass of the loop. Move "
+            "return below the loop: indent it less"
         )
     stop = next((each for each in body if each.tokens == ("break",)), None)
     lists = _LISTS.search(told)

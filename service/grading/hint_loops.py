@@ -104,7 +104,7 @@ def _endless(loop: Statement, code: CodeStatements, listing: Listing, fault: Fau
         turns = next((call for call in loop.calls if call.name == "range"), None)
         numbers = [number for each in (turns.arguments if turns else ()) if (number := code.number(each)) is not None]
         if numbers and max(map(abs, numbers)) >= _MOST_TURNS:
-            return f"{where}: this loop has {max(numbers):,.0f} turns, which is too many. Use a smaller number"
+            return f"{where}: this loop has {max(numbers):,.0f} passes, which is too many. Use a smaller number"
         return ""
     head, condition = joined(loop.tokens), loop.condition
     for each in body:
@@ -135,9 +135,8 @@ def _endless(loop: Statement, code: CodeStatements, listing: Listing, fault: Fau
         return f"{where}: {head[:-1]} never ends: {_unchanged(sorted(names), loop, code, calls)}"
     exact = [place for place, token in enumerate(condition) if token in ("!=", "==")]
     if exact and any(token in PROPERTIES for token in condition) and any(each[:1].isdigit() for each in condition):
-        return (
-            f"{where}: {head[:-1]} does not end: the reading may pass the number between two looks. Compare with < or >"
-        )
+        past = "the value can jump past the number between two readings"
+        return f"{where}: {head[:-1]} does not end: {past}. Compare with < or >"
     return ""
 
 
@@ -151,7 +150,7 @@ def _wrong_step(loop: Statement, body: Sequence[Statement]) -> tuple[Statement, 
         if each.parent != loop.number:
             continue
         if each.target == name and len(each.tokens) == 3 and not is_name(each.tokens[2]):
-            again = f"gives {name} the same value in each turn"
+            again = f"gives {name} the same value in each pass"
             return each, again, "Move it to the line before the loop, without indentation"
         direction = _direction(each, name)
         if direction == _AWAY[sign]:

@@ -28,7 +28,7 @@ from submissions.criteria.stopping import StopOn
 
 _TOOK = re.compile(r"in (\d+\.\d+) s\b")
 _UNWANTED = re.compile(r'but it (?:sent|printed|said) "([^"]+)" as well')
-_SENT_ONCE = re.compile(r"it sent it (?:once|\d+ times?), last at .* no answer came")
+_SENT_ONCE = re.compile(r"it sent the message (?:once|\d+ times?), last at .* no answer came")
 _ONE_SENSOR = re.compile(r"\b(left|right) (?:light )?sensor\b", re.IGNORECASE)
 _OTHER_SIDE = re.compile(r"to the (left|right)\b.* but it was .*to the (?!\1)(?:left|right)")
 _WRITES = frozenset({"print", "say", "speak"})

@@ -42,7 +42,7 @@ def of_words_in_loop(clues: Clues) -> Iterator[str]:
             count = sum(line.text == text for line in lines)
             if once and count > 1 and len(call.arguments[0]) == 1:
                 yield (
-                    f"{listing.at(each.line)} {call.name}s {quoted(text)} {count} times, in each turn of the loop in "
+                    f"{listing.at(each.line)} {call.name}s {quoted(text)} {count} times, in each pass of the loop in "
                     f"line {loop.line}; expected once. To run it after the loop, remove its indentation"
                 )
                 return
@@ -61,9 +61,9 @@ def of_inner_loop(clues: Clues) -> Iterator[str]:
         speaks = any(call.name in _OUTPUT for one in body for call in one.calls)
         if speaks and not any(one.has(*outer.bound - each.bound) for one in (each, *body)):
             yield (
-                f"{listing.at(each.line)}: this loop is inside the loop of line {outer.line}, so it repeats its words "
-                f"in each turn of that loop. Words that were asked for once came {again[1]} more times. To run it "
-                "once, after the other loop, indent it less"
+                f"{listing.at(each.line)}: this loop is inside the loop in line {outer.line}, so it repeats its words "
+                f"in each pass of that loop. Words that are expected once appeared {again[1]} more times. To run this "
+                "loop once, after the other loop, indent it less"
             )
             return
 

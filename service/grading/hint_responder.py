@@ -126,7 +126,10 @@ def of_printed_answers(clues: Clues) -> Iterator[str]:
             if prints and (not returns or prints[-1].line > returns[-1].line):
                 line = prints[-1].line
                 said = quoted(listing.lines[line - 1])
-                yield f"{listing.at(line)}, {said}, prints the answer and nothing returns it; expected return"
+                yield (
+                    f"{listing.at(line)}, {said}, prints the answer, but no line returns it. Return the answer with "
+                    "return"
+                )
             elif not returns:
                 yield f"{listing.at(head.line)}: {head.tokens[1]} has no return with an answer; expected one"
             elif any(each.tokens == ("return",) for each in body):

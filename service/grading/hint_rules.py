@@ -127,7 +127,10 @@ def of_image_log(clues: Clues) -> Iterator[str]:
     """Yield a hint on a print that logs no image because it names no side."""
     if not clues.collaborative and clues.lost and _NO_SIDE in clues.printed:
         where = clues.where("program", _literal("image_data"))
-        yield f'{where} prints "image_data", which logs no image; expected "image_data both", or left or right for both'
+        yield (
+            f'{where} prints "image_data" without a side, so no image is logged. Write "image_data both", '
+            '"image_data left" or "image_data right"'
+        )
 
 
 def of_quoted_names(clues: Clues) -> Iterator[str]:

@@ -105,8 +105,8 @@ def of_single_look(clues: Clues) -> Iterator[str]:
         if reads and drives and not listing.code.loops_around(each):
             text = joined(each.tokens[1:])
             yield (
-                f"{listing.at(each.line)} looks at the sensor only once: if does not repeat. To go on as long as this "
-                f"is true, write while {text}"
+                f"{listing.at(each.line)} reads the sensor only once, because if does not repeat. To repeat as long as "
+                f"this is true, write while {text}"
             )
             return
 
@@ -121,8 +121,8 @@ def of_stop_in_loop(clues: Clues) -> Iterator[str]:
             continue
         if any(moves(one, MOVES_ON) for one in listing.code.statements[: each.number]):
             yield (
-                f"{listing.at(stop.line)} switches the motors off in the loop of line {each.line}, so the robot stops "
-                "in the first turn. Move the line below the loop: remove its indentation"
+                f"{listing.at(stop.line)} switches the motors off in the loop in line {each.line}, so the robot stops "
+                "in the first pass of the loop. Move the line below the loop: remove its indentation"
             )
             return
 

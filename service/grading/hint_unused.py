@@ -26,7 +26,7 @@ _MISSING_FLAG = re.compile(r"to have -(\w), but")
 _VALUED_FLAG = re.compile(r"(?<=\s)-(\w*?)([broxyaPNMs])([A-Za-z]{2,})(?=\s|$)")
 _FEW = re.compile(r"[Ee]xpected at least (\d+) samples of \w+, but there (?:is|are) (\d+)")
 _PAIRS_TAKEN = re.compile(r"\d+ of (\d+) pairs are usable")
-_READING = re.compile(r"reading (\S+) to (\S+) %, but it stopped with it reading (\d+(?:\.\d+)?) %")
+_READING = re.compile(r"reading (\S+) to (\S+) %, but the sensor was reading (\d+(?:\.\d+)?) %")
 _X_NAME = re.compile(r"(?:\w*_)?d?x\d?\Z", re.IGNORECASE)
 _Y_NAME = re.compile(r"(?:\w*_)?d?y\d?\Z", re.IGNORECASE)
 

@@ -99,7 +99,11 @@ def _of_full_marks(hints: tuple[str, ...], submission: Submission | None, langua
     full = language.say(FULL_MARKS)
     if not hints:
         return Diagnosis(full, language.say("No changes needed."))
-    cause = language.say("%(full)s Accepted with a difference: %(difference)s", full=full, difference=hints[0])
+    cause = language.say(
+        "%(full)s Your submission differs from the assignment, but it was accepted: %(difference)s",
+        full=full,
+        difference=hints[0],
+    )
     place = _PLACE.match(hints[0])
     excerpt = _excerpt(submission, place[2], int(place[1])) if place is not None else None
     step = language.say("No changes needed for the marks. Correct this if others use your program.")
@@ -169,7 +173,9 @@ def _practised(grade: Grade, result: CriterionResult, language: Language) -> str
         return ""
     seen = (each for each in grade.criteria if not each.max_marks and _failed(each))
     told = (found(grade, each, language) for each in seen)
-    return next((" " + language.say("In practice: %(found)s", found=each) for each in told), "")
+    return next(
+        (" " + language.say("From a criterion for practice (not marked): %(found)s", found=each) for each in told), ""
+    )
 
 
 def _failed(result: CriterionResult) -> list[Evidence]:

@@ -180,14 +180,14 @@ _WITHOUT: Mapping[str, VerdictWords] = MappingProxyType(
         "robot.py": VerdictWords(
             translatable("no robot.py"),
             translatable("There is no robot.py, so only your responder was graded."),
-            translatable("Only criteria that need a robot program lost marks through this."),
+            translatable("Because of this, you lost marks only for criteria that need a robot program."),
             translatable("Submit robot.py together with responder.py. If you did, check the file name."),
             "bad",
         ),
         "responder.py": VerdictWords(
             translatable("no responder.py"),
             translatable("There is no responder.py, so your robot program was graded without answers."),
-            translatable("Only criteria that need a responder lost marks through this."),
+            translatable("Because of this, you lost marks only for criteria that need a responder."),
             translatable("Submit responder.py together with robot.py. If you did, check the file name."),
             "bad",
         ),

@@ -86,7 +86,7 @@ def _task(sheet: TaskSheet) -> str:
     lines += ["| Marks | For |", "|---:|---|"]
     lines += [f"| {marks:g} | {title.replace('|', chr(92) + '|')} |" for title, marks in sheet.criteria]
     if sheet.more_marks:
-        lines += ["", f"Marks for hidden checks: {sheet.more_marks:g}"]
+        lines += ["", f"Marks for hidden criteria: {sheet.more_marks:g}"]
     return "\n".join(lines) + "\n"
 
 

@@ -156,7 +156,7 @@ def test_students_get_the_task_the_starter_and_the_given_files_and_nothing_that_
     task = files["README.md"].decode()
     assert "| 6 | Names the right shape |" in task
     assert "with noise |" not in task
-    assert "Marks for hidden checks: 2" in task
+    assert "Marks for hidden criteria: 2" in task
 
 
 def test_an_exported_assignment_is_the_same_assignment(tmp_path: Path) -> None:

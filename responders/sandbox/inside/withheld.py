@@ -30,7 +30,7 @@ def rule_for(module: str, names: tuple[str, ...]) -> str | None:
 
 def sentence(name: str) -> str:
     """Return the message for importing an excluded module."""
-    return f"this assignment does without {name}"
+    return f"{name} is not allowed in this assignment"
 
 
 class _Refuses(MetaPathFinder):

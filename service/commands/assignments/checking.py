@@ -10,10 +10,12 @@ from sim.errors import UsageError
 
 
 def check(
-    assignment: Annotated[str | None, typer.Argument(help="Its id in the catalogue, or its folder.")] = None,
+    assignment: Annotated[
+        str | None, typer.Argument(help="The assignment's id in the catalogue, or its folder.")
+    ] = None,
     everything: Annotated[bool, typer.Option("--all", help="Check the whole catalogue and print one table.")] = False,
     write_expected: Annotated[
-        bool, typer.Option("--write-expected", help="Note what examples got of which expected.toml says nothing yet.")
+        bool, typer.Option("--write-expected", help="Add the results of examples without an entry to expected.toml.")
     ] = False,
 ) -> None:
     """Find the mistakes in an assignment's files, grade its examples and compare the marks with the expected ones."""

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-Which = Annotated[str, typer.Argument(help="Its id in the catalogue, or its folder.")]
+Which = Annotated[str, typer.Argument(help="The assignment's id in the catalogue, or its folder.")]
 
 
 def count_words(number: int, one: str, many: str) -> str:

@@ -15,9 +15,9 @@ from submissions.assignment.folder import FILE_NAME
 
 
 def new(
-    folder: Annotated[Path, typer.Argument(help="The folder to make; its name becomes the assignment's id.")],
+    folder: Annotated[Path, typer.Argument(help="The folder to create. Its name becomes the assignment's id.")],
     like: Annotated[
-        str | None, typer.Option(help="Begin with a copy of this assignment instead of the commented example.")
+        str | None, typer.Option(help="Start with a copy of this assignment instead of the commented example.")
     ] = None,
 ) -> None:
     """Create the folder of a new assignment with a reference solution, as a template to edit."""
@@ -31,9 +31,10 @@ def new(
 
 def export(
     assignment: Which,
-    output: Annotated[Path, typer.Option("-o", "--output", help="A folder to write into, or a .zip to make.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="A folder to write to, or a .zip file to create.")],
     student: Annotated[
-        bool, typer.Option("--student", help="What students get: the task, the starter, the given files.")
+        bool,
+        typer.Option("--student", help="Export only the files for students: task, starter program and given files."),
     ] = False,
 ) -> None:
     """Export an assignment: all of it, or with --student the part that students may see."""
@@ -47,7 +48,7 @@ def export(
 
 def autograder(
     assignment: Which,
-    output: Annotated[Path, typer.Option("-o", "--output", help="The folder to make.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The folder to create.")],
 ) -> None:
     """Create the folder of a Gradescope autograder. It contains this installation's secret."""
     from service.autograder import write_autograder

@@ -10,7 +10,7 @@ from service.commands.operating import operating
 from service.commands.shown import document, tell
 from sim.errors import UsageError
 
-BatchId = Annotated[str, typer.Argument(help="The batch's id, or the beginning of it.")]
+BatchId = Annotated[str, typer.Argument(help="The batch's id, or its first characters.")]
 
 
 def pause(batch: BatchId) -> None:
@@ -38,7 +38,7 @@ def resume(batch: BatchId) -> None:
 
 
 def cancel(batch: BatchId) -> None:
-    """End what of a batch is not graded yet; marks that are there stay."""
+    """Cancel the unfinished jobs of a batch. Existing marks stay."""
     from service.operations import batches as operations
 
     with operating() as (service, actor):
@@ -55,8 +55,8 @@ def cancel(batch: BatchId) -> None:
 
 
 def retry(
-    batch: Annotated[str | None, typer.Argument(help="The batch's id, or the beginning of it.")] = None,
-    every: Annotated[bool, typer.Option("--all", help="The dead of all batches.")] = False,
+    batch: Annotated[str | None, typer.Argument(help="The batch's id, or its first characters.")] = None,
+    every: Annotated[bool, typer.Option("--all", help="Retry the failed jobs of all batches.")] = False,
 ) -> None:
     """Queue failed jobs again."""
     from service.operations import batches as operations

@@ -18,11 +18,13 @@ def export(
     form: Annotated[str, format_option("What to write; a wrong one names them all.", _names)] = "csv",
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="A file instead of the screen; a folder for a file each."),
+        typer.Option(
+            "-o", "--output", help="Write to this file, or one file each to this folder. Default: the screen."
+        ),
     ] = None,
-    published: Annotated[bool, typer.Option("--published", help="Only the grades that are published.")] = False,
+    published: Annotated[bool, typer.Option("--published", help="Export only published grades.")] = False,
     worksheet: Annotated[
-        Path | None, typer.Option(help="Moodle's grading worksheet, which --format moodle-worksheet fills in.")
+        Path | None, typer.Option(help="Moodle's grading worksheet, for --format moodle-worksheet.")
     ] = None,
 ) -> None:
     """Export the marks of a batch for a spreadsheet, Moodle, Gradescope or a test page, or as JSON.

@@ -12,7 +12,7 @@ from service.commands.shown import document, show, table
 
 
 def list_batches(
-    course: Annotated[str | None, typer.Option(help="Of this course only; else of all.")] = None,
+    course: Annotated[str | None, typer.Option(help="Show only this course. Default: all courses.")] = None,
 ) -> None:
     """List the newest batches."""
     from service.operations.batch_views import list_newest

@@ -30,7 +30,7 @@ _WHY = {
 def show_overview(
     batch: BatchId,
     pass_mark: Annotated[
-        int, typer.Option("--pass", min=0, max=100, help="The pass mark, per cent of all marks.")
+        int, typer.Option("--pass", min=0, max=100, help="The pass mark, in percent of all marks.")
     ] = int(PASS_SHARE * 100),
 ) -> None:
     """Show marks and their distribution, criteria, causes, students who need attention, and missing submissions."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from service.operations.regrades import Published, Regraded
     from submissions.assignment.definition import Assignment
 
-GradeId = Annotated[str, typer.Argument(help="The grade's id, or the beginning of it.")]
+GradeId = Annotated[str, typer.Argument(help="The grade's id, or its first characters.")]
 
 
 def regrade(
@@ -25,7 +25,7 @@ def regrade(
     assignment: Annotated[
         str | None, typer.Option("-a", "--assignment", help="The changed assignment: its id or its folder.")
     ] = None,
-    wait: Annotated[bool, typer.Option("--wait", help="Wait for the new grades and show what they change.")] = False,
+    wait: Annotated[bool, typer.Option("--wait", help="Wait for the new grades, then show the changes.")] = False,
 ) -> None:
     """Grade a batch again after its assignment or the grader changed; the old grades stay valid until you publish."""
     # The queue loads slowly, and publishing does not need it.
@@ -63,7 +63,7 @@ def regrade(
 def publish(
     batch: BatchId,
     anyway: Annotated[
-        bool, typer.Option("--anyway", help="Also where a criterion could not be judged: it gives no marks.")
+        bool, typer.Option("--anyway", help="Publish even if a criterion could not be judged. It gives no marks.")
     ] = False,
 ) -> None:
     """Publish the newest grades of a batch: they replace older grades, and students see them."""
@@ -80,7 +80,7 @@ def publish(
 def publish_one(
     grade: GradeId,
     anyway: Annotated[
-        bool, typer.Option("--anyway", help="Also where a criterion could not be judged: it gives no marks.")
+        bool, typer.Option("--anyway", help="Publish even if a criterion could not be judged. It gives no marks.")
     ] = False,
 ) -> None:
     """Publish the newest grade of one submission: it replaces older grades, and the student sees it."""

@@ -13,10 +13,10 @@ from service.commands.batch.control import BatchId
 def similar(
     batch: BatchId,
     given: Annotated[
-        Path | None, typer.Option(help="A file or folder of Python that students were given besides; it is left out.")
+        Path | None, typer.Option(help="A file or folder of Python code given to students. It is excluded.")
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="A folder for a page with the evidence side by side.")
+        Path | None, typer.Option("-o", "--output", help="Write a page with the evidence side by side to this folder.")
     ] = None,
 ) -> None:
     """List similar submissions of a batch, by their code and by their robots' behaviour; for staff only.

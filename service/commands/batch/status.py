@@ -16,7 +16,7 @@ from service.commands.statistics_shown import statistics_parts
 
 
 def status(batch: BatchId) -> None:
-    """How far a batch is, the marks that are there, and their statistics."""
+    """Show the progress of a batch, its marks, and their statistics."""
     from service.operations import batches
     from service.operations.batch_views import show_status
 

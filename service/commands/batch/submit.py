@@ -13,22 +13,24 @@ from sim.errors import UsageError
 
 def submit(
     grading_requests: Annotated[
-        Path, typer.Argument(help="A folder or .zip with a submission for each student, or a .csv roster.")
+        Path, typer.Argument(help="A folder or .zip file with one submission for each student, or a .csv roster.")
     ],
     assignment: Annotated[
-        str | None, typer.Option("-a", "--assignment", help="Its id in the catalogue, or its folder.")
+        str | None, typer.Option("-a", "--assignment", help="The assignment's id in the catalogue, or its folder.")
     ] = None,
     wait: Annotated[bool, typer.Option("--wait", help="Wait for the marks and show them.")] = False,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Write a report for each submission into this folder; waits."),
+        typer.Option("-o", "--output", help="Wait, then write a report for each submission to this folder."),
     ] = None,
-    again: Annotated[bool, typer.Option("--again", help="Grade again what was submitted already.")] = False,
+    again: Annotated[bool, typer.Option("--again", help="Grade unchanged submissions again.")] = False,
     people: Annotated[
         Path | None,
-        typer.Option(help="Who is in the course: a .csv with id, name, email; Moodle's grading worksheet is one."),
+        typer.Option(
+            help="The students of the course: a .csv file with id, name and email, such as Moodle's grading worksheet."
+        ),
     ] = None,
-    course: Annotated[str | None, typer.Option(help="The course, where there are several.")] = None,
+    course: Annotated[str | None, typer.Option(help="The course, if there are several.")] = None,
 ) -> None:
     """Queue a submission for each student. Invalid submissions are listed and do not affect the others.
 

@@ -31,9 +31,7 @@ def list_models() -> None:
 
 
 def compare(
-    chosen: Annotated[
-        list[str], typer.Argument(metavar="NAME NAME...", help="Models of the same things, two or more.")
-    ],
+    chosen: Annotated[list[str], typer.Argument(metavar="NAME NAME...", help="Two or more models of the same things.")],
     output: Output = None,
 ) -> None:
     """Compare the cards of classifiers: the accuracy of each, with 95 % intervals."""

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 def train(
     name: Name,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the weights and the card.")] = Path(
-        "models-trained"
-    ),
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="The folder for the weights and the model card.")
+    ] = Path("models-trained"),
 ) -> None:
     """Train a classifier again; the same versions of the libraries give the same bytes."""
     from models.training import train as train_model
@@ -38,7 +38,7 @@ def train(
 
 
 def evaluate(name: Name, output: Output = None) -> None:
-    """Measure a packaged classifier where it is trained for, beside the spot, and with noise."""
+    """Measure the accuracy of a packaged classifier at its training positions, away from them, and with noise."""
     if output is not None:
         from service.reports.written import prepare_folder
 

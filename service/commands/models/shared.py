@@ -12,10 +12,8 @@ from service.commands.shown import note
 from service.home import for_the_user
 from sim.errors import UsageError
 
-Name = Annotated[str, typer.Argument(help="The model's name, as the list has it.")]
-Output = Annotated[
-    Path | None, typer.Option("-o", "--output", help="Write the plots and the numbers into this folder.")
-]
+Name = Annotated[str, typer.Argument(help="The model's name, as shown by robomark models list.")]
+Output = Annotated[Path | None, typer.Option("-o", "--output", help="Write the plots and the numbers to this folder.")]
 
 
 def interval(tally: Tally) -> str:

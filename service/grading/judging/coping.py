@@ -240,18 +240,21 @@ def _mistake(criterion: Resends, question: _Question, recording: Recording) -> t
     times = [message.t for message in question.tries]
     for number, (t, following) in enumerate(zip(times, [*times[1:], None], strict=True), 1):
         if answered is not None and t > answered + 1e-9:
-            return t, f"it sent it again at {t:.2f} s, after its answer had come at {answered:.2f} s"
+            return t, f"it sent the message again at {t:.2f} s, after its answer had come at {answered:.2f} s"
         if criterion.at_most is not None and number > criterion.at_most:
-            return t, f"it sent it {len(times)} times"
+            return t, f"it sent the message {len(times)} times"
         if following is not None and following - t < least - _ROUNDING:
-            return following, f"it did not wait for it: it sent it at {t:.2f} s and again at {following:.2f} s"
+            return (
+                following,
+                f"it did not wait for the answer: it sent the message at {t:.2f} s and again at {following:.2f} s",
+            )
         if following is not None and following - t > most + _ROUNDING:
-            return t, f"it sent it at {t:.2f} s and again only at {following:.2f} s"
+            return t, f"it sent the message at {t:.2f} s and again only at {following:.2f} s"
         gave_up = following is None and (criterion.at_most is None or number < criterion.at_most)
         if gave_up and answered is None and _stopped_trying(t, most, recording):
-            return t, f"it sent it {_times(number)}, last at {t:.2f} s, and no answer came"
+            return t, f"it sent the message {_times(number)}, last at {t:.2f} s, and no answer came"
         if gave_up and answered is not None and until - t > most + _ROUNDING:
-            return t, f"it sent it {_times(number)}, and its answer came only at {until:.2f} s"
+            return t, f"it sent the message {_times(number)}, and its answer came only at {until:.2f} s"
     return None
 
 

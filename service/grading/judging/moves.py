@@ -96,8 +96,8 @@ def misses(wanted: AskedMotion, move: Move) -> str | None:
     """Return how a move differs from the required one, ``a turn of 85 to 95°, but it was 80°``; None if it matches."""
     asked = (
         ("a distance from where it began", "", "", wanted.distance, move.distance, " mm"),
-        ("a way", " forwards", " backwards", wanted.forward, move.forward, " mm"),
-        ("a way", " to the left", " to the right", wanted.sideways, move.sideways, " mm"),
+        ("a distance", " forwards", " backwards", wanted.forward, move.forward, " mm"),
+        ("a distance", " to the left", " to the right", wanted.sideways, move.sideways, " mm"),
         ("a turn", " to the left", " to the right", wanted.turn, move.turn, "°"),
         ("a turn", "", "", wanted.turn_size, abs(move.turn), "°"),
         ("a time", "", "", wanted.seconds, move.seconds, " s"),

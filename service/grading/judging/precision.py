@@ -35,8 +35,8 @@ def tempered(outcome: Outcome, criterion: AmongMany, wanted: int, strays: Strays
     if excess <= 0:
         return outcome
     return failed(
-        f"{outcome.message} Also, {strays.words}. This costs marks, because listing everything is not finding the "
-        "answer.",
+        f"{outcome.message} Also, {strays.words}. This costs marks. Give only the required answers, not every "
+        "possible one.",
         outcome.t,
         outcome.pose,
         outcome.score * wanted / (wanted + excess),

@@ -47,11 +47,12 @@ def judge_relation(criterion: Relation, trial: TrialResult) -> Outcome:
         return failed(
             f"Expected {criterion.of} to change with {criterion.to}{by}, but {span}.", t, end, measures=measures
         )
-    told = f"of two moments in {float(share):.0%}"
+    told = f"true for {float(share):.0%} of all pairs of moments"
     if share >= Fraction(str(criterion.at_least)):
         return passed(f"As expected, {criterion.of} was {lower} where {criterion.to} was: {told}.", t, end, measures)
     return failed(
-        f"{asked}, of two moments in {criterion.at_least:.0%} or more, but it was true for {float(share):.0%}; {span}.",
+        f"{asked} in {criterion.at_least:.0%} or more of all pairs of moments, but this was true for "
+        f"{float(share):.0%}; {span}.",
         t,
         end,
         share / Fraction(str(criterion.at_least)),

@@ -321,4 +321,4 @@ def _missed(
         pose = None if t is None else pose_at(recording, t)
         return failed(f"{expected}, but it did not come{behind}.", t, pose, score)
     (x, y), t = elsewhere.place, elsewhere.line.t
-    return failed(f"{expected}, but it came with it at ({x:.1f}, {y:.1f}).", t, pose_at(recording, t), score)
+    return failed(f"{expected}, but the text came at ({x:.1f}, {y:.1f}).", t, pose_at(recording, t), score)

@@ -68,7 +68,7 @@ def _judge_side(criterion: StopOn, side: Side, recording: Recording) -> Outcome:
         checks.append((close, f"over the colour ({colour})", f"over ({seen}){beside}"))
     if criterion.still:
         stood = _stood_still(recording)
-        checks.append((stood >= criterion.still, f"standing for {criterion.still:g} s", f"had stood for {stood:.2f} s"))
+        checks.append((stood >= criterion.still, f"standing for {criterion.still:g} s", f"standing for {stood:.2f} s"))
     measures = (
         Measure("end x", recording.end.x, "mm"),
         Measure("end y", recording.end.y, "mm"),
@@ -86,7 +86,7 @@ def _judge_side(criterion: StopOn, side: Side, recording: Recording) -> Outcome:
             measures,
         )
     return failed(
-        f"Expected the robot to stop with its {side} sensor {wrong[0]}, but it stopped with it {wrong[1]}.",
+        f"Expected the robot to stop with its {side} sensor {wrong[0]}, but the sensor was {wrong[1]}.",
         recording.end_t,
         recording.end,
         Fraction(sum(holds for holds, _, _ in checks), len(checks)),

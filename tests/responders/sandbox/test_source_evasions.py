@@ -106,9 +106,9 @@ def test_a_refused_import_is_an_error_of_its_line_and_a_note(tmp_path: Path, run
     asked = Assignment("a", "A", WorldSpec(), Parts(), (scenario,), (WITHOUT,))
     recording = grade(read_submission(tmp_path, asked=asked.parts), asked, runner=runner).trials[0].recording
     assert recording.verdict is Verdict.RESPONDER_ERROR
-    assert recording.faults[0].message == "ModuleNotFoundError: this assignment does without joblib"
+    assert recording.faults[0].message == "ModuleNotFoundError: joblib is not allowed in this assignment"
     assert recording.faults[0].line == 1
-    assert recording.notes == ("line 1 of the responder: this assignment does without joblib",)
+    assert recording.notes == ("line 1 of the responder: joblib is not allowed in this assignment",)
 
 
 @pytest.mark.parametrize("rules", [{"avoids": ["joblib"]}, {"avoids": ["import joblib"], "marks": "0"}, {}])

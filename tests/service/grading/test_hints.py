@@ -163,7 +163,8 @@ CELLS = {
     ),
     "a forgotten return": (
         ["def responder(text):\n    print('Python saw >> 0')", "%%sim_magic_preloaded\nprint('PY::0')"],
-        "line 2 of cell 1, \"print('Python saw >> 0')\", prints the answer and nothing returns it; expected return",
+        "line 2 of cell 1, \"print('Python saw >> 0')\", prints the answer, but no line returns it. Return the answer "
+        "with return",
     ),
 }
 

@@ -136,31 +136,31 @@ def test_sent_again_until_the_answer_came() -> None:
     [
         ((), {}, "but it sent nothing"),
         ((asked(0, "PY::0"),), {"at_least": 2}, "but it sent only 1 different"),
-        ((asked(0, "PY::0", "chance"),), {}, "it sent it once, last at 0.00 s, and no answer came"),
+        ((asked(0, "PY::0", "chance"),), {}, "it sent the message once, last at 0.00 s, and no answer came"),
         (
             (asked(0, "PY::0"), answer(0, 0.1, "JSON::0"), asked(1, "PY::0")),
             {},
-            "it sent it again at 1.00 s, after its answer had come at 0.10 s",
+            "it sent the message again at 1.00 s, after its answer had come at 0.10 s",
         ),
         (
             tuple(asked(float(t), "PY::0", "chance") for t in range(4)),
             {"at_most": 3},
-            "again until its answer comes, at most 3 times in all, but it sent it 4 times",
+            "again until its answer comes, at most 3 times in all, but it sent the message 4 times",
         ),
         (
             (asked(0, "PY::0", "chance"), asked(0.05, "PY::0"), answer(1, 0.2, "JSON::0")),
             {},
-            "it did not wait for it: it sent it at 0.00 s and again at 0.05 s",
+            "it did not wait for the answer: it sent the message at 0.00 s and again at 0.05 s",
         ),
         (
             (asked(0, "PY::0", "chance"), asked(5, "PY::0"), answer(1, 5.1, "JSON::0")),
             {"every": [0.5, 2]},
-            "it sent it at 0.00 s and again only at 5.00 s",
+            "it sent the message at 0.00 s and again only at 5.00 s",
         ),
         (
             (asked(0, "PY::0", arrived_as="PY::7"), answer(0, 0.1, "JSON::7")),
             {},
-            "it sent it once, last at 0.00 s, and no answer came",
+            "it sent the message once, last at 0.00 s, and no answer came",
         ),
     ],
 )

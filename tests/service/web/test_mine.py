@@ -100,7 +100,7 @@ def test_a_task_tells_nothing_that_is_hidden_and_gives_what_is_given(web: Web, a
     browser = web.browser(ada)
     shown = browser.get(f"{MINE}/open").text
     assert "The responder echoes each message" in shown
-    assert "Marks for hidden checks: 7" in shown
+    assert "Marks for hidden criteria: 7" in shown
     for secret in ("Secret criterion", "secret-scenario", "do not tell", "key.py"):
         assert secret not in shown
     given = browser.get(f"{MINE}/open/given/notes.txt")
