@@ -105,7 +105,7 @@ def two_shapes(canvas: Canvas) -> None:
 
 
 def _oval(canvas: Canvas, box: Box, colour: Colour) -> None:
-    """Return the ellipse in ``box`` as a polygon with one corner per degree.
+    """Draw the ellipse in ``box`` as a polygon with one corner per degree.
 
     The original Lollipop uses this polygon. Pillow's smoother ellipse would change sensor readings at the edge.
     """

@@ -37,8 +37,9 @@ class WorldSpec:
     robots: Literal[1, 2] = 1
     solid: bool = False  # walls and obstacles stop the robot
     drive: Literal["course", "wheels"] = "course"  # motion of the robot: the course's equations, or rigid-body wheels
-    noise: Literal["course", "both directions"] = "course"  # wheel noise for all speeds, or only for positive ones
-    tick: Literal["thirtieth", "browser"] = "thirtieth"  # per second, or 33 ms as in the original's browser
+    # "course": wheel noise only at positive speeds, as in the original
+    noise: Literal["course", "both directions"] = "course"
+    tick: Literal["thirtieth", "browser"] = "thirtieth"  # tick length: 1/30 s, or 33 ms as in the original's browser
     sheet: int | None = 0  # seed of the digits on a digit sheet; None: the seed of each trial
 
 
