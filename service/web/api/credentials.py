@@ -48,7 +48,7 @@ class CredentialShape(Shape):
 def list_credentials(
     caller: Annotated[Caller, Depends(with_scope("read"))], context: Context
 ) -> Listed[CredentialShape]:
-    """The valid sessions and tokens of the token's owner, as far as the token reaches, newest first."""
+    """List the valid sessions and tokens of the token's owner that the token can access, newest first."""
     found = credentials.list_credentials(context.service, actor_from(caller.identity))
     return Listed(items=[CredentialShape.model_validate(each) for each in found])
 
@@ -57,5 +57,5 @@ def list_credentials(
 def end_credential(
     caller: Annotated[Caller, Depends(with_scope("sign-in"))], context: Context, credential_id: RowName
 ) -> None:
-    """End one of these sessions and tokens, which may be the token itself."""
+    """End a session or a token of the token's owner. This can be the token of the request itself."""
     credentials.end_credential(context.service, actor_from(caller.identity), credential_id)

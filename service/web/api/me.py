@@ -17,7 +17,7 @@ router = api_router("me")
 
 
 class MeShape(Shape):
-    """The owner of the token."""
+    """The owner of the token, with courses and roles."""
 
     name: str
     operator: bool = Field(description="Whether this person is an operator of the installation.")
@@ -48,7 +48,7 @@ def me(caller: Called, context: Context) -> MeShape:
 def courses(
     caller: Annotated[Caller, Depends(with_scope("read"))], context: Context, limit: Limit = 50, after: After = ""
 ) -> Listed[CourseShape]:
-    """The courses that the token's owner has a role in, in the order in which they were made."""
+    """List the courses in which the token's owner has a role, in the order of creation."""
     place = place_after(after, int)
     beyond = 0 if place is None else place[0]
     found = [each for each in _courses(context, caller) if each.id > beyond]

@@ -1,4 +1,4 @@
-"""API for students: open assignments, submitting, and their own results as far as they may see them."""
+"""API for students: open assignments, submitting, and the visible parts of their own results."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ GIVEN: Described = {
 
 
 class OpenShape(Shape):
-    """An assignment that students may see."""
+    """An assignment that students can see, with the limits for the token's owner."""
 
     id: str
     title: str
@@ -63,15 +63,18 @@ class OpenShape(Shape):
 
 
 class PlaceShape(Shape):
-    """How many come before a submission, and how long it is to its marks; null where nothing tells how long."""
+    """Position of a submission in the queue.
+
+    Number of jobs ahead, and estimated seconds until its marks (null if unknown).
+    """
 
     before: int
     seconds: float | None
-    workers: int = Field(description="That live.")
+    workers: int = Field(description="Number of active workers.")
 
 
 class SubmissionShape(Shape):
-    """One submission of the token's owner, and how far it is."""
+    """A submission of the token's owner, with its grading state."""
 
     id: int
     assignment: str
@@ -81,12 +84,12 @@ class SubmissionShape(Shape):
     days_late: int
     over: str | None = Field(
         validation_alias="staff_only",
-        description="The exceeded limit: staff see it, and it counts only with their permission.",
+        description="The exceeded limit; null if none. Only staff see the grade, and they decide if it counts.",
     )
     job: str = Field(validation_alias="job_id")
     state: JobState
     progress: float = Field(description="Grading progress from 0 to 1, estimated from the usual duration.", default=1.0)
-    place: PlaceShape | None = Field(description="In the queue; null once nothing is to come.", default=None)
+    place: PlaceShape | None = Field(description="Position in the queue; null if no grade is pending.", default=None)
     marks: float | None = Field(description="The visible part of the marks; null if there are none.")
     max_marks: float | None
     published: bool = Field(description="Whether the grade is published; until then, parts of it can be hidden.")
@@ -110,7 +113,7 @@ class SubmissionShape(Shape):
 
 
 class CriterionAskedShape(Shape):
-    """One marked line that students see beforehand."""
+    """A criterion that students can see before they submit."""
 
     title: str
     marks: float
@@ -129,7 +132,7 @@ class TaskSheetShape(Shape):
     max_marks: float
     more_marks: float
     background: str = Field(description="The floor.")
-    seconds: float | None = Field(description="Simulated time of the longest visible trial.")
+    seconds: float | None = Field(description="Simulated seconds of the longest visible trial; null without one.")
     given: list[str] = Field(description="Files that students receive.")
 
     model_config = like(
@@ -181,7 +184,7 @@ def one_assignment(here: Reads, context: Context, assignment: AssignmentId) -> T
 
 @router.get(PREFIX + "/assignments/{assignment}/given/{file}", responses=GIVEN, response_class=Response)
 def given_file(here: Reads, context: Context, assignment: AssignmentId, file: str) -> Response:
-    """A file that the assignment gives its students."""
+    """Return a file that students receive with the assignment."""
     return attachment(own_views.show_given_file(context.service, here.acting, here.course_id, assignment, file), file)
 
 
@@ -193,7 +196,7 @@ def submit_one(
     sent: Sent,
     assignment: Annotated[str, Query(min_length=1, max_length=100, examples=["shape-recognition"])],
 ) -> SubmissionShape:
-    """Submit: a robot program, a responder, a notebook, or a zip with them; each a part `files` of the form."""
+    """Submit a robot program, a responder, a notebook, or a zip with them. Send each file as a form part `files`."""
     accepted = submit(context, here.acting, here.course_id, SendRequest(assignment, sent, even_in_part=True))
     return _shown(own_views.show_submission(context.service, here.acting, here.course_id, accepted.submission_id))
 
@@ -210,27 +213,27 @@ def list_submissions(here: Reads, context: Context, limit: Limit = 50, after: Af
 
 @router.get(PREFIX + "/submissions/{submission_id}")
 def one_submission(here: Reads, context: Context, submission_id: RowNumber) -> SubmissionShape:
-    """One submission, and how far it is."""
+    """Return a submission and its grading state."""
     return _shown(own_views.show_submission(context.service, here.acting, here.course_id, submission_id))
 
 
 @router.get(PREFIX + "/submissions/{submission_id}/grade", response_model=GradeShape)
 def grade(request: Request, here: Reads, context: Context, submission_id: RowNumber) -> Response:
-    """The grade, as far as its student may see it now; 404 until there is one."""
+    """Return the parts of the grade that the student can see now; 404 if there is no grade yet."""
     job_id, view = own_views.show_result(context.service, here.acting, here.course_id, submission_id)
     return grade_answer(request, job_id, view)
 
 
 @router.get(PREFIX + "/submissions/{submission_id}/report", responses=HTML, response_class=Response)
 def report(request: Request, here: Reads, context: Context, submission_id: RowNumber) -> Response:
-    """The report, as far as its student may see it now, in the language that `Accept-Language` asks for."""
+    """Return the parts of the report that the student can see now, in the language of `Accept-Language`."""
     asked = (context.service, here.acting, here.course_id, submission_id)
     return report_answer(request, own_views.show_report(*asked, language_of(request)))
 
 
 @router.get(PREFIX + "/submissions/{submission_id}/replay", responses=REPLAY, response_class=Response)
 def replay(request: Request, here: Reads, context: Context, submission_id: RowNumber) -> Response:
-    """Return the data of a replay of the trials that the student may see now."""
+    """Return the replay data of the trials that the student can see now."""
     return replay_answer(request, own_views.show_replay(context.service, here.acting, here.course_id, submission_id))
 
 

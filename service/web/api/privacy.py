@@ -24,7 +24,7 @@ Reads = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "read"))]
 
 
 class ErasedShape(Shape):
-    """How much was removed."""
+    """Numbers of removed submissions and grades."""
 
     submissions: int
     grades: int
@@ -34,19 +34,25 @@ class ErasedShape(Shape):
 
 @router.get("/courses/{course_id}/mine/data", responses=ZIP, response_class=Response)
 def own_data(here: Reads, context: Context) -> Response:
-    """All there is of the token's owner in the course, as they may see it: a zip of JSON, submissions and reports."""
+    """Return the data of the token's owner in the course, as a zip of JSON, submissions and reports.
+
+    Contains only the parts that the owner can see as a student.
+    """
     return _zip(privacy.export_own(context.service, here.acting, here.course_id))
 
 
 @router.get("/courses/{course_id}/people/{enrolment_id}/data", responses=ZIP, response_class=Response)
 def data(here: Manages, context: Context, enrolment_id: RowNumber) -> Response:
-    """All there is of a student of the course, as they may see it, except for assignments with hidden names."""
+    """Return the data of a student of the course, as visible to the student.
+
+    Assignments with hidden names are omitted.
+    """
     return _zip(privacy.export_student(context.service, here.acting, here.course_id, enrolment_id))
 
 
 @router.delete("/courses/{course_id}/people/{student_id}")
 def erase(here: Manages, context: Context, student_id: RowNumber) -> ErasedShape:
-    """Remove a student of the course for good: submissions, grades, recordings, and who they are."""
+    """Permanently delete a student's submissions, grades, recordings and personal data from the course."""
     return ErasedShape.model_validate(privacy.erase_student(context.service, here.acting, here.course_id, student_id))
 
 

@@ -30,7 +30,7 @@ PREFIX = "/courses/{course_id}/mine/tryouts"
 
 
 class TryoutShape(Shape):
-    """A program that is tried."""
+    """A test run of a program."""
 
     id: str
     assignment: str
@@ -38,10 +38,10 @@ class TryoutShape(Shape):
     queued_at: datetime
     before: int = Field(description="Number of test runs ahead in the queue.")
     said: dict[str, Any] | None = Field(
-        description="What came of it, once it is done: `happened`, `whose`, `seconds`, `lines` as [time, text], "
-        "`faults`; or `refused`, why it cannot be run."
+        description="Result of a finished test run: `happened`, `whose`, `seconds`, `lines` as [time, text], "
+        "`faults`; or `refused`, the reason for rejecting the program. Null until then."
     )
-    error: str = Field(description="Why the system could not run it.")
+    error: str = Field(description="Reason for a failure of the system; empty if there is none.")
 
     model_config = like(
         id="7xk2v9q4m0ab",
@@ -62,14 +62,17 @@ def ask(
     sent: Sent,
     assignment: Annotated[str, Query(min_length=1, max_length=100, examples=["shape-recognition"])],
 ) -> TryoutShape:
-    """Let a program be run once, as the assignment starts it first; nothing is marked, and it counts as no attempt."""
+    """Start a test run at the first pose of the first visible scenario.
+
+    A test run has no marks and does not count as an attempt.
+    """
     made = start_test_run(context, here.acting, here.course_id, assignment, sent)
     return _shown(test_runs.show(context.service, here.acting, here.course_id, made))
 
 
 @router.get(PREFIX + "/{tryout_id}")
 def one_tryout(here: Reads, context: Context, tryout_id: RowName) -> TryoutShape:
-    """How far it is, and what came of it; it is kept for a day."""
+    """Return the state and the result of a test run. Test runs are deleted after a day."""
     return _shown(test_runs.show(context.service, here.acting, here.course_id, tryout_id))
 
 
