@@ -24,24 +24,24 @@ Manages = Annotated[Caller, Depends(operating("manage"))]
 
 
 class LaneShape(Shape):
-    """How much waits in a lane."""
+    """Load of a job queue: numbers of queued and running jobs."""
 
     lane: Lane
     queued: int
     running: int
-    oldest_seconds: float = Field(description="Waiting time of the oldest job that a worker can claim.")
+    oldest_seconds: float = Field(description="Waiting time of the oldest job that a worker can claim, in seconds.")
 
 
 class TryoutLaneShape(Shape):
-    """How many programs are tried, which have a lane of their own."""
+    """Load of the test run queue."""
 
     queued: int
     running: int
-    oldest_seconds: float = Field(description="Waiting time of the oldest queued test run.")
+    oldest_seconds: float = Field(description="Waiting time of the oldest queued test run, in seconds.")
 
 
 class FindingShape(Shape):
-    """One thing that grading needs, and how it is."""
+    """Result of one system check."""
 
     what: str
     well: bool
@@ -49,15 +49,15 @@ class FindingShape(Shape):
 
 
 class ServiceShape(Shape):
-    """The whole service at one moment."""
+    """System status: version, queues, results of the system checks, and numbers of failures."""
 
     version: str
     ready: bool
     lanes: list[LaneShape]
     findings: list[FindingShape]
     tryouts: TryoutLaneShape
-    dead: int = Field(description="Failed jobs.")
-    host_faults: int = Field(description="Grading attempts of all jobs that failed because of the system.")
+    dead: int = Field(description="Number of failed jobs.")
+    host_faults: int = Field(description="Number of grading attempts that failed because of the system, for all jobs.")
     paused_batches: int
 
     model_config = like(
@@ -73,7 +73,7 @@ class ServiceShape(Shape):
 
 
 class WorkerShape(Shape):
-    """One worker."""
+    """A worker, with its version, sandbox and problems."""
 
     name: str
     host: str
@@ -83,8 +83,10 @@ class WorkerShape(Shape):
     started_at: datetime
     seen_at: datetime
     lately: bool = Field(description="Whether it reported recently.")
-    quarantine: str | None = Field(description="The self-test failure that stopped it from grading.")
-    problem: str = Field(description="Why it must be restarted; empty if there is no problem.")
+    quarantine: str | None = Field(
+        description="The self-test failure that stopped it from grading; null if there is none."
+    )
+    problem: str = Field(description="Reason for a required restart; empty if there is no problem.")
 
     model_config = like(
         name="worker@host",
@@ -101,7 +103,7 @@ class WorkerShape(Shape):
 
 
 class DeadShape(Shape):
-    """One job that was given up."""
+    """A failed job."""
 
     job_id: str
     course: str
@@ -125,13 +127,13 @@ class DeadShape(Shape):
 
 
 class RetryAsked(BaseModel):
-    """The dead jobs to queue again."""
+    """Selection of failed jobs to queue again."""
 
     batch_id: str | None = Field(None, max_length=32, pattern="^[0-9a-z]+$", description="Null for all batches.")
 
 
 class NamedCourseShape(Shape):
-    """A course of the installation, and how many are in it."""
+    """A course of the installation, with its numbers of instructors and students."""
 
     id: int
     name: str
@@ -175,7 +177,7 @@ class NewInstructorShape(Shape):
 
 @router.get("/operator")
 def service(operator: Reads, context: Context) -> ServiceShape:
-    """How the service is: what waits, and whether all that grading needs is well."""
+    """Return the system status: queue lengths and the results of the system checks."""
     view = system.show(context.service, operator.acting)
     found = view.metrics
     return ServiceShape(
@@ -200,7 +202,7 @@ def service(operator: Reads, context: Context) -> ServiceShape:
 
 @router.get("/operator/workers")
 def list_workers(operator: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[WorkerShape]:
-    """The workers that are known, by name."""
+    """List the workers, by name."""
     place = place_after(after, str)
     shown = [
         WorkerShape(
@@ -223,14 +225,14 @@ def list_workers(operator: Reads, context: Context, limit: Limit = 50, after: Af
 
 @router.get("/operator/courses")
 def list_courses(operator: Reads, context: Context) -> Listed[NamedCourseShape]:
-    """All courses, by name."""
+    """List all courses, by name."""
     found = courses.list_courses(context.service, operator.acting)
     return Listed(items=[NamedCourseShape.model_validate(each) for each in found])
 
 
 @router.post("/operator/courses", status_code=201, openapi_extra=dict(NO_KEY))
 def add_instructor(operator: Manages, context: Context, asked: InstructorAsked) -> NewInstructorShape:
-    """Make an instructor, and the course where there is none of that name, with a link that signs them in once."""
+    """Add an instructor to a course and return a single-use sign-in link. Creates the course if it does not exist."""
     request = MemberRequest(asked.course, asked.id, asked.name)
     added = courses.add_member(context.service, operator.acting, request)
     return NewInstructorShape(
@@ -246,13 +248,13 @@ def add_instructor(operator: Manages, context: Context, asked: InstructorAsked) 
 
 @router.get("/operator/dead")
 def list_dead(operator: Reads, context: Context) -> Listed[DeadShape]:
-    """The newest jobs that could not be graded."""
+    """List the newest failed jobs of all courses."""
     found = system.list_failed(context.service, operator.acting)
     return Listed(items=[DeadShape.model_validate(each) for each in found])
 
 
 @router.post("/operator/retry")
 def retry(operator: Manages, context: Context, asked: RetryAsked | None = None) -> RetriedShape:
-    """Queue again what could not be graded, of one batch or of all."""
+    """Queue the failed jobs of one batch or of all batches again."""
     batch_id = None if asked is None else asked.batch_id
     return RetriedShape.model_validate(batches.retry_dead(context.service, operator.acting, batch_id))

@@ -35,7 +35,7 @@ class PersonEnrolmentShape(Shape):
 
 
 class PersonShape(Shape):
-    """A person: all enrolments, and what they sign in with."""
+    """A person, with all enrolments, sessions and tokens."""
 
     enrolments: list[PersonEnrolmentShape]
     credentials: list[CredentialShape]
@@ -55,7 +55,7 @@ class SignOutAsked(BaseModel):
 
 
 class SignedOutShape(Shape):
-    """How many links, sessions and tokens ended."""
+    """Number of links, sessions and tokens that were ended."""
 
     ended: int
 
@@ -63,10 +63,10 @@ class SignedOutShape(Shape):
 
 
 class JoinAsked(BaseModel):
-    """The other person."""
+    """The other person to merge."""
 
-    other: int = Field(ge=1, le=2**31 - 1, description="One of their enrolments.", examples=[4])
-    from_platform: bool = Field(False, description="Join even if one of them signs in through a learning platform.")
+    other: int = Field(ge=1, le=2**31 - 1, description="ID of one of their enrolments.", examples=[4])
+    from_platform: bool = Field(False, description="Merge even if one of them signs in through a learning platform.")
 
 
 @router.get("/operator/people")
@@ -76,7 +76,7 @@ def find(
     course: Annotated[str, Query(min_length=1, max_length=100)],
     id: Annotated[str, Query(min_length=1, max_length=200)],
 ) -> PersonShape:
-    """The person with this id in this course."""
+    """Return the person with an ID in a course."""
     actor = operator.acting
     member = people.find(context.service, actor, course, id)
     return _shape(people.show(context.service, actor, member.enrolment_id))
@@ -93,7 +93,7 @@ def sign_out(
 
 @router.post("/operator/people/{member_id}/join")
 def join(operator: Manages, context: Context, member_id: RowNumber, asked: JoinAsked) -> PersonShape:
-    """Make one person of two in different courses, and sign both out."""
+    """Merge two persons in different courses into one, and sign both out."""
     actor = operator.acting
     people.join(context.service, actor, JoinRequest(member_id, asked.other, asked.from_platform))
     return _shape(people.show(context.service, actor, member_id))

@@ -40,7 +40,7 @@ _MOODLE = {
 
 
 class PlatformShape(Shape):
-    """A platform as it is registered."""
+    """A registered learning platform."""
 
     id: int
     name: str
@@ -56,7 +56,7 @@ class PlatformShape(Shape):
 
 
 class PlatformAsked(BaseModel):
-    """A platform to be registered, or to be changed where issuer and client are those of one."""
+    """A learning platform to register. It replaces a registration with the same issuer and client ID."""
 
     name: str = Field(min_length=1, max_length=200, examples=[_MOODLE["name"]])
     issuer: Registered = Field(examples=[_MOODLE["issuer"]])
@@ -74,17 +74,17 @@ class PlatformAsked(BaseModel):
 
 
 class CoursePlatformShape(Shape):
-    """The platform that a course is launched from."""
+    """The learning platform from which a course is launched."""
 
-    name: str | None = Field(description="Null if there is none.")
-    members: bool = Field(description="Whether it provides its members.")
-    marks: bool = Field(description="Whether it accepts marks.")
+    name: str | None = Field(description="Name of the platform; null if there is none.")
+    members: bool = Field(description="Whether the platform provides the list of its members.")
+    marks: bool = Field(description="Whether the platform accepts marks.")
 
     model_config = like(name="Moodle", members=True, marks=True)
 
 
 class EnrolledMembersShape(Shape):
-    """How many of the platform's members are in the course, and why others are not."""
+    """Number of enrolled members of the platform, and the reasons for rejected members."""
 
     members: int
     refused: list[str]
@@ -93,13 +93,13 @@ class EnrolledMembersShape(Shape):
 
 
 class MarksOfAsked(BaseModel):
-    """Of which assignment to send the published marks."""
+    """The assignment whose published marks are sent."""
 
     assignment: str = Field(min_length=1, max_length=200, examples=["shape-recognition"])
 
 
 class SentShape(Shape):
-    """How many marks were sent."""
+    """Number of marks that were sent."""
 
     sent: int
 
@@ -108,14 +108,14 @@ class SentShape(Shape):
 
 @router.get("/operator/platforms")
 def list_platforms(operator: OperatorReads, context: Context) -> Listed[PlatformShape]:
-    """All that are registered, by name."""
+    """List the registered platforms, by name."""
     found = platforms.list_platforms(context.service, operator.acting)
     return Listed(items=[PlatformShape.model_validate(each) for each in found])
 
 
 @router.post("/operator/platforms", status_code=201)
 def register(operator: OperatorManages, context: Context, asked: PlatformAsked) -> Listed[PlatformShape]:
-    """Register a platform, or change one of the same issuer and client; all that are registered then."""
+    """Register a platform, or update the one with the same issuer and client ID. Returns all registered platforms."""
     lists = {"deployments": tuple(asked.deployments), "service_origins": tuple(asked.service_origins)}
     request = Registration(**(asked.model_dump() | lists))
     found = platforms.register(context.service, operator.acting, request)
@@ -124,7 +124,7 @@ def register(operator: OperatorManages, context: Context, asked: PlatformAsked) 
 
 @router.get("/courses/{course_id}/platform")
 def course_platform(here: Reads, context: Context) -> CoursePlatformShape:
-    """The platform that the course is launched from, if one does."""
+    """Return the platform from which the course is launched, if there is one."""
     link = platforms.show_course_platform(context.service, here.acting, here.course_id).link
     if link is None:
         return CoursePlatformShape(name=None, members=False, marks=False)
@@ -134,7 +134,7 @@ def course_platform(here: Reads, context: Context) -> CoursePlatformShape:
 
 @router.post("/courses/{course_id}/platform/members", responses=_SILENT)
 def enrol_members(here: Manages, context: Context) -> EnrolledMembersShape:
-    """Enrol everybody whom the platform has in the course."""
+    """Enrol all members of the course on the platform."""
     enrolled = platforms.enrol_members(context.service, here.acting, here.course_id)
     return EnrolledMembersShape.model_validate(enrolled)
 

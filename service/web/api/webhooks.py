@@ -39,7 +39,7 @@ class WebhookShape(Shape):
 
 
 class NewWebhookShape(WebhookShape):
-    """A new webhook, with what its deliveries are signed with."""
+    """A new webhook, with the secret that signs its deliveries."""
 
     secret: str = Field(description="Shown only once.")
 
@@ -60,7 +60,7 @@ class WebhookAsked(BaseModel):
 
 
 class DeliveryShape(Shape):
-    """One thing that was told, or is to be."""
+    """A completed, pending or abandoned delivery of an event to a webhook."""
 
     id: str
     webhook_id: str
@@ -87,21 +87,21 @@ class DeliveryShape(Shape):
 
 @router.get("/courses/{course_id}/webhooks")
 def list_webhooks(here: Manages, context: Context) -> Listed[WebhookShape]:
-    """The webhooks of the course."""
+    """List the webhooks of the course."""
     found = webhooks.list_webhooks(context.service, here.acting, here.course_id)
     return Listed(items=[WebhookShape.model_validate(each) for each in found])
 
 
 @router.post("/courses/{course_id}/webhooks", status_code=201, openapi_extra=dict(NO_KEY))
 def create(here: Manages, context: Context, asked: WebhookAsked) -> NewWebhookShape:
-    """Create a webhook. Its secret is returned only once, so the request is not repeated by its key."""
+    """Create a webhook. Its secret is returned only once, so this route ignores idempotency keys."""
     line, secret = webhooks.create(context.service, here.acting, here.course_id, asked.url, asked.events)
     return NewWebhookShape(**WebhookShape.model_validate(line).model_dump(), secret=secret)
 
 
 @router.delete("/courses/{course_id}/webhooks/{webhook_id}", status_code=204, response_class=Response)
 def revoke(here: Manages, context: Context, webhook_id: RowName) -> None:
-    """Tell it nothing any more."""
+    """Remove a webhook and cancel its pending deliveries."""
     webhooks.revoke(context.service, here.acting, here.course_id, webhook_id)
 
 
