@@ -66,7 +66,7 @@ class CatalogueShape(Shape):
 
 
 class AssignmentShape(Shape):
-    """An assignment of a course, in the version that submissions are marked against."""
+    """An assignment of a course, in the version that submissions are graded against."""
 
     id: str = Field(validation_alias="assignment")
     title: str
@@ -95,7 +95,7 @@ class AssignmentAsked(BaseModel):
 
 
 class MarkedLineShape(Shape):
-    """One criterion, before anything is marked by it."""
+    """A criterion of an assignment."""
 
     id: str
     title: str
@@ -105,17 +105,17 @@ class MarkedLineShape(Shape):
 
 
 class ScenarioShape(Shape):
-    """One kind of trial."""
+    """A scenario: the conditions of one or more trials."""
 
     id: str
     title: str
-    seconds: float = Field(description="Maximum simulated time.")
+    seconds: float = Field(description="Maximum simulated time, in seconds.")
     trials: int
     visibility: str
 
 
 class AskedShape(Shape):
-    """An assignment of the catalogue with all that it asks for, hidden criteria and scenarios among it."""
+    """An assignment of the catalogue with its task, including hidden criteria and scenarios."""
 
     id: str
     title: str
@@ -134,7 +134,7 @@ class AskedShape(Shape):
 
 
 class WholeAssignmentShape(AskedShape):
-    """An assignment of a course with all that it asks for, hidden criteria and scenarios among it."""
+    """An assignment of a course with its task, including hidden criteria and scenarios."""
 
     open: bool
     opened_at: datetime | None
@@ -147,7 +147,7 @@ class WholeAssignmentShape(AskedShape):
 
 
 class PreviewShape(Shape):
-    """The grading of a reference solution; it is the token owner's own, and in no batch."""
+    """The job that grades a reference solution. It belongs to the token's owner and to no batch."""
 
     job: str
 
@@ -155,7 +155,7 @@ class PreviewShape(Shape):
 
 
 class NamesAsked(BaseModel):
-    """Whether names are visible during marking."""
+    """Visibility of names during marking."""
 
     names_hidden: bool
 
@@ -170,7 +170,7 @@ def list_catalogue(
     ] = "",
     topic: Annotated[str, Query(max_length=10, description="Number of a part of the course materials.")] = "",
 ) -> Listed[CatalogueShape]:
-    """The assignments that come with Robomark, of which a course can have any."""
+    """List the assignments of the catalogue, which every course can use."""
     place = place_after(after, str)
     left = (overview(assignment_folder(each)) for each in catalogue() if place is None or each > place[0])
     found = [each for each in left if each.says(q) and topic in ("", each.topic)][: limit + 1]
@@ -194,7 +194,7 @@ def list_assignments(here: Reads, context: Context, limit: Limit = 50, after: Af
 
 @router.post("/courses/{course_id}/assignments", status_code=201)
 def prepare(here: Manages, context: Context, asked: AssignmentAsked) -> AssignmentShape:
-    """Take an assignment from the catalogue, not yet open; again, to mark by its newest version from now on."""
+    """Add an assignment of the catalogue to the course without opening it, or update it to the newest version."""
     made = assignment_uploads.prepare_from_catalogue(context.service, here.acting, here.course_id, asked.assignment)
     return AssignmentShape.model_validate(made)
 
@@ -209,7 +209,8 @@ def upload(
 ) -> AssignmentShape:
     """Upload an assignment as a zip of its folder; its reference solution is graded as a preview.
 
-    It replaces an assignment with the same id. Without `replace`, the answer is 409 if students have seen that one.
+    It replaces an assignment with the same ID. If students have seen that one and `replace` is false, the response is
+    409.
     """
     made = assignment_uploads.upload(context.service, here.acting, here.course_id, UploadRequest(sent, replace))
     return AssignmentShape.model_validate(made)
@@ -230,33 +231,33 @@ def one_assignment(here: Reads, context: Context, assignment: AssignmentId) -> W
 
 @router.post("/courses/{course_id}/assignments/{assignment}/preview", status_code=201)
 def preview(here: Manages, context: Context, assignment: AssignmentId) -> PreviewShape:
-    """Grade the catalogue's reference solution as a submission of the token's owner, which is in no batch."""
+    """Grade the reference solution as a submission of the token's owner. It belongs to no batch."""
     return PreviewShape(job=assignment_uploads.preview(context.service, here.acting, here.course_id, assignment))
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/open")
 def open_one(here: Manages, context: Context, assignment: AssignmentId) -> AssignmentShape:
-    """Let students see it and submit to it."""
+    """Open an assignment: students can see it and submit."""
     changed = assignments.open_for_students(context.service, here.acting, here.course_id, assignment)
     return AssignmentShape.model_validate(changed)
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/close")
 def close_one(here: Manages, context: Context, assignment: AssignmentId) -> AssignmentShape:
-    """Close an assignment: no more submissions. Existing submissions stay."""
+    """Close an assignment for new submissions. Existing submissions are kept."""
     changed = assignments.close(context.service, here.acting, here.course_id, assignment)
     return AssignmentShape.model_validate(changed)
 
 
 @router.delete("/courses/{course_id}/assignments/{assignment}", status_code=204, response_class=Response)
 def remove(here: Manages, context: Context, assignment: AssignmentId) -> None:
-    """Let the course have it no more, as long as no student has been shown it."""
+    """Remove an assignment from the course. This is possible only if students have not seen it."""
     assignments.remove(context.service, here.acting, here.course_id, assignment)
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/names")
 def hide_names(here: Manages, context: Context, assignment: AssignmentId, asked: NamesAsked) -> AssignmentShape:
-    """Hide or show whose work it is."""
+    """Hide or show the students' names during marking."""
     hidden = asked.names_hidden
     changed = assignments.hide_names(context.service, here.acting, here.course_id, assignment, hidden=hidden)
     return AssignmentShape.model_validate(changed)

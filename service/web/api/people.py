@@ -47,7 +47,7 @@ class MemberShape(Shape):
 
 
 class GradingShape(Shape):
-    """The grade that stands of a submission."""
+    """The current grade of a submission."""
 
     job_id: str
     assignment: str
@@ -89,7 +89,7 @@ class StudentShape(MemberShape):
 
 
 class StudentAsked(BaseModel):
-    """A student to be enrolled, or told anew of."""
+    """A student to enrol, or an enrolled student whose name or e-mail address is to be updated."""
 
     id: str = Field(min_length=1, max_length=200, examples=["ada"])
     name: str = Field("", max_length=200, examples=["Ada Lovelace"])
@@ -97,13 +97,13 @@ class StudentAsked(BaseModel):
 
 
 class EnrolAsked(BaseModel):
-    """Students to be enrolled: all of them, or none."""
+    """Students to enrol. If one of them is invalid, none is enrolled."""
 
     students: list[StudentAsked] = Field(min_length=1, max_length=5000)
 
 
 class EnrolledShape(Shape):
-    """How many were named."""
+    """Number of students in the request."""
 
     students: int
 
@@ -114,16 +114,18 @@ class PolicyShape(Shape):
     """The policy of an assignment, or, with an empty assignment, the default policy of the course."""
 
     assignment: str = ""
-    due_at: Moment | None = Field(None, description="Deadline; later submissions are late.")
+    due_at: Moment | None = Field(None, description="Deadline; later submissions are late. Null for no deadline.")
     late_days: int = Field(0, ge=0, le=365, description="Number of days for which late submissions are accepted.")
-    attempts: int | None = Field(None, ge=1, le=1000, description="Maximum number of different submissions.")
-    cool_down_seconds: float = Field(0.0, ge=0, le=600_000, description="Minimum time between submissions.")
+    attempts: int | None = Field(
+        None, ge=1, le=1000, description="Maximum number of different submissions; null for no limit."
+    )
+    cool_down_seconds: float = Field(0.0, ge=0, le=600_000, description="Minimum time between submissions, in seconds.")
 
     model_config = like(assignment="", due_at="2026-11-30T17:00:00Z", late_days=2, attempts=5, cool_down_seconds=600)
 
 
 class PolicyAsked(PolicyShape):
-    """The policy to hold from now on."""
+    """The new policy."""
 
     assignment: str = Field("", max_length=100)
 
@@ -140,7 +142,7 @@ class LimitsShape(Shape):
     """The limits that apply to one student now."""
 
     due_at: datetime | None
-    closed_at: datetime | None = Field(description="Submissions after this time are over the limit.")
+    closed_at: datetime | None = Field(description="Submissions after this time are over the limit; null for no limit.")
     late_days: int
     attempts: int | None
     cool_down_seconds: float
@@ -152,7 +154,7 @@ class LimitsShape(Shape):
 
 @router.get("/courses/{course_id}/people")
 def list_people(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[MemberShape]:
-    """Everybody in the course, in the order in which they came in."""
+    """List the members of the course, in the order of enrolment."""
     place = place_after(after, int)
     actor, start = here.acting, 0 if place is None else place[0]
     found = people_views.list_members_after(context.service, actor, here.course_id, start, limit + 1)
@@ -161,7 +163,7 @@ def list_people(here: Reads, context: Context, limit: Limit = 50, after: After =
 
 @router.post("/courses/{course_id}/people", status_code=201)
 def enrol(here: Manages, context: Context, asked: EnrolAsked) -> EnrolledShape:
-    """Enrol students before they submit, or give those who have an id alone their names and addresses."""
+    """Enrol students. The names and e-mail addresses of enrolled students are updated."""
     students = [Student(each.id, each.name, each.email) for each in asked.students]
     people.enrol(context.service, here.acting, here.course_id, students)
     return EnrolledShape(students=len(asked.students))
@@ -169,7 +171,7 @@ def enrol(here: Manages, context: Context, asked: EnrolAsked) -> EnrolledShape:
 
 @router.get("/courses/{course_id}/people/{enrolment_id}")
 def one_student(here: Reads, context: Context, enrolment_id: RowNumber) -> StudentShape:
-    """A student, what they submitted as far as names are not hidden, and what they are allowed beyond the policy."""
+    """Return a student with extensions and submissions. Submissions to assignments with hidden names are omitted."""
     view = people_views.show_student(context.service, here.acting, here.course_id, enrolment_id)
     return StudentShape.model_validate(
         asdict(view.member)
@@ -199,7 +201,7 @@ def extend(here: Manages, context: Context, enrolment_id: RowNumber, asked: Exte
 
 @router.get("/courses/{course_id}/policies")
 def list_policies(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[PolicyShape]:
-    """When and how often students may submit, by assignment."""
+    """List the policies: deadline and attempts, by assignment."""
     place = place_after(after, str)
     found = policies.list_policies(context.service, here.acting, here.course_id)
     left = [_policy(name, allowed) for name, allowed in sorted(found.items()) if place is None or name > place[0]]
@@ -208,7 +210,7 @@ def list_policies(here: Reads, context: Context, limit: Limit = 50, after: After
 
 @router.put("/courses/{course_id}/policies")
 def set_policy(here: Manages, context: Context, asked: PolicyAsked) -> PolicyShape:
-    """Set what holds from now on for an assignment, or for all that have no policy of their own."""
+    """Set the policy of an assignment. Without an assignment, set the course's default policy."""
     allowed = PolicyLimits(asked.due_at, asked.late_days, asked.attempts, asked.cool_down_seconds)
     policies.set_policy(context.service, here.acting, here.course_id, asked.assignment, allowed)
     return _policy(asked.assignment, allowed)

@@ -23,7 +23,7 @@ _WHERE = "Null unless ROBOMARK_PUBLIC_URL is set."
 
 
 class LinkShape(Shape):
-    """A sign-in link, which works once and is returned only once."""
+    """A single-use sign-in link. It is returned only once."""
 
     path: str
     url: str | None = Field(description=_WHERE)
@@ -32,13 +32,13 @@ class LinkShape(Shape):
 
 
 class LinksAsked(BaseModel):
-    """How long links for a whole course last."""
+    """Validity of the links of a course, in days."""
 
     days: int = Field(sign_in_links.DAYS, ge=1, le=sign_in_links.MOST_DAYS)
 
 
 class StudentLinkShape(Shape):
-    """One student's link, or why there is none."""
+    """The sign-in link of one student, or the reason for a missing link."""
 
     enrolment: int
     id: str
@@ -47,11 +47,11 @@ class StudentLinkShape(Shape):
     path: str | None
     url: str | None = Field(description=_WHERE)
     expires_at: datetime | None
-    reason: str = Field(description="Why there is no link; empty if there is a link.")
+    reason: str = Field(description="Reason for a missing link; empty if there is a link.")
 
 
 class StudentLinksShape(Shape):
-    """A link for each student of the course, told this once."""
+    """Sign-in links for the students of the course. They are returned only once."""
 
     links: list[StudentLinkShape]
 
@@ -73,7 +73,7 @@ class StudentLinksShape(Shape):
 
 @router.post("/courses/{course_id}/people/links", status_code=201, openapi_extra=dict(NO_KEY))
 def links(here: Manages, context: Context, asked: LinksAsked | None = None) -> StudentLinksShape:
-    """A new link for each student of the course, by id; those that were made before count no more."""
+    """Create sign-in links for the students of the course, by ID. Earlier links become invalid."""
     days = sign_in_links.DAYS if asked is None else asked.days
     made = sign_in_links.make_links(context.service, here.acting, here.course_id, days)
     return StudentLinksShape(links=[_told(context, each) for each in made])
