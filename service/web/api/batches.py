@@ -27,16 +27,16 @@ Submits = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "submit")
 
 
 class ProgressShape(Shape):
-    """How far a batch is."""
+    """Progress of a batch, in jobs."""
 
     jobs: int
     ended: int
-    partial: float = Field(description="Progress of the running jobs, in jobs.")
+    partial: float = Field(description="Sum of the progress of the running jobs; each counts from 0 to 1.")
     plots_due: int
 
 
 class PaceShape(Shape):
-    """How fast it goes, by the last minutes."""
+    """Recent grading speed in jobs per minute, and estimated remaining seconds."""
 
     per_minute: float
     left_seconds: float
@@ -48,11 +48,11 @@ class CriterionStatisticsShape(Shape):
     id: str
     title: str
     n: int
-    mean_share: float = Field(description="Mean share of its marks, from 0 to 1.")
+    mean_share: float = Field(description="Mean fraction of the criterion's marks, from 0 to 1.")
 
 
 class CauseShape(Shape):
-    """The cause of lost marks of these students."""
+    """A cause of lost marks, with the affected students."""
 
     sentence: str
     students: list[str]
@@ -74,7 +74,7 @@ class StatisticsShape(Shape):
 
 
 class WholeBatchShape(BatchShape):
-    """A batch with how far it is, and what a class got."""
+    """A batch with its progress and statistics."""
 
     progress: ProgressShape
     pace: PaceShape | None
@@ -91,7 +91,7 @@ class WholeBatchShape(BatchShape):
 
 
 class KnownShape(Shape):
-    """A submission that changes nothing: its student has submitted the very same."""
+    """A submission that the student has already submitted unchanged. It is ignored."""
 
     job_id: str
     batch_id: str | None
@@ -99,7 +99,7 @@ class KnownShape(Shape):
 
 
 class ForStaffShape(Shape):
-    """A submission that is over a limit: it is marked, and shown to staff alone."""
+    """A submission that exceeds a limit. It is graded, but only staff can see it."""
 
     job_id: str
     student: str
@@ -109,9 +109,11 @@ class ForStaffShape(Shape):
 class TakenShape(Shape):
     """The accepted and rejected submissions of an upload."""
 
-    batch: str | None = Field(description="Null if no submission is new.")
+    batch: str | None = Field(description="ID of the batch; null if no submission is new.")
     queued: int
-    copied: int = Field(description="Identical to a graded submission, and therefore already graded.")
+    copied: int = Field(
+        description="Number of submissions identical to a graded one. They get the same grade immediately."
+    )
     known: list[KnownShape]
     for_staff: list[ForStaffShape]
     refusals: list[RefusalShape]
@@ -127,7 +129,7 @@ class TakenShape(Shape):
 
 
 class ControlledShape(Shape):
-    """Whether the batch changed, and how many of its jobs waited and ran then."""
+    """Result of the action: whether the batch changed, and the numbers of waiting and running jobs."""
 
     changed: bool
     waiting: int
@@ -137,7 +139,7 @@ class ControlledShape(Shape):
 
 
 class RetriedShape(Shape):
-    """How many dead jobs wait again, and how many stay dead because their student submitted anew."""
+    """Numbers of failed jobs that were queued again, and of those skipped because of a newer submission."""
 
     queued: int
     outdated: int
@@ -147,7 +149,7 @@ class RetriedShape(Shape):
 
 @router.get("/courses/{course_id}/batches")
 def list_batches(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[BatchShape]:
-    """The batches of the course, the newest first."""
+    """List the batches of the course, newest first."""
     place = place_after(after, datetime, str)
     last = (place[0], place[1]) if place else None
     found = views.list_batches(context.service, here.acting, here.course_id, limit + 1, last)
@@ -169,9 +171,9 @@ def submit_batch(
             description="An assignment of the course or catalogue; if empty, each submission names its assignment.",
         ),
     ] = "",
-    again: Annotated[bool, Query(description="Grade again what was submitted already.")] = False,
+    again: Annotated[bool, Query(description="Grade submissions again that were already submitted.")] = False,
 ) -> TakenShape:
-    """Hand over a zip with a submission for each student, as `robomark batch submit` takes it."""
+    """Upload a zip with one submission for each student, in the layout of `robomark batch submit`."""
     contents = read_upload(context, here.acting, here.course_id, upload, assignment)
     done = operations.submit(context.service, here.acting, here.course_id, SubmitRequest(name, contents, again))
     over = [job for job in done.jobs if job.staff_only]
@@ -187,7 +189,7 @@ def submit_batch(
 
 @router.get("/courses/{course_id}/batches/{batch_id}")
 def one_batch(here: Reads, context: Context, batch_id: RowName) -> WholeBatchShape:
-    """How far a batch is, and what a class got."""
+    """Return a batch with its progress and statistics."""
     found = views.show_graded(context.service, here.acting, here.course_id, batch_id)
     pace = found.view.pace
     return WholeBatchShape(
@@ -203,9 +205,10 @@ def one_batch(here: Reads, context: Context, batch_id: RowName) -> WholeBatchSha
 def batch_grades(
     here: Reads, context: Context, batch_id: RowName, limit: Limit = 50, after: After = ""
 ) -> Listed[JobShape]:
-    """The submissions of a batch, each with the grade that stands or why it has none: by student, or in no order.
+    """List the submissions of a batch by student, each with its current grade or the reason for a missing grade.
 
-    Their order tells nothing where names are hidden.
+    Submissions with hidden names come first, in an order that is independent of the names. For a batch of regrades,
+    the grades are the new ones.
     """
     place = place_after(after, str)
     last = place[0] if place else None
@@ -230,14 +233,14 @@ def resume(here: Submits, context: Context, batch_id: RowName) -> ControlledShap
 
 @router.post("/courses/{course_id}/batches/{batch_id}/cancel")
 def cancel(here: Submits, context: Context, batch_id: RowName) -> ControlledShape:
-    """End what of a batch is not graded yet; marks that are there stay."""
+    """Cancel all unfinished jobs of a batch. Existing grades are kept."""
     done = operations.cancel(context.service, here.acting, here.course_id, batch_id)
     return ControlledShape.model_validate(done)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/retry")
 def retry(here: Submits, context: Context, batch_id: RowName) -> RetriedShape:
-    """Queue again what of a batch could not be graded."""
+    """Queue the failed jobs of a batch again."""
     return RetriedShape.model_validate(operations.retry(context.service, here.acting, here.course_id, batch_id))
 
 

@@ -32,26 +32,26 @@ ZIP: Described = {
 REPLAY: Described = {
     200: {
         "content": {"application/json": {"schema": {"type": "object"}}},
-        "description": "What `robomark show --replay` writes: floors, sources, trials.",
+        "description": "Replay data, as written by `robomark show --replay`: floors, sources, trials.",
     }
 }
 
 
 @router.get("/courses/{course_id}/grades/{job_id}/state")
 def state(here: Reads, context: Context, job_id: RowName) -> JobShape:
-    """How far one grading is."""
+    """Return the state of one grading job."""
     return JobShape.model_validate(grade_views.show_state(context.service, here.acting, here.course_id, job_id))
 
 
 @router.get("/courses/{course_id}/grades/{job_id}", response_model=GradeShape)
 def grade(request: Request, here: Reads, context: Context, job_id: RowName) -> Response:
-    """One grade, with every criterion and trial, hidden ones among them; 404 until there is one."""
+    """Return a grade with all criteria and trials, including hidden ones; 404 if there is no grade yet."""
     return grade_answer(request, job_id, grade_views.show_result(context.service, here.acting, here.course_id, job_id))
 
 
 @router.get("/courses/{course_id}/grades/{job_id}/report", responses=HTML, response_class=Response)
 def report(request: Request, here: Reads, context: Context, job_id: RowName) -> Response:
-    """The report of one grade, a page that needs nothing beside it, in the language that `Accept-Language` asks for."""
+    """Return the report of a grade as a self-contained page, in the language of `Accept-Language`."""
     language = language_of(request)
     return report_answer(
         request, grade_views.show_report(context.service, here.acting, here.course_id, job_id, language)
@@ -60,7 +60,7 @@ def report(request: Request, here: Reads, context: Context, job_id: RowName) -> 
 
 @router.get("/courses/{course_id}/grades/{job_id}/replay", responses=REPLAY, response_class=Response)
 def replay(request: Request, here: Reads, context: Context, job_id: RowName) -> Response:
-    """Return the data of a replay of the grade's trials."""
+    """Return the replay data of the grade's trials."""
     return replay_answer(request, grade_views.show_replay(context.service, here.acting, here.course_id, job_id))
 
 

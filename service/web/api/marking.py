@@ -25,7 +25,7 @@ Marks = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "mark"))]
 StudentReads = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "read"))]
 StudentSubmits = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "submit"))]
 CriterionId = Annotated[str, Path(min_length=1, max_length=200)]
-_SEEN = "The ID of the override that you saw, 0 for none; 409 if it has changed since."
+_SEEN = "ID of the last override that you read, 0 for none. If it has changed since, the response is 409."
 
 
 def _owning(here: StudentSubmits, context: Context, submission_id: RowNumber) -> CallerInCourse:
@@ -41,7 +41,7 @@ GRADE = "/courses/{course_id}/grades/{job_id}"
 class OverrideShape(Shape):
     """Marks that replace the grader's marks; null excuses the criterion."""
 
-    id: int = Field(description="Send it as `seen` with the next change, so that a change in between is detected.")
+    id: int = Field(description="Send it as `seen` with the next change, to detect changes by others.")
     marks: float | None
     reason: str
     actor: str
@@ -49,11 +49,11 @@ class OverrideShape(Shape):
 
 
 class CriterionMarksShape(Shape):
-    """One criterion: as graded, and as it counts."""
+    """Marks of one criterion: by the grader, and in effect after adjustments."""
 
     criterion: str
     title: str
-    graded: float | None = Field(description="Null if it could not be judged.")
+    graded: float | None = Field(description="Marks by the grader; null if the criterion could not be judged.")
     worth: float = Field(description="Maximum marks in the assignment.")
     marks: float
     max_marks: float
@@ -79,11 +79,11 @@ class MarkingStepShape(Shape):
     criterion: str
     before: str
     after: str
-    text: str = Field(description="A reason, a comment, an answer.")
+    text: str = Field(description="Reason, comment or answer.")
 
 
 class MarkingShape(Shape):
-    """The criteria of a grade as they count, the comments on it, and what was done by hand."""
+    """Criteria of a grade with the marks in effect, comments, and the history of manual changes."""
 
     criteria: list[CriterionMarksShape]
     comments: list[CommentShape]
@@ -113,7 +113,7 @@ class MarkingShape(Shape):
 
 
 class MarksAsked(BaseModel):
-    """Marks in place of the grader's, or none to excuse the criterion; students read the reason."""
+    """Marks that replace the grader's marks (null excuses the criterion), and a reason that students can read."""
 
     marks: Decimal | None = Field(ge=0, le=10_000, examples=[5])
     reason: str = Field(min_length=1, max_length=LONGEST_REASON, examples=["The last one is named."])
@@ -121,7 +121,7 @@ class MarksAsked(BaseModel):
 
 
 class CommentAsked(BaseModel):
-    """The comment to the student."""
+    """A comment to the student."""
 
     criterion: str = Field("", max_length=200)
     text: str = Field(min_length=1, max_length=LONGEST_COMMENT, examples=["Well named!"])
@@ -134,7 +134,7 @@ class AppealShape(Shape):
     submission_id: int
     who: str
     assignment: str
-    title: str = Field(description="Of the assignment.")
+    title: str = Field(description="Title of the assignment.")
     attempt: int
     job_id: str
     text: str
@@ -158,14 +158,14 @@ class AppealShape(Shape):
 
 
 class TextAsked(BaseModel):
-    """A question, or its answer."""
+    """Text of an appeal, or of its answer."""
 
     text: str = Field(min_length=1, max_length=LONGEST_TEXT, examples=["Please look at the last shape again."])
 
 
 @router.get(GRADE + "/marking")
 def marking(here: Reads, context: Context, job_id: RowName) -> MarkingShape:
-    """The criteria of a grade as graded and as they count, and the comments on it."""
+    """Return the marks of a grade before and after adjustments, and the comments on it."""
     return MarkingShape.model_validate(grades.show_marking(context.service, here.acting, here.course_id, job_id))
 
 
@@ -173,7 +173,7 @@ def marking(here: Reads, context: Context, job_id: RowName) -> MarkingShape:
 def set_marks(
     here: Marks, context: Context, job_id: RowName, criterion: CriterionId, asked: MarksAsked
 ) -> MarkingShape:
-    """Let a criterion of this submission have these marks from now on, or excuse it; a regrade changes neither."""
+    """Adjust the marks of a criterion of this submission, or excuse it. Regrades keep the adjustment."""
     wanted = MarksRequest(criterion, asked.marks, asked.reason, asked.seen)
     return MarkingShape.model_validate(grades.set_marks(context.service, here.acting, here.course_id, job_id, wanted))
 
@@ -186,14 +186,14 @@ def withdraw(
     criterion: CriterionId,
     seen: Annotated[int | None, Query(ge=0, le=HIGHEST_NUMBER, description=_SEEN)] = None,
 ) -> MarkingShape:
-    """Let the grader's marks of a criterion count again."""
+    """Remove the adjustment of a criterion. The grader's marks apply again."""
     changed = grades.withdraw(context.service, here.acting, here.course_id, job_id, criterion, seen)
     return MarkingShape.model_validate(changed)
 
 
 @router.post(GRADE + "/comments", status_code=201)
 def comment(here: Marks, context: Context, job_id: RowName, asked: CommentAsked) -> MarkingShape:
-    """Write a comment to the student."""
+    """Add a comment to the student."""
     wanted = CommentRequest(asked.text, asked.criterion)
     return MarkingShape.model_validate(grades.comment(context.service, here.acting, here.course_id, job_id, wanted))
 
@@ -230,7 +230,7 @@ def list_appeals(
 
 @router.post("/courses/{course_id}/appeals/{appeal_id}/answer", status_code=204)
 def answer(here: Marks, context: Context, appeal_id: RowNumber, asked: TextAsked) -> None:
-    """Answer an open one, which closes it."""
+    """Answer an open appeal and close it."""
     appeals.answer(context.service, here.acting, here.course_id, appeal_id, asked.text)
 
 

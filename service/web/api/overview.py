@@ -30,7 +30,7 @@ Submits = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "submit")
 
 
 class ExpectedShape(Shape):
-    """One submission that would be taken in."""
+    """A submission that would be accepted."""
 
     student: str
     name: str
@@ -64,7 +64,7 @@ class PreflightShape(Shape):
 
 
 class BinShape(Shape):
-    """How many got from `low` to below `high`; the last bin has those with all marks."""
+    """Number of students with marks from `low` to below `high`. The last bin includes full marks."""
 
     low: float
     high: float
@@ -72,7 +72,7 @@ class BinShape(Shape):
 
 
 class OutlierShape(Shape):
-    """A grade to be looked at, and why."""
+    """A grade that needs review, with the reason."""
 
     id: str
     why: Literal["low", "slow", "close"]
@@ -150,10 +150,10 @@ def show_overview(
     context: Context,
     batch_id: RowName,
     at_least: Annotated[
-        int, Query(alias="pass", ge=0, le=100, description="The pass mark, per cent of all marks.")
+        int, Query(alias="pass", ge=0, le=100, description="Pass mark, in per cent of all marks.")
     ] = int(PASS_SHARE * 100),
 ) -> OverviewShape:
-    """Marks and their distribution, criteria, causes, whom to look at, and who has not submitted."""
+    """Return statistics of a batch: marks, criteria, causes of lost marks, outliers and missing submissions."""
     found = batch_views.show_overview(context.service, here.acting, here.course_id, batch_id, Decimal(at_least) / 100)
     return OverviewShape(
         classes=[

@@ -33,7 +33,7 @@ _CSV = {"requestBody": {"required": True, "content": {"text/csv": {"schema": {"t
 Form = Annotated[
     str, Query(alias="format", max_length=40, description=f"One of {', '.join(sorted(FORMATS))}.", examples=["csv"])
 ]
-Published = Annotated[bool, Query(description="Published grades only.")]
+Published = Annotated[bool, Query(description="Export only published grades.")]
 
 
 class RegradeAsked(BaseModel):
@@ -48,7 +48,7 @@ class RegradeAsked(BaseModel):
 
 
 class RegradedShape(Shape):
-    """A batch of regrades, and how many submissions were left out."""
+    """A batch of regrades, with the numbers of omitted submissions: other assignment, or not graded yet."""
 
     batch_id: str
     jobs: int
@@ -59,7 +59,7 @@ class RegradedShape(Shape):
 
 
 class RegradedOneShape(Shape):
-    """The grading that may take the place of the grade."""
+    """The job that grades a submission again."""
 
     job: str
 
@@ -67,7 +67,7 @@ class RegradedOneShape(Shape):
 
 
 class CriterionChangeShape(Shape):
-    """One criterion whose marks differ, as [marks, the most there are]; null where the assignment did not have it."""
+    """A criterion whose marks differ, as [marks, maximum]. Null if that version of the assignment does not have it."""
 
     title: str
     before: tuple[float, float] | None
@@ -76,7 +76,7 @@ class CriterionChangeShape(Shape):
 
 
 class ChangeShape(Shape):
-    """A regrade beside the grade that it may replace."""
+    """A regrade, compared with the grade that it would replace."""
 
     student: str
     job_id: str
@@ -108,7 +108,7 @@ class ChangeShape(Shape):
 
 
 class PublishAsked(BaseModel):
-    """How grades are published."""
+    """Options for publishing grades."""
 
     anyway: bool = Field(
         False, description="Also publish grades with a criterion that could not be judged; it gives no marks."
@@ -116,7 +116,7 @@ class PublishAsked(BaseModel):
 
 
 class PublishedShape(Shape):
-    """How many grades are published now that were not, and what was left out."""
+    """Numbers of newly published grades, of replaced grades, and of omitted grades by reason."""
 
     published: int
     replaced: int
@@ -130,7 +130,7 @@ class PublishedShape(Shape):
 
 @router.post("/courses/{course_id}/batches/{batch_id}/regrades", status_code=201)
 def regrade(here: Marks, context: Context, batch_id: RowName, asked: RegradeAsked | None = None) -> RegradedShape:
-    """Grade a batch again; the old grades stay valid until you publish."""
+    """Grade a batch again. The old grades apply until you publish the new ones."""
     name = "" if asked is None else asked.assignment
     made = operations.regrade_batch(context.service, here.acting, here.course_id, batch_id, name)
     return RegradedShape.model_validate(made)
@@ -151,7 +151,7 @@ def changes(
 
 @router.post("/courses/{course_id}/batches/{batch_id}/publish")
 def publish(here: Marks, context: Context, batch_id: RowName, asked: PublishAsked | None = None) -> PublishedShape:
-    """Let the newest grades of a batch stand, and release them to the students."""
+    """Publish the newest grades of a batch. They become the current grades, and students can see them."""
     anyway = asked is not None and asked.anyway
     done = operations.publish(context.service, here.acting, here.course_id, batch_id, anyway=anyway)
     return PublishedShape.model_validate(done)
@@ -159,7 +159,7 @@ def publish(here: Marks, context: Context, batch_id: RowName, asked: PublishAske
 
 @router.post("/courses/{course_id}/grades/{job_id}/publish")
 def publish_one(here: Marks, context: Context, job_id: RowName, asked: PublishAsked | None = None) -> PublishedShape:
-    """Let the newest grade of this submission stand, and release it to its student."""
+    """Publish the newest grade of a submission. It becomes the current grade, and the student can see it."""
     anyway = asked is not None and asked.anyway
     done = operations.publish_one(context.service, here.acting, here.course_id, job_id, anyway=anyway)
     return PublishedShape.model_validate(done)
@@ -167,14 +167,14 @@ def publish_one(here: Marks, context: Context, job_id: RowName, asked: PublishAs
 
 @router.post("/courses/{course_id}/grades/{job_id}/regrades", status_code=201)
 def regrade_one(here: Marks, context: Context, job_id: RowName, asked: RegradeAsked | None = None) -> RegradedOneShape:
-    """Grade this submission again; the old grade stays valid until you publish."""
+    """Grade a submission again. The old grade applies until you publish the new one."""
     name = "" if asked is None else asked.assignment
     return RegradedOneShape(job=operations.regrade_one(context.service, here.acting, here.course_id, job_id, name))
 
 
 @router.post("/courses/{course_id}/grades/{job_id}/over-limit", status_code=204)
 def grade_over_limit(here: Marks, context: Context, job_id: RowName) -> None:
-    """Grade a submission that was put aside because it is over a limit."""
+    """Grade a submission that was not graded because it exceeds a limit."""
     operations.grade_over_limit(context.service, here.acting, here.course_id, job_id)
 
 
@@ -182,7 +182,10 @@ def grade_over_limit(here: Marks, context: Context, job_id: RowName) -> None:
 def export(
     here: Reads, context: Context, batch_id: RowName, form: Form = "csv", published: Published = False
 ) -> Response:
-    """The grades of a batch in a format of `robomark batch export`; one without a table is a zip with a file each."""
+    """Export the grades of a batch in a format of `robomark batch export`.
+
+    Formats that are not tables return a zip with one file for each grade.
+    """
     return _file(context, here, batch_id, ExportRequest(form, published))
 
 
@@ -193,7 +196,7 @@ def export(
 async def worksheet(
     request: Request, here: Reads, context: Context, batch_id: RowName, published: Published = False
 ) -> Response:
-    """The uploaded Moodle grading worksheet with the grades filled in; stored data stays unchanged."""
+    """Return the uploaded Moodle grading worksheet with the grades filled in. Stored data does not change."""
     given = await request.body()
     try:
         text = given.decode("utf-8")

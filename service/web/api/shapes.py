@@ -49,7 +49,7 @@ def example_of(shape: type[Shape]) -> Any:
 
 
 class CourseShape(Shape):
-    """A course, and what the token's owner is in it."""
+    """A course, with the role of the token's owner."""
 
     id: int
     name: str
@@ -67,7 +67,7 @@ class RefusalShape(Shape):
 
 
 class JobShape(Shape):
-    """One grading of one submission, as a table of a batch has it."""
+    """A grading job of one submission."""
 
     id: str
     student: str = Field(description="ID in the course; a number if names are hidden.")
@@ -75,21 +75,27 @@ class JobShape(Shape):
     source: str = Field(description="Name of the submitted file or folder.")
     assignment: str
     state: JobState
-    standing: Standing = Field(description="The current grade of a submission is the one that `stands`.")
+    standing: Standing = Field(
+        description="`stands`: current grade; `proposed`: unpublished regrade; `kept`: replaced grade."
+    )
     verdict: str | None
     marks: float | None
     max_marks: float
-    attempt: int = Field(description="The student's, counted for this assignment.")
+    attempt: int = Field(description="Number of the student's attempt at this assignment.")
     error: str | None
     queued_at: datetime
     finished_at: datetime | None
     published_at: datetime | None
     days_late: int
-    staff_only: str | None = Field(description="The limit that the submission exceeds; hidden from students.")
-    suspect: str | None = Field(description="Why the grade can be wrong.")
-    missing: str = Field(description="The required part that was not submitted.")
-    copied_from: str | None = Field(description="The original of an identical grade.")
-    unjudged: int = Field(description="Criteria that could not be judged and need review.")
+    staff_only: str | None = Field(
+        description="The limit that the submission exceeds; null if none. The grade is hidden from students."
+    )
+    suspect: str | None = Field(description="Reason for doubt about the grade; null if there is none.")
+    missing: str = Field(description="The required part that was not submitted; empty if there is none.")
+    copied_from: str | None = Field(
+        description="ID of the job whose grade was copied for an identical submission; null otherwise."
+    )
+    unjudged: int = Field(description="Number of criteria that could not be judged and need review.")
 
     model_config = like(
         id="7xk2v9q4m0ab",
@@ -117,7 +123,7 @@ class JobShape(Shape):
 
 
 class BatchShape(Shape):
-    """A batch, and how many of its jobs are in each state."""
+    """A batch, with the number of jobs in each state."""
 
     id: str
     name: str
@@ -126,15 +132,15 @@ class BatchShape(Shape):
     jobs: int
     states: dict[JobState, int]
     refusals: list[RefusalShape]
-    regrade_of: str | None = Field(description="The batch whose submissions these are.")
-    web_assignment: str | None = Field(description="The assignment of these web submissions.")
+    regrade_of: str | None = Field(description="The batch that was graded again; null if this is not a regrade.")
+    web_assignment: str | None = Field(description="The assignment, for a batch of web submissions; null otherwise.")
     takes_in: bool = Field(description="Whether the assignment is open for more submissions.")
 
     model_config = like(**BATCH_EXAMPLE)
 
 
 class CriterionShape(Shape):
-    """One marked line."""
+    """Marks and message of one criterion."""
 
     id: str
     title: str
@@ -142,11 +148,13 @@ class CriterionShape(Shape):
     max_marks: float
     message: str
     for_staff: str = Field(description="Notes for staff about parts that need review.", default="")
-    set_by_hand: dict[str, Any] | None = Field(description="The adjustment by staff, and the reason.", default=None)
+    set_by_hand: dict[str, Any] | None = Field(
+        description="Adjustment by staff, with the reason; null if there is none.", default=None
+    )
 
 
 class TrialShape(Shape):
-    """One run of the simulation."""
+    """A trial: one run of the simulation."""
 
     scenario: str
     seed: int
@@ -154,14 +162,16 @@ class TrialShape(Shape):
     sha256: str = Field(description="Hash of the recording; the same submission gives the same hash.")
     spoken: list[str]
     messages: list[dict[str, Any]]
-    partner: dict[str, Any] | None = Field(description="The same for the second robot.", default=None)
+    partner: dict[str, Any] | None = Field(
+        description="The same data for the second robot; null if there is none.", default=None
+    )
     notes: list[str]
 
     model_config = ConfigDict(extra="allow")
 
 
 class AccuracyShape(Shape):
-    """How much of what was to be recognised was recognised, with a 95 % interval."""
+    """Fraction of correctly recognised items, with a 95% confidence interval."""
 
     value: float
     low: float
@@ -170,7 +180,7 @@ class AccuracyShape(Shape):
 
 
 class GradeShape(Shape):
-    """A grade, as `robomark show --json` and the format `json` write it; a student's has nothing of what is hidden."""
+    """A grade, in the format of `robomark show --json`. Hidden parts are omitted for students."""
 
     job: str
     schema_: int = Field(alias="schema")
@@ -186,7 +196,7 @@ class GradeShape(Shape):
     comments: list[dict[str, Any]] = Field(description="Comments by instructors.", default=[])
     missing: str = ""
     cost: dict[str, Any] | None = None
-    withheld: bool = Field(description="Whether parts of it are hidden from the token's owner.")
+    withheld: bool = Field(description="Whether parts of the grade are hidden from the token's owner.")
 
     model_config = ConfigDict(
         json_schema_extra={

@@ -24,24 +24,24 @@ Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
 
 
 class StretchShape(Shape):
-    """Lines of the first one's source, and those of the second one's that are like them; lines count from 1."""
+    """Similar lines of two sources, as [first line, last line] of each. Line numbers start at 1."""
 
     lines: tuple[int, int]
     other_lines: tuple[int, int]
 
 
 class AlikeSourcesShape(Shape):
-    """Two sources that are alike."""
+    """Two similar sources."""
 
     files: tuple[str, str]
     shares: tuple[float, float] = Field(
-        description="The share of each student's own code that the other student also has."
+        description="Fraction of each student's own code that the other student also has, from 0 to 1."
     )
     stretches: list[StretchShape]
 
 
 class TrialNameShape(Shape):
-    """The trial, by scenario and number."""
+    """A trial, identified by scenario and index."""
 
     scenario: str
     index: int
@@ -49,7 +49,7 @@ class TrialNameShape(Shape):
 
 
 class SameInTrialShape(Shape):
-    """A trial in which both did what few others did."""
+    """A trial in which both students show the same rare behaviour."""
 
     trial: TrialNameShape
     aspect: Aspect
@@ -58,10 +58,10 @@ class SameInTrialShape(Shape):
 
 
 class SimilarPairShape(Shape):
-    """Two students whose work is alike."""
+    """Two students with similar submissions."""
 
     students: tuple[str, str]
-    share: float = Field(description="The largest share of a source that is also in the other source.")
+    share: float = Field(description="Largest fraction of a source that is also in the other source, from 0 to 1.")
     sources: list[AlikeSourcesShape]
     trials: list[SameInTrialShape]
 
@@ -88,6 +88,6 @@ class SimilaritiesShape(Shape):
 
 @router.get("/courses/{course_id}/batches/{batch_id}/similar")
 def show_similar(here: Reads, context: Context, batch_id: RowName) -> SimilaritiesShape:
-    """Pairs of students of the course whose newest submissions are alike: a reason to look and to ask, and no proof."""
+    """List the pairs of students with similar newest submissions. Similarity is a reason for a review, not a proof."""
     found = list_similar(context.service, here.acting, here.course_id, batch_id)
     return SimilaritiesShape(assignments=[SimilarityShape.model_validate(each) for each in found])
