@@ -20,7 +20,7 @@ from service.web.access import RowNumber, SignInNeeded, actor_from, nothing_here
 from service.web.context import Context
 
 #: Describes the authentication in the OpenAPI document. ``caller_of`` checks the token.
-bearer = HTTPBearer(auto_error=False, description="A token of `/account` or of `robomark user token`.")
+bearer = HTTPBearer(auto_error=False, description="A token from `/account` or `robomark user token`.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from service.web.api_routes import KEY_HEADER, LONGEST_KEY
 from service.web.request_bodies import LARGEST_FORM, MEGABYTE
 
 _ABOUT = f"""
-All functions of the pages, for programs.
+The API covers all functions of the pages.
 
 **Authentication**: send a token from `/account` or `robomark user token` as `Authorization: Bearer rmt_...`. A token
 has the permissions of its owner, limited to its scopes. Objects that the owner cannot see return 404.
@@ -28,8 +28,8 @@ has the permissions of its owner, limited to its scopes. Objects that the owner 
 **Limits**: {LARGEST_FORM // MEGABYTE} MB for a request that is not an upload, and a number of calls per minute for each
 token. Further calls return 429 with `Retry-After`.
 
-Timestamps are ISO 8601 with a time zone, marks are numbers, times are seconds, lengths are millimetres, and angles are
-degrees.
+Timestamps are ISO 8601 with a time zone, and marks are numbers. Durations are in seconds, lengths in millimetres, and
+angles in degrees.
 """
 _PROBLEM = {
     "type": "object",
@@ -40,7 +40,7 @@ _PROBLEM = {
         "type": {"type": "string"},
         "title": {"type": "string"},
         "status": {"type": "integer"},
-        "detail": {"type": "string", "description": "A message for people."},
+        "detail": {"type": "string", "description": "The error message."},
     },
     "examples": [
         {
@@ -55,7 +55,7 @@ _ALWAYS = {
     "400": "The body does not match its content type.",
     "401": "The token is missing, invalid or expired.",
     "403": "The token does not have the scope.",
-    "404": "It does not exist, or the owner of the token does not have access to it.",
+    "404": "The item does not exist, or the owner of the token does not have access to it.",
     "422": "The request is invalid, or the action is not possible.",
     "429": "Too many requests; wait for the seconds in `Retry-After`.",
     "503": "The database or the service failed; check whether the change was saved before you try again.",
@@ -69,7 +69,7 @@ _KEY = {
     "name": KEY_HEADER.title(),
     "in": "header",
     "required": False,
-    "description": "Any text that you choose; a request with the same key runs only once.",
+    "description": "Any unique text. Requests with the same key run only once.",
     "schema": {"type": "string", "minLength": 1, "maxLength": LONGEST_KEY, "pattern": "^[ -~]+$"},
 }
 

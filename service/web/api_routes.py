@@ -43,7 +43,9 @@ _Item = TypeVar("_Item")
 Described = dict[int | str, dict[str, Any]]
 
 Limit = Annotated[int, Query(ge=1, le=200, description="Maximum number of items.")]
-After = Annotated[str, Query(max_length=1000, description="The `next` of the previous page. Empty for the first page.")]
+After = Annotated[
+    str, Query(max_length=1000, description="Value of `next` from the previous page. Empty for the first page.")
+]
 
 
 class Listed(BaseModel, Generic[_Item]):
