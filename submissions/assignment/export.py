@@ -14,7 +14,8 @@ from importlib import resources
 from pathlib import Path
 
 from sim.errors import UsageError
-from submissions.assignment.folder import FILE_NAME, assignment_folder, files_below
+from submissions.assignment.folder import FILE_NAME, assignment_folder
+from submissions.assignment.folder_files import files_below
 from submissions.assignment.reader import ASIDE, read_assignment
 from submissions.assignment.task_sheet import TaskSheet, task_sheet
 

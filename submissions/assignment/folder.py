@@ -1,4 +1,4 @@
-"""Locations of assignments: the catalogue, the folder for a name or path, and the files in it.
+"""Locations of assignments: the catalogue, and the folder for a name or path.
 
 This module opens no files; ``reader.py`` reads them.
 """
@@ -6,12 +6,10 @@ This module opens no files; ``reader.py`` reads them.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 
 from sim.errors import UsageError
-from submissions.assignment.problems import AssignmentProblems
 from submissions.nearest import did_you_mean
 
 FILE_NAME = "assignment.toml"
@@ -43,25 +41,6 @@ def assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
         raise UsageError(f"{name} is a file, expected an id of the catalogue or a folder with {FILE_NAME} in it")
     hint = did_you_mean(name, catalogue()) or "; robomark assignments list shows the catalogue"
     raise UsageError(f"There is no assignment {name!r}, expected an id of the catalogue or a folder{hint}")
-
-
-def files_below(folder: Path) -> Iterator[tuple[tuple[str, ...], Path]]:
-    """Yield the parts of the name and the path of each file in an assignment's folder, sorted.
-
-    Dot files and Python's caches are omitted.
-
-    Raises:
-        AssignmentProblems: A link leads out of the folder. Its author could read files of whoever uses the assignment.
-    """
-    inside = folder.resolve()
-    for path in sorted(folder.rglob("*")):
-        parts = path.relative_to(folder).parts
-        if any(part.startswith(".") or part == "__pycache__" for part in parts):
-            continue
-        if path.is_symlink() and not path.resolve().is_relative_to(inside):
-            raise AssignmentProblems((f"{path}: is a link that leads out of the folder, expected the file itself",))
-        if path.is_file():
-            yield parts, path
 
 
 def _catalogue_folder() -> Path:

@@ -16,7 +16,8 @@ from sim.readers.toml_text import TOMLDecodeError, read_toml
 from sim.readers.unreadable import Unreadable
 from submissions.assignment.assignment_parts import build_assignment
 from submissions.assignment.definition import Assignment
-from submissions.assignment.folder import FILE_NAME, assignment_folder, catalogue, files_below
+from submissions.assignment.folder import FILE_NAME, assignment_folder, catalogue
+from submissions.assignment.folder_files import files_below
 from submissions.assignment.problems import AssignmentProblems, Problems, find_lines
 from submissions.nearest import did_you_mean
 
