@@ -74,7 +74,7 @@ def test_the_share_of_pairs_is_told_and_counts() -> None:
     share = measured(result, "share of pairs")
     assert 0 < share < 0.9
     assert float(result.marks) == pytest.approx(4 * share / 0.9, abs=0.01)
-    assert f"it was true for {share:.0%}; it was from 60 to 180 while the robot moved" in result.message
+    assert f"this was true for {share:.0%}; it was from 60 to 180 while the robot moved" in result.message
 
 
 def test_one_series_alone_is_no_relation() -> None:
