@@ -272,7 +272,12 @@ def _required(criterion: StopOn, recording: Recording) -> str:
     floor = floor_of(recording)
     if place is None or floor is None:
         return ""
-    pixel = floor.pixels[floor.pixels.shape[0] - 1 - round(place[1]), round(place[0])]
+    height, width = floor.pixels.shape[:2]
+    column, row = round(place[0]), height - 1 - round(place[1])
+    # A place may lie beside the floor, and a robot may end there.
+    if not (0 <= column < width and 0 <= row < height):
+        return ""
+    pixel = floor.pixels[row, column]
     return _colour([float(each) for each in pixel[:3]])
 
 

@@ -25,7 +25,8 @@ _WAITS = frozenset({"until", "until_said", "paid_motor"})
 #: Packed format for frequent actions: kind, part of the robot, set point and command of a motor, and a value.
 _packed = struct.Struct("<BBBBd").pack
 _READ, _WAIT, _MOTOR, _LINE = range(4)
-#: Maximum number of lookups of the current line. A program pays processor time for them.
+#: Maximum number of lookups of the current line. A program pays processor time for them. A notification counts as four,
+#: because a program that prints without end sends nothing else.
 _PLACE_LOOKUPS = 20_000
 _LOOKUPS_OF_A_NOTIFICATION = 4
 _PORTS = {"outB": 0, "outC": 1}
