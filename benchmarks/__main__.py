@@ -73,12 +73,12 @@ def main(arguments: list[str]) -> int:
     if unknown := [name for name in chosen.group if name not in GROUPS]:
         parser.error(f"there is no group {unknown[0]}; there are {', '.join(GROUPS)}")
     names = chosen.group or (_QUICK if chosen.quick else tuple(GROUPS))
-    before = table.recorded()
+    before = table.load_recorded_run()
     measured = [row for name in names for row in GROUPS[name](1 if chosen.quick else 5)]
-    table.show(measured, before)
-    table.write(table.LATEST, measured)
+    table.print_rows(measured, before)
+    table.write_rows(table.LATEST, measured)
     if chosen.record:
-        table.write(table.RECORDED, measured)
+        table.write_rows(table.RECORDED, measured)
     return int(any(row.gates for row in measured))
 
 

@@ -5,7 +5,14 @@ from __future__ import annotations
 import os
 import socket
 
-from benchmarks.measurement import MICROSECONDS, SECONDS, Measurement, cpu_seconds, median_of, wall_seconds
+from benchmarks.measurement import (
+    MICROSECONDS,
+    SECONDS,
+    Measurement,
+    measure_cpu_seconds,
+    measure_median,
+    measure_wall_seconds,
+)
 
 LOOP = "a Python loop of ten million additions, CPU"
 #: At module level, where variables are looked up by name, as in ``python -c``.
@@ -17,24 +24,24 @@ _BYTES = 80
 def measure(times: int) -> list[Measurement]:
     """Measure the loop, which is the scale between two machines, and the round trip, which shows the kernel's share."""
     return [
-        Measurement(LOOP, loop_seconds(times), SECONDS),
+        Measurement(LOOP, measure_loop(times), SECONDS),
         Measurement(
             f"a turn of {_BYTES} bytes on a bare socket pair, both ends",
-            median_of(times, lambda: wall_seconds(_turns)) / _TURNS * 1e6,
+            measure_median(times, lambda: measure_wall_seconds(_make_round_trips)) / _TURNS * 1e6,
             MICROSECONDS,
         ),
     ]
 
 
-def loop_seconds(times: int) -> float:
-    return median_of(times, lambda: cpu_seconds(_loop))
+def measure_loop(times: int) -> float:
+    return measure_median(times, lambda: measure_cpu_seconds(_run_loop))
 
 
-def _loop() -> None:
+def _run_loop() -> None:
     exec(_LOOP, {})
 
 
-def _turns() -> None:
+def _make_round_trips() -> None:
     """Make round trips between this process and an echo process."""
     here, there = socket.socketpair()
     pid = os.fork()

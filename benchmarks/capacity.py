@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks import costs, rows
-from benchmarks.calibration import loop_seconds
+from benchmarks.calibration import measure_loop
 
 #: Maximum utilisation of a core. Above it, queues become long.
 _BUSIEST = 0.8
@@ -31,7 +31,7 @@ _RATES = ((10_000 / _HOUR, "10,000 an hour"), (1_000_000 / _DAY, "a million a da
 
 
 @dataclass(frozen=True, slots=True)
-class Load:
+class SubmissionCosts:
     """The costs of one submission in CPU seconds, on a worker's core and on the database's."""
 
     grading: float
@@ -50,7 +50,7 @@ class Load:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class SimulationResult:
     """The result of a simulation."""
 
     waited: tuple[float, float]  # seconds from submission to marks: median and 95th percentile
@@ -68,12 +68,12 @@ class _Step(Enum):
     DRAWN = auto()
 
 
-def workers_needed(rate: float, load: Load) -> int:
+def compute_workers_needed(rate: float, load: SubmissionCosts) -> int:
     """Return the calculated number of workers, one per core, for at most the maximum utilisation."""
     return math.ceil(rate * load.worker / _BUSIEST)
 
 
-def simulate(rate: float, workers: int, load: Load, submissions: int, seed: int = 0) -> Outcome:
+def simulate(rate: float, workers: int, load: SubmissionCosts, submissions: int, seed: int = 0) -> SimulationResult:
     """Simulate submissions that arrive at random, ``rate`` per second.
 
     The database serves requests in order, and marks come before plots. The cost of a grading is uniformly distributed
@@ -84,10 +84,10 @@ def simulate(rate: float, workers: int, load: Load, submissions: int, seed: int 
     for number in range(submissions):
         at += queue.chance.expovariate(rate)
         arrivals.append(at)
-        queue.later(at, _Step.ARRIVES, number)
+        queue.schedule(at, _Step.ARRIVES, number)
     queue.run()
     seconds = sorted(queue.marked[number] - begun for number, begun in enumerate(arrivals))
-    return Outcome(
+    return SimulationResult(
         (seconds[len(seconds) // 2], seconds[len(seconds) * 95 // 100]),
         queue.worked / (workers * queue.now),
         queue.served / (_DATABASE_CORES * queue.now),
@@ -98,7 +98,7 @@ def simulate(rate: float, workers: int, load: Load, submissions: int, seed: int 
 class _Queue:
     """An event simulation of workers and a database."""
 
-    def __init__(self, workers: int, load: Load, chance: random.Random) -> None:
+    def __init__(self, workers: int, load: SubmissionCosts, chance: random.Random) -> None:
         self._load = load
         self.chance = chance
         self._idle = workers
@@ -112,7 +112,7 @@ class _Queue:
         self.most_waiting = 0
         self.marked: dict[int, float] = {}
 
-    def later(self, at: float, step: _Step, number: int) -> None:
+    def schedule(self, at: float, step: _Step, number: int) -> None:
         self._count += 1
         heapq.heappush(self._events, (at, self._count, step, number))
 
@@ -120,7 +120,7 @@ class _Queue:
         while self._events:
             self.now, _, step, number = heapq.heappop(self._events)
             self._take(step, number)
-            self._set_to_work()
+            self._start_work()
 
     def _take(self, step: _Step, number: int) -> None:
         if step in (_Step.ACCEPTED, _Step.CLAIMED, _Step.FINISHED):
@@ -143,7 +143,7 @@ class _Queue:
             case _Step.DRAWN:
                 self._idle += 1
 
-    def _set_to_work(self) -> None:
+    def _start_work(self) -> None:
         while self._idle and (self._waiting or self._undrawn):
             self._idle -= 1
             if self._waiting:
@@ -154,7 +154,7 @@ class _Queue:
     def _work(self, seconds: float, then: _Step, number: int) -> None:
         taken = seconds * self.chance.uniform(0.5, 1.5)
         self.worked += taken
-        self.later(self.now + taken, then, number)
+        self.schedule(self.now + taken, then, number)
 
     def _ask(self, seconds: float, then: _Step, number: int) -> None:
         self._asked.append((seconds, then, number))
@@ -165,29 +165,29 @@ class _Queue:
             seconds, then, number = self._asked.popleft()
             self._free_cores -= 1
             self.served += seconds
-            self.later(self.now + seconds, then, number)
+            self.schedule(self.now + seconds, then, number)
 
 
 def main(_arguments: list[str]) -> int:
     """Measure the costs, then print the calculated and the simulated need for each rate."""
-    measured = costs.of_submission()
-    claim = rows.claim_seconds()
-    load = Load(
+    measured = costs.measure_submission()
+    claim = rows.measure_claim()
+    load = SubmissionCosts(
         measured.grading,
-        measured.of(costs.DRAWN),
-        measured.of(costs.TAKEN_IN),
+        measured.sum_medians(costs.DRAWN),
+        measured.sum_medians(costs.TAKEN_IN),
         claim,
-        measured.of(costs.STORED),
+        measured.sum_medians(costs.STORED),
     )
     print(
-        f"the loop {loop_seconds(5):.2f} s; a submission: grading {load.grading:.3f}, plots {load.plotting:.3f}, "
+        f"the loop {measure_loop(5):.2f} s; a submission: grading {load.grading:.3f}, plots {load.plotting:.3f}, "
         f"accept {load.accept:.4f}, claim {load.claim:.4f}, finish {load.finish:.4f} s"
     )
     table = Table("submissions", "workers", "database cores", box=None)
     for heading in ("to marks p50", "p95", "workers busy", "database busy", "most waiting"):
         table.add_column(heading, justify="right")
     for rate, name in _RATES:
-        workers = workers_needed(rate, load)
+        workers = compute_workers_needed(rate, load)
         for count in sorted({workers, math.ceil(rate * load.worker)}):
             came = simulate(rate, count, load, _SUBMISSIONS)
             table.add_row(

@@ -8,8 +8,8 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from benchmarks.harness.fault_injection import Campaign, FaultInjector, quiet_hashes, small_disk
-from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_database
+from benchmarks.harness.fault_injection import Campaign, FaultInjector, compute_expected_hashes, small_disk
+from benchmarks.harness.postgresql_server import PostgresqlServer, create_database
 from service.settings import load_settings
 from service.store.engine import open_store
 from service.store.states import JobState
@@ -30,7 +30,7 @@ def main(arguments: list[str]) -> int:
         patience_seconds=60 + 5.0 * grading_requests,
         tell=lambda line: print(line, flush=True),
     )
-    quiet = quiet_hashes()
+    quiet = compute_expected_hashes()
     return max(_run("SQLite", campaign, quiet), _run("PostgreSQL", campaign, quiet))
 
 
@@ -40,7 +40,7 @@ def _run(database: str, campaign: Campaign, quiet: list[tuple[str, ...]]) -> int
     with small_disk(folder, _DISK_MEGABYTES) as disk, tempfile.TemporaryDirectory() as elsewhere:
         server = None if database == "SQLite" else PostgresqlServer(folder)
         home = folder / "home" if server is None else Path(elsewhere)
-        url = "" if server is None else fresh_database(server.url)
+        url = "" if server is None else create_database(server.url)
         settings = load_settings(
             home=home,
             concurrency=1,
@@ -59,7 +59,7 @@ def _run(database: str, campaign: Campaign, quiet: list[tuple[str, ...]]) -> int
         finally:
             if server is not None:
                 server.close()
-    whole = tally.states == {JobState.DONE: campaign.grading_requests} and (tally.doubled, tally.differing) == (0, 0)
+    whole = tally.states == {JobState.DONE: campaign.grading_requests} and (tally.duplicated, tally.differing) == (0, 0)
     print(f"{database}: {'whole' if whole else 'BROKEN'}: {tally.sentence()}", flush=True)
     for error in tally.errors:
         print(f"  {error}")

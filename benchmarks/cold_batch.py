@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.commands import ROBOMARK
-from benchmarks.measurement import RATIO, SECONDS, Measurement, median, users_environment, wall_seconds
-from submissions.assignment.examples import examples
+from benchmarks.measurement import RATIO, SECONDS, Measurement, build_user_environment, measure_wall_seconds, median
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.folder import REFERENCE
 
 _ASSIGNMENT = "echo-responder"
@@ -32,14 +32,14 @@ def measure(times: int) -> list[Measurement]:
     count = min(times, _MOST)
     if not NBGRADER:
         # The first run compiles bytecode.
-        _cold()
-        seconds = median([_cold() for _ in range(count)])
-        return [Measurement(_WHAT, seconds, SECONDS, told="against nbgrader: n/a, name its command in NBGRADER")]
+        _measure_cold_batch()
+        seconds = median([_measure_cold_batch() for _ in range(count)])
+        return [Measurement(_WHAT, seconds, SECONDS, details="against nbgrader: n/a, name its command in NBGRADER")]
     with tempfile.TemporaryDirectory() as folder:
         course = Path(folder)
-        _lay_course(course)
-        _cold()
-        ours, theirs = zip(*((_cold(), _autograde(course)) for _ in range(count)), strict=True)
+        _create_course(course)
+        _measure_cold_batch()
+        ours, theirs = zip(*((_measure_cold_batch(), _autograde(course)) for _ in range(count)), strict=True)
     return [
         Measurement(_WHAT, median(ours), SECONDS),
         Measurement(
@@ -48,35 +48,35 @@ def measure(times: int) -> list[Measurement]:
             RATIO,
             1 / 3,
             1 / 6,
-            told=f"{median(ours):.1f} s against {median(theirs):.1f} s",
+            details=f"{median(ours):.1f} s against {median(theirs):.1f} s",
         ),
     ]
 
 
-def _cold() -> float:
+def _measure_cold_batch() -> float:
     with tempfile.TemporaryDirectory() as folder:
         home, batch, reports = (Path(folder) / name for name in ("home", "batch", "reports"))
         for number in range(_SUBMISSIONS):
             own = batch / f"student{number}"
-            shutil.copytree(examples(_ASSIGNMENT) / REFERENCE, own)
+            shutil.copytree(locate_examples(_ASSIGNMENT) / REFERENCE, own)
             # Each text differs, because identical submissions are graded only once.
             (own / "robot.py").write_text(f"# {number}\n" + (own / "robot.py").read_text())
         command = [*ROBOMARK, "batch", "submit", str(batch), "-a", _ASSIGNMENT, "--output", str(reports)]
-        environment = users_environment() | {"ROBOMARK_HOME": str(home)}
-        return wall_seconds(lambda: subprocess.run(command, env=environment, check=True, capture_output=True))
+        environment = build_user_environment() | {"ROBOMARK_HOME": str(home)}
+        return measure_wall_seconds(lambda: subprocess.run(command, env=environment, check=True, capture_output=True))
 
 
-def _lay_course(course: Path) -> None:
+def _create_course(course: Path) -> None:
     """Create an nbgrader course with one assignment and ten submitted notebooks."""
     source = course / "source" / "ps1"
     source.mkdir(parents=True)
-    (source / "p1.ipynb").write_text(json.dumps(_notebook()))
-    _nbgrader(course, "generate_assignment", "ps1")
+    (source / "p1.ipynb").write_text(json.dumps(_build_notebook()))
+    _run_nbgrader(course, "generate_assignment", "ps1")
     for number in range(_SUBMISSIONS):
         shutil.copytree(course / "release" / "ps1", course / "submitted" / f"student{number}" / "ps1")
 
 
-def _notebook() -> Mapping[str, Any]:
+def _build_notebook() -> Mapping[str, Any]:
     solution = {"grade": False, "grade_id": "twice", "locked": False, "schema_version": 3, "solution": True}
     test = {"grade": True, "grade_id": "test", "locked": True, "points": 1, "schema_version": 3, "solution": False}
     texts = (("def twice(x):\n    return 2 * x", solution), ("assert twice(2) == 4", test))
@@ -97,10 +97,10 @@ def _notebook() -> Mapping[str, Any]:
 
 def _autograde(course: Path) -> float:
     shutil.rmtree(course / "autograded", ignore_errors=True)
-    return wall_seconds(lambda: _nbgrader(course, "autograde", "ps1", "--force"))
+    return measure_wall_seconds(lambda: _run_nbgrader(course, "autograde", "ps1", "--force"))
 
 
-def _nbgrader(course: Path, *words: str) -> None:
+def _run_nbgrader(course: Path, *words: str) -> None:
     # nbgrader calls programs from its own environment.
     path = f"{Path(NBGRADER).parent}{os.pathsep}{os.environ['PATH']}"
     environment = os.environ | {"PATH": path}

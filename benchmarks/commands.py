@@ -7,8 +7,8 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.graded_store import GradedBatch, graded_batch
-from benchmarks.measurement import RATIO, Measurement, command_cpu_seconds, median
+from benchmarks.graded_store import GradedBatch, create_graded_batch
+from benchmarks.measurement import RATIO, Measurement, measure_command_cpu, median
 from service.settings import load_settings
 from service.store.engine import open_store
 
@@ -23,11 +23,11 @@ def measure(times: int) -> list[Measurement]:
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
         with open_store(load_settings(home=home)) as store:
-            stored = graded_batch(store)
-        return [_against(imports, name, of, home, times) for imports, name, of in _commands(stored)]
+            stored = create_graded_batch(store)
+        return [_compare_with_import(imports, name, of, home, times) for imports, name, of in _list_commands(stored)]
 
 
-def _commands(stored: GradedBatch) -> Sequence[tuple[str, str, tuple[str, ...]]]:
+def _list_commands(stored: GradedBatch) -> Sequence[tuple[str, str, tuple[str, ...]]]:
     """Return the baseline, the command and the table row of each measurement."""
     return (
         (_BARE, "--help", ()),
@@ -40,14 +40,14 @@ def _commands(stored: GradedBatch) -> Sequence[tuple[str, str, tuple[str, ...]]]
     )
 
 
-def _against(imports: str, name: str, of: tuple[str, ...], home: Path, times: int) -> Measurement:
+def _compare_with_import(imports: str, name: str, of: tuple[str, ...], home: Path, times: int) -> Measurement:
     environment = {"ROBOMARK_HOME": str(home)}
     # The first run compiles bytecode.
-    command_cpu_seconds((*ROBOMARK, *name.split(), *of), environment)
+    measure_command_cpu((*ROBOMARK, *name.split(), *of), environment)
     seconds = [
         (
-            command_cpu_seconds((*ROBOMARK, *name.split(), *of), environment),
-            command_cpu_seconds((sys.executable, "-c", f"import {imports}"), environment),
+            measure_command_cpu((*ROBOMARK, *name.split(), *of), environment),
+            measure_command_cpu((sys.executable, "-c", f"import {imports}"), environment),
         )
         for _ in range(times)
     ]
@@ -58,5 +58,5 @@ def _against(imports: str, name: str, of: tuple[str, ...], home: Path, times: in
         RATIO,
         budget=3 if imports == _BARE else 2,
         beyond=1.5,
-        told=f"{asked:.2f} s against {imported:.2f} s",
+        details=f"{asked:.2f} s against {imported:.2f} s",
     )

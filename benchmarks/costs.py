@@ -17,16 +17,16 @@ from typing import TypeVar
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.calibration import loop_seconds
-from benchmarks.graded_store import short_request
+from benchmarks.calibration import measure_loop
+from benchmarks.graded_store import build_short_request
 from benchmarks.measurement import median
-from benchmarks.simulator import FOLLOWER, spec
+from benchmarks.simulator import FOLLOWER, build_spec
 from service.grading.grade import Grade
 from service.grading.grader import GradingProgress, grade
 from service.grading.trial_runner import TrialRunner
-from service.plotting import draw
-from service.reports.html import report
-from service.reports.view import student_view
+from service.plotting import draw_plots
+from service.reports.html import render_report_page
+from service.reports.view import build_student_view
 from service.settings import load_settings
 from service.store.batches import intake
 from service.store.engine import Store, open_store
@@ -53,37 +53,37 @@ class Costs:
     def take(self, part: str, seconds: float) -> None:
         self.parts.setdefault(part, []).append(seconds)
 
-    def timed(self, part: str, work: Callable[[], Made]) -> Made:
+    def measure_part(self, part: str, work: Callable[[], Made]) -> Made:
         start = time.process_time()
         made = work()
         self.take(part, time.process_time() - start)
         return made
 
-    def of(self, *parts: str) -> float:
+    def sum_medians(self, *parts: str) -> float:
         """Return the sum of the parts' medians."""
         return sum(median(self.parts[part]) for part in parts)
 
     @property
     def grading(self) -> float:
         """The CPU seconds that a worker uses for one submission before it stores the marks."""
-        return self.of(*_GRADING, "packing the recordings")
+        return self.sum_medians(*_GRADING, "packing the recordings")
 
 
 def main(_arguments: list[str]) -> int:
     """Print the three tables."""
-    print(f"a loop of ten million additions: {loop_seconds(5):.2f} s")
-    _show("One trial, a line follower of 60 s", of_trial())
-    costs = of_submission()
-    once = {part: costs.of(part) for part in costs.parts if part not in STARTS}
+    print(f"a loop of ten million additions: {measure_loop(5):.2f} s")
+    _show("One trial, a line follower of 60 s", measure_trial())
+    costs = measure_submission()
+    once = {part: costs.sum_medians(part) for part in costs.parts if part not in STARTS}
     _show("One short submission, warm, from its files to a report", once)
-    cold = {part: costs.of(part) for part in STARTS}
+    cold = {part: costs.sum_medians(part) for part in STARTS}
     _show("Ten of them, cold", cold | {part: 10 * seconds for part, seconds in once.items()})
     return 0
 
 
-def of_trial() -> Mapping[str, float]:
+def measure_trial() -> Mapping[str, float]:
     """Return the CPU seconds of each of our modules in the worker, including library calls."""
-    wanted = spec(FOLLOWER)
+    wanted = build_spec(FOLLOWER)
     with TrialRunner() as runner:
         runner.run(wanted)
         plain, children = [], []
@@ -94,7 +94,7 @@ def of_trial() -> Mapping[str, float]:
             children.append(runner.children_cpu_seconds - before)
         profile = cProfile.Profile(time.process_time)
         profile.runcall(runner.run, wanted)
-    shares = _by_module(profile)
+    shares = _sum_by_module(profile)
     worker = median(plain)
     # Profiling slows everything, so only the shares are used.
     rows = {f"worker: {name}": worker * share for name, share in shares[:_ROOMS]}
@@ -102,26 +102,26 @@ def of_trial() -> Mapping[str, float]:
     return rows | {"worker: all other modules": worker * rest, "program and responder, two children": median(children)}
 
 
-def _by_module(profile: cProfile.Profile) -> list[tuple[str, float]]:
+def _sum_by_module(profile: cProfile.Profile) -> list[tuple[str, float]]:
     """Return each of our modules with its share, the largest first. Built-in functions count for their caller."""
     seconds: Counter[str] = Counter()
     for (file, _, _), (_, _, own, _, callers) in pstats.Stats(profile).stats.items():  # type: ignore[attr-defined]
-        name = _module(file)
+        name = _find_module(file)
         if name is not None or not callers:
             seconds[name or "Python itself"] += own
             continue
         for (caller, _, _), (_, _, share, _) in callers.items():
-            seconds[_module(caller) or "Python itself"] += share
+            seconds[_find_module(caller) or "Python itself"] += share
     whole = sum(seconds.values())
     return [(name, value / whole) for name, value in seconds.most_common()]
 
 
-def _module(file: str) -> str | None:
+def _find_module(file: str) -> str | None:
     path = Path(file)
     return str(path.relative_to(_ROOT)) if path.is_relative_to(_ROOT) and ".venv" not in path.parts else None
 
 
-def of_submission() -> Costs:
+def measure_submission() -> Costs:
     """Return the costs of each part of grading a short submission, on SQLite, without a queue."""
     costs = Costs()
     with (
@@ -130,26 +130,26 @@ def of_submission() -> Costs:
         TrialRunner() as runner,
     ):
         # The first run is a warm-up.
-        _one(store, runner, "nobody", Costs())
+        _measure_one(store, runner, "nobody", Costs())
         for number in range(_TIMES):
-            _one(store, runner, f"student {number}", costs)
-    costs.take(STARTS[0], _cold_seconds() - costs.of(*_GRADING))
+            _measure_one(store, runner, f"student {number}", costs)
+    costs.take(STARTS[0], _measure_cold_grading() - costs.sum_medians(*_GRADING))
     return costs
 
 
-def _one(store: Store, runner: TrialRunner, student: str, costs: Costs) -> None:
-    asked = short_request(student)
-    costs.timed(TAKEN_IN, lambda: intake.accept(store, asked, max_attempts=3))
-    claim = costs.timed(CLAIMED, lambda: jobs.claim(store, "worker", 60))
+def _measure_one(store: Store, runner: TrialRunner, student: str, costs: Costs) -> None:
+    asked = build_short_request(student)
+    costs.measure_part(TAKEN_IN, lambda: intake.accept_submission(store, asked, max_attempts=3))
+    claim = costs.measure_part(CLAIMED, lambda: jobs.claim_job(store, "worker", 60))
     assert claim is not None
-    graded = _graded(asked, runner, costs)
-    prepared = costs.timed("packing the recordings", lambda: results.prepare(graded))
-    costs.timed(STORED, lambda: jobs.finish(store, claim, prepared, datetime.now(UTC)))
-    drawn = costs.timed(DRAWN, lambda: draw(graded, asked.assignment, asked.submission))
-    costs.timed("the report", lambda: report(student_view(graded), drawn, asked.submission))
+    graded = _grade_in_parts(asked, runner, costs)
+    prepared = costs.measure_part("packing the recordings", lambda: results.prepare_grade(graded))
+    costs.measure_part(STORED, lambda: jobs.finish_job(store, claim, prepared, datetime.now(UTC)))
+    drawn = costs.measure_part(DRAWN, lambda: draw_plots(graded, asked.assignment, asked.submission))
+    costs.measure_part("the report", lambda: render_report_page(build_student_view(graded), drawn, asked.submission))
 
 
-def _graded(asked: GradingRequest, runner: TrialRunner, costs: Costs) -> Grade:
+def _grade_in_parts(asked: GradingRequest, runner: TrialRunner, costs: Costs) -> Grade:
     """Return the grade. Trials and judging are separated at the end of the last trial."""
     moments: list[float] = []
 
@@ -166,10 +166,10 @@ def _graded(asked: GradingRequest, runner: TrialRunner, costs: Costs) -> Grade:
     return graded
 
 
-def _cold_seconds() -> float:
+def _measure_cold_grading() -> float:
     """Return the CPU seconds of a grading that starts its own processes, including those processes."""
     before = os.times()
-    asked = short_request("cold")
+    asked = build_short_request("cold")
     grade(asked.submission, asked.assignment)
     after = os.times()
     return sum(after[:4]) - sum(before[:4])

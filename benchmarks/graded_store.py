@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grader import grade
 from service.store.batches import intake
 from service.store.engine import Store
@@ -26,11 +26,13 @@ for turn in range(3):
 """
 
 
-def short_request(student: str) -> GradingRequest:
+def build_short_request(student: str) -> GradingRequest:
     """Return a request for a short submission. Each text differs: identical submissions are graded only once."""
-    program = Code("robot.py", f"# {student}\n{_PROGRAM}")
+    program = SourceFile("robot.py", f"# {student}\n{_PROGRAM}")
     return GradingRequest(
-        Submission(student, program, Code("responder.py", _RESPONDER)), find_assignment(ASSIGNMENT), f"{student}.zip"
+        Submission(student, program, SourceFile("responder.py", _RESPONDER)),
+        find_assignment(ASSIGNMENT),
+        f"{student}.zip",
     )
 
 
@@ -42,13 +44,13 @@ class GradedBatch:
     job: str
 
 
-def graded_batch(store: Store) -> GradedBatch:
+def create_graded_batch(store: Store) -> GradedBatch:
     """Add a batch of one submission, grade it, and store its grade, without a queue."""
-    accepted = intake.accept_batch(store, "one", [short_request("ada")], [], max_attempts=3)
-    claim = jobs.claim(store, "worker", 60)
+    accepted = intake.accept_batch(store, "one", [build_short_request("ada")], [], max_attempts=3)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
     with store.reading() as session:
         asked = intake.load_grading_request(session, claim.job_id)
     graded = grade(asked.submission, asked.assignment)
-    jobs.finish(store, claim, results.prepare(graded), datetime.now(UTC))
+    jobs.finish_job(store, claim, results.prepare_grade(graded), datetime.now(UTC))
     return GradedBatch(accepted.id, claim.job_id)

@@ -11,9 +11,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.graded_store import short_request
-from benchmarks.measurement import RATIO, Measurement, cpu_seconds
-from benchmarks.simulator import FOLLOWER, spec, through_processes
+from benchmarks.graded_store import build_short_request
+from benchmarks.measurement import RATIO, Measurement, measure_cpu_seconds
+from benchmarks.simulator import FOLLOWER, build_spec, measure_through_processes
 from responders.trial_spec import TrialSpec
 from service.grading.trial_runner import TrialRunner
 from service.settings import load_settings
@@ -21,7 +21,7 @@ from service.store.batches import intake
 from service.store.engine import open_store
 
 #: Budget for that ratio.
-_EVEN = 1.5
+_LARGEST_RATIO = 1.5
 _TALKER = "import time\nfor number in range({}):\n    print('PY::' + str(number))\n    time.sleep(0.005)\n"
 
 
@@ -30,36 +30,38 @@ def measure(times: int) -> list[Measurement]:
     with TrialRunner() as runner, tempfile.TemporaryDirectory() as home:
 
         def trial(wanted: TrialSpec) -> float:
-            return through_processes(runner, wanted)
+            return measure_through_processes(runner, wanted)
 
         def length(seconds: int) -> float:
-            return trial(replace(spec(FOLLOWER), seconds=seconds))
+            return trial(replace(build_spec(FOLLOWER), seconds=seconds))
 
         def talk(messages: int) -> float:
-            return trial(spec(_TALKER.format(messages)))
+            return trial(build_spec(_TALKER.format(messages)))
 
         def trials(count: int) -> float:
-            return sum(trial(spec("pass")) for _ in range(count))
+            return sum(trial(build_spec("pass")) for _ in range(count))
 
         with open_store(load_settings(home=Path(home))) as store:
 
             def batch(submissions: int) -> float:
-                asked = [short_request(f"student {number}") for number in range(submissions)]
-                return cpu_seconds(lambda: intake.accept_batch(store, "batch", asked, [], max_attempts=3))
+                asked = [build_short_request(f"student {number}") for number in range(submissions)]
+                return measure_cpu_seconds(lambda: intake.accept_batch(store, "batch", asked, [], max_attempts=3))
 
             return [
-                _even("a simulated second of a line follower, 15 to 60 to 240", length, 15, times),
-                _even("a message and its answer, 400 to 1600 to 6400", talk, 400, times),
-                _even("a trial of an empty program, 2 to 8 to 32", trials, 2, times),
-                _even("a submission taken in with its batch, 25 to 100 to 400", batch, 25, times),
+                _measure_growth("a simulated second of a line follower, 15 to 60 to 240", length, 15, times),
+                _measure_growth("a message and its answer, 400 to 1600 to 6400", talk, 400, times),
+                _measure_growth("a trial of an empty program, 2 to 8 to 32", trials, 2, times),
+                _measure_growth("a submission taken in with its batch, 25 to 100 to 400", batch, 25, times),
             ]
 
 
-def _even(what: str, cost: Callable[[int], float], smallest: int, times: int) -> Measurement:
+def _measure_growth(what: str, cost: Callable[[int], float], smallest: int, times: int) -> Measurement:
     # The minimum of each, because other load only adds to it.
     small, medium, large = (
         min(cost(size) for _ in range(min(times, 3) + 1)) for size in (smallest, 4 * smallest, 16 * smallest)
     )
     piece = (large - medium) / (12 * smallest)
     before = (medium - small) / (3 * smallest)
-    return Measurement(f"growth: {what}", piece / before, RATIO, _EVEN, told=f"{1000 * piece:.2f} ms of CPU each")
+    return Measurement(
+        f"growth: {what}", piece / before, RATIO, _LARGEST_RATIO, details=f"{1000 * piece:.2f} ms of CPU each"
+    )

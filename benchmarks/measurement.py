@@ -18,7 +18,7 @@ class Unit:
     slowness: int = 0  # 1: doubles on a machine of half the speed; -1: halves; 0: independent
     more_is_better: bool = False
 
-    def shown(self, value: float) -> str:
+    def format_value(self, value: float) -> str:
         return f"{value:,.{self.decimals}f}{self.word}"
 
 
@@ -43,7 +43,7 @@ class Measurement:
     unit: Unit
     budget: float | None = None
     beyond: float | None = None
-    told: str = ""  # the spread, or another detail
+    details: str = ""  # the spread, or another detail
 
     @property
     def misses(self) -> bool:
@@ -62,38 +62,42 @@ def median(values: Sequence[float]) -> float:
     return sorted(values)[len(values) // 2]
 
 
-def median_of(count: int, measure: Callable[[], float]) -> float:
+def measure_median(count: int, measure: Callable[[], float]) -> float:
     """Return the median of ``count`` measurements, after a warm-up."""
     measure()
     return median([measure() for _ in range(count)])
 
 
-def cpu_seconds(work: Callable[[], object]) -> float:
+def measure_cpu_seconds(work: Callable[[], object]) -> float:
     """Return the CPU seconds of this process for ``work``."""
     start = time.process_time()
     work()
     return time.process_time() - start
 
 
-def wall_seconds(work: Callable[[], object]) -> float:
+def measure_wall_seconds(work: Callable[[], object]) -> float:
     start = time.perf_counter()
     work()
     return time.perf_counter() - start
 
 
-def users_environment() -> dict[str, str]:
+def build_user_environment() -> dict[str, str]:
     """Return a user's environment, in which Python stores bytecode."""
     return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
 
 
-def command_cpu_seconds(command: Sequence[str], environment: dict[str, str]) -> float:
+def measure_command_cpu(command: Sequence[str], environment: dict[str, str]) -> float:
     """Return the CPU seconds of a command and of all processes that it waited for.
 
     Raises:
         RuntimeError: If the command fails.
     """
     process = subprocess.Popen(
-        command, env=users_environment() | environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        command,
+        env=build_user_environment() | environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     assert process.stderr is not None
     said = process.stderr.read()

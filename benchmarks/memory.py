@@ -17,15 +17,15 @@ _WARM, _TRIALS = 1500, 1000
 _WORKER = """
 import gc, json, os, sys
 from pathlib import Path
-from benchmarks.graded_store import short_request
-from benchmarks.harness.process_tree import descendants
+from benchmarks.graded_store import build_short_request
+from benchmarks.harness.process_tree import find_descendants
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 
 def held(kind):
     gc.collect()
     total = 0
-    for pid in (os.getpid(), *descendants(os.getpid())):
+    for pid in (os.getpid(), *find_descendants(os.getpid())):
         lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
         total += next(int(line.split()[1]) for line in lines if line.startswith(kind))
     return total / 1024
@@ -33,7 +33,7 @@ def held(kind):
 def graded(count, first):
     done = 0
     while done < count:
-        asked = short_request(f"student {first + done}")
+        asked = build_short_request(f"student {first + done}")
         done += len(grade(asked.submission, asked.assignment, runner=runner).trials)
 
 with TrialRunner() as runner:
@@ -54,6 +54,6 @@ def measure(_times: int) -> list[Measurement]:
     return [
         Measurement("memory of a worker and of what it forks from", held, MEGABYTES, 400),
         Measurement(
-            f"its growth in {_TRIALS} trials", after - before, MEGABYTES, 1, told=f"from {before:.1f} MB of its own"
+            f"its growth in {_TRIALS} trials", after - before, MEGABYTES, 1, details=f"from {before:.1f} MB of its own"
         ),
     ]

@@ -12,14 +12,14 @@ from typing import Protocol
 
 import numpy as np
 
-from benchmarks.measurement import GAIN, Measurement, cpu_seconds, median_of
+from benchmarks.measurement import GAIN, Measurement, measure_cpu_seconds, measure_median
 from benchmarks.original_loop import OriginalSimulator
 from benchmarks.simulator import FLOOR, START
 from sim.arena import Arena
 from sim.camera import CachedCamera
-from sim.floors import floor
-from sim.robot import robot
-from sim.world import Chain, Noise, World
+from sim.floors import build_floor
+from sim.robot import get_robot
+from sim.world import HashChain, Noise, World
 
 _TICKS = 600
 _NEAR = 0.01  # mm, and degrees
@@ -45,7 +45,7 @@ def _follow(left: _Wheel, right: _Wheel, red: float, clock: int) -> None:
         right.run("run-forever", clock)
 
 
-def _square(left: _Wheel, right: _Wheel, _red: float, clock: int) -> None:
+def _drive_square(left: _Wheel, right: _Wheel, _red: float, clock: int) -> None:
     """Drive a square: two seconds ahead, two on the spot, to positions."""
     if clock % 60 == 0:
         ahead = clock % 120 == 0
@@ -57,22 +57,22 @@ def _square(left: _Wheel, right: _Wheel, _red: float, clock: int) -> None:
 
 _PROGRAMS: tuple[tuple[str, _Program, Noise], ...] = (
     ("a line follower", _follow, Noise()),
-    ("a square", _square, Noise()),
+    ("a square", _drive_square, Noise()),
     ("a line follower with sensor noise", _follow, Noise(light=32)),
 )
 
 
 def measure(times: int) -> list[Measurement]:
     """Measure how many times less CPU ours needs than the port."""
-    pixels = floor(FLOOR).pixels
+    pixels = build_floor(FLOOR).pixels
     canvas = np.dstack((pixels, np.full(pixels.shape[:2], 255, np.uint8))).tobytes()
     arena, camera = Arena(), CachedCamera(pixels)
     try:
         return [
-            _beside(
+            _compare_speed(
                 name,
-                partial(_theirs, canvas, program, noise),
-                partial(_ours, arena, camera, program, noise),
+                partial(_run_original, canvas, program, noise),
+                partial(_run_world, arena, camera, program, noise),
                 noise,
                 times,
             )
@@ -83,18 +83,18 @@ def measure(times: int) -> list[Measurement]:
         arena.close()
 
 
-def _beside(
+def _compare_speed(
     name: str, theirs: Callable[[], OriginalSimulator], ours: Callable[[], World], noise: Noise, times: int
 ) -> Measurement:
     if noise.light == 0:
         _compare(name, theirs(), ours())
-    port, own = (median_of(min(times, 3), partial(cpu_seconds, run)) for run in (theirs, ours))
+    port, own = (measure_median(min(times, 3), partial(measure_cpu_seconds, run)) for run in (theirs, ours))
     seconds = _TICKS / 30
     return Measurement(
         f"the original's loop in plain Python against ours, {name}",
         port / own,
         GAIN,
-        told=f"{seconds / port:.0f}x and {seconds / own:.0f}x real time",
+        details=f"{seconds / port:.0f}x and {seconds / own:.0f}x real time",
     )
 
 
@@ -106,7 +106,7 @@ def _compare(name: str, port: OriginalSimulator, own: World) -> None:
         raise RuntimeError(f"the port and ours do not end alike with {name}: {apart}")
 
 
-def _theirs(canvas: bytes, program: _Program, noise: Noise) -> OriginalSimulator:
+def _run_original(canvas: bytes, program: _Program, noise: Noise) -> OriginalSimulator:
     simulator = OriginalSimulator(canvas, START.x, START.y, math.radians(START.heading), noise.motor, noise.light)
     for clock in range(_TICKS):
         program(simulator.left, simulator.right, simulator.left_red, clock)
@@ -114,8 +114,8 @@ def _theirs(canvas: bytes, program: _Program, noise: Noise) -> OriginalSimulator
     return simulator
 
 
-def _ours(arena: Arena, camera: CachedCamera, program: _Program, noise: Noise) -> World:
-    world = World(robot("Default_Robot"), arena, camera, START, noise, 0, Chain())
+def _run_world(arena: Arena, camera: CachedCamera, program: _Program, noise: Noise) -> World:
+    world = World(get_robot("Default_Robot"), arena, camera, START, noise, 0, HashChain())
     for clock in range(_TICKS):
         program(world.drive.left, world.drive.right, world.left_means[0], clock)
         world.tick()

@@ -31,7 +31,7 @@ _WALLS = (
 )
 
 
-def _rounded(value: float) -> int:
+def _round_half_up(value: float) -> int:
     """Return the value rounded as in JavaScript."""
     return math.floor(value + 0.5)
 
@@ -59,7 +59,7 @@ class Motor:
             self.speed = max(self.speed - _MOST, self.speed_sp)
         noisy = self.speed + (random.uniform(-noise, noise) if noise > 0 else 0.0)
         if noisy >= 0:
-            self.speed = min(_rounded(noisy), 1050)
+            self.speed = min(_round_half_up(noisy), 1050)
 
     def distance(self) -> float:
         degrees = self.speed / FPS
@@ -96,7 +96,7 @@ class OriginalSimulator:
     texts: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._light_sensors()
+        self._read_light_sensors()
 
     @property
     def left_red(self) -> float:
@@ -119,27 +119,27 @@ class OriginalSimulator:
         self.gyro[0] -= degrees
         self.gyro[1] = -degrees * FPS
         if self.clock % 3 == 0:
-            self._sonar()
-        self._light_sensors()
+            self._read_sonar()
+        self._read_light_sensors()
 
-    def _light_sensors(self) -> None:
+    def _read_light_sensors(self) -> None:
         cosine, sine = math.cos(self.angle - math.pi / 2), math.sin(self.angle - math.pi / 2)
         seen = []
         for across, ahead in _SENSORS:
             column = int(cosine * across - sine * ahead + self.x - _RADIUS)
             row = int(-(sine * across + cosine * ahead) + (HEIGHT - self.y) - _RADIUS)
-            seen.append(self._light(column, row))
+            seen.append(self._read_light_sensor(column, row))
         self.means = [means for means, _ in seen]
         self.texts = [text for _, text in seen]
 
-    def _light(self, column: int, row: int) -> tuple[tuple[float, float, float], str]:
+    def _read_light_sensor(self, column: int, row: int) -> tuple[tuple[float, float, float], str]:
         """Return the means, and the comma-separated values of all pixels, of one window of the canvas."""
         if 0 <= column <= WIDTH - _SIDE and 0 <= row <= HEIGHT - _SIDE:
             pixels, stride = self.pixels, 4 * WIDTH
             begin = row * stride + 4 * column
             window = b"".join(pixels[begin + stride * k : begin + stride * k + 4 * _SIDE] for k in range(_SIDE))
         else:
-            window = self._partly_outside(column, row)
+            window = self._copy_partial_window(column, row)
         noise = self.sensor_noise
         red = green = blue = 0
         values: list[str] = []
@@ -148,9 +148,9 @@ class OriginalSimulator:
             if counts:
                 r, g, b = window[offset], window[offset + 1], window[offset + 2]
                 if noise > 0:
-                    r = min(255, max(0, _rounded(r + random.uniform(-noise, noise))))
-                    g = min(255, max(0, _rounded(g + random.uniform(-noise, noise))))
-                    b = min(255, max(0, _rounded(b + random.uniform(-noise, noise))))
+                    r = min(255, max(0, _round_half_up(r + random.uniform(-noise, noise))))
+                    g = min(255, max(0, _round_half_up(g + random.uniform(-noise, noise))))
+                    b = min(255, max(0, _round_half_up(b + random.uniform(-noise, noise))))
                 red += r
                 green += g
                 blue += b
@@ -160,7 +160,7 @@ class OriginalSimulator:
             offset += 4
         return (red / _SEEN, green / _SEEN, blue / _SEEN), ",".join(values)
 
-    def _partly_outside(self, column: int, row: int) -> bytes:
+    def _copy_partial_window(self, column: int, row: int) -> bytes:
         window = bytearray(4 * _SIDE * _SIDE)
         for k in range(_SIDE * _SIDE):
             x, y = column + k % _SIDE, row + k // _SIDE
@@ -169,7 +169,7 @@ class OriginalSimulator:
                 window[4 * k : 4 * k + 4] = self.pixels[begin : begin + 4]
         return bytes(window)
 
-    def _sonar(self) -> None:
+    def _read_sonar(self) -> None:
         heading = math.degrees(self.angle)
         x, y = self.x + 20 * math.cos(self.angle), self.y + 20 * math.sin(self.angle)
         nearest = float(_REACH)
@@ -177,20 +177,20 @@ class OriginalSimulator:
             towards = math.radians(heading + ray)
             end_x, end_y = x + _REACH * math.cos(towards), y + _REACH * math.sin(towards)
             for wall in _WALLS:
-                distance = _hit(x, y, end_x, end_y, wall)
-                if distance is not None and distance < nearest and _counts(heading, wall[4]):
+                distance = _find_hit_distance(x, y, end_x, end_y, wall)
+                if distance is not None and distance < nearest and _is_detectable(heading, wall[4]):
                     nearest = distance
-        self.ultrasonic = min(_REACH, max(0, _rounded(nearest)))
+        self.ultrasonic = min(_REACH, max(0, _round_half_up(nearest)))
 
 
-def _counts(heading: float, line: float) -> bool:
+def _is_detectable(heading: float, line: float) -> bool:
     incidence = abs(line - heading)
     if incidence > 180:
         incidence = 360 - incidence
     return 40 < incidence < 140
 
 
-def _hit(
+def _find_hit_distance(
     x: float, y: float, end_x: float, end_y: float, wall: tuple[float, float, float, float, float]
 ) -> float | None:
     """Return the distance of the wall along the ray, or None if the ray misses it."""

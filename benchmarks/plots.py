@@ -6,14 +6,22 @@ from collections.abc import Callable
 from functools import partial
 from typing import TypeVar
 
-from benchmarks.measurement import MEGABYTES, RATIO, SECONDS, Measurement, cpu_seconds, median, wall_seconds
+from benchmarks.measurement import (
+    MEGABYTES,
+    RATIO,
+    SECONDS,
+    Measurement,
+    measure_cpu_seconds,
+    measure_wall_seconds,
+    median,
+)
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.plotting import draw
-from service.reports.html import report
-from service.reports.view import student_view
-from submissions.assignment.examples import examples
+from service.plotting import draw_plots
+from service.reports.html import render_report_page
+from service.reports.view import build_student_view
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.folder import REFERENCE
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
@@ -28,22 +36,24 @@ Made = TypeVar("Made")
 def measure(times: int) -> list[Measurement]:
     """Measure the reference submissions, after a warm-up."""
     with TrialRunner() as runner:
-        rows = [_against_marking(name, runner, times) for name in _ASSIGNMENTS]
-        return [*rows, *_of_report(_asked(_FOLLOWER), runner, times)]
+        rows = [_compare_with_marking(name, runner, times) for name in _ASSIGNMENTS]
+        return [*rows, *_measure_report(_build_request(_FOLLOWER), runner, times)]
 
 
-def _asked(name: str) -> GradingRequest:
+def _build_request(name: str) -> GradingRequest:
     assignment = find_assignment(name)
-    submission = read_submission(examples(name) / REFERENCE, asked=assignment.parts)
+    submission = read_submission(locate_examples(name) / REFERENCE, asked=assignment.parts)
     return GradingRequest(submission, assignment, name)
 
 
-def _against_marking(name: str, runner: TrialRunner, times: int) -> Measurement:
-    asked = _asked(name)
-    graded = _marked(asked, runner)
-    plots = draw(graded, asked.assignment, asked.submission)
-    marking = [_marking_seconds(asked, runner) for _ in range(times)]
-    drawing = [cpu_seconds(partial(draw, graded, asked.assignment, asked.submission)) for _ in range(times)]
+def _compare_with_marking(name: str, runner: TrialRunner, times: int) -> Measurement:
+    asked = _build_request(name)
+    graded = _grade_request(asked, runner)
+    plots = draw_plots(graded, asked.assignment, asked.submission)
+    marking = [_measure_marking(asked, runner) for _ in range(times)]
+    drawing = [
+        measure_cpu_seconds(partial(draw_plots, graded, asked.assignment, asked.submission)) for _ in range(times)
+    ]
     return Measurement(
         f"plots of {name}, CPU against marking it",
         median(drawing) / median(marking),
@@ -54,23 +64,23 @@ def _against_marking(name: str, runner: TrialRunner, times: int) -> Measurement:
     )
 
 
-def _marked(asked: GradingRequest, runner: TrialRunner) -> Grade:
+def _grade_request(asked: GradingRequest, runner: TrialRunner) -> Grade:
     return grade(asked.submission, asked.assignment, runner=runner)
 
 
-def _marking_seconds(asked: GradingRequest, runner: TrialRunner) -> float:
+def _measure_marking(asked: GradingRequest, runner: TrialRunner) -> float:
     """Return the CPU seconds of the worker and of the students' processes."""
     before = runner.children_cpu_seconds
-    own = cpu_seconds(lambda: _marked(asked, runner))
+    own = measure_cpu_seconds(lambda: _grade_request(asked, runner))
     return own + runner.children_cpu_seconds - before
 
 
-def _of_report(asked: GradingRequest, runner: TrialRunner, times: int) -> list[Measurement]:
-    graded = _marked(asked, runner)
-    drawn = draw(graded, asked.assignment, asked.submission)
-    page = partial(report, student_view(graded), drawn, asked.submission)
-    size = len(_warm(page).encode())
-    seconds = median([wall_seconds(page) for _ in range(times)])
+def _measure_report(asked: GradingRequest, runner: TrialRunner, times: int) -> list[Measurement]:
+    graded = _grade_request(asked, runner)
+    drawn = draw_plots(graded, asked.assignment, asked.submission)
+    page = partial(render_report_page, build_student_view(graded), drawn, asked.submission)
+    size = len(_warm_up(page).encode())
+    seconds = median([measure_wall_seconds(page) for _ in range(times)])
     trials = f"{len(graded.trials)} trials of at most 60 s"
     return [
         Measurement("report with a replay of 60 s", size / 1e6, MEGABYTES, 1, 0.4, trials),
@@ -78,6 +88,6 @@ def _of_report(asked: GradingRequest, runner: TrialRunner, times: int) -> list[M
     ]
 
 
-def _warm(made: Callable[[], Made]) -> Made:
+def _warm_up(made: Callable[[], Made]) -> Made:
     made()
     return made()

@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.graded_store import short_request
-from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_database
+from benchmarks.graded_store import build_short_request
+from benchmarks.harness.postgresql_server import PostgresqlServer, create_database
 from benchmarks.measurement import A_MINUTE, COUNT, GAIN, SECONDS, Measurement
 from service.queue.celery_app import make_celery
 from service.queue.notifier import Notifier
@@ -25,8 +25,8 @@ from service.store.batches import batches, intake
 from service.store.engine import Store, open_store
 from service.store.grades import plots, results
 from service.store.models import Job
-from service.store.queue.metrics import quantile
-from service.store.states import JobState, Lane
+from service.store.queue.metrics import compute_quantile
+from service.store.states import JobQueue, JobState
 
 _BATCH = 200
 _DEEP = 500
@@ -45,27 +45,27 @@ class _Bench:
     def batch(self, name: str, count: int) -> str:
         """Queue this number of submissions, each with a different text."""
         accepted = intake.accept_batch(
-            self.store, name, [short_request(f"{name}-{number}") for number in range(count)], [], max_attempts=3
+            self.store, name, [build_short_request(f"{name}-{number}") for number in range(count)], [], max_attempts=3
         )
-        self.notifier.grade(Lane.BATCH, count)
+        self.notifier.grade(JobQueue.BATCH, count)
         return accepted.id
 
-    def ended(self, batch: str) -> int:
+    def count_ended_jobs(self, batch: str) -> int:
         with self.store.reading() as session:
-            return batches.progress(session, batch).ended
+            return batches.load_progress(session, batch).ended
 
-    def single(self, student: str) -> float:
+    def measure_single(self, student: str) -> float:
         """Return the seconds from a submission to its report on disk, with marks and without plots."""
         begun = time.perf_counter()
-        job = intake.accept(self.store, short_request(student), max_attempts=3).job_id
-        self.notifier.grade(Lane.INTERACTIVE)
-        self.until(lambda: self._graded(job))
+        job = intake.accept_submission(self.store, build_short_request(student), max_attempts=3).job_id
+        self.notifier.grade(JobQueue.INTERACTIVE)
+        self.wait_until(lambda: self._graded(job))
         with self.store.reading() as session:
-            line, graded = batches.job_line(session, job), results.load(session, job)
+            line, graded = batches.load_job_line(session, job), results.load_grade(session, job)
         write_report(self.store, line, graded, self.folder, student)
         return time.perf_counter() - begun
 
-    def until(self, look: Callable[[], bool], pause: float = 0.02) -> None:
+    def wait_until(self, look: Callable[[], bool], pause: float = 0.02) -> None:
         begun = time.monotonic()
         while not look():
             if time.monotonic() - begun > _PATIENCE:
@@ -81,7 +81,7 @@ def measure(_times: int) -> list[Measurement]:
     """Measure throughput with one and two workers, then single submissions alone and behind a batch."""
     with PostgresqlServer() as server:
         with _service(server, workers=1) as bench:
-            alone = _rate(bench)
+            alone = _measure_rate(bench)
         with _service(server, workers=2) as bench:
             return _measure(bench, alone)
 
@@ -90,49 +90,51 @@ def measure(_times: int) -> list[Measurement]:
 def _service(server: PostgresqlServer, workers: int) -> Iterator[_Bench]:
     """Yield a service on an empty database, when its workers are ready."""
     with tempfile.TemporaryDirectory() as folder:
-        settings = load_settings(home=Path(folder), database_url=fresh_database(server.url), concurrency=1)
+        settings = load_settings(home=Path(folder), database_url=create_database(server.url), concurrency=1)
         with open_store(settings) as store, Supervisor(settings, store, workers=workers, listening=None) as service:
             bench = _Bench(store, Notifier(make_celery(service.settings), store, service.settings), Path(folder))
             service.ensure()
-            bench.until(lambda: service.ready)
+            bench.wait_until(lambda: service.is_ready)
             yield bench
 
 
-def _rate(bench: _Bench) -> float:
+def _measure_rate(bench: _Bench) -> float:
     """Return the submissions per minute, up to their marks, after a warm-up."""
     warm = bench.batch("warm", 8)
-    bench.until(lambda: bench.ended(warm) == 8)
-    bench.until(lambda: _plots_drawn(bench))
+    bench.wait_until(lambda: bench.count_ended_jobs(warm) == 8)
+    bench.wait_until(lambda: _has_drawn_plots(bench))
     begun = time.perf_counter()
     batch = bench.batch("batch", _BATCH)
-    bench.until(lambda: bench.ended(batch) == _BATCH)
+    bench.wait_until(lambda: bench.count_ended_jobs(batch) == _BATCH)
     return 60 * _BATCH / (time.perf_counter() - begun)
 
 
 def _measure(bench: _Bench, alone: float) -> list[Measurement]:
     begun = time.perf_counter()
-    rate = _rate(bench)
-    bench.until(lambda: _plots_drawn(bench))
+    rate = _measure_rate(bench)
+    bench.wait_until(lambda: _has_drawn_plots(bench))
     drawn = 60 * _BATCH / (time.perf_counter() - begun)
-    idle = sorted(bench.single(f"idle-{number}") for number in range(_SINGLE))
+    idle = sorted(bench.measure_single(f"idle-{number}") for number in range(_SINGLE))
     deep = bench.batch("deep", _DEEP)
-    loaded = sorted(bench.single(f"loaded-{number}") for number in range(_SINGLE))
-    left = _DEEP - bench.ended(deep)
+    loaded = sorted(bench.measure_single(f"loaded-{number}") for number in range(_SINGLE))
+    left = _DEEP - bench.count_ended_jobs(deep)
     batch = f"batch of {_BATCH} short submissions, PostgreSQL"
     return [
         Measurement(f"{batch}, 2 workers, to marks", rate, A_MINUTE, 300, 600),
         Measurement(f"{batch}, 2 workers, to marks and plots", drawn, A_MINUTE, 300, 600),
         Measurement(f"{batch}: 2 workers against 1, on {os.cpu_count()} cores", rate / alone, GAIN),
-        _latency("submission to report, nothing else to do", idle, 1),
-        _latency(f"submission to report, {_DEEP} of a batch waiting", loaded),
+        _build_latency_row("submission to report, nothing else to do", idle, 1),
+        _build_latency_row(f"submission to report, {_DEEP} of a batch waiting", loaded),
         Measurement("of these still waiting at the end", left, COUNT),
     ]
 
 
-def _plots_drawn(bench: _Bench) -> bool:
-    return plots.due(bench.store) == 0
+def _has_drawn_plots(bench: _Bench) -> bool:
+    return plots.count_due_plots(bench.store) == 0
 
 
-def _latency(what: str, seconds: Sequence[float], budget: float | None = None) -> Measurement:
-    told = ", ".join(f"p{share:.0%}".rstrip("%") + f" {quantile(seconds, share):.2f} s" for share in (0.95, 0.99))
-    return Measurement(what, quantile(seconds, 0.5), SECONDS, budget, told=told)
+def _build_latency_row(what: str, seconds: Sequence[float], budget: float | None = None) -> Measurement:
+    told = ", ".join(
+        f"p{share:.0%}".rstrip("%") + f" {compute_quantile(seconds, share):.2f} s" for share in (0.95, 0.99)
+    )
+    return Measurement(what, compute_quantile(seconds, 0.5), SECONDS, budget, details=told)

@@ -14,9 +14,9 @@ from typing import Any
 from sqlalchemy import event
 
 from benchmarks import many_rows
-from benchmarks.graded_store import graded_batch
-from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_database
-from benchmarks.measurement import MILLISECONDS, Measurement, median, wall_seconds
+from benchmarks.graded_store import create_graded_batch
+from benchmarks.harness.postgresql_server import PostgresqlServer, create_database
+from benchmarks.measurement import MILLISECONDS, Measurement, measure_wall_seconds, median
 from service.settings import load_settings
 from service.store.batches import batches
 from service.store.engine import Store, open_store
@@ -29,7 +29,7 @@ _WORKER = "worker"
 
 
 @dataclass(frozen=True, slots=True)
-class _Question:
+class _TimedQuery:
     """A query, and the time allowed for it."""
 
     name: str
@@ -37,90 +37,94 @@ class _Question:
     milliseconds: float
 
 
-def _status(store: Store) -> object:
+def _query_status(store: Store) -> object:
     with store.reading() as session:
-        name = many_rows.batch_name(3)
-        return batches.find_batch(session, name), batches.batch(session, name), batches.progress(session, name)
+        name = many_rows.format_batch_name(3)
+        return (
+            batches.find_batch(session, name),
+            batches.load_batch(session, name),
+            batches.load_progress(session, name),
+        )
 
 
-def _list(store: Store) -> object:
+def _query_batches(store: Store) -> object:
     with store.reading() as session:
         return batches.list_batches(session)
 
 
-def _marks(store: Store) -> object:
+def _query_marks(store: Store) -> object:
     with store.reading() as session:
-        return batches.job_lines(session, many_rows.batch_name(3))
+        return batches.load_job_lines(session, many_rows.format_batch_name(3))
 
 
-def _of_student(store: Store) -> object:
+def _query_student(store: Store) -> object:
     with store.reading() as session:
-        enrolment = many_rows.enrolment_of(many_rows.STUDENTS // 2)
-        return session.execute(batches._job_lines().where(Job.enrolment_id == enrolment)).all()
+        enrolment = many_rows.compute_enrolment_id(many_rows.STUDENTS // 2)
+        return session.execute(batches._select_job_lines().where(Job.enrolment_id == enrolment)).all()
 
 
-def _show(store: Store) -> object:
+def _query_grade(store: Store) -> object:
     with store.reading() as session:
-        return batches.find_job(session, many_rows.grade_name(70_007))
+        return batches.find_job(session, many_rows.format_grade_name(70_007))
 
 
 def _claim(store: Store) -> object:
-    return jobs.claim(store, _WORKER, 60)
+    return jobs.claim_job(store, _WORKER, 60)
 
 
-_QUESTIONS = (
-    _Question("batch status: the counts of a batch of 2000", _status, 50),
-    _Question("batch list: the counts of 50 batches", _list, 50),
-    _Question("batch status: the marks of a batch of 2000", _marks, 300),
-    _Question("all 50 grades of a student", _of_student, 50),
-    _Question("a grade found by the beginning of its id", _show, 50),
-    _Question("claim, 10,000 jobs waiting", _claim, 50),
+_QUERIES = (
+    _TimedQuery("batch status: the counts of a batch of 2000", _query_status, 50),
+    _TimedQuery("batch list: the counts of 50 batches", _query_batches, 50),
+    _TimedQuery("batch status: the marks of a batch of 2000", _query_marks, 300),
+    _TimedQuery("all 50 grades of a student", _query_student, 50),
+    _TimedQuery("a grade found by the beginning of its id", _query_grade, 50),
+    _TimedQuery("claim, 10,000 jobs waiting", _claim, 50),
 )
 
 
 def measure(times: int) -> list[Measurement]:
     """Measure the medians of nine or more repetitions on both databases."""
     return [
-        _asked(database, store, question, max(times, _TIMES))
-        for database, store in _filled()
-        for question in _QUESTIONS
+        _measure_query(database, store, question, max(times, _TIMES))
+        for database, store in _fill_databases()
+        for question in _QUERIES
     ]
 
 
-def _asked(database: str, store: Store, question: _Question, times: int) -> Measurement:
-    seconds = _seconds(question.ask, store, times)
+def _measure_query(database: str, store: Store, question: _TimedQuery, times: int) -> Measurement:
+    seconds = _time_query(question.ask, store, times)
     what = f"{many_rows.GRADES:,} grades, {database}: {question.name}"
     told = f"most {1000 * max(seconds):.1f} ms"
-    return Measurement(what, 1000 * median(seconds), MILLISECONDS, question.milliseconds, told=told)
+    return Measurement(what, 1000 * median(seconds), MILLISECONDS, question.milliseconds, details=told)
 
 
-def claim_seconds() -> float:
+def measure_claim() -> float:
     """Return the seconds of a claim in PostgreSQL with 10,000 waiting jobs."""
-    *_, seconds = (_seconds(_claim, store, _TIMES) for _, store in _filled())
+    *_, seconds = (_time_query(_claim, store, _TIMES) for _, store in _fill_databases())
     return median(seconds)
 
 
 def main(_arguments: list[str]) -> int:
     """Write the query plans of both databases."""
     parts = [f"How {many_rows.GRADES:,} grades are asked; written by python -m benchmarks plans.\n"]
-    for database, store in _filled():
-        for question in _QUESTIONS:
+    for database, store in _fill_databases():
+        for question in _QUERIES:
             parts.append(f"\n== {database}: {question.name}\n")
-            parts += [f"\n{plan}\n" for plan in _plans(store, question)]
+            parts += [f"\n{plan}\n" for plan in _collect_plans(store, question)]
     _PLANS.write_text("".join(parts))
     return 0
 
 
-def _seconds(ask: Callable[[Store], object], store: Store, times: int) -> list[float]:
-    return [wall_seconds(lambda: ask(store)) for _ in range(times)]
+def _time_query(ask: Callable[[Store], object], store: Store, times: int) -> list[float]:
+    return [measure_wall_seconds(lambda: ask(store)) for _ in range(times)]
 
 
-def _filled() -> Iterator[tuple[str, Store]]:
+def _fill_databases() -> Iterator[tuple[str, Store]]:
     """Yield both databases in turn. Each is removed before the next."""
     with tempfile.TemporaryDirectory() as folder, PostgresqlServer() as server:
-        for database, url in (("SQLite", ""), ("PostgreSQL", fresh_database(server.url))):
+        for database, url in (("SQLite", ""), ("PostgreSQL", create_database(server.url))):
             with open_store(load_settings(home=Path(folder), database_url=url)) as store:
-                many_rows.fill(store, graded_batch(store))
+                many_rows.fill(store, create_graded_batch(store))
                 if url:
                     # Autovacuum does this within minutes. For SQLite, the service doesn't do it either.
                     with store.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
@@ -128,7 +132,7 @@ def _filled() -> Iterator[tuple[str, Store]]:
                 yield database, store
 
 
-def _plans(store: Store, question: _Question) -> list[str]:
+def _collect_plans(store: Store, question: _TimedQuery) -> list[str]:
     """Return the plan of each statement of a query."""
     asked: dict[str, Any] = {}
 

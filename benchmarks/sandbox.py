@@ -15,13 +15,21 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks.measurement import KIBIBYTES, MEGABYTES, MILLISECONDS, SECONDS, Measurement, median, wall_seconds
+from benchmarks.measurement import (
+    KIBIBYTES,
+    MEGABYTES,
+    MILLISECONDS,
+    SECONDS,
+    Measurement,
+    measure_wall_seconds,
+    median,
+)
 from responders import wire
 from responders.sandbox.inside import grants, lockdown
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped
 from responders.sandbox.running_child import ChildLimits, ServedChild
-from responders.sandbox.zygote import Role
+from responders.sandbox.zygote import ChildRole
 from sim.recording import TICK, Verdict
 
 _LIMITS = {"robot": ChildLimits(2, 128 << 20), "responder with libraries": ChildLimits(2, 512 << 20)}
@@ -54,36 +62,36 @@ input()
 
 def measure(_times: int) -> list[Measurement]:
     """Measure the sandbox, in about twenty seconds."""
-    with Sandboxes() as sandboxes, sandboxes.private_folder() as folder:
-        cold = wall_seconds(lambda: _spawn(sandboxes, "responder with libraries").close())
-        light = _many(100, lambda: _until_locked(sandboxes, "robot"))
-        heavy = _many(100, lambda: _until_locked(sandboxes, "responder with libraries"))
-        answers = _many(50, lambda: _until_answer(sandboxes, folder))
-        ends = _many(100, lambda: _until_gone(sandboxes))
-        turns = _turns(sandboxes, folder)
-        alone = _many(50, _lockdown_alone)
-        dirty, share = _memory(sandboxes, folder)
-        cpu = max(_cpu_overshoot(sandboxes, text) for text in ("while True: pass", "sum(range(10**12))"))
-        stalled = _stall_overshoot(sandboxes)
-        output = _output_overshoot(sandboxes, folder)
+    with Sandboxes() as sandboxes, sandboxes.open_private_folder() as folder:
+        cold = measure_wall_seconds(lambda: _spawn(sandboxes, "responder with libraries").close())
+        light = _collect_samples(100, lambda: _time_until_locked(sandboxes, "robot"))
+        heavy = _collect_samples(100, lambda: _time_until_locked(sandboxes, "responder with libraries"))
+        answers = _collect_samples(50, lambda: _time_until_answer(sandboxes, folder))
+        ends = _collect_samples(100, lambda: _time_until_gone(sandboxes))
+        turns = _time_turns(sandboxes, folder)
+        alone = _collect_samples(50, _time_lockdown)
+        dirty, share = _measure_memory(sandboxes, folder)
+        cpu = max(_measure_cpu_overshoot(sandboxes, text) for text in ("while True: pass", "sum(range(10**12))"))
+        stalled = _measure_stall_overshoot(sandboxes)
+        output = _measure_output_overshoot(sandboxes, folder)
     return [
-        _timed("fork to locked, robot", light, 10),
-        _timed("fork to locked, responder with scikit-learn", heavy, 15, 8),
-        _timed("fork to first answer, responder", answers, 20),
-        _timed("Landlock and the filter alone", alone, 5),
-        _timed("message and answer", turns, 0.2),
-        _timed("kill and reap, responder", ends, 15),
+        _build_row("fork to locked, robot", light, 10),
+        _build_row("fork to locked, responder with scikit-learn", heavy, 15, 8),
+        _build_row("fork to first answer, responder", answers, 20),
+        _build_row("Landlock and the filter alone", alone, 5),
+        _build_row("message and answer", turns, 0.2),
+        _build_row("kill and reap, responder", ends, 15),
         Measurement("sandbox: zygote with scikit-learn, cold start", cold, SECONDS, 5),
         Measurement("sandbox: memory of an idle responder's own, one of ten", dirty, MEGABYTES, 5),
         Measurement("sandbox: its share of all memory", share, MEGABYTES, 20),
         Measurement("sandbox: CPU beyond the limit", 1000 * cpu, MILLISECONDS, 100),
         Measurement("sandbox: waiting beyond the limit", 1000 * stalled, MILLISECONDS, 100),
         Measurement("sandbox: output beyond the limit", output / 1024, KIBIBYTES, 128),
-        Measurement("sandbox: worker killed, until nothing is left", _until_nothing_left(), SECONDS, 1),
+        Measurement("sandbox: worker killed, until nothing is left", _time_until_nothing_left(), SECONDS, 1),
     ]
 
 
-def _timed(what: str, seconds: list[float], budget: float, beyond: float | None = None) -> Measurement:
+def _build_row(what: str, seconds: list[float], budget: float, beyond: float | None = None) -> Measurement:
     ordered = sorted(seconds)
     late = ordered[len(ordered) * 95 // 100]
     return Measurement(
@@ -91,18 +99,18 @@ def _timed(what: str, seconds: list[float], budget: float, beyond: float | None 
     )
 
 
-def _many(count: int, sample: Callable[[], float]) -> list[float]:
+def _collect_samples(count: int, sample: Callable[[], float]) -> list[float]:
     """Return samples, after a few for warm-up."""
     for _ in range(5):
         sample()
     return [sample() for _ in range(count)]
 
 
-def _spawn(sandboxes: Sandboxes, role: Role, folder: Path | None = None) -> ServedChild:
+def _spawn(sandboxes: Sandboxes, role: ChildRole, folder: Path | None = None) -> ServedChild:
     return sandboxes.spawn(role, _LIMITS[role], folder)
 
 
-def _until_locked(sandboxes: Sandboxes, role: Role) -> float:
+def _time_until_locked(sandboxes: Sandboxes, role: ChildRole) -> float:
     start = time.perf_counter()
     child = _spawn(sandboxes, role)
     taken = time.perf_counter() - start
@@ -110,28 +118,28 @@ def _until_locked(sandboxes: Sandboxes, role: Role) -> float:
     return taken
 
 
-def _until_gone(sandboxes: Sandboxes) -> float:
-    return wall_seconds(_spawn(sandboxes, "responder with libraries").close)
+def _time_until_gone(sandboxes: Sandboxes) -> float:
+    return measure_wall_seconds(_spawn(sandboxes, "responder with libraries").close)
 
 
-def _until_answer(sandboxes: Sandboxes, folder: Path) -> float:
+def _time_until_answer(sandboxes: Sandboxes, folder: Path) -> float:
     start = time.perf_counter()
-    child = _echo(sandboxes, folder)
-    _turn(child)
+    child = _start_echo(sandboxes, folder)
+    _make_turn(child)
     taken = time.perf_counter() - start
     child.close()
     return taken
 
 
-def _turns(sandboxes: Sandboxes, folder: Path) -> list[float]:
-    child = _echo(sandboxes, folder)
+def _time_turns(sandboxes: Sandboxes, folder: Path) -> list[float]:
+    child = _start_echo(sandboxes, folder)
     try:
-        return _many(500, lambda: wall_seconds(lambda: _turn(child)))
+        return _collect_samples(500, lambda: measure_wall_seconds(lambda: _make_turn(child)))
     finally:
         child.close()
 
 
-def _echo(sandboxes: Sandboxes, folder: Path) -> ServedChild:
+def _start_echo(sandboxes: Sandboxes, folder: Path) -> ServedChild:
     child = _spawn(sandboxes, "responder with libraries", folder)
     _start(child, "responder with libraries", _ECHO)
     while child.receive(wire.RESPONDER)["do"] != "ready":
@@ -139,19 +147,19 @@ def _echo(sandboxes: Sandboxes, folder: Path) -> ServedChild:
     return child
 
 
-def _start(child: ServedChild, role: Role, text: str) -> None:
+def _start(child: ServedChild, role: ChildRole, text: str) -> None:
     own = {"preamble": "none", "sensors": {}, "modules": {}, "tick": TICK} if role == "robot" else {"function": None}
     child.send({"name": f"{role}.py", "text": text, "seed": 1, **own})
 
 
-def _turn(child: ServedChild) -> None:
+def _make_turn(child: ServedChild) -> None:
     child.send({"do": "message", "t": 0, "text": "hello"})
     child.receive(wire.RESPONDER)
 
 
-def _lockdown_alone() -> float:
+def _time_lockdown() -> float:
     """Return the seconds for the lockdown of a fork of this process, with the grants of a robot program."""
-    rules = _rules()
+    rules = _prepare_rules()
     reading, writing = os.pipe()
     pid = os.fork()
     if pid == 0:
@@ -170,17 +178,19 @@ def _lockdown_alone() -> float:
 
 
 @functools.cache
-def _rules() -> tuple[bytes, ...]:
+def _prepare_rules() -> tuple[bytes, ...]:
     """Prepare the rules, as a zygote does once."""
-    return lockdown.reading_rules(lockdown.Grants(grants.readable([]), grants.listable([])))
+    return lockdown.build_reading_rules(
+        lockdown.Grants(grants.list_readable_paths([]), grants.list_listable_folders([]))
+    )
 
 
-def _memory(sandboxes: Sandboxes, folder: Path) -> tuple[float, float]:
+def _measure_memory(sandboxes: Sandboxes, folder: Path) -> tuple[float, float]:
     """Return megabytes: a child's private memory, and its share of all when it is one of ten.
 
     Not every user may read these values.
     """
-    children = [_echo(sandboxes, folder) for _ in range(10)]
+    children = [_start_echo(sandboxes, folder) for _ in range(10)]
     try:
         lines = Path(f"/proc/{children[0]._pid}/smaps_rollup").read_text().splitlines()  # type: ignore[attr-defined]
     except PermissionError:
@@ -204,18 +214,18 @@ def _run_until(sandboxes: Sandboxes, text: str, limits: ChildLimits, verdict: Ve
             raise RuntimeError(f"expected {verdict}, but {stop.message}") from None
 
 
-def _cpu_overshoot(sandboxes: Sandboxes, text: str) -> float:
+def _measure_cpu_overshoot(sandboxes: Sandboxes, text: str) -> float:
     before = sandboxes.children_cpu_seconds
     _run_until(sandboxes, text, ChildLimits(_CPU_LIMIT, 64 << 20), Verdict.CPU_LIMIT)
     return sandboxes.children_cpu_seconds - before - _CPU_LIMIT
 
 
-def _stall_overshoot(sandboxes: Sandboxes) -> float:
+def _measure_stall_overshoot(sandboxes: Sandboxes) -> float:
     text = "import select; select.select([], [], [])"
-    return wall_seconds(lambda: _run_until(sandboxes, text, _LIMITS["robot"], Verdict.STALLED)) - _STALLED
+    return measure_wall_seconds(lambda: _run_until(sandboxes, text, _LIMITS["robot"], Verdict.STALLED)) - _STALLED
 
 
-def _output_overshoot(sandboxes: Sandboxes, folder: Path) -> int:
+def _measure_output_overshoot(sandboxes: Sandboxes, folder: Path) -> int:
     """Return the bytes that a program could print after the worker had stopped reading."""
     child = _spawn(sandboxes, "robot", folder)
     _start(child, "robot", _FLOOD)
@@ -227,7 +237,7 @@ def _output_overshoot(sandboxes: Sandboxes, folder: Path) -> int:
         return int.from_bytes(count[:], "little") - _OUTPUT
 
 
-def _until_nothing_left() -> float:
+def _time_until_nothing_left() -> float:
     worker = subprocess.Popen([sys.executable, "-c", _WORKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert worker.stdout is not None
     assert worker.stdin is not None
@@ -236,7 +246,7 @@ def _until_nothing_left() -> float:
     start = time.perf_counter()
     worker.kill()
     worker.wait()
-    while _runs(child) or _runs(zygote):
+    while _is_running(child) or _is_running(zygote):
         time.sleep(0.0005)
     taken = time.perf_counter() - start
     worker.stdin.close()
@@ -244,7 +254,7 @@ def _until_nothing_left() -> float:
     return taken
 
 
-def _runs(process: Path) -> bool:
+def _is_running(process: Path) -> bool:
     try:
         return (process / "stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:

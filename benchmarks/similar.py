@@ -13,12 +13,12 @@ import time
 from collections.abc import Iterator, Mapping
 from itertools import combinations
 
-from benchmarks.harness.copyists import COPYISTS
-from models.intervals import wilson
-from service.similarity.sources import given_with
-from service.similarity.writing import ALIKE, FEWEST_TOKENS, compare, source_of
-from submissions.assignment.examples import examples
-from submissions.assignment.folder import REFERENCE, catalogue
+from benchmarks.harness.disguises import DISGUISES
+from models.intervals import compute_wilson_interval
+from service.similarity.similar_sources import FEWEST_TOKENS, SIMILARITY_THRESHOLD, build_source, compare_sources
+from service.similarity.sources import collect_given_code
+from submissions.assignment.examples import locate_examples
+from submissions.assignment.folder import REFERENCE, list_catalogue_ids
 from submissions.assignment.reader import find_assignment
 
 #: Independent solutions of one assignment, as their texts show: one per author and idea.
@@ -39,80 +39,82 @@ _LINES = 25
 
 def main() -> int:
     """Print the three tables."""
-    references = dict(_references())
-    given = {name: given_with(find_assignment(name)) for name, _ in references}
-    print(f"alike from {ALIKE} on; {FEWEST_TOKENS} own tokens or more")
-    _within(given)
-    _between(references, given)
-    _found(references, given)
+    references = dict(_read_references())
+    given = {name: collect_given_code(find_assignment(name)) for name, _ in references}
+    print(f"alike from {SIMILARITY_THRESHOLD} on; {FEWEST_TOKENS} own tokens or more")
+    _print_alarms_within(given)
+    _print_alarms_between(references, given)
+    _print_detected_copies(references, given)
     for students in (60, 500, 2000):
-        _cost(students)
+        _print_cost(students)
     return 0
 
 
-def _references() -> Iterator[tuple[tuple[str, str], str]]:
-    for name in catalogue():
-        for path in sorted((examples(name) / REFERENCE).glob("*.py")):
+def _read_references() -> Iterator[tuple[tuple[str, str], str]]:
+    for name in list_catalogue_ids():
+        for path in sorted((locate_examples(name) / REFERENCE).glob("*.py")):
             yield (name, path.name), path.read_text(encoding="utf-8")
 
 
-def _within(given: Mapping[str, tuple[str, ...]]) -> None:
+def _print_alarms_within(given: Mapping[str, tuple[str, ...]]) -> None:
     """Print the false alarms among independent solutions of the same assignment."""
     pairs, alarms, highest = 0, [], 0.0
     for name, file, written in WRITTEN_ANEW:
-        texts = {each: (examples(name) / each / file).read_text(encoding="utf-8") for each in written}
+        texts = {each: (locate_examples(name) / each / file).read_text(encoding="utf-8") for each in written}
         for one, other in combinations(texts, 2):
-            sources = [source_of(each, file, texts[each]) for each in (one, other)]
-            writing = compare(sources, given[name], alike=0.0)
+            sources = [build_source(each, file, texts[each]) for each in (one, other)]
+            writing = compare_sources(sources, given[name], alike=0.0)
             if not writing.too_short:
                 pairs += 1
                 highest = max([highest, *(each.share for each in writing.alike)])
-                alarms += [f"{name}: {one}, {other}" for each in writing.alike if each.share >= ALIKE]
-    print(f"one assignment, written anew: {_rate(len(alarms), pairs)}; the highest share is {highest:.2f}")
+                alarms += [f"{name}: {one}, {other}" for each in writing.alike if each.share >= SIMILARITY_THRESHOLD]
+    print(f"one assignment, written anew: {_format_rate(len(alarms), pairs)}; the highest share is {highest:.2f}")
 
 
-def _between(references: Mapping[tuple[str, str], str], given: Mapping[str, tuple[str, ...]]) -> None:
+def _print_alarms_between(references: Mapping[tuple[str, str], str], given: Mapping[str, tuple[str, ...]]) -> None:
     """Print the false alarms between all references: programs with programs, responders with responders."""
     for file in ("robot.py", "responder.py"):
         pairs, alarms = 0, []
         names = [name for name, which in references if which == file]
         for one, other in combinations(names, 2):
-            sources = [source_of(name, file, references[name, file]) for name in (one, other)]
-            writing = compare(sources, [*given[one], *given[other]])
+            sources = [build_source(name, file, references[name, file]) for name in (one, other)]
+            writing = compare_sources(sources, [*given[one], *given[other]])
             if not writing.too_short:
                 pairs += 1
                 alarms += [f"{one} and {other} {each.share:.2f}" for each in writing.alike]
-        print(f"references, {file}: {_rate(len(alarms), pairs)}")
+        print(f"references, {file}: {_format_rate(len(alarms), pairs)}")
         print("".join(f"    {alarm}\n" for alarm in alarms), end="")
 
 
-def _rate(alarms: int, pairs: int) -> str:
-    low, high = wilson(alarms, pairs)
+def _format_rate(alarms: int, pairs: int) -> str:
+    low, high = compute_wilson_interval(alarms, pairs)
     return f"{alarms} of {pairs} pairs are alike ({low:.0%} to {high:.0%})"
 
 
-def _found(references: Mapping[tuple[str, str], str], given: Mapping[str, tuple[str, ...]]) -> None:
-    for how, copyist in COPYISTS.items():
+def _print_detected_copies(references: Mapping[tuple[str, str], str], given: Mapping[str, tuple[str, ...]]) -> None:
+    for how, copyist in DISGUISES.items():
         found = copies = 0
         for (name, file), text in references.items():
-            writing = compare([source_of("one", file, text), source_of("other", file, copyist(text))], given[name])
+            writing = compare_sources(
+                [build_source("one", file, text), build_source("other", file, copyist(text))], given[name]
+            )
             if "one" not in writing.too_short:
                 copies += 1
                 found += bool(writing.alike)
         print(f"{how}: {found} of {copies} copies found")
 
 
-def _cost(students: int) -> None:
-    texts = [_program(random.Random(number)) for number in range(students)]
+def _print_cost(students: int) -> None:
+    texts = [_build_program(random.Random(number)) for number in range(students)]
     began = time.process_time()
-    sources = [source_of(str(number), "robot.py", text) for number, text in enumerate(texts)]
-    alike = compare(sources, []).alike
+    sources = [build_source(str(number), "robot.py", text) for number, text in enumerate(texts)]
+    alike = compare_sources(sources, []).alike
     seconds, megabytes = time.process_time() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"{students} students, {len(sources[0].tokens)} tokens each: {seconds:.2f} s, {len(alike)} alike, ", end="")
     print(f"{megabytes:.0f} MB at most in this process")
 
 
-def _program(chance: random.Random) -> str:
+def _build_program(chance: random.Random) -> str:
     """Return lines in students' style, each chosen from a few."""
     lines = []
     for _ in range(_LINES):

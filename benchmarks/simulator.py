@@ -13,21 +13,21 @@ from benchmarks.measurement import (
     RATIO,
     SPEED,
     Measurement,
-    cpu_seconds,
-    median_of,
-    wall_seconds,
+    measure_cpu_seconds,
+    measure_median,
+    measure_wall_seconds,
 )
 from responders.channel import Channel
-from responders.code import Code
 from responders.sandbox.running_child import ChildLimits
+from responders.source_file import SourceFile
 from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.trial_runner import TrialRunner
 from sim.arena import Arena
 from sim.camera import HEIGHT, WIDTH, BulletCamera, CachedCamera, LightCamera
-from sim.floors import floor
+from sim.floors import build_floor
 from sim.recording import Pose
-from sim.robot import robot
-from sim.world import Chain, Noise, World
+from sim.robot import get_robot
+from sim.world import HashChain, Noise, World
 
 SECONDS = 60
 START = Pose(320, 500, 90)
@@ -46,22 +46,24 @@ _LIMITS = ChildLimits(30, 512 << 20)
 
 def measure(times: int) -> list[Measurement]:
     """Measure the speed relative to real time on one core, by CPU time, and the costs of both sandboxed processes."""
-    pixels = floor(FLOOR).pixels
+    pixels = build_floor(FLOOR).pixels
     arena, cached, camera = Arena(), CachedCamera(pixels), BulletCamera(pixels)
     try:
-        table = median_of(times, lambda: cpu_seconds(lambda: _follow(arena, cached)))
-        shots = median_of(min(times, 3), lambda: cpu_seconds(lambda: _follow(arena, camera)))
-        differing = _differing_pixels(camera, pixels)
+        table = measure_median(times, lambda: measure_cpu_seconds(lambda: _follow(arena, cached)))
+        shots = measure_median(min(times, 3), lambda: measure_cpu_seconds(lambda: _follow(arena, camera)))
+        differing = _count_differing_pixels(camera, pixels)
     finally:
         camera.close()
         cached.close()
         arena.close()
     with TrialRunner() as runner:
-        both = median_of(max(times, 5), lambda: through_processes(runner, spec(FOLLOWER)))
-        ready = median_of(4 * times, lambda: wall_seconds(lambda: runner.run(spec("pass"))))
+        both = measure_median(max(times, 5), lambda: measure_through_processes(runner, build_spec(FOLLOWER)))
+        ready = measure_median(4 * times, lambda: measure_wall_seconds(lambda: runner.run(build_spec("pass"))))
     return [
         Measurement(f"{_ALONE}, sensor table", SECONDS / table, SPEED, 400, 800, f"{table:.3f} s"),
-        Measurement(f"{_ALONE}, a PyBullet camera image each tick", SECONDS / shots, SPEED, 60, told=f"{shots:.3f} s"),
+        Measurement(
+            f"{_ALONE}, a PyBullet camera image each tick", SECONDS / shots, SPEED, 60, details=f"{shots:.3f} s"
+        ),
         Measurement(
             "the same through both sandboxed processes, CPU of all against the simulator alone",
             both / table,
@@ -77,7 +79,7 @@ def measure(times: int) -> list[Measurement]:
 
 def _follow(arena: Arena, camera: LightCamera) -> None:
     """Read both sensors fifty times a second, as a program that only reads them."""
-    world = World(robot("Default_Robot"), arena, camera, START, Noise(), 0, Chain())
+    world = World(get_robot("Default_Robot"), arena, camera, START, Noise(), 0, HashChain())
     left, right = world.drive.left, world.drive.right
     left.run("run-forever", 0)
     right.run("run-forever", 0)
@@ -88,24 +90,24 @@ def _follow(arena: Arena, camera: LightCamera) -> None:
         world.tick()
 
 
-def _differing_pixels(camera: LightCamera, pixels: NDArray[np.uint8]) -> int:
+def _count_differing_pixels(camera: LightCamera, pixels: NDArray[np.uint8]) -> int:
     """Return the number of differing pixels in 200 windows of 20 by 20 pixels, spread over the floor."""
     chance = random.Random(0)
     places = [(chance.randrange(WIDTH - _SIDE), chance.randrange(HEIGHT - _SIDE)) for _ in range(200)]
     return sum(
-        int(np.count_nonzero((camera.window(x, y, _SIDE) != pixels[y : y + _SIDE, x : x + _SIDE]).any(axis=2)))
+        int(np.count_nonzero((camera.render_window(x, y, _SIDE) != pixels[y : y + _SIDE, x : x + _SIDE]).any(axis=2)))
         for x, y in places
     )
 
 
-def spec(program: str) -> TrialSpec:
+def build_spec(program: str) -> TrialSpec:
     """Return a trial of sixty seconds on the loop, with an echo responder."""
     return TrialSpec(
-        ProgramSpec(Code("robot.py", program), "preloaded", _LIMITS, 1 << 20),
-        ResponderSpec(Code("responder.py", "def responder(text): return text"), {}, _LIMITS, 1 << 20),
+        ProgramSpec(SourceFile("robot.py", program), "preloaded", _LIMITS, 1 << 20),
+        ResponderSpec(SourceFile("responder.py", "def responder(text): return text"), {}, _LIMITS, 1 << 20),
         True,
-        floor(FLOOR),
-        robot("Default_Robot"),
+        build_floor(FLOOR),
+        get_robot("Default_Robot"),
         START,
         Noise(),
         Channel(),
@@ -115,8 +117,8 @@ def spec(program: str) -> TrialSpec:
     )
 
 
-def through_processes(runner: TrialRunner, wanted: TrialSpec) -> float:
+def measure_through_processes(runner: TrialRunner, wanted: TrialSpec) -> float:
     """Return the CPU seconds of the worker and of both students' processes."""
     before = runner.children_cpu_seconds
-    own = cpu_seconds(lambda: runner.run(wanted))
+    own = measure_cpu_seconds(lambda: runner.run(wanted))
     return own + runner.children_cpu_seconds - before

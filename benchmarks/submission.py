@@ -9,14 +9,14 @@ from pathlib import Path
 
 from benchmarks.measurement import SECONDS, Measurement
 from service.queue.celery_app import make_celery
-from service.queue.embedded import EmbeddedServices
+from service.queue.embedded_services import EmbeddedServices
 from service.queue.notifier import Notifier
 from service.settings import load_settings
 from service.store.batches import intake
 from service.store.engine import Store, open_store
 from service.store.models import Job
-from service.store.states import JobState, Lane, PlotState
-from submissions.assignment.examples import examples
+from service.store.states import JobQueue, JobState, PlotState
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 from submissions.grading_request import GradingRequest
@@ -31,7 +31,7 @@ def measure(_times: int) -> list[Measurement]:
         settings = load_settings(home=Path(folder))
         with open_store(settings) as store, EmbeddedServices(settings, store) as services:
             notifier = Notifier(make_celery(services.settings), store, services.settings)
-            runs = [_once(store, notifier, f"student {number}") for number in range(_TIMES + 1)][1:]
+            runs = [_measure_once(store, notifier, f"student {number}") for number in range(_TIMES + 1)][1:]
     marks, plots = (sorted(times)[_TIMES // 2] for times in zip(*runs, strict=True))
     return [
         Measurement("one short submission, embedded, to marks in the database", marks, SECONDS, 1, 0.4),
@@ -39,15 +39,15 @@ def measure(_times: int) -> list[Measurement]:
     ]
 
 
-def _once(store: Store, notifier: Notifier, student: str) -> tuple[float, float]:
+def _measure_once(store: Store, notifier: Notifier, student: str) -> tuple[float, float]:
     """Return the seconds until the marks are committed, and until the plots are."""
     assignment = find_assignment(_ASSIGNMENT)
     start = time.perf_counter()
-    submission = read_submission(examples(_ASSIGNMENT) / "reference", student=student, asked=assignment.parts)
+    submission = read_submission(locate_examples(_ASSIGNMENT) / "reference", student=student, asked=assignment.parts)
     # One file differs, because identical submissions are graded only once.
     submission = replace(submission, files={**submission.files, "student.txt": student.encode()})
-    job = intake.accept(store, GradingRequest(submission, assignment, student), max_attempts=3).job_id
-    notifier.grade(Lane.INTERACTIVE)
+    job = intake.accept_submission(store, GradingRequest(submission, assignment, student), max_attempts=3).job_id
+    notifier.grade(JobQueue.INTERACTIVE)
     marks = None
     while True:
         with store.reading() as session:

@@ -24,13 +24,13 @@ LATEST = Path(__file__).parent / "latest.json"
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class RecordedRun:
     """The values of an earlier run by name."""
 
     at: str
     values: dict[str, float]
 
-    def on_a_machine_like(self, loop_seconds: float | None, row: Measurement) -> float | None:
+    def scale_to_machine(self, loop_seconds: float | None, row: Measurement) -> float | None:
         """Return the earlier value, scaled to a machine with this loop time, or None if it was not measured."""
         value, then = self.values.get(row.what), self.values.get(LOOP)
         if value is None or not then or not loop_seconds or row.what == LOOP:
@@ -38,18 +38,18 @@ class Run:
         return value * (loop_seconds / then) ** row.unit.slowness
 
 
-def recorded(path: Path = RECORDED) -> Run | None:
+def load_recorded_run(path: Path = RECORDED) -> RecordedRun | None:
     """Return the run in the file, or None if there is none."""
     if not path.exists():
         return None
     written = json.loads(path.read_text())
-    return Run(written["at"], {line["what"]: line["value"] for line in written["lines"]})
+    return RecordedRun(written["at"], {line["what"]: line["value"] for line in written["lines"]})
 
 
-def write(path: Path, rows: Sequence[Measurement]) -> None:
+def write_rows(path: Path, rows: Sequence[Measurement]) -> None:
     """Replace the rows with the same names in the file. Other rows stay."""
     lines = {line["what"]: line for line in json.loads(path.read_text())["lines"]} if path.exists() else {}
-    lines |= {row.what: _line(row) for row in rows}
+    lines |= {row.what: _build_entry(row) for row in rows}
     written = {
         "at": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "python": platform.python_version(),
@@ -58,7 +58,7 @@ def write(path: Path, rows: Sequence[Measurement]) -> None:
     path.write_text(json.dumps(written, indent=1) + "\n")
 
 
-def show(rows: Sequence[Measurement], before: Run | None) -> None:
+def print_rows(rows: Sequence[Measurement], before: RecordedRun | None) -> None:
     """Print each row with its budget and the recorded value, scaled to this machine."""
     loop = next((row.value for row in rows if row.what == LOOP), None)
     table = Table("what", box=None, pad_edge=False)
@@ -66,12 +66,12 @@ def show(rows: Sequence[Measurement], before: Run | None) -> None:
         table.add_column(heading, justify="right")
     table.add_column("spread")
     for row in rows:
-        then = None if before is None else before.on_a_machine_like(loop, row)
+        then = None if before is None else before.scale_to_machine(loop, row)
         table.add_row(
             Text(row.what),
-            Text(row.unit.shown(row.value), style="red" if row.misses else ""),
-            *("" if value is None else row.unit.shown(value) for value in (row.budget, row.beyond, then)),
-            row.told,
+            Text(row.unit.format_value(row.value), style="red" if row.misses else ""),
+            *("" if value is None else row.unit.format_value(value) for value in (row.budget, row.beyond, then)),
+            row.details,
         )
     console = Console(width=170)
     console.print(table)
@@ -79,11 +79,11 @@ def show(rows: Sequence[Measurement], before: Run | None) -> None:
         console.print(f"recorded: {before.at}; times are scaled by the loop where both runs have it")
     for row in rows:
         if row.gates:
-            console.print(f"misses its budget: {row.what}: {row.unit.shown(row.value)}", style="red")
+            console.print(f"misses its budget: {row.what}: {row.unit.format_value(row.value)}", style="red")
 
 
-def _line(row: Measurement) -> dict[str, Any]:
-    optional = {"budget": row.budget, "beyond": row.beyond, "spread": row.told or None}
+def _build_entry(row: Measurement) -> dict[str, Any]:
+    optional = {"budget": row.budget, "beyond": row.beyond, "spread": row.details or None}
     return {"what": row.what, "value": round(row.value, 6), "unit": row.unit.word.strip()} | {
         name: value for name, value in optional.items() if value is not None
     }

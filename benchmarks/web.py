@@ -19,21 +19,21 @@ from pathlib import Path
 from sqlalchemy import func, select
 
 from benchmarks import many_rows
-from benchmarks.graded_store import ASSIGNMENT, graded_batch, short_request
-from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_database
+from benchmarks.graded_store import ASSIGNMENT, build_short_request, create_graded_batch
+from benchmarks.harness.postgresql_server import PostgresqlServer, create_database
 from benchmarks.measurement import COUNT, MILLISECONDS, SECONDS, Measurement, median
 from service.queue.supervisor import Supervisor
 from service.settings import load_settings
 from service.store.courses import open_assignments
-from service.store.courses.versions import freeze
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.engine import Store, open_store
 from service.store.models import Job
 from service.store.people import credentials, membership
 from service.store.people.students import DEFAULT_COURSE
-from service.store.queue.metrics import quantile
+from service.store.queue.metrics import compute_quantile
 from service.store.states import CredentialKind, JobState
-from service.web.access import CSRF_HEADER, SESSION_COOKIE, csrf_word
-from service.web.listening import listen
+from service.web.access import CSRF_HEADER, SESSION_COOKIE, derive_csrf_token
+from service.web.listening_sockets import listen
 from submissions.assignment.reader import find_assignment
 from submissions.student_identity import Student
 
@@ -63,7 +63,7 @@ class _Browser:
         body = ("".join(parts) + f"--{_BOUNDARY}--\r\n").encode()
         headers = {
             "content-type": f"multipart/form-data; boundary={_BOUNDARY}",
-            CSRF_HEADER: csrf_word(self.secret),
+            CSRF_HEADER: derive_csrf_token(self.secret),
         }
         return self._ask("POST", path, body, headers)
 
@@ -82,48 +82,50 @@ class _Browser:
 def measure(times: int) -> list[Measurement]:
     """Measure the page, then the class, both on PostgreSQL."""
     with PostgresqlServer() as server:
-        return [*_page(server, max(times, 5)), *_class(server)]
+        return [*_measure_page(server, max(times, 5)), *_measure_class(server)]
 
 
-def _page(server: PostgresqlServer, times: int) -> list[Measurement]:
+def _measure_page(server: PostgresqlServer, times: int) -> list[Measurement]:
     with ExitStack() as held:
-        store, port = _served(held, server, workers=1)
-        many_rows.fill(store, graded_batch(store))
+        store, port = _start_service(held, server, workers=1)
+        many_rows.fill(store, create_graded_batch(store))
         with store.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
             connection.exec_driver_sql("VACUUM ANALYZE")
-        browser = _Browser(port, _session(store, _instructor(store)))
-        path = f"/courses/1/batches/{many_rows.batch_name(3)}"
+        browser = _Browser(port, _create_session(store, _create_instructor(store)))
+        path = f"/courses/1/batches/{many_rows.format_batch_name(3)}"
         for _ in range(2):
             status, _ = browser.get(path)
         taken = [browser.get(path)[1] for _ in range(times)]
     if status != 200:
         raise RuntimeError(f"the page of a batch answered {status}")
     told = f"most {1000 * max(taken):.0f} ms"
-    return [Measurement("web, PostgreSQL: page of a batch of 2000", 1000 * median(taken), MILLISECONDS, 300, told=told)]
+    return [
+        Measurement("web, PostgreSQL: page of a batch of 2000", 1000 * median(taken), MILLISECONDS, 300, details=told)
+    ]
 
 
-def _instructor(store: Store) -> int:
+def _create_instructor(store: Store) -> int:
     """Return the id of an instructor of the first course."""
     with store.transaction() as session:
         return membership.make_instructor(session, DEFAULT_COURSE, Student("instructor")).person_id
 
 
-def _class(server: PostgresqlServer) -> list[Measurement]:
+def _measure_class(server: PostgresqlServer) -> list[Measurement]:
     with ExitStack() as held:
-        store, port = _served(held, server, workers=2)
+        store, port = _start_service(held, server, workers=2)
         names = [f"student-{number}" for number in range(_STUDENTS)]
         with store.transaction() as session:
             members = [membership.make_student(session, DEFAULT_COURSE, Student(name)).person_id for name in names]
-            open_assignments.prepare(session, 1, freeze(find_assignment(ASSIGNMENT)))
+            open_assignments.prepare_assignment(session, 1, freeze_assignment(find_assignment(ASSIGNMENT)))
             open_assignments.open_for_students(session, 1, ASSIGNMENT)
-        browsers = [_Browser(port, _session(store, person_id)) for person_id in members]
+        browsers = [_Browser(port, _create_session(store, person_id)) for person_id in members]
         begun = time.monotonic()
         chance = random.Random(1)
         moments = sorted(chance.uniform(0, _WITHIN_SECONDS) for _ in names)
 
         def upload(number: int) -> tuple[int, float]:
             time.sleep(max(0.0, begun + moments[number] - time.monotonic()))
-            asked = short_request(names[number]).submission
+            asked = build_short_request(names[number]).submission
             assert asked.program is not None
             assert asked.responder is not None
             files = [("robot.py", asked.program.text), ("responder.py", asked.responder.text)]
@@ -131,31 +133,31 @@ def _class(server: PostgresqlServer) -> list[Measurement]:
 
         with ThreadPoolExecutor(_AT_A_TIME) as pool:
             answers = list(pool.map(upload, range(_STUDENTS)))
-        last = _until_graded(store, begun)
+        last = _wait_until_graded(store, begun)
         with store.reading() as session:
             kept = session.scalar(select(func.count()).select_from(Job)) or 0
             graded = session.scalar(select(func.count()).where(Job.state == JobState.DONE)) or 0
     taken = sorted(seconds for _, seconds in answers)
     lost = _STUDENTS - min(kept, graded, sum(status == 303 for status, _ in answers))
     what = f"web, PostgreSQL, 2 workers: {_STUDENTS} students upload within a minute"
-    told = f"half {quantile(taken, 0.5):.3f} s, 19 of 20 {quantile(taken, 0.95):.3f} s"
+    told = f"half {compute_quantile(taken, 0.5):.3f} s, 19 of 20 {compute_quantile(taken, 0.95):.3f} s"
     return [
-        Measurement(f"{what}: slowest answer", taken[-1], SECONDS, 1.0, told=told),
+        Measurement(f"{what}: slowest answer", taken[-1], SECONDS, 1.0, details=told),
         Measurement(f"{what}: lost", lost, COUNT, 0),
         Measurement(f"{what}: the last is graded after", last, SECONDS),
     ]
 
 
-def _served(held: ExitStack, server: PostgresqlServer, workers: int) -> tuple[Store, int]:
+def _start_service(held: ExitStack, server: PostgresqlServer, workers: int) -> tuple[Store, int]:
     """Yield the service on an empty database when it is ready, with the port of its web server."""
     folder = held.enter_context(tempfile.TemporaryDirectory())
-    settings = load_settings(home=Path(folder), database_url=fresh_database(server.url), concurrency=1)
+    settings = load_settings(home=Path(folder), database_url=create_database(server.url), concurrency=1)
     store = held.enter_context(open_store(settings))
     listening = held.enter_context(listen("127.0.0.1", 0))
     service = held.enter_context(Supervisor(settings, store, workers, listening))
     service.ensure()
     begun = time.monotonic()
-    while not service.ready:
+    while not service.is_ready:
         if time.monotonic() - begun > _PATIENCE_SECONDS:
             raise RuntimeError("the service does not come up")
         time.sleep(0.1)
@@ -163,12 +165,12 @@ def _served(held: ExitStack, server: PostgresqlServer, workers: int) -> tuple[St
     return store, port
 
 
-def _session(store: Store, person_id: int) -> str:
+def _create_session(store: Store, person_id: int) -> str:
     with store.transaction() as session:
-        return credentials.issue(session, person_id, CredentialKind.SESSION, timedelta(hours=1))
+        return credentials.issue_credential(session, person_id, CredentialKind.SESSION, timedelta(hours=1))
 
 
-def _until_graded(store: Store, begun: float) -> float:
+def _wait_until_graded(store: Store, begun: float) -> float:
     while True:
         with store.reading() as session:
             left = session.scalar(select(func.count()).where(Job.state.in_((JobState.QUEUED, JobState.RUNNING))))

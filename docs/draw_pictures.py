@@ -20,9 +20,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from tutorial_pictures import find_browser, photograph_tutorial
 
-from service.reports.plots.style import FAULT, font
-from sim.floors import floor, names
-from submissions.assignment.examples import examples
+from service.reports.plots.style import FAULT, load_font
+from sim.floors import build_floor, list_floor_names
+from submissions.assignment.examples import locate_examples
 
 DOCS = Path(__file__).parent
 _COLUMNS = 5
@@ -35,7 +35,9 @@ def draw_report() -> None:
     """The beginning of the report on a submission that is neither right nor hopeless."""
     browser = find_browser()
     with tempfile.TemporaryDirectory() as folder:
-        _robomark("grade", examples("shape-recognition") / "flawed", "-a", "shape-recognition", "--report", folder)
+        _robomark(
+            "grade", locate_examples("shape-recognition") / "flawed", "-a", "shape-recognition", "--report", folder
+        )
         flags = ["--headless", "--disable-gpu", "--hide-scrollbars", "--no-first-run", f"--window-size={_PAGE}"]
         # Root has no sandbox of Chromium's; the page is our own.
         flags += ["--no-sandbox"] if os.geteuid() == 0 else []
@@ -47,7 +49,7 @@ def draw_report() -> None:
 
 def draw_floors() -> None:
     """Every floor with the robot where it starts, on one sheet."""
-    known = [floor(name) for name in names()]
+    known = [build_floor(name) for name in list_floor_names()]
     rows = -(-len(known) // _COLUMNS)
     figure = Figure(figsize=(20.8, rows * 2.3), dpi=100, facecolor="#eeeeee")
     cells = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
@@ -60,7 +62,7 @@ def draw_floors() -> None:
         pose = each.default_pose
         axes.plot(pose.x, pose.y, marker=(3, 0, pose.heading - 90), color=FAULT, markersize=11, markeredgecolor="white")
         axes.set(xlim=(0, _WIDE), ylim=(0, _HIGH), xticks=(), yticks=())
-        axes.set_title(each.name, font=font(11), loc="left", pad=4)
+        axes.set_title(each.name, font=load_font(11), loc="left", pad=4)
     figure.subplots_adjust(0.006, 0.01, 0.994, 0.97, wspace=0.03, hspace=0.16)
     FigureCanvasAgg(figure).print_png(DOCS / "floors.png")
 

@@ -4,6 +4,6 @@ Weights files are pickles. Robomark's own processes load only files whose hash m
 submitted by students are loaded inside the sandbox.
 """
 
-from models.cards import Card, card, names, weights_bytes
+from models.cards import Card, list_classifier_names, load_card, load_weights
 
-__all__ = ["Card", "card", "names", "weights_bytes"]
+__all__ = ["Card", "list_classifier_names", "load_card", "load_weights"]

@@ -13,7 +13,7 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from typing import Any
 
-from models.intervals import wilson
+from models.intervals import compute_wilson_interval
 from sim.errors import HostError, UsageError
 
 Confusion = tuple[tuple[int, ...], ...]
@@ -34,7 +34,7 @@ class Tally:
     @property
     def interval(self) -> tuple[float, float]:
         """Wilson 95 % confidence interval of the share."""
-        return wilson(self.right, self.n)
+        return compute_wilson_interval(self.right, self.n)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class CardCurve:
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class AccuracyResults:
     """Results of testing a classifier."""
 
     accuracy: Tally  # all images of the confusion matrix
@@ -57,7 +57,7 @@ class Measured:
     curves: tuple[CardCurve, ...]
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> Measured:
+    def from_json(cls, data: Mapping[str, Any]) -> AccuracyResults:
         """Build an instance from the JSON form of ``asdict``."""
         curves = tuple(
             CardCurve(
@@ -86,7 +86,7 @@ class Card:
     test_data: str
     seed: int
     classes: tuple[str, ...]
-    measured: Measured
+    measured: AccuracyResults
     libraries: Mapping[str, str]
     sha256: str  # SHA-256 of the weights file
 
@@ -99,40 +99,44 @@ class Card:
         """Parse a card from the text that ``to_json`` returns."""
         data = json.loads(text)
         data["classes"] = tuple(data["classes"])
-        data["measured"] = Measured.from_json(data["measured"])
+        data["measured"] = AccuracyResults.from_json(data["measured"])
         return cls(**data)
 
 
-def _folder() -> Traversable:
+def _locate_weights_folder() -> Traversable:
     return resources.files("models") / "weights"
 
 
-def names() -> tuple[str, ...]:
+def list_classifier_names() -> tuple[str, ...]:
     """Return the names of the packaged classifiers."""
     return tuple(
-        sorted(entry.name.removesuffix(".json") for entry in _folder().iterdir() if entry.name.endswith(".json"))
+        sorted(
+            entry.name.removesuffix(".json")
+            for entry in _locate_weights_folder().iterdir()
+            if entry.name.endswith(".json")
+        )
     )
 
 
-def card(name: str) -> Card:
+def load_card(name: str) -> Card:
     """Return the card of a packaged classifier.
 
     Raises:
         UsageError: No classifier has this name.
     """
-    if name not in names():
-        raise UsageError(f"there is no model called {name!r}; expected one of {', '.join(names())}")
-    return Card.from_json((_folder() / f"{name}.json").read_text())
+    if name not in list_classifier_names():
+        raise UsageError(f"there is no model called {name!r}; expected one of {', '.join(list_classifier_names())}")
+    return Card.from_json((_locate_weights_folder() / f"{name}.json").read_text())
 
 
-def weights_bytes(name: str) -> bytes:
+def load_weights(name: str) -> bytes:
     """Return the weights file of a packaged classifier.
 
     Raises:
         HostError: The file does not match the hash on its card.
     """
-    about = card(name)
-    data = (_folder() / about.file).read_bytes()
+    about = load_card(name)
+    data = (_locate_weights_folder() / about.file).read_bytes()
     if hashlib.sha256(data).hexdigest() != about.sha256:
         raise HostError(f"the weights of {name} ({about.file}) do not match its card; install again")
     return data

@@ -14,8 +14,17 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from models.layers import Dense, Filters, Flat, Floats, Forgetting, Halving, Layer, Positive
-from models.onnx_format import onnx_file
+from models.layers import (
+    ConvolutionLayer,
+    DenseLayer,
+    DropoutLayer,
+    FlattenLayer,
+    Floats,
+    Layer,
+    MaxPoolingLayer,
+    ReluLayer,
+)
+from models.onnx_format import build_onnx_file
 from models.preprocessing import Vector
 
 _DECIMALS = 4
@@ -47,8 +56,8 @@ class Convolution:
         """
         chance = np.random.default_rng(self.seed)
         side, classes = math.isqrt(images.shape[1]), int(labels.max()) + 1
-        layers = self._layers(side, classes, chance)
-        descent = _Descent([weights for layer in layers for weights in layer.weights], self.decay)
+        layers = self._build_layers(side, classes, chance)
+        descent = _AdamOptimizer([weights for layer in layers for weights in layer.weights], self.decay)
         shown = images.astype(np.float32).reshape(-1, side, side, 1)
         steps = self.passes * (len(shown) // _BATCH)
         for number in range(steps):
@@ -56,16 +65,16 @@ class Convolution:
             if at == 0:
                 order = chance.permutation(len(shown))
             rows = order[at * _BATCH : (at + 1) * _BATCH]
-            _slopes(layers, shown[rows], labels[rows])
+            _compute_gradients(layers, shown[rows], labels[rows])
             size = self.step * (1 + math.cos(math.pi * number / steps)) / 2 * min(1.0, (number + 1) / _WARM_UP)
-            descent.step([slopes for layer in layers for slopes in layer.slopes], size)
+            descent.step([slopes for layer in layers for slopes in layer.gradients], size)
         for layer in layers:
             for weights in layer.weights:
                 # Rounding hides differences in the last bits.
                 weights[...] = np.round(weights, _DECIMALS)
-        return onnx_file(layers, side, classes)
+        return build_onnx_file(layers, side, classes)
 
-    def architecture(self, inputs: int, classes: int) -> str:
+    def describe_architecture(self, inputs: int, classes: int) -> str:
         """Describe the layers in words."""
         side = math.isqrt(inputs)
         first, second, third = self.filters
@@ -74,26 +83,26 @@ class Convolution:
             f"{third} filters of 3 x 3, {self.hidden}-{classes}, ReLU, Adam"
         )
 
-    def _layers(self, side: int, classes: int, chance: Generator) -> tuple[Layer, ...]:
+    def _build_layers(self, side: int, classes: int, chance: Generator) -> tuple[Layer, ...]:
         first, second, third = self.filters
         half = side // 2
         return (
-            Filters(5, 1, first, 2, chance),
-            Halving(),
-            Positive(),
-            Filters(3, first, second, 1, chance),
-            Positive(),
-            Filters(3, second, third, 0, chance),
-            Positive(),
-            Flat(),
-            Forgetting(self.forget, chance),
-            Dense((half - 2) ** 2 * third, self.hidden, chance),
-            Positive(),
-            Dense(self.hidden, classes, chance),
+            ConvolutionLayer(5, 1, first, 2, chance),
+            MaxPoolingLayer(),
+            ReluLayer(),
+            ConvolutionLayer(3, first, second, 1, chance),
+            ReluLayer(),
+            ConvolutionLayer(3, second, third, 0, chance),
+            ReluLayer(),
+            FlattenLayer(),
+            DropoutLayer(self.forget, chance),
+            DenseLayer((half - 2) ** 2 * third, self.hidden, chance),
+            ReluLayer(),
+            DenseLayer(self.hidden, classes, chance),
         )
 
 
-class _Descent:
+class _AdamOptimizer:
     """Adam (D. Kingma, J. Ba, ICLR 2015) with weight decay (I. Loshchilov, F. Hutter, ICLR 2019)."""
 
     def __init__(self, weights: Sequence[Floats], decay: float) -> None:
@@ -113,7 +122,7 @@ class _Descent:
             weights -= corrected * mean / (np.sqrt(square) + 1e-8)
 
 
-def _slopes(layers: Sequence[Layer], images: Floats, labels: NDArray[np.int64]) -> None:
+def _compute_gradients(layers: Sequence[Layer], images: Floats, labels: NDArray[np.int64]) -> None:
     """Compute the gradients of the mean softmax cross entropy over ``images`` and store them in each layer."""
     values = images
     for layer in layers:

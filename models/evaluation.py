@@ -11,11 +11,11 @@ from typing import Literal
 
 import numpy as np
 
-from models.cards import Card, CardCurve, Measured, Tally, card, weights_bytes
+from models.cards import AccuracyResults, Card, CardCurve, Tally, load_card, load_weights
 from models.images import LabelledPose, Photographer, Shift
-from models.networks import Network, read
-from models.preprocessing import Grey, features
-from models.tasks import Task, tasks
+from models.networks import Network, load_network
+from models.preprocessing import Grey, compute_features
+from models.tasks import Task, load_tasks
 
 Axis = Literal["x", "y", "heading", "noise"]
 
@@ -25,7 +25,7 @@ _DEGREES: tuple[float, ...] = (-8, -5, -3, -2, -1, -0.5, 0, 0.5, 1, 2, 3, 5, 8)
 
 
 @dataclass(frozen=True, slots=True)
-class Answered:
+class ClassifiedImage:
     """One test image: its place, true class and predicted class."""
 
     place: LabelledPose
@@ -44,8 +44,8 @@ class Evaluation:
     """A new measurement beside the card; ``answered`` holds the images of the confusion matrix."""
 
     card: Card
-    measured: Measured
-    answered: tuple[Answered, ...]
+    measured: AccuracyResults
+    answered: tuple[ClassifiedImage, ...]
 
 
 def evaluate(name: str) -> Evaluation:
@@ -54,35 +54,35 @@ def evaluate(name: str) -> Evaluation:
     Raises:
         UsageError: No classifier has this name.
     """
-    about = card(name)
-    measured, answered = measure(tasks()[name], read(about.file, weights_bytes(name)))
+    about = load_card(name)
+    measured, answered = measure(load_tasks()[name], load_network(about.file, load_weights(name)))
     return Evaluation(about, measured, answered)
 
 
-def measure(task: Task, network: Network) -> tuple[Measured, tuple[Answered, ...]]:
+def measure(task: Task, network: Network) -> tuple[AccuracyResults, tuple[ClassifiedImage, ...]]:
     """Run the whole test of ``task`` and return the results and the images that count for its accuracy."""
     with Photographer() as photographer:
-        answered = tuple(_accuracy(task, network, photographer))
-        curves = tuple(_curves(task, network, photographer))
+        answered = tuple(_classify_test_images(task, network, photographer))
+        curves = tuple(_measure_curves(task, network, photographer))
     confusion = np.zeros((len(task.classes), len(task.classes)), np.int64)
     for each in answered:
         confusion[each.place.label, each.answer] += 1
     table = tuple(tuple(int(count) for count in row) for row in confusion)
-    return Measured(Tally(int(np.trace(confusion)), len(answered)), table, curves), answered
+    return AccuracyResults(Tally(int(np.trace(confusion)), len(answered)), table, curves), answered
 
 
-def _accuracy(task: Task, network: Network, photographer: Photographer) -> Iterator[Answered]:
+def _classify_test_images(task: Task, network: Network, photographer: Photographer) -> Iterator[ClassifiedImage]:
     test = task.test()
     for noise, draws in test.noises:
         found = list(photographer.draws(test.places, Shift(noise=noise), "accuracy", draws))
-        answers = network.predict(np.array([features(grey, task.side) for _, grey in found]))
+        answers = network.predict(np.array([compute_features(grey, task.side) for _, grey in found]))
         for (place, grey), answer in zip(found, answers, strict=True):
-            yield Answered(place, noise, grey, int(answer))
+            yield ClassifiedImage(place, noise, grey, int(answer))
 
 
-def _curves(task: Task, network: Network, photographer: Photographer) -> Iterator[CardCurve]:
+def _measure_curves(task: Task, network: Network, photographer: Photographer) -> Iterator[CardCurve]:
     words = ("light noise", "grey levels either way", "on the spot")
-    yield _curve(task, network, photographer, words, _LIGHT_NOISES, Shift(), "noise")
+    yield _measure_curve(task, network, photographer, words, _LIGHT_NOISES, Shift(), "noise")
     sweeps: tuple[tuple[str, str, tuple[float, ...], Axis], ...] = (
         ("offset in x", "mm", _MILLIMETRES, "x"),
         ("offset in y", "mm", _MILLIMETRES, "y"),
@@ -91,13 +91,13 @@ def _curves(task: Task, network: Network, photographer: Photographer) -> Iterato
     for varied, unit, values, axis in sweeps:
         for noise in task.test().noises_beside:
             words = (varied, unit, f"light noise {noise:g}" if noise else "no noise")
-            yield _curve(task, network, photographer, words, values, Shift(noise=noise), axis)
+            yield _measure_curve(task, network, photographer, words, values, Shift(noise=noise), axis)
     for altered in task.test().altered:
-        tallies = tuple(_tally(task, network, list(altered.seen(value))) for value in altered.values)
+        tallies = tuple(_count_correct(task, network, list(altered.seen(value))) for value in altered.values)
         yield CardCurve(altered.varied, altered.unit, altered.under, altered.values, tallies)
 
 
-def _curve(
+def _measure_curve(
     task: Task,
     network: Network,
     photographer: Photographer,
@@ -110,11 +110,11 @@ def _curve(
     tallies = []
     for value in values:
         found = photographer.draws(test.swept, replace(rest, **{axis: value}), "curve", test.draws)
-        tallies.append(_tally(task, network, [(place.label, grey) for place, grey in found]))
+        tallies.append(_count_correct(task, network, [(place.label, grey) for place, grey in found]))
     return CardCurve(*words, tuple(float(value) for value in values), tuple(tallies))
 
 
-def _tally(task: Task, network: Network, seen: Sequence[tuple[int, Grey]]) -> Tally:
-    answers = network.predict(np.array([features(grey, task.side) for _, grey in seen]))
+def _count_correct(task: Task, network: Network, seen: Sequence[tuple[int, Grey]]) -> Tally:
+    answers = network.predict(np.array([compute_features(grey, task.side) for _, grey in seen]))
     right = sum(label == answer for (label, _), answer in zip(seen, answers, strict=True))
     return Tally(int(right), len(seen))

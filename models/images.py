@@ -9,14 +9,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 
-from models.preprocessing import Grey, focus
+from models.preprocessing import Grey, extract_focus
 from sim.arena import Arena
 from sim.camera import Cameras
-from sim.chance import Stream
-from sim.floors import Floor, floor
+from sim.floors import Floor, build_floor
+from sim.random_streams import RandomStream
 from sim.recording import Pose
-from sim.robot import robot
-from sim.world import Chain, Noise, World
+from sim.robot import get_robot
+from sim.world import HashChain, Noise, World
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Photographer:
         self._arena = Arena(())
         # The test visits up to six sheets, once for each value of a varied condition.
         self._cameras = Cameras(most=6)
-        self._robot = robot("Default_Robot")
+        self._robot = get_robot("Default_Robot")
 
     def __enter__(self) -> Photographer:
         return self
@@ -57,12 +57,12 @@ class Photographer:
         self._cameras.close()
         self._arena.close()
 
-    def image(self, place: LabelledPose, shift: Shift, seed: int = 0) -> Grey:
+    def take_image(self, place: LabelledPose, shift: Shift, seed: int = 0) -> Grey:
         """Return the grey focus of the left light sensor, shape (14, 14)."""
         pose = Pose(place.pose.x + shift.x, place.pose.y + shift.y, place.pose.heading + shift.heading)
-        camera = self._cameras.camera(_ground(place).pixels)
-        world = World(self._robot, self._arena, camera, pose, Noise(light=shift.noise), seed, Chain())
-        return focus(world.images()[0])
+        camera = self._cameras.open_camera(_build_place_floor(place).pixels)
+        world = World(self._robot, self._arena, camera, pose, Noise(light=shift.noise), seed, HashChain())
+        return extract_focus(world.render_images()[0])
 
     def draws(
         self, places: Sequence[LabelledPose], shift: Shift, name: str, draws: int
@@ -70,8 +70,11 @@ class Photographer:
         """Yield every place ``draws`` times, each with its own noise seeded by ``name``; once without noise."""
         for number, place in enumerate(places):
             for draw in range(draws if shift.noise > 0 else 1):
-                yield place, self.image(place, shift, Stream(0, f"{name}:{shift}:{number}:{draw}").integer(0) >> 1)
+                yield (
+                    place,
+                    self.take_image(place, shift, RandomStream(0, f"{name}:{shift}:{number}:{draw}").integer(0) >> 1),
+                )
 
 
-def _ground(place: LabelledPose) -> Floor:
-    return floor(place.background, seed=place.sheet)
+def _build_place_floor(place: LabelledPose) -> Floor:
+    return build_floor(place.background, seed=place.sheet)

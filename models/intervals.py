@@ -10,7 +10,7 @@ import math
 _Z95 = 1.959963984540054
 
 
-def wilson(right: int, count: int) -> tuple[float, float]:
+def compute_wilson_interval(right: int, count: int) -> tuple[float, float]:
     """Return the 95 % interval of a proportion (Wilson, J. Am. Stat. Assoc. 22 (1927) 209); (0, 1) without trials."""
     if count == 0:
         return 0.0, 1.0

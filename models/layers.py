@@ -19,7 +19,7 @@ class Layer(ABC):
     """One layer of a network."""
 
     weights: tuple[Floats, ...] = ()  # updated in place during training
-    slopes: tuple[Floats, ...] = ()  # gradient of the loss for each weight, set by ``backward``
+    gradients: tuple[Floats, ...] = ()  # gradient of the loss for each weight, set by ``backward``
 
     @abstractmethod
     def forward(self, values: Floats) -> Floats:
@@ -30,12 +30,12 @@ class Layer(ABC):
         """Return the gradient of the loss at the layer's input, given the gradient at its output."""
 
 
-class Filters(Layer):
+class ConvolutionLayer(Layer):
     """Convolution with ``side`` x ``side`` filters and ``margin`` pixels of zero padding."""
 
     def __init__(self, side: int, channels: int, filters: int, margin: int, chance: Generator) -> None:
         self.side, self.margin = side, margin
-        self.weights = _start(chance, side * side * channels, filters)
+        self.weights = _initialise_weights(chance, side * side * channels, filters)
 
     def forward(self, values: Floats) -> Floats:
         self._shape = values.shape
@@ -50,7 +50,7 @@ class Filters(Layer):
 
     def backward(self, slopes: Floats) -> Floats:
         flat = slopes.reshape(-1, slopes.shape[-1])
-        self.slopes = (self._windows.T @ flat, flat.sum(axis=0))
+        self.gradients = (self._windows.T @ flat, flat.sum(axis=0))
         (count, height, width), (_, tall, wide, channels) = self._places, self._shape
         back = (flat @ self.weights[0].T).reshape(count, height, width, self.side, self.side, channels)
         padded = np.zeros((count, tall + 2 * self.margin, wide + 2 * self.margin, channels), np.float32)
@@ -60,7 +60,7 @@ class Filters(Layer):
         return padded[:, self.margin : self.margin + tall, self.margin : self.margin + wide]
 
 
-class Halving(Layer):
+class MaxPoolingLayer(Layer):
     """Max pooling over 2 x 2 pixels. Height and width must be even."""
 
     def forward(self, values: Floats) -> Floats:
@@ -70,11 +70,11 @@ class Halving(Layer):
         return np.maximum(rows[:, :, 0::2], rows[:, :, 1::2])
 
     def backward(self, slopes: Floats) -> Floats:
-        rows = _apart(slopes, self._left, axis=2)
-        return _apart(rows, self._upper, axis=1)
+        rows = _route_gradient(slopes, self._left, axis=2)
+        return _route_gradient(rows, self._upper, axis=1)
 
 
-class Positive(Layer):
+class ReluLayer(Layer):
     """ReLU activation: negative values become 0."""
 
     def forward(self, values: Floats) -> Floats:
@@ -85,7 +85,7 @@ class Positive(Layer):
         return slopes * self._positive
 
 
-class Flat(Layer):
+class FlattenLayer(Layer):
     """Flatten each image to a row of numbers."""
 
     def forward(self, values: Floats) -> Floats:
@@ -96,7 +96,7 @@ class Flat(Layer):
         return slopes.reshape(self._shape)
 
 
-class Forgetting(Layer):
+class DropoutLayer(Layer):
     """Dropout with rate ``share``. Used only during training."""
 
     def __init__(self, share: float, chance: Generator) -> None:
@@ -111,28 +111,28 @@ class Forgetting(Layer):
         return slopes * self._kept
 
 
-class Dense(Layer):
+class DenseLayer(Layer):
     """Fully connected layer."""
 
     def __init__(self, inputs: int, outputs: int, chance: Generator) -> None:
-        self.weights = _start(chance, inputs, outputs)
+        self.weights = _initialise_weights(chance, inputs, outputs)
 
     def forward(self, values: Floats) -> Floats:
         self._values = values
         return np.asarray(values @ self.weights[0] + self.weights[1])
 
     def backward(self, slopes: Floats) -> Floats:
-        self.slopes = (self._values.T @ slopes, slopes.sum(axis=0))
+        self.gradients = (self._values.T @ slopes, slopes.sum(axis=0))
         return np.asarray(slopes @ self.weights[0].T)
 
 
-def _start(chance: Generator, inputs: int, outputs: int) -> tuple[Floats, Floats]:
+def _initialise_weights(chance: Generator, inputs: int, outputs: int) -> tuple[Floats, Floats]:
     """Return initial weights and biases (K. He et al., ICCV 2015, 1026)."""
     weights = chance.standard_normal((inputs, outputs)) * np.sqrt(2 / inputs)
     return weights.astype(np.float32), np.zeros(outputs, np.float32)
 
 
-def _apart(slopes: Floats, first: NDArray[np.bool_], axis: int) -> Floats:
+def _route_gradient(slopes: Floats, first: NDArray[np.bool_], axis: int) -> Floats:
     """Return the gradient at the larger value of each pair, and 0 at the smaller."""
     pairs = np.stack((slopes * first, slopes * ~first), axis=axis + 1)
     shape = list(slopes.shape)

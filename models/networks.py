@@ -21,13 +21,13 @@ class Network(Protocol):
         ...
 
 
-def read(file: str, data: bytes) -> Network:
+def load_network(file: str, data: bytes) -> Network:
     """Load the network in ``file``. The hash of the file must be on a card; never use it for other files."""
     if file.endswith(".onnx"):
         return _OnnxSession(data)
     from models import perceptrons
 
-    network: Network = perceptrons.read(data)
+    network: Network = perceptrons.load_perceptron(data)
     return network
 
 

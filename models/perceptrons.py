@@ -45,17 +45,17 @@ class Perceptron:
             for step, passes in self.stages:
                 network.set_params(learning_rate_init=step, max_iter=passes)
                 network.fit(images, labels)
-        _settle(network)
+        _finalise_network(network)
         file = io.BytesIO()
         joblib.dump(network, file)
         return file.getvalue()
 
-    def architecture(self, inputs: int, classes: int) -> str:
+    def describe_architecture(self, inputs: int, classes: int) -> str:
         """Describe the layers in words."""
         return f"multi-layer perceptron {inputs}-{self.hidden}-{classes}, ReLU, Adam"
 
 
-def _settle(network: MLPClassifier) -> None:
+def _finalise_network(network: MLPClassifier) -> None:
     """Round the weights to hide differences in the last bits, and remove attributes used only in training."""
     network.coefs_ = [np.ascontiguousarray(np.round(weights, _DECIMALS), np.float32) for weights in network.coefs_]
     network.intercepts_ = [np.round(weights, _DECIMALS).astype(np.float32) for weights in network.intercepts_]
@@ -65,6 +65,6 @@ def _settle(network: MLPClassifier) -> None:
         delattr(network, left_over)
 
 
-def read(data: bytes) -> MLPClassifier:
+def load_perceptron(data: bytes) -> MLPClassifier:
     """Load a network. The hash of the bytes must be on a card; never use it for other files."""
     return joblib.load(io.BytesIO(data))

@@ -21,7 +21,7 @@ from models.preprocessing import Grey, Vector
 Examples = tuple[Vector, NDArray[np.int64]]
 
 
-class Plan(Protocol):
+class NetworkTrainer(Protocol):
     """Training method of a network and format of its file."""
 
     @property
@@ -33,13 +33,13 @@ class Plan(Protocol):
         """Train a network reproducibly and return its file; ``images`` has shape (n, inputs)."""
         ...
 
-    def architecture(self, inputs: int, classes: int) -> str:
+    def describe_architecture(self, inputs: int, classes: int) -> str:
         """Describe the layers in words."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
-class Altered:
+class AlterationTest:
     """Test on images that no packaged floor shows: one varied condition, its values, and the images at each value."""
 
     varied: str
@@ -50,7 +50,7 @@ class Altered:
 
 
 @dataclass(frozen=True, slots=True)
-class Test:
+class ClassifierTest:
     """Test of a classifier: ``places`` give the accuracy, and a selection of them the curves.
 
     ``noises`` are pairs of (grey levels, draws per place) that count for the accuracy. ``noises_beside`` are the noise
@@ -64,7 +64,7 @@ class Test:
     noises_beside: tuple[float, ...]
     draws: int
     words: str
-    altered: tuple[Altered, ...] = ()
+    altered: tuple[AlterationTest, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,10 +76,10 @@ class Task:
     words: str
     classes: tuple[str, ...]
     side: int  # width and height of the images in pixels
-    plan: Plan
+    plan: NetworkTrainer
     examples: Callable[[], Examples]
     training_words: str
-    test: Callable[[], Test]
+    test: Callable[[], ClassifierTest]
     needs: str | None = None  # extra package that provides the training data
 
 
@@ -94,7 +94,7 @@ def register(task: Task) -> Task:
     return task
 
 
-def tasks() -> Mapping[str, Task]:
+def load_tasks() -> Mapping[str, Task]:
     """Return all tasks by name, in alphabetical order."""
     # Families import this module to register their tasks, so the import cannot be at the top.
     importlib.import_module("models.families")

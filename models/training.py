@@ -14,9 +14,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 from models.cards import Card
-from models.tasks import tasks
+from models.tasks import load_tasks
 from sim.errors import HostError, UsageError
-from sim.processes import python_command, same_arithmetic, start
+from sim.processes import build_arithmetic_environment, build_python_command, launch_process
 
 
 def train(name: str, folder: Path) -> Card:
@@ -26,7 +26,7 @@ def train(name: str, folder: Path) -> Card:
         UsageError: The name is unknown, a package with the training data is missing, or the folder cannot be created.
         HostError: The training process failed.
     """
-    known = tasks()
+    known = load_tasks()
     if name not in known:
         raise UsageError(f"there is no model called {name!r} to train; expected one of {', '.join(known)}")
     package = known[name].needs
@@ -39,8 +39,10 @@ def train(name: str, folder: Path) -> Card:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"{folder} cannot be made: {error.strerror}") from error
-    command = python_command("-m", "models.training", name, str(folder.absolute()))
-    process = start(command, same_arithmetic(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    command = build_python_command("-m", "models.training", name, str(folder.absolute()))
+    process = launch_process(
+        command, build_arithmetic_environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     _, said = process.communicate()
     if process.returncode != 0:
         reason = (said.strip().splitlines() or ["no reason given"])[-1]
@@ -50,18 +52,18 @@ def train(name: str, folder: Path) -> Card:
 
 def _main(name: str, folder: Path) -> None:
     from models.evaluation import measure
-    from models.networks import read
+    from models.networks import load_network
 
-    task = tasks()[name]
+    task = load_tasks()[name]
     images, labels = task.examples()
     data = task.plan.fit(images, labels)
-    measured, _ = measure(task, read(task.file, data))
+    measured, _ = measure(task, load_network(task.file, data))
     resized = "" if task.side == 14 else f", resized to {task.side} x {task.side} by LANCZOS"
     card = Card(
         name=name,
         file=task.file,
         task=task.words,
-        architecture=task.plan.architecture(task.side**2, len(task.classes)),
+        architecture=task.plan.describe_architecture(task.side**2, len(task.classes)),
         preprocessing=f"crop (3, 3, 17, 17) of 20 x 20 pixels, greyscale{resized}, divided by the maximum, flattened",
         training_data=task.training_words,
         training_images=len(labels),

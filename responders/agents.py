@@ -15,26 +15,26 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from responders import wire
-from responders.faults import error_fault, surprise
+from responders.faults import build_error_fault, to_child_data_error
 from responders.logger_file import read_log
 from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.trial_spec import AgentSpec
-from sim.chance import Stream
+from sim.random_streams import RandomStream
 from sim.readers.json_text import read_json
 from sim.recording import SECOND, AgentMessage, AgentOutput, Fault, Recording, Verdict
-from sim.world import Chain
+from sim.world import HashChain
 
 #: Maximum number of questions per trial between the responder and its agents.
 _MOST_QUESTIONS = 10_000
 _MOST_NOTES = 200
 _LONGEST_TYPE = 100
-_NOT_JSON = object()
+_INVALID_JSON = object()
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class AgentReply:
     """Reply to a question: a JSON value or an error message to raise in the asker, and how long the agent slept."""
 
     kind: Literal["value", "error"]
@@ -43,7 +43,7 @@ class Told:
 
 
 @dataclass(frozen=True, slots=True)
-class Position:
+class AgentCounts:
     """Counts of agent messages, faults and calls at one point in the trial."""
 
     messages: int = 0
@@ -70,18 +70,18 @@ class Agents:
         self.faults: list[Fault] = []
         self.notes: list[str] = []
         self._meter = meter
-        self._chain = Chain()
+        self._chain = HashChain()
         self._outputs: list[AgentOutput] = []
         self._waiting: list[str] = []  # agents that are waiting for an answer, outermost first
         self._loaded = False
         self._unloadable = 0  # number of faults from loading
         self._processes: dict[str, AgentProcess] = {}
         for name, each in specs.items():
-            folder = stack.enter_context(sandboxes.private_folder())
+            folder = stack.enter_context(sandboxes.open_private_folder())
             self._processes[name] = AgentProcess(name, each, sandboxes, folder, seed, meter, self)
             stack.callback(self._processes[name].close)
 
-    def others(self, asker: str) -> Sequence[str]:
+    def list_askable_agents(self, asker: str) -> Sequence[str]:
         """Return the names of the agents that ``asker`` (the responder or an agent) may ask."""
         return [name for name in self._processes if name != asker]
 
@@ -97,11 +97,11 @@ class Agents:
         self._loaded = True
         self._unloadable = len(self.faults)
 
-    def faults_since(self, since: Position) -> Sequence[Fault]:
+    def collect_faults_since(self, since: AgentCounts) -> Sequence[Fault]:
         """Return all loading faults, and the other faults recorded since ``since``."""
         return (*self.faults[: self._unloadable], *self.faults[max(since.faults, self._unloadable) :])
 
-    def ask(self, asker: str, question: wire.Frame, t: int, message: int) -> Told:
+    def ask(self, asker: str, question: wire.Frame, t: int, message: int) -> AgentReply:
         """Ask the agent named in ``question`` and return its reply.
 
         Args:
@@ -119,11 +119,11 @@ class Agents:
             raise ChildStopped(Verdict.SANDBOX_VIOLATION, "it asked an agent that this assignment does not have")
         if len(self.messages) >= 2 * _MOST_QUESTIONS:
             raise ChildStopped(Verdict.OUTPUT_LIMIT, f"it and the agents asked more than {_MOST_QUESTIONS} questions")
-        arguments, named = _content(question["arguments"], list), _content(question["named"], dict)
+        arguments, named = _parse_content(question["arguments"], list), _parse_content(question["named"], dict)
         values = [*arguments, *named.values()]
         index = len(self.messages)
-        self._note(asker, name, values[0] if len(values) == 1 else values, t, message)
-        told = self._refusal(asker, name)
+        self._record_message(asker, name, values[0] if len(values) == 1 else values, t, message)
+        told = self._find_refusal(asker, name)
         if told is None:
             self._waiting.append(name)
             try:
@@ -133,15 +133,15 @@ class Agents:
         if told.kind == "error":
             self.messages[index] = replace(self.messages[index], note="no answer")
         else:
-            self._note(name, asker, _content(told.text, object), t + told.slept, message, index)
+            self._record_message(name, asker, _parse_content(told.text, object), t + told.slept, message, index)
         return told
 
-    def position(self) -> Position:
+    def count_events(self) -> AgentCounts:
         """Return the current counts of messages, faults and calls."""
         calls = {name: len(process.calls) for name, process in self._processes.items()}
-        return Position(len(self.messages), len(self.faults), MappingProxyType(calls))
+        return AgentCounts(len(self.messages), len(self.faults), MappingProxyType(calls))
 
-    def seal(self, chain: Chain, now: int) -> None:
+    def seal(self, chain: HashChain, now: int) -> None:
         """Add the digest of all agent messages so far to the hash chain of a run that ends."""
         chain.add("agents", now, self._chain.hexdigest().encode())
 
@@ -155,7 +155,7 @@ class Agents:
             self._outputs.append(AgentOutput(name, "\n".join(process.output), log))
             self.notes += process.notes
 
-    def add_talk(self, recording: Recording, since: Position) -> Recording:
+    def add_messages_and_calls(self, recording: Recording, since: AgentCounts) -> Recording:
         """Return the recording with the agent messages and calls since ``since``."""
         talk = [
             replace(each, reply_to=None if each.reply_to is None else each.reply_to - since.messages)
@@ -173,7 +173,7 @@ class Agents:
         """Return the recording with the output and logs of all agents. Call ``finish`` first."""
         return replace(recording, agent_outputs=tuple(self._outputs))
 
-    def failed(self, name: str, fault: Fault, why: str, slept: int) -> Told:
+    def record_failure(self, name: str, fault: Fault, why: str, slept: int) -> AgentReply:
         """Return the error that the asker receives when agent ``name`` fails.
 
         Records the fault, unless a given agent failed but is still running: the asker may have caused that, so it
@@ -181,24 +181,26 @@ class Agents:
         """
         process = self._processes[name]
         sentence = f"{name} gave no answer: {why}"
-        if not process.given or not process.alive:
+        if not process.given or not process.is_alive:
             self.faults.append(fault)
         elif len(self.notes) < _MOST_NOTES and f"the given agent {sentence}" not in self.notes:
             self.notes.append(f"the given agent {sentence}")
-        return Told("error", sentence, slept)
+        return AgentReply("error", sentence, slept)
 
-    def _refusal(self, asker: str, name: str) -> Told | None:
+    def _find_refusal(self, asker: str, name: str) -> AgentReply | None:
         if not self._loaded:
-            return Told("error", f"{name} cannot be asked while the agents are being loaded, only in a function")
+            return AgentReply("error", f"{name} cannot be asked while the agents are being loaded, only in a function")
         if name in self._waiting or name == asker:
             way = " → ".join(["responder", *self._waiting, name])
-            return Told("error", f"{name} cannot be asked now, as it waits for an answer itself: {way}")
+            return AgentReply("error", f"{name} cannot be asked now, as it waits for an answer itself: {way}")
         return None
 
-    def _note(self, sender: str, receiver: str, value: Any, t: int, message: int, reply_to: int | None = None) -> None:
+    def _record_message(
+        self, sender: str, receiver: str, value: Any, t: int, message: int, reply_to: int | None = None
+    ) -> None:
         text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
         text = text.encode("utf-8", "replace").decode("utf-8")  # replace lone surrogates, which can't be stored
-        self._meter.keep(len(text))
+        self._meter.charge_bytes(len(text))
         self.messages.append(
             AgentMessage(t / SECOND, sender, receiver, text, message, reply_to, is_text=isinstance(value, str))
         )
@@ -207,7 +209,7 @@ class Agents:
 
 
 @contextlib.contextmanager
-def agents_beside(
+def running_agents(
     specs: Mapping[str, AgentSpec], seed: int, sandboxes: Sandboxes, meter: JobMeter
 ) -> Iterator[Agents | None]:
     """Yield the agents, loaded in fresh processes, or None if there are none."""
@@ -237,71 +239,71 @@ class AgentProcess(ResponderProcess):
         self._schema = wire.AGENT
         self._who = name
         self._all = agents
-        self._ended: Told | None = None
+        self._ended: AgentReply | None = None
         self.given = spec.given
         self.folder = folder
 
-    def answer_question(self, question: wire.Frame, t: int, message: int) -> Told:
+    def answer_question(self, question: wire.Frame, t: int, message: int) -> AgentReply:
         """Return the agent's reply to a question. Raises no exception for errors in student code."""
         if self._child is None:
-            return self._ended or Told("error", f"{self._who} gave no answer: it could not be loaded")
+            return self._ended or AgentReply("error", f"{self._who} gave no answer: it could not be loaded")
         self._message, self._asked_at, self._slept = message, t, 0
         try:
             self._child.send({"do": "asked", "t": t, "arguments": question["arguments"], "named": question["named"]})
-            return self._read(self._until("returned"))
+            return self._parse_reply(self._receive_until("returned"))
         except ChildStopped as stopped:
             stop = stopped
         except Exception as error:
-            stop = surprise(error)
-        fault = self._stopped(stop, t + self._slept)
-        told = self._all.failed(self._who, fault, stop.message, self._slept)
+            stop = to_child_data_error(error)
+        fault = self._convert_stop(stop, t + self._slept)
+        told = self._all.record_failure(self._who, fault, stop.message, self._slept)
         self._ended = replace(told, slept=0)
         return told
 
-    def _beginning(self) -> dict[str, Any]:
-        seed = Stream(self._seed, f"agent {self._who}").integer(0)
+    def _build_first_frame(self) -> dict[str, Any]:
+        seed = RandomStream(self._seed, f"agent {self._who}").integer(0)
         return {
-            **super()._beginning(),
+            **super()._build_first_frame(),
             "agent": self._who,
-            "agents": self._all.others(self._who),
+            "agents": self._all.list_askable_agents(self._who),
             "seed": seed,
         }
 
-    def _read(self, frame: wire.Frame) -> Told:
+    def _parse_reply(self, frame: wire.Frame) -> AgentReply:
         match frame:
             case {"kind": "value", "text": text}:
-                _content(text, object)
-                return Told("value", text, self._slept)
+                _parse_content(text, object)
+                return AgentReply("value", text, self._slept)
             case {"kind": "error", "error": error}:
-                fault = error_fault(error, self._asked_at + self._slept, self._who)
+                fault = build_error_fault(error, self._asked_at + self._slept, self._who)
                 # A RuntimeError reports the fault of another agent. Only the original cause is passed on.
                 why = str(error["text"] or fault.message) if error["type"] == "RuntimeError" else fault.message
-                return self._all.failed(self._who, fault, why, self._slept)
+                return self._all.record_failure(self._who, fault, why, self._slept)
             case {"kind": "other", "type": kind}:
                 sentence = f"the {self._who} returned {kind[:_LONGEST_TYPE]}, which no message can hold"
-                fault = self._protocol_fault(self._asked_at, sentence)
+                fault = self._build_protocol_fault(self._asked_at, sentence)
             case {"kind": "long", "length": length}:
                 sentence = f"the {self._who} returned {length} characters of JSON; the most is about 60000"
-                fault = self._protocol_fault(self._asked_at, sentence)
+                fault = self._build_protocol_fault(self._asked_at, sentence)
             case _:
                 raise ChildStopped(Verdict.SANDBOX_VIOLATION, "it sent an answer without its content")
-        return self._all.failed(self._who, fault, sentence, self._slept)
+        return self._all.record_failure(self._who, fault, sentence, self._slept)
 
 
-def _content(text: str, kind: type) -> Any:
+def _parse_content(text: str, kind: type) -> Any:
     """Return the decoded JSON content of a message.
 
     Raises:
         ChildStopped: If the text is not valid JSON or not of type ``kind``.
     """
     try:
-        value = read_json(text, parse_constant=_no_constant)
+        value = read_json(text, parse_constant=_reject_constant)
     except ValueError:
-        value = _NOT_JSON
-    if value is _NOT_JSON or not isinstance(value, kind):
+        value = _INVALID_JSON
+    if value is _INVALID_JSON or not isinstance(value, kind):
         raise ChildStopped(Verdict.PROTOCOL_ERROR, "it sent a message that is no JSON or is nested too deeply")
     return value
 
 
-def _no_constant(name: str) -> None:
+def _reject_constant(name: str) -> None:
     raise ValueError(f"{name} is not JSON")

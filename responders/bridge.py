@@ -11,31 +11,31 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NoReturn
 
-from responders import message_format, packed, wire
+from responders import message_format, packets, wire
 from responders.conversation import Answer, Conversation
-from responders.faults import error_fault, refusal, stopped, surprise
-from responders.link import link_of
-from responders.responder_process import Collected, ResponderProcess
+from responders.faults import build_error_fault, build_stop_fault, describe_refusal, to_child_data_error
+from responders.link import build_link
+from responders.responder_process import LoggedData, ResponderProcess
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import ServedChild
 from responders.trial_spec import TrialSpec
 from sim.arena import Arena
 from sim.camera import LightCamera
-from sim.chance import Stream
 from sim.drive import Wheel
-from sim.recording import MILLISECOND, SECOND, STAND_IN, Fault, Image, Line, ProgramLine, Verdict
-from sim.world import Chain, World
+from sim.random_streams import RandomStream
+from sim.recording import MILLISECOND, SECOND, STAND_IN_PREFIX, Fault, Image, ProgramLine, TimedText, Verdict
+from sim.world import HashChain, World
 
-_READ = 10 * MILLISECOND
+_READ_TIME = 10 * MILLISECOND
 _WORDS_A_MINUTE = 130
 #: Maximum number of actions without a wait. The child counts too and can report the line. One motor action there may
 #: arrive here as two, after the line that it is on.
-_FREE_ACTS = 300_100
+_MAX_FREE_ACTIONS = 300_100
 _MOST_NOTES = 200
 _MOST_PLACES = 20_000
 
 
-class _Cut(Exception):
+class _TrialEnded(Exception):
     """Ends the trial with a fault."""
 
     def __init__(self, fault: Fault) -> None:
@@ -60,12 +60,12 @@ class Bridge:
         self._responder = responder
         self._meter = meter
         self.now = 0
-        self.chain = Chain()
-        self.world = world_of(spec, arena, camera, self.chain)
-        link = link_of(spec.channel, arena, lambda: self.world.pose)
+        self.chain = HashChain()
+        self.world = build_world(spec, arena, camera, self.chain)
+        link = build_link(spec.channel, arena, lambda: self.world.pose)
         self.conversation = Conversation(spec.channel, spec.seed, self.chain, link)
-        self.printed: list[Line] = []
-        self.spoken: list[Line] = []
+        self.printed: list[TimedText] = []
+        self.spoken: list[TimedText] = []
         self.images: list[Image] = []
         self.image_log: list[tuple[str, str, int]] = []
         self.notes: list[str] = []
@@ -83,16 +83,16 @@ class Bridge:
     def run(self) -> Fault | None:
         """Serve the program until it ends. Return the fault that ended it, or None."""
         try:
-            return self._run()
+            return self._serve_program()
         except ChildStopped as stop:
-            return self._stopped(stop)
-        except _Cut as cut:
-            return self._placed(cut.fault)
+            return self._convert_stop(stop)
+        except _TrialEnded as cut:
+            return self._locate_fault(cut.fault)
         except Exception as error:
-            return self._stopped(surprise(error))
+            return self._convert_stop(to_child_data_error(error))
 
-    def _run(self) -> Fault | None:
-        spec, values = self._spec, self.world.readings()
+    def _serve_program(self) -> Fault | None:
+        spec, values = self._spec, self.world.collect_readings()
         self._child.send(
             {
                 "name": spec.program.code.name,
@@ -101,83 +101,83 @@ class Bridge:
                 "modules": dict(spec.program.modules),
                 "tick": spec.tick,
                 "sensors": {name: len(value) if isinstance(value, list) else 0 for name, value in values.items()},
-                "seed": Stream(spec.child_seed, "program").integer(0),
+                "seed": RandomStream(spec.child_seed, "program").integer(0),
                 "number": spec.number,
-                **({"watch": True} if spec.program.ran is not None else {}),
+                **({"watch": True} if spec.program.executed_statements is not None else {}),
             }
         )
         while True:
             frame = self._child.receive(wire.ROBOT)
             if frame["do"] == "end":
-                return None if frame["error"] is None else error_fault(frame["error"], self.now, "program")
-            self._serve(frame)
+                return None if frame["error"] is None else build_error_fault(frame["error"], self.now, "program")
+            self._serve_frame(frame)
 
-    def _stopped(self, stop: ChildStopped) -> Fault:
-        return stopped(stop, "program", self.now)
+    def _convert_stop(self, stop: ChildStopped) -> Fault:
+        return build_stop_fault(stop, "program", self.now)
 
-    def _placed(self, fault: Fault) -> Fault:
+    def _locate_fault(self, fault: Fault) -> Fault:
         """Return a time-limit fault with the line that the program was waiting in. Other faults are unchanged."""
         if fault.verdict is not Verdict.TIME_LIMIT:
             return fault
-        place = self._child.last_place()
+        place = self._child.stop_and_locate()
         return replace(fault, line=place["line"], file=place["file"] or "")
 
-    def collected(self) -> Collected:
+    def collect_logged_data(self) -> LoggedData:
         """Return the data and images that the program has logged since the last call."""
         lines, images = self.printed[self._told_lines :], self.image_log[self._told_images :]
         self._told_lines, self._told_images = len(self.printed), len(self.image_log)
-        data = (message_format.datum(line.text, line.t) for line in lines)
-        return Collected(
+        data = (message_format.parse_datum(line.text, line.t) for line in lines)
+        return LoggedData(
             tuple((datum.name, datum.value, datum.simtime, datum.t) for datum in data if datum is not None),
             tuple(f"{side} {csv} {tick}" for side, csv, tick in images),
         )
 
-    def _serve(self, frame: wire.Frame) -> None:
+    def _serve_frame(self, frame: wire.Frame) -> None:
         match frame["do"]:
             case "acts":
-                self._act(frame["acts"])
+                self._execute_actions(frame["acts"])
             case "print":
                 self._print(frame["text"])
             case "polarity":
-                self._free_act()
-                self._wheel(frame["port"]).polarity = frame["polarity"][:20]
+                self._count_free_action()
+                self._look_up_wheel(frame["port"]).polarity = frame["polarity"][:20]
             case "motor_state":
-                self._free_act()
-                self._reply_wheel(frame["port"])
+                self._count_free_action()
+                self._reply_wheel_state(frame["port"])
             case "paid_motor":
-                self._advance(_READ)
-                self._reply_wheel(frame["port"])
+                self._advance(_READ_TIME)
+                self._reply_wheel_state(frame["port"])
             case "until":
-                self._until(frame)
+                self._wait_for_state(frame)
             case "say":
                 self._say(frame["text"])
             case "until_said":
                 while self.now < self._said_until:
-                    self._advance(_READ)
+                    self._advance(_READ_TIME)
                 self._reply(None)
             case "stuck":
-                self._never_waits(frame["line"], frame["file"])
-            case "ran" if self._spec.program.ran is not None:
-                self._spec.program.ran.add(frame)
+                self._raise_never_waits(frame["line"], frame["file"])
+            case "ran" if self._spec.program.executed_statements is not None:
+                self._spec.program.executed_statements.add(frame)
             case "refused":
                 if len(self.notes) < _MOST_NOTES:
-                    self.notes.append(refusal("program", frame))
+                    self.notes.append(describe_refusal("program", frame))
 
-    def _act(self, acts: Sequence[packed.Act]) -> None:
+    def _execute_actions(self, acts: Sequence[packets.Action]) -> None:
         drive = self.world.drive
         for kind, number in acts:
-            if type(kind) is packed.MotorCommand:
-                self._free_act()
+            if type(kind) is packets.MotorCommand:
+                self._count_free_action()
                 port, set_point, command = kind
                 wheel = drive.left if port == "outB" else drive.right
                 if set_point:
                     setattr(wheel, set_point, number)
                 if command is not None:
                     wheel.run(command, self.world.clock)
-            elif type(kind) is packed.Read:
-                self._read(kind.what, int(number) * _READ)
-            elif type(kind) is packed.Place:
-                self._free_act()
+            elif type(kind) is packets.SensorRead:
+                self._read_sensor(kind.sensor, int(number) * _READ_TIME)
+            elif type(kind) is packets.LineChange:
+                self._count_free_action()
                 self._note_place(number)
             else:
                 self._advance(int(number))
@@ -192,17 +192,17 @@ class Bridge:
         due = (self.world.clock + 1) * tick
         while due <= last:
             self.now = due
-            self._tick()
+            self._run_tick()
             due += tick
             if self.world.clock % 3000 == 0:
                 self._meter.heartbeat()
         if end > self._limit:
             self.now = self._limit
             sentence = f"the program was still running after {self._spec.seconds:g} seconds of simulated time"
-            raise _Cut(Fault(self.now / SECOND, Verdict.TIME_LIMIT, "program", sentence))
+            raise _TrialEnded(Fault(self.now / SECOND, Verdict.TIME_LIMIT, "program", sentence))
         self.now = end
 
-    def _tick(self) -> None:
+    def _run_tick(self) -> None:
         self.take_arrivals()
         self.world.tick()
 
@@ -214,7 +214,7 @@ class Bridge:
         self._child.send({"t": self.now, "v": value}, self._arrived)
         self._arrived = []
 
-    def _read(self, what: str, lasts: int) -> None:
+    def _read_sensor(self, what: str, lasts: int) -> None:
         """Send the value of every sensor, unless the child already has the readings of this tick."""
         end = self.now + lasts
         # A read that ends after the time limit is cut like any wait, even if the child already has the value.
@@ -224,17 +224,17 @@ class Bridge:
             self.now = end
         else:
             self._advance(lasts)
-            self._values = self.world.readings()
+            self._values = self.world.collect_readings()
             self._entries = {}
             self._told_until = (self.world.clock + 1) * self._spec.tick
         entry = self._entries.get(what)
         if entry is None:
-            entry = self._entries[what] = self.chain.timeless(what, worded(self._values[what]))
+            entry = self._entries[what] = self.chain.encode_without_time(what, format_reading(self._values[what]))
         self.chain.add_bytes(entry % end)
         if not known:
-            self._reply_readings()
+            self._send_readings()
 
-    def _reply_readings(self) -> None:
+    def _send_readings(self) -> None:
         numbers: list[float] = []
         for value in self._values.values():
             if isinstance(value, list):
@@ -246,11 +246,11 @@ class Bridge:
         else:
             self._child.send_readings(self.now, numbers)
 
-    def _wheel(self, port: str) -> Wheel:
+    def _look_up_wheel(self, port: str) -> Wheel:
         return self.world.drive.left if port == "outB" else self.world.drive.right
 
-    def _reply_wheel(self, port: str) -> None:
-        wheel = self._wheel(port)
+    def _reply_wheel_state(self, port: str) -> None:
+        wheel = self._look_up_wheel(port)
         value = {
             "position": wheel.position,
             "position_sp": wheel.position_sp,
@@ -262,13 +262,13 @@ class Bridge:
         self.chain.add(port, self.now, repr(value).encode())
         self._reply(value)
 
-    def _until(self, frame: wire.Frame) -> None:
+    def _wait_for_state(self, frame: wire.Frame) -> None:
         """Check the condition at once, then every 10 ms. The wait times out when its limit is strictly exceeded."""
-        wheel = self._wheel(frame["port"])
+        wheel = self._look_up_wheel(frame["port"])
         wanted = frame["state"] == "running"
         began = self.now
         while (wheel.state == "running") is not wanted:
-            self._advance(_READ)
+            self._advance(_READ_TIME)
             if frame["timeout"] is not None and self.now - began > frame["timeout"]:
                 self._reply(False)
                 return
@@ -276,38 +276,38 @@ class Bridge:
         self._reply(True)
 
     def _print(self, text: str) -> None:
-        self._free_act()
-        self._spend(len(text.encode()) + 1, "printed")
+        self._count_free_action()
+        self._charge_output(len(text.encode()) + 1, "printed")
         self.chain.add("print", self.now, text.encode())
-        kind = message_format.kind(text)
+        kind = message_format.classify_text(text)
         if kind == "log image":
             self._log_image(text)
             return
-        self.printed.append(Line(self.now / SECOND, text))
+        self.printed.append(TimedText(self.now / SECOND, text))
         if self._spec.collaborative and kind == "py":
-            self._send(text)
+            self._send_text(text)
         elif self._spec.collaborative and kind == "image":
             self._send_image()
 
-    def _send(self, text: str) -> int:
+    def _send_text(self, text: str) -> int:
         """Send ``text`` to the responder and queue its answer. Return the index of the message."""
         sent = self.conversation.send(text, self.now)
         for copy in range(sent.copies):
             if self._responder is not None:
-                answer = self._responder.answer(sent.text, self.now, sent.message, self.collected())
+                answer = self._responder.answer(sent.text, self.now, sent.message, self.collect_logged_data())
             else:
-                self._meter.keep(len(STAND_IN) + len(text))
-                answer = Answer(STAND_IN + sent.text)
-            self.conversation.answer(sent, copy, answer)
+                self._meter.charge_bytes(len(STAND_IN_PREFIX) + len(text))
+                answer = Answer(STAND_IN_PREFIX + sent.text)
+            self.conversation.record_answer(sent, copy, answer)
         return sent.message
 
     def _send_image(self) -> None:
-        left, right = self.world.images()
-        self._spend(len(left) + len(right), "sent images of")
+        left, right = self.world.render_images()
+        self._charge_output(len(left) + len(right), "sent images of")
         where = self.world.left_footprint
-        text = message_format.image_message(left, right)
-        self._meter.keep(len(text) + len(left) + len(right))
-        message = self._send(text)
+        text = message_format.format_image_message(left, right)
+        self._meter.charge_bytes(len(text) + len(left) + len(right))
+        message = self._send_text(text)
         self.images.append(
             Image(
                 self.now / SECOND,
@@ -316,60 +316,60 @@ class Bridge:
                 left,
                 right,
                 message,
-                self._spec.floor.label_at(where.x, where.y),
+                self._spec.floor.find_label(where.x, where.y),
                 self._spec.robot.left_light.diameter,
             )
         )
 
     def _log_image(self, text: str) -> None:
-        sides = message_format.logged_sides(text)
+        sides = message_format.parse_logged_sides(text)
         word = text.split(" ")[1] if " " in text else "undefined"
-        self.printed.append(Line(self.now / SECOND, f"{word} image data logged..."))
-        images = dict(zip(("left", "right"), self.world.images(), strict=True))
+        self.printed.append(TimedText(self.now / SECOND, f"{word} image data logged..."))
+        images = dict(zip(("left", "right"), self.world.render_images(), strict=True))
         for side in sides:
-            self._spend(len(images[side]), "logged images of")
+            self._charge_output(len(images[side]), "logged images of")
             self.chain.add("image", self.now, images[side])
-            pixels = message_format.csv(images[side])
-            self._meter.keep(len(pixels))
+            pixels = message_format.format_csv(images[side])
+            self._meter.charge_bytes(len(pixels))
             self.image_log.append((side, pixels, self.world.clock))
 
     def _say(self, text: str) -> None:
         """Queue an utterance. Its duration is its number of words at 130 words per minute."""
-        self._free_act()
-        self._spend(len(text.encode()) + 1, "said")
+        self._count_free_action()
+        self._charge_output(len(text.encode()) + 1, "said")
         self.chain.add("say", self.now, text.encode())
-        self.spoken.append(Line(self.now / SECOND, text))
+        self.spoken.append(TimedText(self.now / SECOND, text))
         length = len(text.split()) * 60 * SECOND // _WORDS_A_MINUTE
         self._said_until = max(self._said_until, self.now) + length
 
-    def _spend(self, size: int, did: str) -> None:
+    def _charge_output(self, size: int, did: str) -> None:
         """Charge ``size`` to the program's output limit before the output is stored. Ends the trial at the limit."""
         self._output_left -= size
         if self._output_left < 0:
             sentence = f"the program {did} more than {self._spec.program.output_bytes} bytes"
-            raise _Cut(Fault(self.now / SECOND, Verdict.OUTPUT_LIMIT, "program", sentence))
+            raise _TrialEnded(Fault(self.now / SECOND, Verdict.OUTPUT_LIMIT, "program", sentence))
 
     def _note_place(self, number: float) -> None:
         """Note a line of the program. Places that are not complete would mislead, so they are dropped."""
         self._places_complete &= number > 0 and len(self.places) < _MOST_PLACES
         if self._places_complete:
-            self.places.append(ProgramLine(self.now / SECOND, *packed.lines_of(number)))
+            self.places.append(ProgramLine(self.now / SECOND, *packets.unpack_lines(number)))
         else:
             self.places.clear()
 
-    def _free_act(self) -> None:
+    def _count_free_action(self) -> None:
         self._free_acts += 1
-        if self._free_acts > _FREE_ACTS:
-            self._never_waits(None, None)
+        if self._free_acts > _MAX_FREE_ACTIONS:
+            self._raise_never_waits(None, None)
 
-    def _never_waits(self, line: int | None, file: str | None) -> NoReturn:
+    def _raise_never_waits(self, line: int | None, file: str | None) -> NoReturn:
         where = "this loop never waits" if line is not None else "the program never waits"
         hint = "Let it sleep or read a sensor: the robot moves only while the program waits."
         sentence = f"{where}, so the world cannot move"
-        raise _Cut(Fault(self.now / SECOND, Verdict.CPU_LIMIT, "program", sentence, line, hint, file=file or ""))
+        raise _TrialEnded(Fault(self.now / SECOND, Verdict.CPU_LIMIT, "program", sentence, line, hint, file=file or ""))
 
 
-def worded(reading: float | list[float]) -> str:
+def format_reading(reading: float | list[float]) -> str:
     """Return the ``repr`` of a reading.
 
     Lists of three equal values are common over a grey floor and take a faster path, because formatting floats is slow.
@@ -381,14 +381,14 @@ def worded(reading: float | list[float]) -> str:
     return repr(reading)
 
 
-def world_of(spec: TrialSpec, arena: Arena, camera: LightCamera, chain: Chain) -> World:
+def build_world(spec: TrialSpec, arena: Arena, camera: LightCamera, chain: HashChain) -> World:
     """Return the world at the start of the trial."""
     return World(spec.robot, arena, camera, spec.pose, spec.noise, spec.seed, chain, spec.physics, spec.tick)
 
 
-def robot_state(world: World, spec: TrialSpec) -> dict[str, Any]:
+def build_robot_state(world: World, spec: TrialSpec) -> dict[str, Any]:
     """Return the robot's pose and sensor values, with the keys of the original ``%sim_robot_state``."""
-    readings = world.readings()
+    readings = world.collect_readings()
     state: dict[str, Any] = {
         "x": world.pose.x,
         "y": world.pose.y,
@@ -399,9 +399,9 @@ def robot_state(world: World, spec: TrialSpec) -> dict[str, Any]:
         "_sensorNoise": spec.noise.light,
         "_wheelNoise": spec.noise.motor,
     }
-    for number, (side, image) in enumerate(zip(("left", "right"), world.images(), strict=True)):
+    for number, (side, image) in enumerate(zip(("left", "right"), world.render_images(), strict=True)):
         rgb = readings[side]
-        state[f"sensor{number + 1}dataArray"] = message_format.csv(image)
+        state[f"sensor{number + 1}dataArray"] = message_format.format_csv(image)
         state[f"{side}_light_raw"] = rgb
         state[f"{side}_light"] = int(rgb[0])
         state[f"{side}_light_pc"] = 100 * int(rgb[0]) / 255

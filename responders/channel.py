@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from string import ascii_lowercase, ascii_uppercase, digits
 from typing import Literal
 
-from sim.chance import Stream
+from sim.random_streams import RandomStream
 from sim.recording import SECOND
 
 #: Extra delay of a text that is reordered.
-_HELD_BACK = SECOND
-_MOST_CHANGED = 3
+_REORDERING_DELAY = SECOND
+_MAX_CHANGED_CHARACTERS = 3
 _ALPHABETS = (digits, ascii_lowercase, ascii_uppercase)
 
 
@@ -39,15 +39,15 @@ class Channel:
     blocked_by: Literal["obstacles", "nothing"] = "obstacles"
 
 
-class ChannelOfTrial:
+class TrialChannel:
     """The channel of one trial. The random draws for a text depend only on its number."""
 
     def __init__(self, channel: Channel, seed: int) -> None:
         self._channel = channel
-        self._chance = Stream(seed, "channel")
-        self._corruption = Stream(seed, "corruption")
+        self._chance = RandomStream(seed, "channel")
+        self._corruption = RandomStream(seed, "corruption")
 
-    def copies(self, number: int, index: int = 0) -> int:
+    def count_copies(self, number: int, index: int = 0) -> int:
         """Return how many copies of text ``number`` the responder receives: 0 if lost, 2 if duplicated, otherwise 1.
 
         The draws start at ``index``, so that each direction has its own.
@@ -56,7 +56,7 @@ class ChannelOfTrial:
             return 0
         return 2 if self._chance.uniform(number, index + 1) < self._channel.duplication else 1
 
-    def arrivals(self, number: int, copy: int, sent: int, slept: int) -> tuple[int, ...]:
+    def compute_arrivals(self, number: int, copy: int, sent: int, slept: int) -> tuple[int, ...]:
         """Return the arrival times of the answer to one copy of text ``number``; empty if the answer is lost.
 
         Args:
@@ -67,14 +67,15 @@ class ChannelOfTrial:
         """
         index = 16 + 16 * copy
         return tuple(
-            sent + slept + self._delay(number, index + 4 * place) for place in range(self.copies(number, index + 8))
+            sent + slept + self._compute_delay(number, index + 4 * place)
+            for place in range(self.count_copies(number, index + 8))
         )
 
-    def one_way(self, number: int, sent: int, copies: int) -> tuple[int, ...]:
+    def compute_one_way_arrivals(self, number: int, sent: int, copies: int) -> tuple[int, ...]:
         """Return the arrival times of the copies of a text that needs no answer, sent to the other robot."""
-        return tuple(sent + self._delay(number, 16 + 16 * copy) for copy in range(copies))
+        return tuple(sent + self._compute_delay(number, 16 + 16 * copy) for copy in range(copies))
 
-    def corrupted(self, text: str, number: int, index: int = 0) -> str | None:
+    def corrupt_text(self, text: str, number: int, index: int = 0) -> str | None:
         """Return the corrupted form of ``text``, or None if it arrives unchanged.
 
         Corruption replaces one to three letters or digits after the prefix with others of the same kind.
@@ -83,25 +84,25 @@ class ChannelOfTrial:
         if chance.uniform(number, index) >= self._channel.corruption:
             return None
         begin = text.find("::") + 2 if "::" in text else 0
-        places = [place for place in range(begin, len(text)) if _alphabet(text[place])]
+        places = [place for place in range(begin, len(text)) if _find_alphabet(text[place])]
         if not places:
             return None
         letters = list(text)
-        for turn in range(1 + chance.integer(number, index + 1) % _MOST_CHANGED):
+        for turn in range(1 + chance.integer(number, index + 1) % _MAX_CHANGED_CHARACTERS):
             place = places[chance.integer(number, index + 2 + 2 * turn) % len(places)]
-            others = _alphabet(text[place]).replace(text[place], "")
+            others = _find_alphabet(text[place]).replace(text[place], "")
             letters[place] = others[chance.integer(number, index + 3 + 2 * turn) % len(others)]
         return "".join(letters)
 
-    def corrupted_answer(self, text: str, number: int, copy: int, place: int) -> str | None:
+    def corrupt_answer(self, text: str, number: int, copy: int, place: int) -> str | None:
         """Return the corrupted form of an answer to a copy of text ``number``, or None. ``place`` counts duplicates."""
-        return self.corrupted(text, number, 16 + 16 * copy + 8 * place)
+        return self.corrupt_text(text, number, 16 + 16 * copy + 8 * place)
 
-    def _delay(self, number: int, index: int) -> int:
+    def _compute_delay(self, number: int, index: int) -> int:
         seconds = self._channel.delay + self._channel.jitter * self._chance.uniform(number, index)
         held_back = self._chance.uniform(number, index + 1) < self._channel.reordering
-        return round(seconds * SECOND) + (_HELD_BACK if held_back else 0)
+        return round(seconds * SECOND) + (_REORDERING_DELAY if held_back else 0)
 
 
-def _alphabet(character: str) -> str:
+def _find_alphabet(character: str) -> str:
     return next((each for each in _ALPHABETS if character in each), "")

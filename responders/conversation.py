@@ -8,15 +8,15 @@ from __future__ import annotations
 import heapq
 from dataclasses import dataclass, replace
 
-from responders.channel import Channel, ChannelOfTrial
+from responders.channel import Channel, TrialChannel
 from responders.link import ChannelLink, Contact
-from responders.message_format import queue_entry
+from responders.message_format import format_queue_entry
 from sim.recording import SECOND, Fault, Message
-from sim.world import Chain
+from sim.world import HashChain
 
 
 @dataclass(frozen=True, slots=True)
-class Sent:
+class SentText:
     """A text sent by the robot: its index in the messages, its number among the robot's texts, and its time."""
 
     message: int
@@ -38,7 +38,7 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True)
-class _UnderWay:
+class _AnswerInTransit:
     """An answer in transit: its queue entry, and its text if the channel corrupted it."""
 
     entry: str | None
@@ -48,20 +48,20 @@ class _UnderWay:
 class Conversation:
     """All messages of one trial, and the answers in transit. Times are units of simulated time."""
 
-    def __init__(self, channel: Channel, seed: int, chain: Chain, link: ChannelLink) -> None:
-        self._channel = ChannelOfTrial(channel, seed)
+    def __init__(self, channel: Channel, seed: int, chain: HashChain, link: ChannelLink) -> None:
+        self._channel = TrialChannel(channel, seed)
         self._chain = chain
         self.link = link
-        self._under_way: list[tuple[int, int, _UnderWay]] = []  # arrival time, message index, content
+        self._under_way: list[tuple[int, int, _AnswerInTransit]] = []  # arrival time, message index, content
         self._texts = 0
         self.messages: list[Message] = []
         self.faults: list[Fault] = []
 
-    def send(self, text: str, now: int) -> Sent:
+    def send(self, text: str, now: int) -> SentText:
         """Record a text from the robot. It reaches the responder at once, in zero or more copies."""
-        contact = self.link.contact()
-        copies = 0 if contact.lost else self._channel.copies(self._texts)
-        corrupted = self._channel.corrupted(text, self._texts) if copies else None
+        contact = self.link.measure_contact()
+        copies = 0 if contact.lost else self._channel.count_copies(self._texts)
+        corrupted = self._channel.corrupt_text(text, self._texts) if copies else None
         message = Message(
             now / SECOND,
             "robot",
@@ -73,30 +73,30 @@ class Conversation:
             angle=contact.angle,
             arrived_as=corrupted,
         )
-        sent = Sent(len(self.messages), self._texts, now, message.received, copies)
+        sent = SentText(len(self.messages), self._texts, now, message.received, copies)
         self.messages.append(message)
         self._texts += 1
         self._chain.add("message", now, text.encode())
-        self._chain_befell(now, contact, corrupted)
+        self._chain_channel_effects(now, contact, corrupted)
         return sent
 
-    def answer(self, sent: Sent, copy: int, answer: Answer) -> None:
+    def record_answer(self, sent: SentText, copy: int, answer: Answer) -> None:
         """Record the responder's answer to one copy of a text and schedule its arrival."""
         if answer.fault is not None:
             self.faults.append(answer.fault)
         if answer.text is None:
             return
-        arrivals = self._channel.arrivals(sent.number, copy, sent.t, answer.slept)
+        arrivals = self._channel.compute_arrivals(sent.number, copy, sent.t, answer.slept)
         said = Message((sent.t + answer.slept) / SECOND, "responder", answer.text, None, sent.message, answer.note)
         if not arrivals:
             self.messages.append(replace(said, note=said.note or "lost", lost="chance"))
         for place, due in enumerate(arrivals):
-            corrupted = self._channel.corrupted_answer(answer.text, sent.number, copy, place)
-            entry = answer.entry if corrupted is None or answer.entry is None else _entry_of(corrupted)
-            heapq.heappush(self._under_way, (due, len(self.messages), _UnderWay(entry, corrupted)))
+            corrupted = self._channel.corrupt_answer(answer.text, sent.number, copy, place)
+            entry = answer.entry if corrupted is None or answer.entry is None else _parse_queue_entry(corrupted)
+            heapq.heappush(self._under_way, (due, len(self.messages), _AnswerInTransit(entry, corrupted)))
             self.messages.append(replace(said, note=said.note or ("duplicated" if place else "")))
 
-    def pass_on(self, sent: Sent, entry: str | None, other: Conversation) -> tuple[int, ...]:
+    def pass_on(self, sent: SentText, entry: str | None, other: Conversation) -> tuple[int, ...]:
         """Send a text of this robot to the other robot. Return the indices of its copies in the other's messages.
 
         ``entry`` is the entry for the other robot's queue, as JSON.
@@ -104,8 +104,8 @@ class Conversation:
         message = self.messages[sent.message]
         self.messages[sent.message] = replace(message, delivered=None, to_partner=True)
         first = len(other.messages)
-        for copy, due in enumerate(self._channel.one_way(sent.number, sent.t, sent.copies)):
-            heapq.heappush(other._under_way, (due, len(other.messages), _UnderWay(entry, message.arrived_as)))
+        for copy, due in enumerate(self._channel.compute_one_way_arrivals(sent.number, sent.t, sent.copies)):
+            heapq.heappush(other._under_way, (due, len(other.messages), _AnswerInTransit(entry, message.arrived_as)))
             note = "duplicated" if copy else ""
             other.messages.append(Message(sent.t / SECOND, "partner", message.text, None, note=note))
         return tuple(range(first, len(other.messages)))
@@ -118,7 +118,7 @@ class Conversation:
         arrived = []
         while self._under_way and self._under_way[0][0] <= now:
             _, index, under_way = heapq.heappop(self._under_way)
-            if self._arrives(index, now, under_way.corrupted) and under_way.entry is not None:
+            if self._deliver_message(index, now, under_way.corrupted) and under_way.entry is not None:
                 arrived.append(under_way.entry)
         return arrived
 
@@ -128,18 +128,18 @@ class Conversation:
             self.messages[index] = replace(self.messages[index], note="undelivered")
         self._under_way.clear()
 
-    def _arrives(self, index: int, now: int, corrupted: str | None) -> bool:
-        contact = self.link.contact()
+    def _deliver_message(self, index: int, now: int, corrupted: str | None) -> bool:
+        contact = self.link.measure_contact()
         message = replace(self.messages[index], distance=contact.distance, angle=contact.angle)
         if contact.lost:
             self.messages[index] = replace(message, note=message.note or "lost", lost=contact.lost)
         else:
             self.messages[index] = replace(message, delivered=now / SECOND, arrived_as=corrupted)
             self._chain.add("answer", now, message.text.encode())
-        self._chain_befell(now, contact, corrupted)
+        self._chain_channel_effects(now, contact, corrupted)
         return not contact.lost
 
-    def _chain_befell(self, now: int, contact: Contact, corrupted: str | None) -> None:
+    def _chain_channel_effects(self, now: int, contact: Contact, corrupted: str | None) -> None:
         """Add the effects of an infrared link or a corrupting channel to the hash chain."""
         if contact.lost:
             self._chain.add("lost", now, contact.lost.encode())
@@ -147,9 +147,9 @@ class Conversation:
             self._chain.add("corrupted", now, corrupted.encode())
 
 
-def _entry_of(corrupted: str) -> str | None:
+def _parse_queue_entry(corrupted: str) -> str | None:
     """Return the queue entry of a corrupted JSON answer, or None if it is no longer valid JSON."""
     try:
-        return queue_entry(corrupted)
+        return format_queue_entry(corrupted)
     except ValueError:
         return None

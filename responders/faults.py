@@ -24,7 +24,7 @@ _PYTHON_2 = (
 )
 
 
-class Surprise(ChildStopped):
+class ChildDataError(ChildStopped):
     """Raised when a child's data caused an error in our own code. ``cause`` is for staff."""
 
     def __init__(self, error: Exception) -> None:
@@ -32,15 +32,15 @@ class Surprise(ChildStopped):
         self.cause = f"{type(error).__name__}: {error}"[:300]
 
 
-def surprise(error: Exception) -> Surprise:
+def to_child_data_error(error: Exception) -> ChildDataError:
     """Convert an exception that was raised while handling a child's data. Re-raises ``error`` for host faults."""
     if isinstance(error, RobomarkError | OSError | MemoryError):
         raise error
     _log.error("a child has sent what our own code stumbled over", exc_info=error)
-    return Surprise(error)
+    return ChildDataError(error)
 
 
-def stopped(stop: ChildStopped, who: str, now: int) -> Fault:
+def build_stop_fault(stop: ChildStopped, who: str, now: int) -> Fault:
     """Return the fault of a child that was stopped or ended at ``now``, in units of simulated time.
 
     ``who`` is the program, the responder, or the name of an agent, as in the functions below.
@@ -48,51 +48,51 @@ def stopped(stop: ChildStopped, who: str, now: int) -> Fault:
     verdict = stop.verdict
     if who != "program" and verdict is Verdict.PROGRAM_ERROR:
         verdict = Verdict.RESPONDER_ERROR
-    cause = stop.cause if isinstance(stop, Surprise) else ""
+    cause = stop.cause if isinstance(stop, ChildDataError) else ""
     sentence = f"the {who} was stopped: {stop.message}"
-    return _fault(now, verdict, who, sentence, stop.line, staff=cause, file=stop.file or "")
+    return _build_fault(now, verdict, who, sentence, stop.line, staff=cause, file=stop.file or "")
 
 
 #: Start of the message for a responder that returns something other than a text.
-_RETURNED = "the responder returned "
+_WRONG_RETURN = "the responder returned "
 
 
-def returned_sentence(what: str) -> str:
+def describe_wrong_return(what: str) -> str:
     """Return the message for a responder that returned ``what`` instead of a text."""
-    return f"{_RETURNED}{what}"
+    return f"{_WRONG_RETURN}{what}"
 
 
-def is_no_text(fault: Fault) -> bool:
+def is_wrong_return(fault: Fault) -> bool:
     """Return whether the fault is that a responder returned something other than a text.
 
     Stored recordings contain only the message, and another field would change their format. So the message is parsed
     here, next to the function that creates it, and nowhere else.
     """
-    return fault.verdict is Verdict.PROTOCOL_ERROR and fault.message.startswith(_RETURNED)
+    return fault.verdict is Verdict.PROTOCOL_ERROR and fault.message.startswith(_WRONG_RETURN)
 
 
-def error_fault(error: Mapping[str, Any], now: int, who: str) -> Fault:
+def build_error_fault(error: Mapping[str, Any], now: int, who: str) -> Fault:
     """Return the fault for an exception that a child reported. Running out of memory counts as a limit."""
     out_of_memory = error["type"] == "OSError" and error["text"].startswith(f"[Errno {errno.ENOMEM}]")
     if error["type"] == "MemoryError" or out_of_memory:
         sentence = f"the {who} asked for more memory than it may have"
-        return _fault(now, Verdict.MEMORY_LIMIT, who, sentence, error["line"], file=error["file"] or "")
+        return _build_fault(now, Verdict.MEMORY_LIMIT, who, sentence, error["line"], file=error["file"] or "")
     verdict = Verdict.PROGRAM_ERROR if who == "program" else Verdict.RESPONDER_ERROR
     words = error["text"]
     sentence = f"{error['type']}: {words}" if words else str(error["type"])
     hint = error.get("hint", "")[:_LONGEST_HINT]
     if error["type"] == "SyntaxError" and words.startswith(_PYTHON_2):
         hint = 'Programs here are Python 3: print is a function and needs brackets, as in print("hello").'
-    return _fault(now, verdict, who, sentence, error["line"], hint, file=error["file"] or "")
+    return _build_fault(now, verdict, who, sentence, error["line"], hint, file=error["file"] or "")
 
 
-def refusal(who: str, frame: wire.Frame) -> str:
+def describe_refusal(who: str, frame: wire.Frame) -> str:
     """Return the report's sentence about an operation that the sandbox refused."""
     where = f"line {frame['line']} of {frame['file'] or f'the {who}'}" if frame["line"] is not None else f"the {who}"
     return f"{where}: {frame['what'][:200]}"
 
 
-def _fault(
+def _build_fault(
     now: int,
     verdict: Verdict,
     who: str,

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from responders import wire
-from responders.code import Code
-from responders.faults import error_fault, surprise
+from responders.faults import build_error_fault, to_child_data_error
 from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import RanStatements, ResponderSpec
+from responders.source_file import SourceFile
+from responders.trial_spec import ExecutedStatements, ResponderSpec
 from sim.readers.json_text import read_json
 from sim.recording import Fault, Verdict
 
@@ -26,7 +26,7 @@ _NO_RESPONDER = ""
 
 
 #: The required field of each kind of value.
-_NEEDED = {"value": "text", "error": "error", "other": "type"}
+_REQUIRED_FIELDS = {"value": "text", "error": "error", "other": "type"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class FunctionCall:
 
 
 @dataclass(frozen=True, slots=True)
-class Returned:
+class CallResult:
     """The result of a call: a JSON value, or the fault."""
 
     value: Any = None
@@ -51,14 +51,14 @@ class Returned:
 
 
 @dataclass(frozen=True, slots=True)
-class Called:
+class CallResults:
     """The results of all calls, in order. ``fault`` is set if the module could not be loaded.
 
     ``printed`` holds the output from loading the module, then the output of each call. ``notes`` holds the notes made
     by the end of each of these.
     """
 
-    returned: tuple[Returned, ...]
+    returned: tuple[CallResult, ...]
     fault: Fault | None
     sandbox: str
     printed: tuple[tuple[str, ...], ...] = ()
@@ -66,7 +66,7 @@ class Called:
 
 
 def call_functions(
-    code: Code,
+    code: SourceFile,
     files: Mapping[str, bytes],
     calls: Sequence[FunctionCall],
     limits: ChildLimits,
@@ -74,8 +74,8 @@ def call_functions(
     sandboxes: Sandboxes,
     seed: int,
     meter: JobMeter,
-    ran: RanStatements | None = None,
-) -> Called:
+    ran: ExecutedStatements | None = None,
+) -> CallResults:
     """Load ``code`` with ``files`` in its folder and make the calls.
 
     Args:
@@ -92,24 +92,24 @@ def call_functions(
     Raises:
         HostError: If the machine fails, not the module.
     """
-    with sandboxes.private_folder() as folder:
+    with sandboxes.open_private_folder() as folder:
         spec = ResponderSpec(code, files, limits, output_bytes, _NO_RESPONDER, ran)
-        caller = _Caller(spec, sandboxes, folder, seed, meter)
+        caller = _CallProcess(spec, sandboxes, folder, seed, meter)
         try:
             sandbox = caller.sandbox
             fault = caller.load()
-            printed, notes = [caller.taken()], [tuple(caller.notes)]
+            printed, notes = [caller.take_output()], [tuple(caller.notes)]
             gave = []
             for call in calls if fault is None else ():
-                gave.append(caller.call(call))
-                printed.append(caller.taken())
+                gave.append(caller.call_function(call))
+                printed.append(caller.take_output())
                 notes.append(tuple(caller.notes))
-            return Called(tuple(gave), fault, sandbox, tuple(printed), tuple(notes))
+            return CallResults(tuple(gave), fault, sandbox, tuple(printed), tuple(notes))
         finally:
             caller.close()
 
 
-class _Caller(ResponderProcess):
+class _CallProcess(ResponderProcess):
     """A responder process whose functions are called by name."""
 
     _schema = wire.CALLS
@@ -118,58 +118,58 @@ class _Caller(ResponderProcess):
         super().__init__(spec, sandboxes, folder, seed, meter)
         self._ended: Fault | None = None
 
-    def taken(self) -> tuple[str, ...]:
+    def take_output(self) -> tuple[str, ...]:
         """Return the output printed since the last call of this method."""
         printed, self.output = tuple(self.output), []
         return printed
 
-    def call(self, call: FunctionCall) -> Returned:
+    def call_function(self, call: FunctionCall) -> CallResult:
         """Return the result of one call. Raises no exception for errors in the called code.
 
         After the process has been stopped, every call returns the same fault.
         """
         if self._child is None:
-            return Returned(fault=self._ended)
+            return CallResult(fault=self._ended)
         self._watches = not call.hidden
         try:
             self._child.send(
                 {"do": "call", "function": call.function, "arguments": list(call.arguments), "named": dict(call.named)}
             )
-            frame = self._until("returned")
-            needed = _NEEDED.get(frame["kind"])
+            frame = self._receive_until("returned")
+            needed = _REQUIRED_FIELDS.get(frame["kind"])
             if needed is not None and needed not in frame:
                 raise ChildStopped(Verdict.SANDBOX_VIOLATION, "the process sent a value without its content")
-            return _read(frame, call.function)
+            return _parse_result(frame, call.function)
         except ChildStopped as stop:
-            self._ended = self._stopped(stop, 0)
+            self._ended = self._convert_stop(stop, 0)
         except Exception as error:
-            self._ended = self._stopped(surprise(error), 0)
-        return Returned(fault=self._ended)
+            self._ended = self._convert_stop(to_child_data_error(error), 0)
+        return CallResult(fault=self._ended)
 
 
-def _read(frame: wire.Frame, function: str) -> Returned:
+def _parse_result(frame: wire.Frame, function: str) -> CallResult:
     """Return the result in a frame that has the required field for its kind."""
     match frame["kind"]:
         case "value":
             try:
-                return Returned(read_json(frame["text"], parse_constant=_no_constant))
+                return CallResult(read_json(frame["text"], parse_constant=_reject_constant))
             except ValueError:
                 sentence = f"{function} returned a value that cannot be read"
         case "missing":
-            sentence = no_function(function)
+            sentence = describe_missing_function(function)
         case "long":
             sentence = f"{function} returned a value that is too long to be passed on"
         case "other":
             sentence = f"{function} returned {frame['type'][:100]}, which cannot be passed on"
         case _:
-            return Returned(fault=error_fault(frame["error"], 0, "responder"))
-    return Returned(fault=Fault(0.0, Verdict.RESPONDER_ERROR, "responder", sentence))
+            return CallResult(fault=build_error_fault(frame["error"], 0, "responder"))
+    return CallResult(fault=Fault(0.0, Verdict.RESPONDER_ERROR, "responder", sentence))
 
 
-def no_function(name: str) -> str:
+def describe_missing_function(name: str) -> str:
     """Return the fault's message for a module that has no function of this name."""
     return f"there is no function called {name}"
 
 
-def _no_constant(name: str) -> None:
+def _reject_constant(name: str) -> None:
     raise ValueError(f"{name} is not JSON")

@@ -12,16 +12,16 @@ import re
 from collections.abc import Iterator, Mapping
 from itertools import chain
 
-from responders.sandbox.inside.libraries import BESIDE
+from responders.sandbox.inside.libraries import STANDARD_MODULES
 from sim.readers.python_source import parse_module
-from sim.readers.unreadable import Unreadable
+from sim.readers.reader_errors import UnreadableDataError
 
-_LOADED = ("nbev3devsim.load_nbev3devwidget", "inside.static_analysis.reader")
+_LOADED_MODULES = ("nbev3devsim.load_nbev3devwidget", "inside.static_analysis.reader")
 #: Maximum number of characters per text, because parsing longer texts is slow.
-_MOST_READ = 60_000
+_MAX_CHARACTERS = 60_000
 #: Names that give access to loaded modules, to code outside the syntax trees, or to garbage collection; and course
 #: modules that need libraries.
-_LEADING_AWAY = re.compile(
+_UNSAFE_NAMES = re.compile(
     r"modules|meta_path|path_hooks|path_importer_cache|settrace|setprofile|eval|exec|compile|getattr|globals|locals"
     r"|vars|dir|help|breakpoint|attrgetter|methodcaller|get_type_hints|ForwardRef|Formatter|make_dataclass|image_data"
     r"|builtins|importlib|(?:gi|cr|ag|tb)_frame|f_(?:back|builtins|globals|locals)"
@@ -43,38 +43,38 @@ def may_need_libraries(text: str, files: Mapping[str, bytes]) -> bool:
         texts = (text, *(data.decode() for data in modules.values()))
     except UnicodeDecodeError:
         return True
-    known = {*modules, *BESIDE, *_LOADED}
-    return any((imported := _imports(each)) is None or not known.issuperset(imported) for each in texts)
+    known = {*modules, *STANDARD_MODULES, *_LOADED_MODULES}
+    return any((imported := _find_imports(each)) is None or not known.issuperset(imported) for each in texts)
 
 
-def notebook_source(cells: tuple[str, ...]) -> str:
+def build_notebook_source(cells: tuple[str, ...]) -> str:
     """Return a notebook's source that runs as Python in its own process. Most magics remain and don't parse."""
     return "\n".join(_HARMLESS_LINE.sub("pass", cell) for cell in cells if not _ROBOT_CELL.match(cell))
 
 
 @functools.lru_cache(maxsize=64)
-def _imports(text: str) -> frozenset[str] | None:
+def _find_imports(text: str) -> frozenset[str] | None:
     """Return all names that a text imports, or None if that is unknown. Parses each distinct text once."""
-    if len(text) > _MOST_READ:
+    if len(text) > _MAX_CHARACTERS:
         return None
     try:
         nodes = list(ast.walk(parse_module(text)))
-    except (SyntaxError, Unreadable):
+    except (SyntaxError, UnreadableDataError):
         # The program may only report this error; loading libraries for it costs little.
         return None
-    if any(map(_LEADING_AWAY.fullmatch, chain.from_iterable(map(_named, nodes)))):
+    if any(map(_UNSAFE_NAMES.fullmatch, chain.from_iterable(map(_list_mentioned_names, nodes)))):
         return None
-    return frozenset(chain.from_iterable(map(_imported, nodes)))
+    return frozenset(chain.from_iterable(map(_list_imported_modules, nodes)))
 
 
-def _imported(node: ast.AST) -> Iterator[str]:
+def _list_imported_modules(node: ast.AST) -> Iterator[str]:
     if isinstance(node, ast.Import):
         yield from (each.name for each in node.names)
     elif isinstance(node, ast.ImportFrom):
         yield "." * node.level + (node.module or "")
 
 
-def _named(node: ast.AST) -> Iterator[str]:
+def _list_mentioned_names(node: ast.AST) -> Iterator[str]:
     match node:
         case ast.Attribute(value=ast.Name(id="re"), attr="compile"):
             pass

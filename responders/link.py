@@ -16,7 +16,7 @@ from sim.arena import Arena
 from sim.recording import LossReason, Pose
 from sim.trigonometry import sincos
 
-_DIGITS = 6  # decimals of a distance or an angle; the last bits depend on the C library
+_DECIMALS = 6  # decimals of a distance or an angle; the last bits depend on the C library
 
 #: Returns the current position of the receiver, mm. A beacon is fixed; another robot may move.
 Receiver = Callable[[], tuple[float, float]]
@@ -34,7 +34,7 @@ class Contact:
 class ChannelLink(Protocol):
     """The link between a robot and its receiver."""
 
-    def contact(self) -> Contact:
+    def measure_contact(self) -> Contact:
         """Return whether a text gets through now, with distance and angle."""
         ...
 
@@ -42,7 +42,7 @@ class ChannelLink(Protocol):
 class Cable:
     """A link without limits."""
 
-    def contact(self) -> Contact:
+    def measure_contact(self) -> Contact:
         """Return an unrestricted contact."""
         return Contact()
 
@@ -59,24 +59,24 @@ class InfraredLink:
         self._robot = robot
         self._receiver = receiver
 
-    def contact(self) -> Contact:
+    def measure_contact(self) -> Contact:
         """Return the contact. The first failed test of range, facing and obstacles gives the reason."""
         channel, pose, (x, y) = self._channel, self._robot(), self._receiver()
         sine, cosine = sincos(math.radians(pose.heading))
         dx, dy = x - pose.x, y - pose.y
-        distance = round(math.hypot(dx, dy), _DIGITS)
-        angle = round(math.degrees(math.atan2(cosine * dy - sine * dx, cosine * dx + sine * dy)), _DIGITS)
+        distance = round(math.hypot(dx, dy), _DECIMALS)
+        angle = round(math.degrees(math.atan2(cosine * dy - sine * dx, cosine * dx + sine * dy)), _DECIMALS)
         lost: LossReason = ""
         if distance > channel.range:
             lost = "out of range"
         elif abs(angle) > channel.facing / 2:
             lost = "facing away"
-        elif channel.blocked_by == "obstacles" and self._arena.stands_between((pose.x, pose.y), (x, y)):
+        elif channel.blocked_by == "obstacles" and self._arena.is_blocked_between((pose.x, pose.y), (x, y)):
             lost = "blocked"
         return Contact(lost, distance, angle)
 
 
-def link_of(channel: Channel, arena: Arena, robot: Callable[[], Pose]) -> ChannelLink:
+def build_link(channel: Channel, arena: Arena, robot: Callable[[], Pose]) -> ChannelLink:
     """Return the link of a robot whose receiver, if any, is the channel's beacon."""
     beacon = channel.beacon
     if channel.link == "cable" or beacon is None:

@@ -12,9 +12,9 @@ from greenlet import getcurrent, greenlet
 
 from responders import message_format
 from responders.bridge import Bridge
-from responders.conversation import Sent
+from responders.conversation import SentText
 from responders.link import InfraredLink
-from responders.responder_process import Collected, ResponderProcess
+from responders.responder_process import LoggedData, ResponderProcess
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ServedChild
 from responders.trial_spec import TrialSpec
@@ -24,11 +24,11 @@ from sim.shared_arena import SharedArena
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class PendingText:
     """A text for the responder, with the data that its robot had logged when it was sent."""
 
-    sent: Sent
-    collected: Collected
+    sent: SentText
+    collected: LoggedData
 
 
 class PairedBridge(Bridge):
@@ -44,11 +44,11 @@ class PairedBridge(Bridge):
         super().__init__(spec, arena, camera, child, None, meter)
         self.arena = arena
         self.number = spec.number
-        self.questions: list[Question] = []
+        self.questions: list[PendingText] = []
         self.calls: list[Call] = []
         self._passed_on: list[tuple[int, tuple[int, ...]]] = []  # message index, indices at the partner
 
-    def meet(self, partner: PairedBridge) -> None:
+    def connect_partner(self, partner: PairedBridge) -> None:
         """Connect this robot with its partner."""
         self.partner = partner
         channel = self._spec.channel
@@ -60,7 +60,7 @@ class PairedBridge(Bridge):
 
             self.conversation.link = InfraredLink(channel, self.arena, lambda: self.world.pose, there)
 
-    def settle(self) -> None:
+    def set_delivery_times(self) -> None:
         """Set the delivery time of each text that went to the partner. Call it after both programs have ended."""
         messages = self.conversation.messages
         for index, copies in self._passed_on:
@@ -71,7 +71,7 @@ class PairedBridge(Bridge):
                 message = replace(message, note=message.note or heard[0].note, lost=heard[0].lost)
             messages[index] = message
 
-    def _tick(self) -> None:
+    def _run_tick(self) -> None:
         """Run one tick. Errors that a program causes in our own code occur in its own turn and count as its fault."""
         _wait_for_partner()
         self.take_arrivals()
@@ -81,39 +81,39 @@ class PairedBridge(Bridge):
         _wait_for_partner()
         self.world.sense(moved)
 
-    def _send(self, text: str) -> int:
+    def _send_text(self, text: str) -> int:
         sent = self.conversation.send(text, self.now)
         if self._spec.responder is None:
             self._pass_on(text, sent)
         elif sent.copies:
-            self.questions.append(Question(sent, self.collected()))
+            self.questions.append(PendingText(sent, self.collect_logged_data()))
         return sent.message
 
-    def _pass_on(self, text: str, sent: Sent) -> None:
+    def _pass_on(self, text: str, sent: SentText) -> None:
         entry = None
         try:
-            entry = message_format.passed_on(text)
+            entry = message_format.format_partner_entry(text)
         except ValueError as error:
             sentence = f"the text begins with PY::JSON:: but is not JSON: {error}"
             self.conversation.faults.append(Fault(self.now / SECOND, Verdict.PROTOCOL_ERROR, "program", sentence))
         if entry is not None and sent.text != text:
-            entry = _entry_of(sent.text)
-        self._meter.keep(sent.copies * (len(text) + len(entry or "")))
+            entry = _parse_partner_entry(sent.text)
+        self._meter.charge_bytes(sent.copies * (len(text) + len(entry or "")))
         self._passed_on.append((sent.message, self.conversation.pass_on(sent, entry, self.partner.conversation)))
 
 
-Faults = tuple[Fault | None, Fault | None]
+FaultPair = tuple[Fault | None, Fault | None]
 
 
-def serve_both(first: PairedBridge, second: PairedBridge, responder: ResponderProcess | None) -> Faults:
+def serve_both(first: PairedBridge, second: PairedBridge, responder: ResponderProcess | None) -> FaultPair:
     """Serve both programs until they end. Return the fault of each, or None.
 
     A robot stands still after its program has ended, and the other program continues. Host faults and exceptions from
     the meter's heartbeat are raised from here, and neither program is left running.
     """
     bridges = first, second
-    first.meet(second)
-    second.meet(first)
+    first.connect_partner(second)
+    second.connect_partner(first)
     # All work stays in this thread, so heartbeats, signals and locks behave as for one robot.
     turns = [greenlet(bridge.run) for bridge in bridges]
     faults: dict[int, Fault | None] = {}
@@ -121,7 +121,7 @@ def serve_both(first: PairedBridge, second: PairedBridge, responder: ResponderPr
         while len(faults) < len(turns):
             _take_turns(turns, faults)  # both sense; their programs are served until the next tick
             if responder is not None:
-                _ask(responder, bridges)
+                _answer_pending_texts(responder, bridges)
             _take_turns(turns, faults)  # both receive arrivals and move
     finally:
         for turn in turns:
@@ -142,15 +142,15 @@ def _wait_for_partner() -> None:
     getcurrent().parent.switch()
 
 
-def _entry_of(corrupted: str) -> str | None:
+def _parse_partner_entry(corrupted: str) -> str | None:
     """Return the queue entry of a corrupted text, or None if it was JSON and no longer is."""
     try:
-        return message_format.passed_on(corrupted)
+        return message_format.format_partner_entry(corrupted)
     except ValueError:
         return None
 
 
-def _ask(responder: ResponderProcess, bridges: Sequence[PairedBridge]) -> None:
+def _answer_pending_texts(responder: ResponderProcess, bridges: Sequence[PairedBridge]) -> None:
     """Answer the texts that both robots have sent since the last tick, in the order they were sent."""
     asked = [(bridge, question) for bridge in bridges for question in bridge.questions]
     for bridge, question in sorted(asked, key=lambda each: each[1].sent.t):
@@ -159,7 +159,7 @@ def _ask(responder: ResponderProcess, bridges: Sequence[PairedBridge]) -> None:
             before = len(responder.calls)
             answer = responder.answer(sent.text, sent.t, sent.message, logged, bridge.number)
             bridge.calls += responder.calls[before:]
-            bridge.conversation.answer(sent, copy, answer)
-            logged = Collected()
+            bridge.conversation.record_answer(sent, copy, answer)
+            logged = LoggedData()
     for bridge in bridges:
         bridge.questions.clear()

@@ -9,7 +9,7 @@ import os
 import stat
 from pathlib import Path
 
-from responders.faults import stopped
+from responders.faults import build_stop_fault
 from responders.sandbox.meter import ChildStopped, JobMeter
 from sim.recording import Fault
 
@@ -34,7 +34,7 @@ def read_log(folder: Path, meter: JobMeter, who: str = "responder") -> tuple[str
             return "", None
         data = file.read(_LOG_BYTES)
     try:
-        meter.keep(len(data))
+        meter.charge_bytes(len(data))
     except ChildStopped as stop:
-        return "", stopped(stop, who, 0)
+        return "", build_stop_fault(stop, who, 0)
     return data.decode("utf-8", "replace"), None

@@ -12,25 +12,25 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from responders import wire
-from responders.agents import Agents, Position, agents_beside
-from responders.bridge import Bridge, robot_state, world_of
+from responders.agents import AgentCounts, Agents, running_agents
+from responders.bridge import Bridge, build_robot_state, build_world
 from responders.logger_file import read_log
 from responders.notebook_process import NotebookProcess, NotebookSpec
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
-from responders.trial import MOST_NOTES, recording_of
+from responders.trial import MOST_NOTES, build_recording
 from responders.trial_spec import TrialSpec
 from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.motion import Rectangle
 from sim.recording import SECOND, Fault, Recording, Verdict
-from sim.world import Chain
+from sim.world import HashChain
 
 _MOST_RUNS = 300
 _LONGEST_LINE = 2000
 _MOST_CELL_ERRORS = 5
 #: Limit on the processor time of all unmarked runs together, as a multiple of the limit for one program.
-_UNMARKED_CPU = 4
+_UNMARKED_CPU_FACTOR = 4
 #: Limits on the simulated time of all unmarked runs together: seconds, and multiples of the trial's time limit. The
 #: larger one applies.
 _UNMARKED_SECONDS, _UNMARKED_RUNS = 600, 20
@@ -65,24 +65,24 @@ class PlannedRun:
 class RunPlanner(Protocol):
     """Decides what each magic does."""
 
-    def standing(self) -> PlannedRun:
+    def plan_standstill(self) -> PlannedRun:
         """Return a plan with the state of the robot while it is not running."""
 
-    def call(self, call: MagicCall) -> PlannedRun:
+    def plan_call(self, call: MagicCall) -> PlannedRun:
         """Return the plan for a magic: a run, notes, or nothing."""
 
-    def ran(self, recording: Recording) -> None:
+    def record_run(self, recording: Recording) -> None:
         """Record that a planned run has ended."""
 
-    def last(self) -> PlannedRun:
+    def plan_last_run(self) -> PlannedRun:
         """Return the run to make after all cells, if any."""
 
 
-Ground = Callable[[TrialSpec, tuple[Rectangle, ...]], tuple[Arena, LightCamera]]
+SceneFactory = Callable[[TrialSpec, tuple[Rectangle, ...]], tuple[Arena, LightCamera]]
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class NotebookRun:
     """One run of a robot. ``cell`` is the cell that started it, or None after the last cell.
 
     ``printed`` is the number of characters of notebook output before the run.
@@ -98,7 +98,7 @@ class Run:
 class ExecutedNotebook:
     """The results of a notebook. ``raised`` holds the faults of single cells, ``stopped`` the fault that ended it."""
 
-    runs: tuple[Run, ...]
+    runs: tuple[NotebookRun, ...]
     output: str
     log: str
     notes: tuple[str, ...]
@@ -107,11 +107,11 @@ class ExecutedNotebook:
     stopped: Fault | None
 
     @property
-    def marked(self) -> Run | None:
+    def marked_run(self) -> NotebookRun | None:
         """Return the marked run, if there was one."""
         return next((run for run in self.runs if run.marked), None)
 
-    def told(self, recording: Recording) -> Recording:
+    def add_notebook_output(self, recording: Recording) -> Recording:
         """Return the recording of a run with the output, log and notes of the whole notebook."""
         return replace(
             recording,
@@ -123,18 +123,18 @@ class ExecutedNotebook:
 
 
 def execute_notebook(
-    spec: NotebookSpec, planner: RunPlanner, ground: Ground, sandboxes: Sandboxes, meter: JobMeter
+    spec: NotebookSpec, planner: RunPlanner, ground: SceneFactory, sandboxes: Sandboxes, meter: JobMeter
 ) -> ExecutedNotebook:
     """Execute the notebook in a fresh process and folder. ``meter`` counts the costs of the job.
 
     Raises:
         HostError: If the machine fails, not the student's code.
     """
-    with sandboxes.private_folder() as folder, agents_beside(spec.agents, spec.seed, sandboxes, meter) as agents:
+    with sandboxes.open_private_folder() as folder, running_agents(spec.agents, spec.seed, sandboxes, meter) as agents:
         process = NotebookProcess(spec, sandboxes, folder, meter, agents)
         try:
             execution = _Execution(process, planner, ground, sandboxes, meter, agents)
-            process.execute(execution.perform)
+            process.execute(execution.perform_request)
             execution.finish()
         finally:
             process.close()
@@ -154,10 +154,12 @@ def execute_notebook(
     )
 
 
-def never_ran(spec: TrialSpec, arena: Arena, camera: LightCamera, fault: Fault, sandbox: str) -> Recording:
+def build_unstarted_recording(
+    spec: TrialSpec, arena: Arena, camera: LightCamera, fault: Fault, sandbox: str
+) -> Recording:
     """Return the recording of a run that did not start: the robot stays at its start pose."""
-    chain = Chain()
-    world = world_of(spec, arena, camera, chain)
+    chain = HashChain()
+    world = build_world(spec, arena, camera, chain)
     return Recording(
         background=spec.floor.name,
         start=spec.pose,
@@ -182,7 +184,7 @@ class _Execution:
         self,
         process: NotebookProcess,
         planner: RunPlanner,
-        ground: Ground,
+        ground: SceneFactory,
         sandboxes: Sandboxes,
         meter: JobMeter,
         agents: Agents | None,
@@ -197,12 +199,12 @@ class _Execution:
         self._marked_cpu = 0.0  # of the worker, for the marked run
         self._free_cpu = _FREE_REQUEST_SECONDS
         self._missing: str | None = None  # reason for the missing responder of a run that needs one
-        self.runs: list[Run] = []
+        self.runs: list[NotebookRun] = []
 
-    def perform(self, frame: wire.Frame) -> dict[str, Any]:
+    def perform_request(self, frame: wire.Frame) -> dict[str, Any]:
         """Perform the request of a magic, or report the robot's state. Return the frame that resumes the notebook."""
         with self._charged():
-            return self._perform(frame)
+            return self._run_request(frame)
 
     @contextlib.contextmanager
     def _charged(self) -> Iterator[None]:
@@ -215,57 +217,57 @@ class _Execution:
             self._meter.charge_cpu(max(0.0, spent - self._free_cpu))
             self._free_cpu = max(0.0, self._free_cpu - spent)
 
-    def _perform(self, frame: wire.Frame) -> dict[str, Any]:
+    def _run_request(self, frame: wire.Frame) -> dict[str, Any]:
         if frame["do"] == "state":
-            return {"do": "state", "state": self._state()}
-        cell, line = self._process.place(frame["line"])
+            return {"do": "state", "state": self._build_state()}
+        cell, line = self._process.locate_line(frame["line"])
         call = MagicCall(cell, line, frame["name"], frame["arguments"][:_LONGEST_LINE], frame["body"])
-        planned = self._planner.call(call)
+        planned = self._planner.plan_call(call)
         for note in planned.notes:
-            self._process.note(frame["line"], note)
+            self._process.add_note(frame["line"], note)
         if planned.spec is None:
-            return _done()
-        refusal = self._refusal(planned, planned.spec)
+            return _build_done_frame()
+        refusal = self._describe_refusal(planned, planned.spec)
         if refusal:
-            self._process.note(frame["line"], refusal)
-            return _done()
-        bridge = self._run(cell, planned, planned.spec)
-        logged = bridge.collected()
-        return _done(bridge.now, logged.data, logged.images, robot_state(bridge.world, planned.spec))
+            self._process.add_note(frame["line"], refusal)
+            return _build_done_frame()
+        bridge = self._run_robot(cell, planned, planned.spec)
+        logged = bridge.collect_logged_data()
+        return _build_done_frame(bridge.now, logged.data, logged.images, build_robot_state(bridge.world, planned.spec))
 
-    def _state(self) -> dict[str, Any]:
-        standing = self._planner.standing()
+    def _build_state(self) -> dict[str, Any]:
+        standing = self._planner.plan_standstill()
         assert standing.spec is not None
         ground = self._ground(standing.spec, standing.obstacles)
-        return robot_state(world_of(standing.spec, *ground, Chain()), standing.spec)
+        return build_robot_state(build_world(standing.spec, *ground, HashChain()), standing.spec)
 
     def finish(self) -> None:
         """Make the planner's final run. Add a hint to runs whose responder was defined too late."""
         since, missing = self._process.answers_since, self._missing
         if since is not None and missing is not None:
-            self.runs = [_told_too_late(run, missing, since) if run.marked else run for run in self.runs]
-        planned = self._planner.last()
+            self.runs = [_add_order_hint(run, missing, since) if run.marked else run for run in self.runs]
+        planned = self._planner.plan_last_run()
         if planned.spec is not None:
-            self._run(None, planned, planned.spec)
+            self._run_robot(None, planned, planned.spec)
 
-    def _refusal(self, planned: PlannedRun, spec: TrialSpec) -> str:
+    def _describe_refusal(self, planned: PlannedRun, spec: TrialSpec) -> str:
         if planned.marked:
             return ""
         if len(self.runs) >= _MOST_RUNS:
             return f"the robot was not started: a notebook may start it {_MOST_RUNS} times"
         too_long = self._unmarked_seconds > max(_UNMARKED_SECONDS, _UNMARKED_RUNS * spec.seconds)
-        if too_long or self._unmarked_cpu > _UNMARKED_CPU * spec.program.limits.cpu_seconds:
+        if too_long or self._unmarked_cpu > _UNMARKED_CPU_FACTOR * spec.program.limits.cpu_seconds:
             return "the robot was not started: the runs before have used up the time for runs that are not marked"
         return ""
 
-    def _run(self, cell: int | None, planned: PlannedRun, spec: TrialSpec) -> Bridge:
+    def _run_robot(self, cell: int | None, planned: PlannedRun, spec: TrialSpec) -> Bridge:
         process = self._process
         printed = len("\n".join(process.output))
         if planned.needs_responder:
             self._missing = process.missing
         answers = spec.collaborative and (process.missing is None or planned.needs_responder)
         first_call = len(process.calls)
-        since = self._agents.position() if self._agents is not None else Position()
+        since = self._agents.count_events() if self._agents is not None else AgentCounts()
         arena, camera = self._ground(spec, planned.obstacles)
         program = self._sandboxes.spawn(spec.program.role, spec.program.limits, meter=self._meter)
         began = time.thread_time()
@@ -273,7 +275,7 @@ class _Execution:
             bridge = Bridge(spec, arena, camera, program, process if answers else None, self._meter)
             fault = bridge.run()
             if not planned.marked:
-                self._unmarked_cpu += program.cpu_seconds()
+                self._unmarked_cpu += program.measure_cpu_seconds()
                 self._unmarked_seconds += bridge.now / SECOND
         finally:
             program.close()
@@ -284,26 +286,30 @@ class _Execution:
             self._agents.seal(bridge.chain, bridge.now)
         faults = [*bridge.conversation.faults, *([fault] if fault else [])]
         if planned.needs_responder and process.missing is not None and not bridge.conversation.faults:
-            faults.append(Fault(0.0, Verdict.RESPONDER_ERROR, "responder", process.missing, hint=self._why_missing()))
-        faults = [self._placed(each, planned.program_cell) for each in faults]
+            faults.append(
+                Fault(
+                    0.0, Verdict.RESPONDER_ERROR, "responder", process.missing, hint=self._explain_missing_responder()
+                )
+            )
+        faults = [self._locate_fault(each, planned.program_cell) for each in faults]
         # Loading faults of agents count in every run, other faults only in the run where they occur.
-        faults += [] if self._agents is None else self._agents.faults_since(since)
+        faults += [] if self._agents is None else self._agents.collect_faults_since(since)
         faults.sort(key=lambda each: each.t)
-        recording = recording_of(spec, bridge, tuple(faults), program.sandbox)
+        recording = build_recording(spec, bridge, tuple(faults), program.sandbox)
         calls = [replace(call, before=call.before - since.messages) for call in process.calls[first_call:]]
         recording = replace(recording, calls=tuple(calls))
         if self._agents is not None:
-            recording = self._agents.add_talk(recording, since)
-        self.runs.append(Run(cell, planned.marked, recording, printed))
-        self._planner.ran(recording)
+            recording = self._agents.add_messages_and_calls(recording, since)
+        self.runs.append(NotebookRun(cell, planned.marked, recording, printed))
+        self._planner.record_run(recording)
         return bridge
 
-    def _placed(self, fault: Fault, program_cell: int | None) -> Fault:
+    def _locate_fault(self, fault: Fault, program_cell: int | None) -> Fault:
         if fault.who == "program" and fault.line is not None:
             return replace(fault, cell=program_cell)
-        return self._process.placed(fault)
+        return self._process.locate_fault(fault)
 
-    def _why_missing(self) -> str:
+    def _explain_missing_responder(self) -> str:
         """Return the message of the first failed cell, a possible reason for the missing responder, or ""."""
         if not self._process.raised:
             return ""
@@ -311,7 +317,7 @@ class _Execution:
         return f"In {first.place}: {first.message}"
 
 
-def _told_too_late(run: Run, missing: str, since: int) -> Run:
+def _add_order_hint(run: NotebookRun, missing: str, since: int) -> NotebookRun:
     """Return the run with a hint to the cell that defines the responder, in place of the ``missing`` message."""
     message = f"the responder is defined in cell {since}, after the robot of cell {run.cell} has run"
     hint = f"Move cell {since} above cell {run.cell}."
@@ -322,7 +328,7 @@ def _told_too_late(run: Run, missing: str, since: int) -> Run:
     return replace(run, recording=replace(run.recording, faults=faults))
 
 
-def _done(
+def _build_done_frame(
     now: int = 0,
     data: tuple[tuple[str, float, float | None, float], ...] = (),
     images: tuple[str, ...] = (),

@@ -13,15 +13,15 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from responders import wire
-from responders.code import Code
-from responders.faults import error_fault, surprise
-from responders.libraries_needed import notebook_source
+from responders.faults import build_error_fault, to_child_data_error
+from responders.libraries_needed import build_notebook_source
 from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.source_file import SourceFile
 from responders.trial_spec import AgentSpec, ResponderSpec
-from sim.chance import Stream
+from sim.random_streams import RandomStream
 from sim.recording import Fault, Verdict
 
 if TYPE_CHECKING:
@@ -44,9 +44,11 @@ class NotebookSpec:
     agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))
 
     @property
-    def as_responder(self) -> ResponderSpec:
+    def responder_spec(self) -> ResponderSpec:
         """Return the responder spec for the Python code of the notebook's process."""
-        return ResponderSpec(Code(self.name, notebook_source(self.cells)), self.files, self.limits, self.output_bytes)
+        return ResponderSpec(
+            SourceFile(self.name, build_notebook_source(self.cells)), self.files, self.limits, self.output_bytes
+        )
 
 
 class NotebookProcess(ResponderProcess):
@@ -57,7 +59,7 @@ class NotebookProcess(ResponderProcess):
     def __init__(
         self, spec: NotebookSpec, sandboxes: Sandboxes, folder: Path, meter: JobMeter, agents: Agents | None = None
     ) -> None:
-        super().__init__(spec.as_responder, sandboxes, folder, spec.seed, meter, agents)
+        super().__init__(spec.responder_spec, sandboxes, folder, spec.seed, meter, agents)
         if agents is not None:
             self._schema = wire.NOTEBOOK_WITH_AGENTS
         self._notebook = spec
@@ -83,65 +85,65 @@ class NotebookProcess(ResponderProcess):
                 {
                     "name": self._notebook.name,
                     "cells": self._notebook.cells,
-                    "seed": Stream(self._seed, "responder").integer(0),
+                    "seed": RandomStream(self._seed, "responder").integer(0),
                     "function": None,
-                    **self._agent_names(),
+                    **self._build_agents_entry(),
                 }
             )
             while True:
                 frame = self._child.receive(self._schema)
                 if frame["do"] == "executed":
                     self.missing = frame["missing"]
-                    self._note_answering(self.missing is None)
+                    self._record_answering(self.missing is None)
                     return
-                self._take_cell(frame, perform)
+                self._accept_cell_frame(frame, perform)
                 if self._child is None:
                     return
         except ChildStopped as stop:
-            self._stopped(stop, 0)
+            self._convert_stop(stop, 0)
         except Exception as error:
-            self._stopped(surprise(error), 0)
+            self._convert_stop(to_child_data_error(error), 0)
         finally:
-            self._tell_what_was_not_run()
+            self._note_skipped_cells()
 
-    def placed(self, fault: Fault) -> Fault:
+    def locate_fault(self, fault: Fault) -> Fault:
         """Return a fault of the process with its cell and line, if known."""
         if fault.who != "responder" or fault.line is None or fault.cell is not None or fault.file:
             return fault
-        cell, line = self.place(fault.line)
+        cell, line = self.locate_line(fault.line)
         return replace(fault, cell=cell, line=line)
 
-    def place(self, line: int | None) -> tuple[int, int | None]:
+    def locate_line(self, line: int | None) -> tuple[int, int | None]:
         """Return the cell, and the line in it, for a line of the whole notebook. Without a line, the current cell."""
         if line is None or not 1 <= line < self._first_lines[-1]:
             return self._cell, None
         cell = bisect.bisect_right(self._first_lines, line)
         return cell, line - self._first_lines[cell - 1] + 1
 
-    def note(self, line: int | None, sentence: str, file: str | None = None) -> None:
+    def add_note(self, line: int | None, sentence: str, file: str | None = None) -> None:
         """Keep a note for the report with its place. ``file`` is a file beside the notebook."""
-        cell, number = self.place(line) if file is None else (self._cell, line)
+        cell, number = self.locate_line(line) if file is None else (self._cell, line)
         where = f"cell {cell}" if number is None else f"cell {cell}, line {number}"
-        self._note(f"{where}{f' of {file}' if file else ''}: {sentence}")
+        self._add_note(f"{where}{f' of {file}' if file else ''}: {sentence}")
 
-    def _tell_what_was_not_run(self) -> None:
+    def _note_skipped_cells(self) -> None:
         first, last = self._cell + 1, len(self._notebook.cells)
         if self.stopped is not None and first <= last:
             which = f"cell {last} was" if first == last else f"cells {first} to {last} were"
-            self._note(f"{which} not run: the notebook was stopped in cell {self._cell}")
+            self._add_note(f"{which} not run: the notebook was stopped in cell {self._cell}")
 
-    def _take_cell(self, frame: wire.Frame, perform: Callable[[wire.Frame], dict[str, Any]]) -> None:
+    def _accept_cell_frame(self, frame: wire.Frame, perform: Callable[[wire.Frame], dict[str, Any]]) -> None:
         # Each costs output, so a process can't send them without limit.
-        self._spend("", "sent")
+        self._charge_output("", "sent")
         match frame["do"]:
             case "cell":
-                self._note_answering(frame["answers"])
+                self._record_answering(frame["answers"])
                 self._cell = min(frame["place"] + 1, len(self._notebook.cells))
             case "raised":
-                fault = self.placed(error_fault(frame["error"], 0, "responder"))
+                fault = self.locate_fault(build_error_fault(frame["error"], 0, "responder"))
                 fault = replace(fault, message=fault.message.replace("the responder asked", "it asked", 1))
                 self.raised.append(replace(fault, cell=fault.cell or self._cell))
-                self._note(f"{self.raised[-1].place}: {fault.message}; the other cells were run all the same")
+                self._add_note(f"{self.raised[-1].place}: {fault.message}; the other cells were run all the same")
             case "magic" | "state":
                 self._magics += 1
                 if self._magics > _MOST_MAGICS:
@@ -153,25 +155,25 @@ class NotebookProcess(ResponderProcess):
                 if self._child is not None:
                     self._child.send(reply)
             case _:
-                self._take(frame)
+                self._accept_frame(frame)
 
-    def _note_answering(self, answers: bool) -> None:
+    def _record_answering(self, answers: bool) -> None:
         """Record whether there is a responder after the cell that has just been executed."""
         if not answers:
             self.answers_since = None
         elif self.answers_since is None:
             self.answers_since = self._cell
 
-    def _take(self, frame: wire.Frame) -> None:
+    def _accept_frame(self, frame: wire.Frame) -> None:
         match frame["do"]:
             case "refused":
-                self.note(frame["line"], frame["what"][:200], frame["file"])
+                self.add_note(frame["line"], frame["what"][:200], frame["file"])
             case "note":
                 # A responder may call magics too.
-                self._spend("", "sent")
-                self.note(frame["line"], frame["text"][:400], frame["file"])
+                self._charge_output("", "sent")
+                self.add_note(frame["line"], frame["text"][:400], frame["file"])
             case _:
-                super()._take(frame)
+                super()._accept_frame(frame)
 
     def _print(self, text: str) -> None:
         if self._cell != self._printed_in:
@@ -179,9 +181,9 @@ class NotebookProcess(ResponderProcess):
             self.output.append(f"--- cell {self._cell} ---")
         super()._print(text)
 
-    def _stopped(self, stop: ChildStopped, t: int) -> Fault:
-        fault = super()._stopped(stop, t)
-        self.stopped = self.placed(replace(fault, message=fault.message.replace("the responder", "the notebook")))
+    def _convert_stop(self, stop: ChildStopped, t: int) -> Fault:
+        fault = super()._convert_stop(stop, t)
+        self.stopped = self.locate_fault(replace(fault, message=fault.message.replace("the responder", "the notebook")))
         if self.stopped.cell is None:
             self.stopped = replace(self.stopped, cell=self._cell)
         return self.stopped

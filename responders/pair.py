@@ -15,7 +15,7 @@ from responders.logger_file import read_log
 from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
-from responders.trial import MOST_NOTES, recording_of
+from responders.trial import MOST_NOTES, build_recording
 from responders.trial_spec import PartnerSpec, TrialSpec
 from sim.camera import LightCamera
 from sim.recording import Fault, Recording, Verdict
@@ -37,10 +37,10 @@ def run_pair(
     Raises:
         HostError: If the machine fails, not the student's code.
     """
-    specs = spec, spec.of_partner(partner)
+    specs = spec, spec.build_partner_spec(partner)
     for arena, other in zip(arenas, reversed(specs), strict=True):
         arena.place_partner(other.pose.x, other.pose.y, math.radians(other.pose.heading))
-    with sandboxes.private_folder() as folder:
+    with sandboxes.open_private_folder() as folder:
         with ExitStack() as children:
             responder = None
             if spec.responder is not None:
@@ -59,13 +59,15 @@ def run_pair(
     for bridge in bridges:
         bridge.conversation.finish()
     for bridge in bridges:
-        bridge.settle()
-    own = _in_order((unloadable, *first.conversation.faults, cut, unread))
-    others = (_of_second(fault, partner) for fault in _in_order((*second.conversation.faults, partner_cut)))
-    partners = recording_of(specs[1], second, tuple(fault for fault in others if fault is not None), layers[1])
+        bridge.set_delivery_times()
+    own = _sort_faults((unloadable, *first.conversation.faults, cut, unread))
+    others = (
+        _attribute_to_second(fault, partner) for fault in _sort_faults((*second.conversation.faults, partner_cut))
+    )
+    partners = build_recording(specs[1], second, tuple(fault for fault in others if fault is not None), layers[1])
     first.chain.add("partner", second.now, partners.sha256.encode())
     recording = replace(
-        recording_of(spec, first, own, layers[0]),
+        build_recording(spec, first, own, layers[0]),
         calls=tuple(first.calls),
         partner=replace(partners, calls=tuple(second.calls)),
     )
@@ -79,11 +81,11 @@ def run_pair(
     )
 
 
-def _in_order(faults: Iterable[Fault | None]) -> tuple[Fault, ...]:
+def _sort_faults(faults: Iterable[Fault | None]) -> tuple[Fault, ...]:
     return tuple(sorted((fault for fault in faults if fault is not None), key=lambda fault: fault.t))
 
 
-def _of_second(fault: Fault, partner: PartnerSpec) -> Fault | None:
+def _attribute_to_second(fault: Fault, partner: PartnerSpec) -> Fault | None:
     """Return the fault as one of the second program. None for a time limit of a given program, which is no fault."""
     if fault.who != "program":
         return fault

@@ -26,27 +26,27 @@ from responders.sandbox.running_child import Child, ServedChild
 from sim.errors import RobomarkError
 from sim.recording import Fault, Recording, Verdict
 
-_LIMITS = frozenset({Verdict.CPU_LIMIT, Verdict.STALLED})
+_LIMIT_VERDICTS = frozenset({Verdict.CPU_LIMIT, Verdict.STALLED})
 #: Faults that are expensive to repeat, by the role of the child that caused them.
-_COSTLY = MappingProxyType({"robot": _LIMITS | {Verdict.PROGRAM_ERROR}, "responder": _LIMITS})
+_COSTLY_VERDICTS = MappingProxyType({"robot": _LIMIT_VERDICTS | {Verdict.PROGRAM_ERROR}, "responder": _LIMIT_VERDICTS})
 #: Limits on the recorded steps of one child, and on failed attempts to replay it.
 _MOST_STEPS, _MOST_BYTES = 20_000, 8 << 20
-_MOST_MISSES = 3
+_MAX_FAILED_REPLAYS = 3
 #: Modules without access to randomness. Any other import may give access to it.
-_WITHOUT_CHANCE = frozenset(
+_DETERMINISTIC_MODULES = frozenset(
     ["collections", "ev3dev2", "ev3dev2_glue", "functools", "itertools", "json", "math", "re", "string", "time"]
 )
 _IMPORT = re.compile(r"\bfrom\s+([\w.]+)\s+import\b|\bimport\b([^\n;#]*)")
 #: Names that give access to randomness or to another child's memory, and constructs that can hide a name: escapes,
 #: format fields, copied attributes.
-_LEADING_AWAY = re.compile(
+_UNSAFE_NAMES = re.compile(
     r"\\[xuN0-7\n]|\b(?:v?format(?:_map|_field)?|get_field|Formatter|update_wrapper|wraps|metaclass)\b|\btype\s*\([^)]*,|"
     r"\b(?:_?random|urandom|_?sys|modules|eval|exec|compile|open|getattr|globals|locals|vars|id|hash|inspect"
     r"|(?:gi|cr|ag|tb)_frame|_getframe|f_\w+|__(?!(?:name|main|init|str|repr)__)\w+)\b"
 )
 
 #: Notes for the recording, by the role of the replayed child.
-SPARED = MappingProxyType(
+REPLAY_NOTES = MappingProxyType(
     {
         "robot": "the robot program was not run again in this trial",
         "responder": "the responder was not run again in this trial",
@@ -54,93 +54,97 @@ SPARED = MappingProxyType(
 )
 
 
-class Diverged(RobomarkError):
+class ReplayDiverged(RobomarkError):
     """Raised when a child's input differs from the recorded one: the trial has to be run."""
 
 
 @dataclass(slots=True)
-class _Part:
+class _ChildRecording:
     """The recorded input and output of one child, in order. ``whole`` is False if it grew too large."""
 
     first: wire.Frame
     sandbox: str
-    steps: list[_Told | _Said] = field(default_factory=list)
-    left: int = _MOST_BYTES
-    whole: bool = True
-    repeats: bool = True  # whether the same limit is certain to be exceeded again
+    steps: list[_ChildInput | _ChildOutput] = field(default_factory=list)
+    bytes_left: int = _MOST_BYTES
+    is_complete: bool = True
+    is_repeatable: bool = True  # whether the same limit is certain to be exceeded again
 
-    def add(self, step: _Told | _Said, size: int) -> None:
-        self.left -= size
-        if self.left < 0 or len(self.steps) >= _MOST_STEPS:
-            self.whole = False
+    def add(self, step: _ChildInput | _ChildOutput, size: int) -> None:
+        self.bytes_left -= size
+        if self.bytes_left < 0 or len(self.steps) >= _MOST_STEPS:
+            self.is_complete = False
             self.steps.clear()
-        if self.whole:
+        if self.is_complete:
             self.steps.append(step)
 
 
 @dataclass(frozen=True, slots=True)
-class _Told:
+class _ChildInput:
     frame: wire.Frame
     arrived: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class _Said:
-    what: wire.Frame | ChildStopped
-    paid: int  # bytes charged to the job's meter
+class _ChildOutput:
+    frame_or_stop: wire.Frame | ChildStopped
+    bytes_charged: int  # bytes charged to the job's meter
 
 
-class RepeatedFaults:
+class FaultReplay:
     """Follows the trials of one grading in the order they are run."""
 
     def __init__(self) -> None:
         self._last: Fault | None = None
-        self._heard: list[_Part] = []
-        self._known: list[_Part] = []
+        self._heard: list[_ChildRecording] = []
+        self._known: list[_ChildRecording] = []
         self._misses = 0
         self._diverged = False  # whether this trial runs real children after a divergence
         self._by_heart = False  # whether a child of this trial was replayed
 
-    def child(self, role: str, folder: Path | None, meter: JobMeter | None, spawn: Callable[[], Child]) -> ServedChild:
+    def provide_child(
+        self, role: str, folder: Path | None, meter: JobMeter | None, spawn: Callable[[], Child]
+    ) -> ServedChild:
         """Return a child of this role: a real one from ``spawn``, recorded or not, or a replayed one."""
-        spared = self._last is not None and role.startswith(_role(self._last)) and self._misses < _MOST_MISSES
+        spared = (
+            self._last is not None and role.startswith(_find_role(self._last)) and self._misses < _MAX_FAILED_REPLAYS
+        )
         if not spared or meter is None or self._diverged:
             return spawn()
         if self._known:
-            return _ByHeart(self._known, folder, meter, spawn, self._told_by_heart)
-        return _Written(spawn(), folder, meter, self._heard)
+            return _ReplayedChild(self._known, folder, meter, spawn, self._record_replay)
+        return _RecordedChild(spawn(), folder, meter, self._heard)
 
-    def ran(self, recording: Recording) -> Recording:
+    def record_trial(self, recording: Recording) -> Recording:
         """Record that a trial has ended. Return its recording, with a note if a child was replayed."""
-        fault, by_heart = _costly(recording.faults), self._by_heart
+        fault, by_heart = _find_costly_fault(recording.faults), self._by_heart
         self._by_heart = self._diverged = False
         if by_heart and self._last is not None:
-            return replace(recording, notes=(*recording.notes, SPARED[_role(self._last)]))
-        if not self._known and fault is not None and self._last is not None and _alike(fault, self._last):
-            self._known = [part for part in self._heard if part.whole]
-            if not all(part.repeats for part in self._known):
+            return replace(recording, notes=(*recording.notes, REPLAY_NOTES[_find_role(self._last)]))
+        if not self._known and fault is not None and self._last is not None and _is_same_failure(fault, self._last):
+            self._known = [part for part in self._heard if part.is_complete]
+            if not all(part.is_repeatable for part in self._known):
                 # Too close to the limit, another trial may end differently. So all trials are run and measuring stops.
-                self._known, self._misses = [], _MOST_MISSES
+                self._known, self._misses = [], _MAX_FAILED_REPLAYS
         if not self._known:
             self._last = fault
         self._heard = []
         return recording
 
-    def again(self) -> None:
+    def record_divergence(self) -> None:
         """Record that the trial diverged and is run again."""
         self._by_heart, self._diverged = False, True
         self._misses += 1
 
-    def _told_by_heart(self) -> None:
+    def _record_replay(self) -> None:
         self._by_heart = True
 
 
-class _Written:
+class _RecordedChild:
     """A real child whose input and output are recorded."""
 
-    def __init__(self, child: Child, folder: Path | None, meter: JobMeter, parts: list[_Part]) -> None:
+    def __init__(self, child: Child, folder: Path | None, meter: JobMeter, parts: list[_ChildRecording]) -> None:
         self._child, self._folder, self._meter, self._parts = child, folder, meter, parts
-        self._part: _Part | None = None
+        self._part: _ChildRecording | None = None
         self._begun = False
         self._spoke = 0.0  # processor seconds at its last frame
         self.sandbox = child.sandbox
@@ -148,16 +152,16 @@ class _Written:
     def send(self, frame: wire.Frame, arrived: Sequence[str] = ()) -> None:
         self._child.send(frame, arrived)
         if self._part is not None:
-            self._part.add(_Told(frame, tuple(arrived)), sum(map(len, arrived)) + len(str(frame)))
-        elif not self._begun and _is_alone(frame) and not _may_use_chance(frame, self._folder):
-            self._part = _Part(_without_seed(frame), self.sandbox)
+            self._part.add(_ChildInput(frame, tuple(arrived)), sum(map(len, arrived)) + len(str(frame)))
+        elif not self._begun and _is_independent(frame) and not _may_use_chance(frame, self._folder):
+            self._part = _ChildRecording(_remove_seed(frame), self.sandbox)
             self._child.measured = True
         self._begun = True
 
     def send_readings(self, units: int, values: Sequence[float]) -> None:
         self._child.send_readings(units, values)
         if self._part is not None:
-            self._part.add(_Told(_readings(units, values), ()), 8 * len(values))
+            self._part.add(_ChildInput(_build_readings_frame(units, values), ()), 8 * len(values))
 
     def receive(self, schema: wire.Schema) -> wire.Frame:
         before = self._meter.spent.kept_bytes
@@ -165,23 +169,23 @@ class _Written:
         try:
             said = self._child.receive(schema)
             if self._part is not None:
-                self._spoke = self._child.cpu_seconds()
+                self._spoke = self._child.measure_cpu_seconds()
         except ChildStopped as stop:
             said = stop
-            if self._part is not None and stop.verdict in _LIMITS:
-                self._part.repeats = self._child.outlasted and self._spoke < self._child.cpu_limit / 2
+            if self._part is not None and stop.verdict in _LIMIT_VERDICTS:
+                self._part.is_repeatable = self._child.outlasted and self._spoke < self._child.cpu_limit / 2
         paid = self._meter.spent.kept_bytes - before
         if self._part is not None:
-            self._part.add(_Said(said, paid), paid)
+            self._part.add(_ChildOutput(said, paid), paid)
         if isinstance(said, ChildStopped):
             raise said
         return said
 
-    def cpu_seconds(self) -> float:
-        return self._child.cpu_seconds()
+    def measure_cpu_seconds(self) -> float:
+        return self._child.measure_cpu_seconds()
 
-    def last_place(self) -> wire.Frame:
-        return self._child.last_place()
+    def stop_and_locate(self) -> wire.Frame:
+        return self._child.stop_and_locate()
 
     def close(self) -> None:
         self._child.close()
@@ -191,12 +195,12 @@ class _Written:
             self._part = None
 
 
-class _ByHeart:
+class _ReplayedChild:
     """A replayed child. If no recording starts with the same frame, it runs a real child."""
 
     def __init__(
         self,
-        parts: Sequence[_Part],
+        parts: Sequence[_ChildRecording],
         folder: Path | None,
         meter: JobMeter,
         spawn: Callable[[], Child],
@@ -204,7 +208,7 @@ class _ByHeart:
     ) -> None:
         self._parts, self._folder, self._meter, self._spawn, self._tell = parts, folder, meter, spawn, tell
         self._child: Child | None = None
-        self._steps: list[_Told | _Said] | None = None
+        self._steps: list[_ChildInput | _ChildOutput] | None = None
         self._next = 0
         self.sandbox = parts[0].sandbox
 
@@ -212,42 +216,44 @@ class _ByHeart:
         if self._child is not None:
             self._child.send(frame, arrived)
         elif self._steps is None:
-            self._begin(frame, arrived)
+            self._start_replay(frame, arrived)
         else:
-            self._compare(_Told(frame, tuple(arrived)))
+            self._compare_input(_ChildInput(frame, tuple(arrived)))
 
     def send_readings(self, units: int, values: Sequence[float]) -> None:
         if self._child is not None:
             self._child.send_readings(units, values)
         else:
-            self._compare(_Told(_readings(units, values), ()))
+            self._compare_input(_ChildInput(_build_readings_frame(units, values), ()))
 
     def receive(self, schema: wire.Schema) -> wire.Frame:
         if self._child is not None:
             return self._child.receive(schema)
-        step = self._step()
-        if not isinstance(step, _Said):
-            raise Diverged("a child was not told something")
-        if step.paid:
-            self._meter.keep(step.paid - OBJECT_BYTES)
-        if isinstance(step.what, ChildStopped):
-            raise ChildStopped(step.what.verdict, step.what.message, step.what.line, step.what.file)
-        return step.what
+        step = self._take_step()
+        if not isinstance(step, _ChildOutput):
+            raise ReplayDiverged("a child was not told something")
+        if step.bytes_charged:
+            self._meter.charge_bytes(step.bytes_charged - OBJECT_BYTES)
+        if isinstance(step.frame_or_stop, ChildStopped):
+            raise ChildStopped(
+                step.frame_or_stop.verdict, step.frame_or_stop.message, step.frame_or_stop.line, step.frame_or_stop.file
+            )
+        return step.frame_or_stop
 
-    def cpu_seconds(self) -> float:
-        return self._child.cpu_seconds() if self._child is not None else 0.0
+    def measure_cpu_seconds(self) -> float:
+        return self._child.measure_cpu_seconds() if self._child is not None else 0.0
 
-    def last_place(self) -> wire.Frame:
+    def stop_and_locate(self) -> wire.Frame:
         if self._child is None:
-            raise Diverged("a child that is not run is nowhere")
-        return self._child.last_place()
+            raise ReplayDiverged("a child that is not run is nowhere")
+        return self._child.stop_and_locate()
 
     def close(self) -> None:
         if self._child is not None:
             self._child.close()
 
-    def _begin(self, frame: wire.Frame, arrived: Sequence[str]) -> None:
-        first = _without_seed(frame)
+    def _start_replay(self, frame: wire.Frame, arrived: Sequence[str]) -> None:
+        first = _remove_seed(frame)
         self._steps = next((part.steps for part in self._parts if part.first == first), None)
         if self._steps is not None:
             self._tell()
@@ -256,40 +262,40 @@ class _ByHeart:
         self.sandbox = self._child.sandbox
         self._child.send(frame, arrived)
 
-    def _compare(self, told: _Told) -> None:
-        if self._step() != told:
-            raise Diverged("a child was told something new")
+    def _compare_input(self, told: _ChildInput) -> None:
+        if self._take_step() != told:
+            raise ReplayDiverged("a child was told something new")
 
-    def _step(self) -> _Told | _Said | None:
+    def _take_step(self) -> _ChildInput | _ChildOutput | None:
         assert self._steps is not None
         self._next += 1
         return self._steps[self._next - 1] if self._next <= len(self._steps) else None
 
 
-def _readings(units: int, values: Sequence[float]) -> wire.Frame:
+def _build_readings_frame(units: int, values: Sequence[float]) -> wire.Frame:
     return {"t": units, "v": list(values)}
 
 
-def _costly(faults: Sequence[Fault]) -> Fault | None:
-    return next((each for each in faults if each.verdict in _COSTLY[_role(each)]), None)
+def _find_costly_fault(faults: Sequence[Fault]) -> Fault | None:
+    return next((each for each in faults if each.verdict in _COSTLY_VERDICTS[_find_role(each)]), None)
 
 
-def _role(fault: Fault) -> str:
+def _find_role(fault: Fault) -> str:
     return "responder" if fault.who == "responder" else "robot"
 
 
-def _alike(one: Fault, other: Fault) -> bool:
+def _is_same_failure(one: Fault, other: Fault) -> bool:
     """Return whether two faults are equal. For the processor limit, the line is ignored because it varies."""
     if one.verdict is Verdict.CPU_LIMIT:
         one, other = (replace(each, line=None, file="") for each in (one, other))
     return one == other
 
 
-def _without_seed(frame: wire.Frame) -> wire.Frame:
+def _remove_seed(frame: wire.Frame) -> wire.Frame:
     return {name: value for name, value in frame.items() if name != "seed"}
 
 
-def _is_alone(frame: wire.Frame) -> bool:
+def _is_independent(frame: wire.Frame) -> bool:
     """Return whether the child gets data only from the worker: it is no notebook and has no agents."""
     return not frame.keys() & {"cells", "agents", "agent"}
 
@@ -300,10 +306,13 @@ def _may_use_chance(frame: Mapping[str, Any], folder: Path | None) -> bool:
     if folder is not None:
         modules |= {file.stem: file.read_text("utf-8", "replace") for file in folder.glob("*.py")}
     texts = [unicodedata.normalize("NFKC", text) for text in (frame["text"], *modules.values())]
-    return any(_LEADING_AWAY.search(text) or not _imports(text) <= _WITHOUT_CHANCE | modules.keys() for text in texts)
+    return any(
+        _UNSAFE_NAMES.search(text) or not _find_imports(text) <= _DETERMINISTIC_MODULES | modules.keys()
+        for text in texts
+    )
 
 
-def _imports(text: str) -> set[str]:
+def _find_imports(text: str) -> set[str]:
     """Return the imported module names, and any other words that follow ``import``."""
     found = (source or names for source, names in _IMPORT.findall(text))
     return {name.strip().partition(" ")[0].partition(".")[0] for names in found for name in names.split(",")}

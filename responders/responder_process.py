@@ -11,12 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 from responders import message_format, wire
 from responders.conversation import Answer
-from responders.faults import error_fault, refusal, returned_sentence, stopped, surprise
+from responders.faults import (
+    build_error_fault,
+    build_stop_fault,
+    describe_refusal,
+    describe_wrong_return,
+    to_child_data_error,
+)
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.running_child import ServedChild
 from responders.trial_spec import ResponderSpec
-from sim.chance import Stream
+from sim.random_streams import RandomStream
 from sim.recording import SECOND, Call, Fault, Verdict
 
 if TYPE_CHECKING:
@@ -25,12 +31,12 @@ if TYPE_CHECKING:
 _MOST_NOTES = 200
 #: Maximum number of recorded calls, and of characters in each of their parts.
 _MOST_CALLS, _MOST_SHOWN = 10_000, 200
-_FORGOT_RETURN = "A function returns nothing where it comes to its end, or to a bare return: return the answer."
-_MAKE_JSON = 'For an object return "JSON::" + json.dumps(the object).'
+_RETURN_HINT = "A function returns nothing where it comes to its end, or to a bare return: return the answer."
+_JSON_HINT = 'For an object return "JSON::" + json.dumps(the object).'
 
 
 @dataclass(frozen=True, slots=True)
-class Collected:
+class LoggedData:
     """Data and images that a robot has logged. A data entry is name, value, the program's time or None, and the time.
 
     Images are texts ``left 245,226,... 30``: side, RGBA numbers, tick, as the course's kit stores them.
@@ -80,38 +86,38 @@ class ResponderProcess:
         """Load the module. Return the fault if it cannot answer, otherwise None."""
         assert self._child is not None
         try:
-            self._child.send(self._beginning())
-            frame = self._until("ready")
+            self._child.send(self._build_first_frame())
+            frame = self._receive_until("ready")
         except ChildStopped as stop:
-            return self._stopped(stop, 0)
+            return self._convert_stop(stop, 0)
         except Exception as error:
-            return self._stopped(surprise(error), 0)
+            return self._convert_stop(to_child_data_error(error), 0)
         if frame["error"] is not None:
             self.close()
-            return error_fault(frame["error"], 0, self._who)
+            return build_error_fault(frame["error"], 0, self._who)
         return None
 
-    def _beginning(self) -> dict[str, Any]:
+    def _build_first_frame(self) -> dict[str, Any]:
         """Return the first frame for the child."""
         return {
             "name": self._spec.code.name,
             "text": self._spec.code.text,
-            "seed": Stream(self._seed, "responder").integer(0),
+            "seed": RandomStream(self._seed, "responder").integer(0),
             "function": self._spec.function,
-            **self._agent_names(),
-            **({"watch": True} if self._spec.ran is not None else {}),
+            **self._build_agents_entry(),
+            **({"watch": True} if self._spec.executed_statements is not None else {}),
         }
 
-    def _agent_names(self) -> dict[str, Any]:
+    def _build_agents_entry(self) -> dict[str, Any]:
         """Return the agent names for the first frame, or nothing if there are no agents."""
-        return {"agents": self._agents.others("responder")} if self._agents is not None else {}
+        return {"agents": self._agents.list_askable_agents("responder")} if self._agents is not None else {}
 
     @property
-    def alive(self) -> bool:
+    def is_alive(self) -> bool:
         """Return whether the child is running."""
         return self._child is not None
 
-    def answer(self, text: str, t: int, message: int, collected: Collected, sender: int | None = None) -> Answer:
+    def answer(self, text: str, t: int, message: int, collected: LoggedData, sender: int | None = None) -> Answer:
         """Return the responder's answer to ``text``.
 
         Args:
@@ -127,11 +133,11 @@ class ResponderProcess:
         try:
             frame = {"do": "message", "t": t, "text": text, "data": collected.data, "images": collected.images}
             self._child.send(frame if sender is None else {**frame, "sender": sender})
-            return self._answer(self._until("answer"), t)
+            return self._parse_answer(self._receive_until("answer"), t)
         except ChildStopped as stop:
-            return Answer(fault=self._stopped(stop, t))
+            return Answer(fault=self._convert_stop(stop, t))
         except Exception as error:
-            return Answer(fault=self._stopped(surprise(error), t))
+            return Answer(fault=self._convert_stop(to_child_data_error(error), t))
 
     def close(self) -> None:
         """Close the child, if there is one."""
@@ -139,44 +145,46 @@ class ResponderProcess:
             self._child.close()
             self._child = None
 
-    def _answer(self, frame: wire.Frame, t: int) -> Answer:
+    def _parse_answer(self, frame: wire.Frame, t: int) -> Answer:
         """Return the answer in a frame. A valid ``JSON::`` text also has an entry for the robot's queue."""
         said = frame["error"]["text"] if frame["kind"] == "error" else frame.get("text", "")
-        self._spend(said, "printed and answered")
+        self._charge_output(said, "printed and answered")
         hint = ""
         match frame["kind"]:
             case "text" if not said.startswith(message_format.JSON):
                 return Answer(said, self._slept)
             case "text":
                 try:
-                    entry = message_format.queue_entry(said)
+                    entry = message_format.format_queue_entry(said)
                 except ValueError as error:
                     sentence = f"the responder's answer begins with JSON:: but is not JSON: {error}"
-                    return Answer(said, self._slept, self._protocol_fault(t, sentence, _MAKE_JSON), note="malformed")
-                self._meter.keep(len(entry))
+                    return Answer(
+                        said, self._slept, self._build_protocol_fault(t, sentence, _JSON_HINT), note="malformed"
+                    )
+                self._meter.charge_bytes(len(entry))
                 return Answer(said, self._slept, entry=entry)
             case "error":
-                return Answer(fault=error_fault(frame["error"], t + self._slept, "responder"))
+                return Answer(fault=build_error_fault(frame["error"], t + self._slept, "responder"))
             case "long":
                 what = f"an answer of {frame['length']} characters; the most is about 60000"
             case _:
                 what = f"{frame['type'][:_MOST_SHOWN]} instead of a text; an answer has to be a str"
-                hint = _FORGOT_RETURN if frame["type"] == "NoneType" else _MAKE_JSON
-        return Answer(fault=self._protocol_fault(t, returned_sentence(what), hint))
+                hint = _RETURN_HINT if frame["type"] == "NoneType" else _JSON_HINT
+        return Answer(fault=self._build_protocol_fault(t, describe_wrong_return(what), hint))
 
-    def _protocol_fault(self, t: int, sentence: str, hint: str = "") -> Fault:
+    def _build_protocol_fault(self, t: int, sentence: str, hint: str = "") -> Fault:
         agent = "" if self._who == "responder" else self._who
         return Fault((t + self._slept) / SECOND, Verdict.PROTOCOL_ERROR, "responder", sentence, hint=hint, agent=agent)
 
-    def _until(self, last: str) -> wire.Frame:
+    def _receive_until(self, last: str) -> wire.Frame:
         assert self._child is not None
         while True:
             frame = self._child.receive(self._schema)
             if frame["do"] == last:
                 return frame
-            self._take(frame)
+            self._accept_frame(frame)
 
-    def _take(self, frame: wire.Frame) -> None:
+    def _accept_frame(self, frame: wire.Frame) -> None:
         """Process a frame that needs no reply.
 
         Raises:
@@ -186,10 +194,10 @@ class ResponderProcess:
             case "print":
                 self._print(frame["text"])
             case "refused":
-                self._note(refusal(self._who, frame))
+                self._add_note(describe_refusal(self._who, frame))
             case "ran":
-                if self._spec.ran is not None and self._watches:
-                    self._spec.ran.add(frame)
+                if self._spec.executed_statements is not None and self._watches:
+                    self._spec.executed_statements.add(frame)
             case "sleep":
                 self._slept += frame["units"]
             case "call":
@@ -205,19 +213,19 @@ class ResponderProcess:
             case kind:
                 raise ChildStopped(Verdict.SANDBOX_VIOLATION, f"the {self._who}'s process sent a stray {kind} frame")
 
-    def _note(self, sentence: str) -> None:
+    def _add_note(self, sentence: str) -> None:
         if len(self.notes) < _MOST_NOTES and sentence not in self.notes:
             self.notes.append(sentence)
 
     def _print(self, text: str) -> None:
-        self._spend(text, "printed")
+        self._charge_output(text, "printed")
         self.output.append(text)
 
-    def _spend(self, text: str, did: str) -> None:
+    def _charge_output(self, text: str, did: str) -> None:
         self._output_left -= len(text.encode("utf-8", "replace")) + 1
         if self._output_left < 0:
             raise ChildStopped(Verdict.OUTPUT_LIMIT, f"the {self._who} {did} more than {self._spec.output_bytes} bytes")
 
-    def _stopped(self, stop: ChildStopped, t: int) -> Fault:
+    def _convert_stop(self, stop: ChildStopped, t: int) -> Fault:
         self.close()
-        return stopped(stop, self._who, t)
+        return build_stop_fault(stop, self._who, t)

@@ -15,11 +15,11 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
-from responders.code import Code
-from responders.function_calls import Called, FunctionCall, Returned, call_functions
+from responders.function_calls import CallResult, CallResults, FunctionCall, call_functions
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.source_file import SourceFile
 from sim.recording import Fault, Verdict
 
 #: Maximum number of pixels per frame. A larger image is sent alone.
@@ -35,7 +35,7 @@ class TrainingSpec:
     The groups of ``unseen`` are predicted in order, so the output for one group depends on no later group.
     """
 
-    code: Code
+    code: SourceFile
     files: Mapping[str, bytes]
     function: str
     images: Images
@@ -47,7 +47,7 @@ class TrainingSpec:
 
 
 @dataclass(frozen=True, slots=True)
-class Named:
+class Predictions:
     """The predicted label of each image of a group, or None where the model gave no valid one.
 
     ``fault``, ``output`` and ``notes`` are those up to the end of the group.
@@ -59,7 +59,7 @@ class Named:
     notes: tuple[str, ...] = ()
 
 
-def train_and_name(spec: TrainingSpec, sandboxes: Sandboxes, meter: JobMeter) -> tuple[Named, ...]:
+def train_and_predict(spec: TrainingSpec, sandboxes: Sandboxes, meter: JobMeter) -> tuple[Predictions, ...]:
     """Train the student's model in one child and return its predictions for each group of images.
 
     The limits apply to loading, training and prediction together.
@@ -67,14 +67,18 @@ def train_and_name(spec: TrainingSpec, sandboxes: Sandboxes, meter: JobMeter) ->
     Raises:
         HostError: If the machine fails, not the student's code.
     """
-    groups = [_chunks(images) for images in spec.unseen]
+    groups = [_split_images(images) for images in spec.unseen]
     calls = [
         FunctionCall("robomark_train", (spec.function,)),
-        *(FunctionCall("robomark_predict", (_encoded(chunk), chunk.shape[1])) for group in groups for chunk in group),
+        *(
+            FunctionCall("robomark_predict", (_encode_images(chunk), chunk.shape[1]))
+            for group in groups
+            for chunk in group
+        ),
     ]
     called = call_functions(
-        replace(spec.code, text=f"{spec.code.text}\n\n\n{_harness()}"),
-        {**spec.files, "train.npz": _packed(spec.images, spec.labels)},
+        replace(spec.code, text=f"{spec.code.text}\n\n\n{_load_harness()}"),
+        {**spec.files, "train.npz": _pack_training_file(spec.images, spec.labels)},
         calls,
         spec.limits,
         spec.output_bytes,
@@ -82,61 +86,63 @@ def train_and_name(spec: TrainingSpec, sandboxes: Sandboxes, meter: JobMeter) ->
         spec.seed,
         meter,
     )
-    return tuple(_named(called, groups, spec))
+    return tuple(_collect_predictions(called, groups, spec))
 
 
-def _named(called: Called, groups: Sequence[Sequence[Images]], spec: TrainingSpec) -> Iterator[Named]:
+def _collect_predictions(
+    called: CallResults, groups: Sequence[Sequence[Images]], spec: TrainingSpec
+) -> Iterator[Predictions]:
     """Yield the predictions of each group, validated because they are untrusted."""
     fault = called.fault or (called.returned[0].fault if called.returned else None)
     trained, end = fault is None, 1
     for group in groups:
         names: list[str | None] = []
         for chunk, returned in zip(group, called.returned[end:], strict=False):
-            given = _names(returned, len(chunk)) if trained else None
+            given = _parse_labels(returned, len(chunk)) if trained else None
             if given is None and fault is None:
-                fault = returned.fault or _bad_answer()
+                fault = returned.fault or _build_answer_fault()
             names += given or [None] * len(chunk)
         end += len(group)
         missing = sum(map(len, group)) - len(names)
         output = "\n".join(itertools.chain.from_iterable(called.printed[: end + 1]))
         notes = called.notes[: end + 1][-1]
-        yield Named((*names, *[None] * missing), _in_their_file(fault, spec), output, notes)
+        yield Predictions((*names, *[None] * missing), _drop_harness_line(fault, spec), output, notes)
 
 
-def _names(returned: Returned, count: int) -> list[str | None] | None:
+def _parse_labels(returned: CallResult, count: int) -> list[str | None] | None:
     value = returned.value
     if isinstance(value, list) and len(value) == count and all(isinstance(name, str) for name in value):
         return list(value)
     return None
 
 
-def _bad_answer() -> Fault:
+def _build_answer_fault() -> Fault:
     return Fault(
         0.0, Verdict.RESPONDER_ERROR, "responder", "the model's predict gave something that is no list of names"
     )
 
 
-def _in_their_file(fault: Fault | None, spec: TrainingSpec) -> Fault | None:
+def _drop_harness_line(fault: Fault | None, spec: TrainingSpec) -> Fault | None:
     """Return the fault without a line number that is beyond the end of the student's own text."""
     if fault is None or fault.line is None or fault.line <= spec.code.text.count("\n") + 1:
         return fault
     return replace(fault, line=None)
 
 
-def _chunks(images: Images) -> list[Images]:
+def _split_images(images: Images) -> list[Images]:
     each = max(1, _PIXELS_A_CALL // max(1, images.shape[1] * images.shape[2])) if len(images) else 1
     return [images[start : start + each] for start in range(0, len(images), each)]
 
 
-def _encoded(images: Images) -> str:
+def _encode_images(images: Images) -> str:
     return base64.b64encode(np.ascontiguousarray(images).tobytes()).decode("ascii")
 
 
-def _packed(images: Images, labels: Sequence[str]) -> bytes:
+def _pack_training_file(images: Images, labels: Sequence[str]) -> bytes:
     stream = io.BytesIO()
     np.savez(stream, images=images, labels=np.asarray(list(labels), dtype=np.str_))
     return stream.getvalue()
 
 
-def _harness() -> str:
+def _load_harness() -> str:
     return resources.files("responders").joinpath("training_harness.py").read_text("utf-8")

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from responders import message_format
-from responders.agents import Position, agents_beside
+from responders.agents import AgentCounts, running_agents
 from responders.bridge import Bridge
 from responders.logger_file import read_log
 from responders.responder_process import ResponderProcess
@@ -34,7 +34,10 @@ def run_trial(
     Raises:
         HostError: If the machine fails, not the student's code.
     """
-    with sandboxes.private_folder() as folder, agents_beside(spec.agents, spec.child_seed, sandboxes, meter) as agents:
+    with (
+        sandboxes.open_private_folder() as folder,
+        running_agents(spec.agents, spec.child_seed, sandboxes, meter) as agents,
+    ):
         responder = None
         if spec.responder is not None:
             responder = ResponderProcess(spec.responder, sandboxes, folder, spec.child_seed, meter, agents)
@@ -57,7 +60,7 @@ def run_trial(
     of_agents = agents.faults if agents is not None else ()
     faults = [each for each in (*of_agents, unloadable, *bridge.conversation.faults, fault, unread) if each is not None]
     faults.sort(key=lambda each: each.t)
-    recording = recording_of(spec, bridge, tuple(faults), program.sandbox)
+    recording = build_recording(spec, bridge, tuple(faults), program.sandbox)
     if responder is None:
         return recording
     recording = replace(
@@ -67,13 +70,13 @@ def run_trial(
         responder_log=log,
         notes=(*recording.notes, *responder.notes, *(agents.notes if agents is not None else ()))[:MOST_NOTES],
     )
-    return recording if agents is None else agents.add_outputs(agents.add_talk(recording, Position()))
+    return recording if agents is None else agents.add_outputs(agents.add_messages_and_calls(recording, AgentCounts()))
 
 
-def recording_of(spec: TrialSpec, bridge: Bridge, faults: tuple[Fault, ...], sandbox: str) -> Recording:
+def build_recording(spec: TrialSpec, bridge: Bridge, faults: tuple[Fault, ...], sandbox: str) -> Recording:
     """Return the recording of a bridge that has finished, without the data from the responder's process."""
     world = bridge.world
-    data = (message_format.datum(line.text, line.t) for line in bridge.printed)
+    data = (message_format.parse_datum(line.text, line.t) for line in bridge.printed)
     return Recording(
         background=spec.floor.name,
         start=spec.pose,

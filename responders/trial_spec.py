@@ -13,24 +13,24 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from responders.channel import Channel
-from responders.code import Code
 from responders.libraries_needed import may_need_libraries
 from responders.sandbox.inside.libraries import LIBRARIES
 from responders.sandbox.running_child import ChildLimits
-from responders.sandbox.zygote import Role
-from sim.chance import Stream
+from responders.sandbox.zygote import ChildRole
+from responders.source_file import SourceFile
 from sim.floors import Floor
 from sim.motion import COURSE_PHYSICS, Physics
+from sim.random_streams import RandomStream
 from sim.recording import TICK, Pose
 from sim.robot import Robot
 from sim.world import Noise
 
-_A_LIBRARY = re.compile(rf"\b(?:{'|'.join(LIBRARIES)})\b")
+_LIBRARY_NAME = re.compile(rf"\b(?:{'|'.join(LIBRARIES)})\b")
 _MOST_STATEMENTS = 100_000
 Preamble = Literal["none", "imports", "preloaded"]
 
 
-class RanStatements:
+class ExecutedStatements:
     """The executed statements that a part's processes report: file (empty for the part itself), line, column."""
 
     def __init__(self) -> None:
@@ -49,36 +49,36 @@ class ProgramSpec:
     ``ran`` collects the executed statements, if given.
     """
 
-    code: Code
+    code: SourceFile
     preamble: Preamble
     limits: ChildLimits
     output_bytes: int
     modules: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    ran: RanStatements | None = None
+    executed_statements: ExecutedStatements | None = None
 
     @property
-    def role(self) -> Role:
+    def role(self) -> ChildRole:
         """Return the role of the process. It has libraries loaded if an import line names one."""
         texts = (self.code.text, *self.modules.values())
         lines = (line for text in texts for line in text.splitlines() if "import" in line)
-        return "robot with libraries" if any(map(_A_LIBRARY.search, lines)) else "robot"
+        return "robot with libraries" if any(map(_LIBRARY_NAME.search, lines)) else "robot"
 
 
 @dataclass(frozen=True, slots=True)
 class ResponderSpec:
     """A responder: its code and the files in its folder. ``ran`` as in ``ProgramSpec``."""
 
-    code: Code
+    code: SourceFile
     files: Mapping[str, bytes]
     limits: ChildLimits
     output_bytes: int
     function: str | None = None  # name of the responder function; None lets the module choose
-    ran: RanStatements | None = None
+    executed_statements: ExecutedStatements | None = None
 
     @property
-    def role(self) -> Role:
+    def role(self) -> ChildRole:
         """Return the role of the process. It has libraries loaded unless the responder certainly needs none."""
-        withheld = any(name.partition(".")[0] not in sys.stdlib_module_names for name in self.limits.without)
+        withheld = any(name.partition(".")[0] not in sys.stdlib_module_names for name in self.limits.excluded_modules)
         needed = withheld or may_need_libraries(self.code.text, self.files)
         return "responder with libraries" if needed else "responder"
 
@@ -129,15 +129,15 @@ class TrialSpec:
     partner: PartnerSpec | None = None
     number: int = 1  # the robot's number, as its program sees it
 
-    def of_partner(self, partner: PartnerSpec) -> TrialSpec:
+    def build_partner_spec(self, partner: PartnerSpec) -> TrialSpec:
         """Return the trial as the second robot sees it, with its own seeds."""
         return replace(
             self,
             program=partner.program,
             pose=partner.pose,
             pen_down=partner.pen_down,
-            seed=Stream(self.seed, "second robot").integer(0),
-            child_seed=Stream(self.seed if partner.given else self.child_seed, "second robot").integer(1),
+            seed=RandomStream(self.seed, "second robot").integer(0),
+            child_seed=RandomStream(self.seed if partner.given else self.child_seed, "second robot").integer(1),
             partner=None,
             number=2,
         )

@@ -16,7 +16,7 @@ from typing import Any
 Frame = dict[str, Any]
 
 #: Maximum line length, bytes.
-MOST = 65536
+MAX_FRAME_BYTES = 65536
 
 
 class WireError(Exception):
@@ -29,60 +29,60 @@ Check = Callable[[object], bool]
 LARGEST = sys.float_info.max
 
 
-def _text(value: object) -> bool:
+def _is_text(value: object) -> bool:
     return isinstance(value, str)
 
 
-def _whole(low: int, high: int) -> Check:
+def _allow_range(low: int, high: int) -> Check:
     return lambda value: type(value) is int and low <= value <= high
 
 
-def _flag(value: object) -> bool:
+def _is_flag(value: object) -> bool:
     return type(value) is bool
 
 
-def _number(value: object) -> bool:
+def _is_number(value: object) -> bool:
     # A very large int is finite but doesn't fit a float.
     return type(value) in (int, float) and -LARGEST <= value <= LARGEST  # type: ignore[operator]
 
 
-def _packed_alone(_: object) -> bool:
+def _reject_unpacked(_: object) -> bool:
     """Reject the field in JSON lines. Only packets may contain this action."""
     return False
 
 
-def _one_of(*values: object) -> Check:
+def _allow_values(*values: object) -> Check:
     return lambda value: isinstance(value, str) and value in values
 
 
-def _or_none(check: Check) -> Check:
+def _allow_none(check: Check) -> Check:
     return lambda value: value is None or check(value)
 
 
-def _error(value: object) -> bool:
+def _is_error(value: object) -> bool:
     return (
         isinstance(value, dict)
         and value.keys() - {"hint"} == {"type", "text", "line", "file"}
         and isinstance(value["type"], str)
         and isinstance(value["text"], str)
-        and _line(value["line"])
-        and _file(value["file"])
+        and _is_line(value["line"])
+        and _is_file(value["file"])
         and isinstance(value.get("hint", ""), str)
     )
 
 
-def _module_file(value: object) -> bool:
+def _is_module_file(value: object) -> bool:
     return isinstance(value, str) and value.endswith(".py") and value[:-3].isidentifier() and len(value) <= 200
 
 
-_line = _or_none(_whole(0, 10**7))
-_file = _or_none(_module_file)
+_is_line = _allow_none(_allow_range(0, 10**7))
+_is_file = _allow_none(_is_module_file)
 #: A place in the student's files: a line, and the file if it isn't the main one.
-_PLACE: Mapping[str, Check] = MappingProxyType({"line": _line, "file": _file})
-_port = _one_of("outB", "outC")
+_PLACE: Mapping[str, Check] = MappingProxyType({"line": _is_line, "file": _is_file})
+_is_port = _allow_values("outB", "outC")
 #: Longest time that a program can request, thirds of a microsecond.
-MOST_UNITS = 10**15
-_units = _whole(0, MOST_UNITS)
+MAX_UNITS = 10**15
+_is_duration = _allow_range(0, MAX_UNITS)
 
 Schema = Mapping[str, tuple[Mapping[str, Check], Mapping[str, Check]]]
 
@@ -91,13 +91,13 @@ SANDBOX: Schema = MappingProxyType(
     {
         "sandbox": (
             {
-                "landlock": _whole(0, 99),
-                "seccomp": _flag,
-                "own_user": _flag,
-                "fixed_addresses": _flag,
-                "without_doorkeeper": _or_none(_text),
-                "policy": _text,
-                "missing": _or_none(_text),
+                "landlock": _allow_range(0, 99),
+                "seccomp": _is_flag,
+                "own_user": _is_flag,
+                "fixed_addresses": _is_flag,
+                "without_doorkeeper": _allow_none(_is_text),
+                "policy": _is_text,
+                "missing": _allow_none(_is_text),
             },
             {},
         )
@@ -108,16 +108,16 @@ SANDBOX: Schema = MappingProxyType(
 BATTERY: Schema = MappingProxyType(
     {
         "battery": (
-            {"version": _text, "tried": _whole(0, 10_000), "through": lambda value: isinstance(value, list)},
+            {"version": _is_text, "tried": _allow_range(0, 10_000), "through": lambda value: isinstance(value, list)},
             {},
         )
     }
 )
 
-_REFUSED: tuple[Mapping[str, Check], Mapping[str, Check]] = ({"what": _text, **_PLACE}, {})
+_REFUSED: tuple[Mapping[str, Check], Mapping[str, Check]] = ({"what": _is_text, **_PLACE}, {})
 #: First execution of a student's statement.
 _RAN: tuple[Mapping[str, Check], Mapping[str, Check]] = (
-    {"line": _whole(0, 10**7), "file": _file, "column": _whole(0, 10**7)},
+    {"line": _allow_range(0, 10**7), "file": _is_file, "column": _allow_range(0, 10**7)},
     {},
 )
 #: Last frame of a child without libraries that has imported one.
@@ -126,23 +126,23 @@ _LIBRARIES: tuple[Mapping[str, Check], Mapping[str, Check]] = ({}, {})
 #: Frames of a robot program's process: for each ``do``, the required and the optional fields.
 ROBOT: Schema = MappingProxyType(
     {
-        "acts": ({"acts": _packed_alone}, {}),
+        "acts": ({"acts": _reject_unpacked}, {}),
         "refused": _REFUSED,
         "ran": _RAN,
         "libraries": _LIBRARIES,
-        "print": ({"text": _text}, {}),
-        "say": ({"text": _text}, {}),
-        "polarity": ({"port": _port, "polarity": _text}, {}),
-        "motor_state": ({"port": _port}, {}),
-        "paid_motor": ({"port": _port}, {}),
+        "print": ({"text": _is_text}, {}),
+        "say": ({"text": _is_text}, {}),
+        "polarity": ({"port": _is_port, "polarity": _is_text}, {}),
+        "motor_state": ({"port": _is_port}, {}),
+        "paid_motor": ({"port": _is_port}, {}),
         "until": (
-            {"port": _port, "state": _one_of("running", "still"), "timeout": _or_none(_units)},
+            {"port": _is_port, "state": _allow_values("running", "still"), "timeout": _allow_none(_is_duration)},
             {},
         ),
         "until_said": ({}, {}),
         "stuck": (_PLACE, {}),
         "busy": (_PLACE, {}),
-        "end": ({"error": _or_none(_error)}, {}),
+        "end": ({"error": _allow_none(_is_error)}, {}),
     }
 )
 
@@ -152,23 +152,23 @@ RESPONDER: Schema = MappingProxyType(
         "refused": _REFUSED,
         "ran": _RAN,
         "libraries": _LIBRARIES,
-        "ready": ({"error": _or_none(_error)}, {}),
-        "print": ({"text": _text}, {}),
-        "sleep": ({"units": _units}, {}),
+        "ready": ({"error": _allow_none(_is_error)}, {}),
+        "print": ({"text": _is_text}, {}),
+        "sleep": ({"units": _is_duration}, {}),
         "busy": (_PLACE, {}),
         "call": (
             {
-                "depth": _whole(0, 1000),
-                "caller": _text,
-                "callee": _text,
-                "argument": _text,
-                "result": _text,
+                "depth": _allow_range(0, 1000),
+                "caller": _is_text,
+                "callee": _is_text,
+                "argument": _is_text,
+                "result": _is_text,
             },
             {},
         ),
         "answer": (
-            {"kind": _one_of("text", "error", "other", "long")},
-            {"text": _text, "error": _error, "type": _text, "length": _whole(0, 10**12)},
+            {"kind": _allow_values("text", "error", "other", "long")},
+            {"text": _is_text, "error": _is_error, "type": _is_text, "length": _allow_range(0, 10**12)},
         ),
     }
 )
@@ -177,21 +177,21 @@ RESPONDER: Schema = MappingProxyType(
 NOTEBOOK: Schema = MappingProxyType(
     {
         **RESPONDER,
-        "cell": ({"place": _whole(0, 10**5), "answers": _flag}, {}),
-        "raised": ({"error": _error}, {}),
-        "note": ({"text": _text, **_PLACE}, {}),
+        "cell": ({"place": _allow_range(0, 10**5), "answers": _is_flag}, {}),
+        "raised": ({"error": _is_error}, {}),
+        "note": ({"text": _is_text, **_PLACE}, {}),
         "magic": (
             {
-                "name": _one_of("sim_magic", "sim_magic_imports", "sim_magic_preloaded"),
-                "arguments": _text,
-                "body": _or_none(_text),
-                "line": _line,
-                "missing": _or_none(_text),
+                "name": _allow_values("sim_magic", "sim_magic_imports", "sim_magic_preloaded"),
+                "arguments": _is_text,
+                "body": _allow_none(_is_text),
+                "line": _is_line,
+                "missing": _allow_none(_is_text),
             },
             {},
         ),
         "state": ({}, {}),
-        "executed": ({"missing": _or_none(_text)}, {}),
+        "executed": ({"missing": _allow_none(_is_text)}, {}),
     }
 )
 
@@ -200,13 +200,16 @@ CALLS: Schema = MappingProxyType(
     {
         **RESPONDER,
         "returned": (
-            {"kind": _one_of("value", "missing", "error", "other", "long")},
-            {"text": _text, "error": _error, "type": _text, "length": _whole(0, 10**12)},
+            {"kind": _allow_values("value", "missing", "error", "other", "long")},
+            {"text": _is_text, "error": _is_error, "type": _is_text, "length": _allow_range(0, 10**12)},
         ),
     }
 )
 
-_ASK: tuple[Mapping[str, Check], Mapping[str, Check]] = ({"agent": _text, "arguments": _text, "named": _text}, {})
+_ASK: tuple[Mapping[str, Check], Mapping[str, Check]] = (
+    {"agent": _is_text, "arguments": _is_text, "named": _is_text},
+    {},
+)
 
 #: Frames of a responder's process with agents, of a notebook's with agents, and of an agent's.
 RESPONDER_WITH_AGENTS: Schema = MappingProxyType({**RESPONDER, "ask": _ASK})
@@ -215,7 +218,7 @@ AGENT: Schema = MappingProxyType({**CALLS, "ask": _ASK})
 
 #: Frames that are not charged to the meter. They hold only numbers and schema words, or are a child's last frame, so
 #: nothing of their text is stored. Honest programs send thousands of them.
-NOTHING_KEPT = frozenset(
+UNCHARGED_FRAMES = frozenset(
     {
         "polarity",
         "motor_state",
@@ -232,30 +235,30 @@ NOTHING_KEPT = frozenset(
 )
 
 #: The required field of each kind of answer.
-_ANSWER = {"text": "text", "error": "error", "other": "type", "long": "length"}
+_ANSWER_FIELDS = {"text": "text", "error": "error", "other": "type", "long": "length"}
 
 
-def _no_constant(name: str) -> None:
+def _reject_constant(name: str) -> None:
     raise WireError(f"{name} is not a JSON number")
 
 
-def _no_duplicates(pairs: list[tuple[str, Any]]) -> Frame:
+def _reject_duplicates(pairs: list[tuple[str, Any]]) -> Frame:
     frame = dict(pairs)
     if len(frame) != len(pairs):
         raise WireError("a key appears twice")
     return frame
 
 
-_decode = json.JSONDecoder(parse_constant=_no_constant, object_pairs_hook=_no_duplicates).decode
+_decode = json.JSONDecoder(parse_constant=_reject_constant, object_pairs_hook=_reject_duplicates).decode
 
 
 _SURROGATE = re.compile(rb"\\u[dD][89a-fA-F]")
 #: Start of every line. It can't occur elsewhere in the line, because inner quotation marks are escaped.
-BEGINNING = b'{"n":'
-_NUMBER = re.compile(re.escape(BEGINNING) + rb"(0|[1-9][0-9]{0,11}),")
+LINE_START = b'{"n":'
+_NUMBER = re.compile(re.escape(LINE_START) + rb"(0|[1-9][0-9]{0,11}),")
 
 
-def unnumbered(line: bytes) -> tuple[int, bytes]:
+def split_number(line: bytes) -> tuple[int, bytes]:
     """Return the frame number and the rest of a line.
 
     Frames are numbered from 0 in each direction, so lost, repeated or inserted frames are detected.
@@ -269,14 +272,14 @@ def unnumbered(line: bytes) -> tuple[int, bytes]:
     return int(number[1]), b"{" + line[number.end() :]
 
 
-def parse(line: bytes, schema: Schema) -> Frame:
+def parse_frame(line: bytes, schema: Schema) -> Frame:
     """Return a validated frame of ``schema`` from a line without its number.
 
     Raises:
         WireError: If the line is invalid.
     """
-    if len(line) > MOST:
-        raise WireError(f"a frame of more than {MOST} bytes")
+    if len(line) > MAX_FRAME_BYTES:
+        raise WireError(f"a frame of more than {MAX_FRAME_BYTES} bytes")
     try:
         frame = _decode(line.decode("utf-8"))
     except WireError:
@@ -298,26 +301,26 @@ def parse(line: bytes, schema: Schema) -> Frame:
                 continue
             if name not in optional or not optional[name](value):
                 raise WireError(f"a {frame['do']} frame with a wrong {name[:40]!r}")
-    if frame["do"] == "answer" and _ANSWER[frame["kind"]] not in frame:
-        raise WireError(f"an answer without its {_ANSWER[frame['kind']]}")
-    return _encodable(frame) if _SURROGATE.search(line) else frame
+    if frame["do"] == "answer" and _ANSWER_FIELDS[frame["kind"]] not in frame:
+        raise WireError(f"an answer without its {_ANSWER_FIELDS[frame['kind']]}")
+    return _replace_surrogates(frame) if _SURROGATE.search(line) else frame
 
 
-def _encodable(value: Any) -> Any:
+def _replace_surrogates(value: Any) -> Any:
     """Return the value with lone surrogates replaced, which files and databases reject."""
     if isinstance(value, str):
         return value.encode("utf-8", "replace").decode("utf-8")
     if isinstance(value, dict):
-        return {name: _encodable(each) for name, each in value.items()}
+        return {name: _replace_surrogates(each) for name, each in value.items()}
     if isinstance(value, list):
-        return [_encodable(each) for each in value]
+        return [_replace_surrogates(each) for each in value]
     return value
 
 
 _encode = json.JSONEncoder(separators=(",", ":")).encode
 
 
-def encode(frame: Mapping[str, Any], number: int, arrived: Sequence[str] = ()) -> bytes:
+def encode_frame(frame: Mapping[str, Any], number: int, arrived: Sequence[str] = ()) -> bytes:
     """Return a frame for a child as one line with its number.
 
     ``arrived`` holds JSON texts, which are inserted into the list ``m`` unchanged.

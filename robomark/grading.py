@@ -12,7 +12,7 @@ from responders.sandbox.manager import Sandboxes
 from service.grading import grader
 from service.grading.grade import Grade
 from service.grading.trial_runner import TrialRunner
-from service.home_secret import secret_here
+from service.home_secret import load_home_secret
 from service.settings import load_settings
 from submissions.assignment.definition import Assignment
 from submissions.assignment.reader import find_assignment
@@ -51,7 +51,7 @@ class Grader(AbstractContextManager["Grader"]):
 
     def __init__(self) -> None:
         self._runner = TrialRunner(Sandboxes())
-        self._secret = secret_here(load_settings())
+        self._secret = load_home_secret(load_settings())
 
     def grade(self, submission: Submission, assignment: Assignment) -> Grade:
         """Grade a submission and return the grade, with the recording of every trial.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from service.grading.grade import Grade
-from service.language import language_called
+from service.language import load_language
 from submissions.submission import Submission
 
 
@@ -27,11 +27,13 @@ def render_report(
     Raises:
         UsageError: If the language is not available.
     """
-    from service.reports.html import report
-    from service.reports.plots.drawn import draw_all
-    from service.reports.view import staff_view, student_view
-    from submissions.diagram_cells import diagrams_in
+    from service.reports.html import render_report_page
+    from service.reports.plots.grade_plots import draw_all_plots
+    from service.reports.view import build_staff_view, build_student_view
+    from submissions.diagram_cells import read_diagrams
 
-    view = staff_view if reader == "staff" else student_view
-    cells = () if submission is None else diagrams_in(submission.notebook).cells
-    return report(view(grade, language=language_called(language)), draw_all(grade, cells=cells), submission)
+    view = build_staff_view if reader == "staff" else build_student_view
+    cells = () if submission is None else read_diagrams(submission.notebook).cells
+    return render_report_page(
+        view(grade, language=load_language(language)), draw_all_plots(grade, cells=cells), submission
+    )

@@ -9,8 +9,8 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-from service.grading import standalone
-from service.grading.standalone import RunOptions
+from service.grading import standalone_runs
+from service.grading.standalone_runs import RunOptions
 from service.grading.trial_runner import TrialRunner
 from service.reports.replay.document import FORMAT
 from sim.errors import UsageError
@@ -18,7 +18,7 @@ from sim.readers.json_text import read_json
 from sim.recording import Recording
 from submissions.magics import parse_flags
 
-_ISLAND = re.compile(rb'<script type="application/json">(.*?)</script>')
+_DATA_SCRIPT = re.compile(rb'<script type="application/json">(.*?)</script>')
 _MOST_BYTES = 256 << 20
 _MOST_VALUES = 20_000_000
 
@@ -45,10 +45,10 @@ def run_program(
         HostError: If this machine can't run student code safely, or fails.
     """
     options = RunOptions(flags=parse_flags("sim_magic", flags), seconds=seconds, seed=seed)
-    answering = None if responder is None else standalone.find_responder(responder, options.limits)
+    answering = None if responder is None else standalone_runs.load_responder(responder, options.limits)
     with TrialRunner() as runner:
-        program = standalone.read_program(Path(path))
-        return standalone.run_program(program, options, runner, responder=answering).recording
+        program = standalone_runs.read_program(Path(path))
+        return standalone_runs.run_program(program, options, runner, responder=answering).recording
 
 
 def read_replay(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -58,9 +58,9 @@ def read_replay(path: str | os.PathLike[str]) -> dict[str, Any]:
         UsageError: If the file can't be read, or is not a replay.
     """
     file = Path(path)
-    content = standalone.read_file(file)
+    content = standalone_runs.read_file(file)
     try:
-        data = read_json(content if file.suffix.lower() == ".json" else _unpacked(content), most_values=_MOST_VALUES)
+        data = read_json(content if file.suffix.lower() == ".json" else _unpack_page(content), most_values=_MOST_VALUES)
     except (ValueError, KeyError, TypeError, zlib.error) as error:
         raise UsageError(f"{file} is not a replay; expected a file that --replay or --report has written") from error
     if not isinstance(data, dict) or data.get("format") != FORMAT:
@@ -68,13 +68,13 @@ def read_replay(path: str | os.PathLike[str]) -> dict[str, Any]:
     return data
 
 
-def _unpacked(page: bytes) -> bytes:
+def _unpack_page(page: bytes) -> bytes:
     """Return the data of a page.
 
     Raises:
         ValueError: If the page has no data, or too much. Invalid data may also raise KeyError, TypeError or zlib.error.
     """
-    found = _ISLAND.search(page)
+    found = _DATA_SCRIPT.search(page)
     if found is None:
         raise ValueError("the page has no data")
     unpack = zlib.decompressobj()

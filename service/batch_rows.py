@@ -9,43 +9,43 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from service.grading.grade import Grade
-from service.reports.rows import TableRow, missing_words
+from service.reports.rows import TableRow, describe_missing_part
 from service.store.batches.batches import JobLine
 from service.store.engine import Store
 from service.store.grades import results
 from service.store.states import JobState
-from submissions.student_identity import Refusal, Student
+from submissions.student_identity import RejectedSubmission, Student
 
 
-def rows_of(
-    store: Store, lines: Sequence[JobLine], refusals: Sequence[Refusal] = (), *, published: bool = False
+def build_rows(
+    store: Store, lines: Sequence[JobLine], refusals: Sequence[RejectedSubmission] = (), *, published: bool = False
 ) -> list[TableRow[Grade]]:
     """Return a row for each submission and rejection; ``published`` hides unpublished grades."""
-    reasons = {line.id: why_not_shown(line, published=published) for line in lines}
+    reasons = {line.id: describe_missing_grade(line, published=published) for line in lines}
     with store.reading() as session:
-        grades = dict(results.load_each(session, [line.id for line in lines if not reasons[line.id]]))
-    rows = [refused_row(refusal) for refusal in refusals]
+        grades = dict(results.load_each_grade(session, [line.id for line in lines if not reasons[line.id]]))
+    rows = [build_rejected_row(refusal) for refusal in refusals]
     for line in lines:
         grade = grades.get(line.id)
         named = None if grade is None else replace(grade, student=line.student)
-        rows.append(row_of(line, named, reasons[line.id]))
+        rows.append(build_row(line, named, reasons[line.id]))
     return sorted(rows, key=lambda row: (row.who, row.assignment))
 
 
-def row_of(line: JobLine, grade: Grade | None, reason: str = "") -> TableRow[Grade]:
+def build_row(line: JobLine, grade: Grade | None, reason: str = "") -> TableRow[Grade]:
     """Return the row of one job."""
     student = Student(line.student, line.name, line.email)
-    reason = reason or missing_words(line.missing)
-    told, for_staff = _told(line), line.staff_only is not None
-    return TableRow(student, line.source, line.assignment, grade, reason, told=told, for_staff=for_staff)
+    reason = reason or describe_missing_part(line.missing)
+    told, for_staff = _describe_for_students(line), line.staff_only is not None
+    return TableRow(student, line.source, line.assignment, grade, reason, student_reason=told, for_staff=for_staff)
 
 
-def refused_row(refusal: Refusal) -> TableRow[Grade]:
+def build_rejected_row(refusal: RejectedSubmission) -> TableRow[Grade]:
     """Return the row of a rejected file."""
     return TableRow(refusal.student, refusal.source, refusal.assignment, reason=refusal.reason, refused=True)
 
 
-def why_not_shown(line: JobLine, *, published: bool = False) -> str:
+def describe_missing_grade(line: JobLine, *, published: bool = False) -> str:
     """Return the reason why a job has no visible grade; empty if it has one."""
     match line.state:
         case JobState.QUEUED:
@@ -61,7 +61,7 @@ def why_not_shown(line: JobLine, *, published: bool = False) -> str:
     return "not published" if published and line.published_at is None else ""
 
 
-def _told(line: JobLine) -> str:
+def _describe_for_students(line: JobLine) -> str:
     """Return the reason for students if it differs from the one for staff, who also see host faults."""
     match line.state:
         case JobState.DEAD:

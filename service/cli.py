@@ -9,9 +9,11 @@ import sys
 
 # With ``python -m`` or ``-c``, and with an empty entry in PYTHONPATH, the current folder is on the path. It may
 # contain submissions, so later imports must not find its files. Python itself has already imported ``os``.
-_own = __file__.rpartition("/service/")[0]
-_here = sys.modules["os"].getcwd()
-sys.path[:] = [folder for folder in sys.path if folder == _own or (folder.startswith("/") and folder != _here)]
+_project_folder = __file__.rpartition("/service/")[0]
+_current_folder = sys.modules["os"].getcwd()
+sys.path[:] = [
+    folder for folder in sys.path if folder == _project_folder or (folder.startswith("/") and folder != _current_folder)
+]
 
 import gc  # noqa: E402
 import os  # noqa: E402

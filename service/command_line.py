@@ -22,16 +22,16 @@ from typer.exceptions import TyperException
 from typer.main import get_command
 
 from service.command_table import COMMANDS, Command, CommandGroup
-from service.commands.shown import want_json, want_quiet
-from service.home import keep_private
-from service.reports.readable import readable
+from service.commands.output import set_json_output, set_quiet_output
+from service.home import keep_files_private
+from service.reports.display_text import to_display_text
 from sim.errors import Cancelled, RobomarkError, UsageError
 
 _CALLER, _OURS, _STOPPED = 2, 3, 130
 _CONTEXT = {"help_option_names": ["-h", "--help"]}
 
 
-class _ChecksLess:
+class _LazyValidation:
     """A command whose parameters Typer validates only if they do not have their final type yet.
 
     Typer imports pydantic to validate any parameter, even a missing flag, which takes longer than most simple commands.
@@ -41,12 +41,12 @@ class _ChecksLess:
         """Parse the arguments and return the remaining ones."""
         command: Any = super()
         for parameter in command.get_params(ctx):
-            parameter.process_value = _unless_needless(parameter)
+            parameter.process_value = _skip_needless_validation(parameter)
         left: list[str] = command.parse_args(ctx, args)
         return left
 
 
-def _unless_needless(parameter: Any) -> Callable[[Any, Any], Any]:
+def _skip_needless_validation(parameter: Any) -> Callable[[Any, Any], Any]:
     """Return a value processor that skips validation for values of the right type, and for missing optional ones."""
     checked = parameter.process_value
     may_be_missing = not (parameter.required or parameter.multiple or parameter.nargs == -1)
@@ -59,17 +59,17 @@ def _unless_needless(parameter: Any) -> Callable[[Any, Any], Any]:
     return taken
 
 
-class _Command(_ChecksLess, TyperCommand):
+class _Command(_LazyValidation, TyperCommand):
     """A command that is not a group."""
 
 
-class _Commands(_ChecksLess, TyperGroup):
+class _CommandGroup(_LazyValidation, TyperGroup):
     """A group of commands. Only the selected command is imported, because imports are slow."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
         """Return the name, the command, and the remaining arguments."""
         name, listed, rest = super().resolve_command(ctx, args)
-        if name is None or isinstance(listed, _Commands):
+        if name is None or isinstance(listed, _CommandGroup):
             return name, listed, rest
         command = load_command(*ctx.command_path.split()[1:], name)
         # Imported objects are permanent, so the collector skips them.
@@ -85,28 +85,30 @@ def load_command(*path: str) -> Any:
     for group in groups:
         listed = listed[group].commands
     command: Command = listed[name]
-    keep_private()
-    module, _, attribute = command.where.partition(":")
+    keep_files_private()
+    module, _, attribute = command.entry_point.partition(":")
     found = getattr(importlib.import_module(f"service.commands.{module}"), attribute)
     app = typer.Typer(context_settings=_CONTEXT, rich_markup_mode=None, add_completion=False)
     app.command(name, cls=_Command)(found)
     loaded = get_command(app)
     if not command.serves:
-        loaded.params += _shared_options()
+        loaded.params += _build_shared_options()
     return loaded
 
 
-def _shared_options() -> list[Any]:
+def _build_shared_options() -> list[Any]:
     """Return the options shared by all commands that print a result and exit."""
     app = typer.Typer(add_completion=False)
-    app.command()(_shared)
+    app.command()(_declare_shared_options)
     return get_command(app).params
 
 
-def _shared(
+def _declare_shared_options(
     _as_json: Annotated[
         bool,
-        typer.Option("--json", is_eager=True, callback=want_json, expose_value=False, help="Print one JSON document."),
+        typer.Option(
+            "--json", is_eager=True, callback=set_json_output, expose_value=False, help="Print one JSON document."
+        ),
     ] = False,
     _quietly: Annotated[
         bool,
@@ -114,7 +116,7 @@ def _shared(
             "-q",
             "--quiet",
             is_eager=True,
-            callback=want_quiet,
+            callback=set_quiet_output,
             expose_value=False,
             help="Print only results and errors.",
         ),
@@ -123,29 +125,29 @@ def _shared(
     """Stands for any command."""
 
 
-def _command_line() -> Any:
+def _build_command_line() -> Any:
     app = typer.Typer(
         name="robomark",
         help="Grades robot programs and responders of the RoboLab activities, without a screen.",
-        **_of_group(),
+        **_build_group_arguments(),
     )
-    app.callback()(_root)
-    _list(app, COMMANDS)
+    app.callback()(_declare_root_options)
+    _add_commands(app, COMMANDS)
     return get_command(app)
 
 
-def _of_group() -> dict[str, Any]:
-    return {"cls": _Commands, "no_args_is_help": True, "rich_markup_mode": None, "context_settings": _CONTEXT}
+def _build_group_arguments() -> dict[str, Any]:
+    return {"cls": _CommandGroup, "no_args_is_help": True, "rich_markup_mode": None, "context_settings": _CONTEXT}
 
 
-def _list(app: typer.Typer, commands: Mapping[str, Command | CommandGroup]) -> None:
+def _add_commands(app: typer.Typer, commands: Mapping[str, Command | CommandGroup]) -> None:
     for name, listed in commands.items():
         if isinstance(listed, Command):
-            app.command(name, short_help=listed.summary)(_nothing)
+            app.command(name, short_help=listed.summary)(_do_nothing)
         else:
-            group = typer.Typer(help=listed.summary, **_of_group())
-            group.callback()(_nothing)
-            _list(group, listed.commands)
+            group = typer.Typer(help=listed.summary, **_build_group_arguments())
+            group.callback()(_do_nothing)
+            _add_commands(group, listed.commands)
             app.add_typer(group, name=name, short_help=listed.summary)
 
 
@@ -158,7 +160,7 @@ def _print_version(asked: bool) -> None:
         raise typer.Exit
 
 
-def _root(
+def _declare_root_options(
     _version: Annotated[
         bool,
         typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and exit."),
@@ -167,7 +169,7 @@ def _root(
     """Options before the command."""
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     """Stands for a command that is only listed."""
 
 
@@ -178,41 +180,41 @@ def main() -> NoReturn:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         # Typer returns the status of its own exits: help, and a stop by Ctrl-C.
-        ending = _command_line()(prog_name="robomark", standalone_mode=False)
+        ending = _build_command_line()(prog_name="robomark", standalone_mode=False)
         sys.stdout.flush()
     except UsageError as error:
-        _end(str(error), _CALLER)
+        _exit_with_error(str(error), _CALLER)
     except Cancelled as error:
-        _end(str(error) or "stopped", _STOPPED)
+        _exit_with_error(str(error) or "stopped", _STOPPED)
     except RobomarkError as error:
-        _end(str(error), _OURS)
+        _exit_with_error(str(error), _OURS)
     except TyperException as error:
-        _end_misspelt(error)
+        _exit_for_usage_error(error)
     except (typer.Abort, KeyboardInterrupt):
-        _end("stopped", _STOPPED)
+        _exit_with_error("stopped", _STOPPED)
     except BrokenPipeError:
-        _end_unread()
+        _exit_silently()
     except SystemExit as ended:
         # Typer itself exits this way after shell completion, or if the output is closed.
         if not ended.code:
             raise
-        _end_unread()
+        _exit_silently()
     except OSError as error:
-        _debug()
+        _print_debug_traceback()
         where = "" if error.filename is None else f"{error.filename}: "
-        _end(f"the operating system reported an error: {where}{error.strerror or error}", _OURS)
+        _exit_with_error(f"the operating system reported an error: {where}{error.strerror or error}", _OURS)
     except Exception as error:
-        _debug()
+        _print_debug_traceback()
         database = sys.modules.get("sqlalchemy.exc")
         if database is not None and isinstance(error, database.DBAPIError):
-            _end(f"the database reported an error: {error.orig}; run robomark doctor", _OURS)
-        _end(
+            _exit_with_error(f"the database reported an error: {error.orig}; run robomark doctor", _OURS)
+        _exit_with_error(
             f"internal error in Robomark, not in your files: {type(error).__name__}: {error} "
             "(set ROBOMARK_DEBUG=1 to see where)",
             _OURS,
         )
     if ending == _STOPPED:
-        _end("stopped", _STOPPED)
+        _exit_with_error("stopped", _STOPPED)
     sys.exit(ending if isinstance(ending, int) else 0)
 
 
@@ -230,12 +232,12 @@ def _prepare_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-def _debug() -> None:
+def _print_debug_traceback() -> None:
     if os.environ.get("ROBOMARK_DEBUG"):
         traceback.print_exc()
 
 
-def _end_misspelt(error: TyperException) -> NoReturn:
+def _exit_for_usage_error(error: TyperException) -> NoReturn:
     """Exit for an invalid command line; a group without a command prints its help."""
     sentence = error.format_message().strip()
     if not sentence or "\n" in sentence:
@@ -244,15 +246,15 @@ def _end_misspelt(error: TyperException) -> NoReturn:
     context = getattr(error, "ctx", None)
     command = "robomark" if context is None else context.command_path
     sentence = sentence.replace("Value error, ", "").replace("'?", "'")
-    _end(f"{sentence[:1].lower()}{sentence[1:].rstrip('.')}; see {command} --help", _CALLER)
+    _exit_with_error(f"{sentence[:1].lower()}{sentence[1:].rstrip('.')}; see {command} --help", _CALLER)
 
 
-def _end_unread() -> NoReturn:
+def _exit_silently() -> NoReturn:
     """Exit silently after the reader closed our output, so that the interpreter does not write to it."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(_STOPPED)
 
 
-def _end(sentence: str, status: int) -> NoReturn:
-    print(f"robomark: {readable(sentence, 8000)}", file=sys.stderr)
+def _exit_with_error(sentence: str, status: int) -> NoReturn:
+    print(f"robomark: {to_display_text(sentence, 8000)}", file=sys.stderr)
     sys.exit(status)

@@ -17,7 +17,7 @@ class Command:
     ``serves`` marks those that run until stopped and log.
     """
 
-    where: str
+    entry_point: str
     summary: str
     serves: bool = False
 

@@ -29,26 +29,26 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from responders.sandbox import control_group
 from service.home import open_home
-from service.queue.alive import worker_lives
-from service.queue.broker import broker_answers, broker_client, broker_version, socket_path
+from service.queue.broker import create_broker_client, fetch_broker_version, is_broker_responding, prepare_socket_path
+from service.queue.live_workers import is_worker_running
 from service.settings import Settings
 from service.store.engine import Store, now, open_engine
-from service.store.installation import secret_of
+from service.store.installation import load_secret
 from service.store.models import Job
 from service.store.queue import workers
-from service.store.queue.metrics import collect_queue
-from service.store.revision import newest_revision, schema_state
+from service.store.queue.metrics import collect_queue_metrics
+from service.store.revision import find_newest_revision, load_schema_state
 from service.store.states import JobState
-from service.version import GRADER_VERSION, release_problem
+from service.version import GRADER_VERSION, describe_release_problem
 from sim.errors import RobomarkError
-from submissions.seeds import name_of
+from submissions.seeds import format_secret_name
 
 #: Packages of the distribution, next to its metadata.
 _PACKAGES = frozenset({"robomark", "sim", "models", "responders", "submissions", "service"})
 _FREE_BYTES = 1_000_000_000
 _OLDEST_BROKER = (6, 2)
-_APART_SECONDS = 5.0
-_LONG_SECONDS = 60.0
+_CLOCK_DIFFERENCE_SECONDS = 5.0
+_LONG_WAIT_SECONDS = 60.0
 _STUCK_SECONDS = 180.0
 _READY_SECONDS = 2.0
 #: SQLSTATE of PostgreSQL.
@@ -74,31 +74,31 @@ class Check:
     """
 
     what: str
-    here: Callable[[Settings], tuple[bool, str]]
-    of_service: Callable[[Settings, Store], tuple[bool, str]] | None = None
+    check_machine: Callable[[Settings], tuple[bool, str]]
+    check_service: Callable[[Settings, Store], tuple[bool, str]] | None = None
 
 
-def examine(settings: Settings) -> list[Finding]:
+def examine_machine(settings: Settings) -> list[Finding]:
     """Run all checks of this machine, in reading order."""
-    return [_found_here(check, settings) for check in CHECKS]
+    return [_run_machine_check(check, settings) for check in CHECKS]
 
 
 def examine_service(settings: Settings, store: Store) -> list[Finding]:
     """Run all checks of the service. ``settings.broker_url`` must be set."""
-    return [_found_of_service(check, settings, store) for check in CHECKS if check.of_service is not None]
+    return [_run_service_check(check, settings, store) for check in CHECKS if check.check_service is not None]
 
 
-def _found_here(check: Check, settings: Settings) -> Finding:
+def _run_machine_check(check: Check, settings: Settings) -> Finding:
     try:
-        return Finding(check.what, *check.here(settings))
+        return Finding(check.what, *check.check_machine(settings))
     except (RobomarkError, SQLAlchemyError, redis.RedisError, OSError, ImportError) as error:
         return Finding(check.what, False, " ".join(str(error).split()))
 
 
-def _found_of_service(check: Check, settings: Settings, store: Store) -> Finding:
-    assert check.of_service is not None
+def _run_service_check(check: Check, settings: Settings, store: Store) -> Finding:
+    assert check.check_service is not None
     try:
-        return Finding(check.what, *check.of_service(settings, store))
+        return Finding(check.what, *check.check_service(settings, store))
     except (RobomarkError, SQLAlchemyError, OSError) as error:
         return Finding(
             check.what, False, "the disk is full" if _is_disk_full(error) else "no connection to the database"
@@ -117,35 +117,35 @@ def _is_disk_full(error: Exception) -> bool:
     return is_full
 
 
-def _release(_settings: Settings) -> tuple[bool, str]:
-    return True, f"Robomark {GRADER_VERSION}, tables at revision {newest_revision()}"
+def _check_release(_settings: Settings) -> tuple[bool, str]:
+    return True, f"Robomark {GRADER_VERSION}, tables at revision {find_newest_revision()}"
 
 
-def _release_of_service(settings: Settings, _store: Store) -> tuple[bool, str]:
-    problem = release_problem()
-    return not problem, problem or _release(settings)[1]
+def _check_service_release(settings: Settings, _store: Store) -> tuple[bool, str]:
+    problem = describe_release_problem()
+    return not problem, problem or _check_release(settings)[1]
 
 
-def _python(_settings: Settings) -> tuple[bool, str]:
+def _check_python(_settings: Settings) -> tuple[bool, str]:
     fits = sys.version_info[:2] == (3, 11) and platform.machine() == "x86_64" and sys.platform == "linux"
     found = f"{platform.python_implementation()} {platform.python_version()} on {sys.platform} {platform.machine()}"
     return fits, found if fits else f"{found}; PyBullet needs CPython 3.11 on x86-64 Linux"
 
 
-def _files(_settings: Settings) -> tuple[bool, str]:
+def _check_installed_files(_settings: Settings) -> tuple[bool, str]:
     """Check that the installed files are unchanged: another distribution may contain a ``models/`` folder, too."""
     recorded = [file for file in metadata.files("robomark") or () if file.hash is not None]
     ours = [file for file in recorded if file.parts[0] in _PACKAGES]
     if not ours:
         return True, "an editable installation, so its files cannot be compared with a record"
-    changed = sorted(str(file) for file in ours if not _is_as_recorded(file))
+    changed = sorted(str(file) for file in ours if not _is_unchanged(file))
     if not changed:
         return True, f"{len(ours)} files are unchanged since installation"
     more = f" and {len(changed) - 1} more" if len(changed) > 1 else ""
     return False, f"{changed[0]}{more} changed since installation, perhaps by another package: install robomark again"
 
 
-def _is_as_recorded(file: metadata.PackagePath) -> bool:
+def _is_unchanged(file: metadata.PackagePath) -> bool:
     assert file.hash is not None
     try:
         data = Path(str(file.locate())).read_bytes()
@@ -155,7 +155,7 @@ def _is_as_recorded(file: metadata.PackagePath) -> bool:
     return digest.rstrip(b"=").decode() == file.hash.value
 
 
-def _simulator(_settings: Settings) -> tuple[bool, str]:
+def _check_simulator(_settings: Settings) -> tuple[bool, str]:
     import pybullet
 
     client = pybullet.connect(pybullet.DIRECT)
@@ -163,46 +163,46 @@ def _simulator(_settings: Settings) -> tuple[bool, str]:
     return client >= 0, f"PyBullet {metadata.version('pybullet')}"
 
 
-def _sandbox(_settings: Settings) -> tuple[bool, str]:
+def _check_sandbox(_settings: Settings) -> tuple[bool, str]:
     from responders.sandbox.manager import Sandboxes
 
     with Sandboxes() as sandboxes:
-        return True, f"layers around student code: {sandboxes.check()}"
+        return True, f"layers around student code: {sandboxes.check_isolation()}"
 
 
-def _sandbox_of_workers(_settings: Settings, store: Store) -> tuple[bool, str]:
-    standing = sorted({worker.sandbox for worker in _lately(store)})
+def _check_worker_sandboxes(_settings: Settings, store: Store) -> tuple[bool, str]:
+    standing = sorted({worker.sandbox for worker in _load_recent_workers(store)})
     return bool(standing), "; ".join(standing) or "no worker has reported its sandbox layers"
 
 
-def _control_groups(settings: Settings) -> tuple[bool, str]:
+def _check_control_groups(settings: Settings) -> tuple[bool, str]:
     """Check control groups, which are optional. A worker's unit may have them although this process does not."""
-    reason = control_group.why_not()
+    reason = control_group.check_available()
     told = (
         f"a worker started from here has {'one for each concurrent grading' if reason is None else f'none: {reason}'}"
     )
-    with _opened(settings) as store:
+    with _open_usable_store(settings) as store:
         if store is None:
             return True, told
-        lately = _lately(store)
+        lately = _load_recent_workers(store)
     if not lately:
         return True, told
     have = sum("control group" in worker.sandbox for worker in lately)
     return True, f"{told}; {have} of {len(lately)} workers seen recently have control groups"
 
 
-def _between_trials(_settings: Settings) -> tuple[bool, str]:
+def _check_trial_isolation(_settings: Settings) -> tuple[bool, str]:
     """Check the isolation between trials; without it, workers here do not grade hidden scenarios."""
     from responders.sandbox.manager import Sandboxes
 
     with Sandboxes() as sandboxes:
-        reason = sandboxes.remembers()
+        reason = sandboxes.check_data_leaks()
     if reason is None:
         return True, "no data remains between trials"
     return False, f"data can remain between trials, so hidden scenarios are not graded: {reason}"
 
 
-def _home(settings: Settings) -> tuple[bool, str]:
+def _check_home(settings: Settings) -> tuple[bool, str]:
     open_home(settings.home)
     if not os.access(settings.home, os.W_OK | os.X_OK):
         return False, f"{settings.home} cannot be written"
@@ -211,10 +211,10 @@ def _home(settings: Settings) -> tuple[bool, str]:
     return enough, f"{settings.home}, {free / 1e9:.1f} GB free" + ("" if enough else "; at least 1 GB is needed")
 
 
-def _database(settings: Settings) -> tuple[bool, str]:
+def _check_database(settings: Settings) -> tuple[bool, str]:
     engine = open_engine(settings.database)
     try:
-        state = schema_state(engine)
+        state = load_schema_state(engine)
     finally:
         engine.dispose()
     where = engine.url.render_as_string(hide_password=True)
@@ -225,20 +225,20 @@ def _database(settings: Settings) -> tuple[bool, str]:
     return True, f"{where}, tables at revision {state.revision}"
 
 
-def _tables(_settings: Settings, store: Store) -> tuple[bool, str]:
-    state = schema_state(store.engine)
+def _check_tables(_settings: Settings, store: Store) -> tuple[bool, str]:
+    state = load_schema_state(store.engine)
     if not state.is_usable:
         return False, f"its tables are {state.problem or 'missing'}"
     return True, f"connected, tables at revision {state.revision}"
 
 
-def _secret(settings: Settings) -> tuple[bool, str]:
+def _check_secret(settings: Settings) -> tuple[bool, str]:
     """Check that trials here have the same worlds as the newest grade."""
     whose = "the secret in the database" if settings.own_secret is None else "the secret in ROBOMARK_SECRET"
-    with _opened(settings) as store:
+    with _open_usable_store(settings) as store:
         if store is None:
             return True, f"{whose}; it is created with the tables" if settings.own_secret is None else whose
-        secret = secret_of(store)
+        secret = load_secret(store)
         with store.reading() as session:
             newest = session.scalar(
                 select(Job.secret_sha256)
@@ -248,15 +248,18 @@ def _secret(settings: Settings) -> tuple[bool, str]:
             )
     told = f"{whose}, hash {secret.name}"
     if newest not in (None, secret.sha256):
-        return False, f"{told}; the newest grade has {name_of(newest)}: every machine needs the same ROBOMARK_SECRET"
+        return (
+            False,
+            f"{told}; the newest grade has {format_secret_name(newest)}: every machine needs the same ROBOMARK_SECRET",
+        )
     return True, told
 
 
-def _broker(settings: Settings) -> tuple[bool, str]:
+def _check_broker(settings: Settings) -> tuple[bool, str]:
     if not settings.broker_url:
-        running = "runs" if broker_answers(settings) else "is started when needed"
-        return True, f"the bundled Valkey, which {running}, on {socket_path(settings)}"
-    client = broker_client(settings.broker_url, 3.0)
+        running = "runs" if is_broker_responding(settings) else "is started when needed"
+        return True, f"the bundled Valkey, which {running}, on {prepare_socket_path(settings)}"
+    client = create_broker_client(settings.broker_url, 3.0)
     try:
         version = str(client.info("server").get("redis_version", "0"))
         policy = str(client.info("memory").get("maxmemory_policy", ""))
@@ -270,58 +273,58 @@ def _broker(settings: Settings) -> tuple[bool, str]:
     return True, f"{where} is running, version {version}"
 
 
-def _broker_of_service(settings: Settings, _store: Store) -> tuple[bool, str]:
-    version = broker_version(settings.broker_url, _READY_SECONDS)
+def _check_service_broker(settings: Settings, _store: Store) -> tuple[bool, str]:
+    version = fetch_broker_version(settings.broker_url, _READY_SECONDS)
     return version is not None, f"running, version {version}" if version else "no connection"
 
 
-def _known_answer(settings: Settings) -> tuple[bool, str]:
+def _check_known_answer(settings: Settings) -> tuple[bool, str]:
     """Check that this machine passes the self-test and that all workers passed recently."""
     from service.grading.trial_runner import TrialRunner
     from service.queue import self_test as known_answers
 
     with TrialRunner() as runner:
-        actual = known_answers.ask(runner)
-    wrong = "" if actual is None else known_answers.difference(known_answers.known(), actual)
+        actual = known_answers.run_self_test(runner)
+    wrong = "" if actual is None else known_answers.describe_difference(known_answers.load_known_answer(), actual)
     if wrong:
         return False, f"this machine gives wrong grades: {wrong}"
     here = "stopped by a limit of this machine" if actual is None else "correct on this machine"
-    with _opened(settings) as store:
+    with _open_usable_store(settings) as store:
         if store is None:
             return True, here
         with store.reading() as session:
             lately = now(session) - timedelta(days=1)
-            shut_out = [found for found in workers.in_quarantine(session) if found.since > lately]
+            shut_out = [found for found in workers.list_quarantined_workers(session) if found.since > lately]
     if not shut_out:
         return True, here
     told = "; ".join(f"{found.worker} since {found.since:%Y-%m-%d %H:%M} UTC: {found.reason}" for found in shut_out)
     return False, f"{here}; in quarantine: {told}"
 
 
-def _clock(settings: Settings) -> tuple[bool, str]:
+def _check_clock(settings: Settings) -> tuple[bool, str]:
     """Compare the clocks. Leases use the database's clock, so a wrong clock here affects only logs."""
-    with _opened(settings) as store:
+    with _open_usable_store(settings) as store:
         if store is None:
             return True, "no other clock to compare with yet"
         if store.engine.dialect.name == "sqlite":
             return True, "this machine's, because the database is a local file"
         with store.reading() as session:
             apart = abs((now(session) - datetime.now(UTC)).total_seconds())
-    if apart > _APART_SECONDS:
+    if apart > _CLOCK_DIFFERENCE_SECONDS:
         return False, f"{apart:.0f} s different from the database's clock: times in this machine's logs are wrong"
     return True, "same as the database's clock"
 
 
-def _workers(settings: Settings) -> tuple[bool, str]:
+def _check_workers(settings: Settings) -> tuple[bool, str]:
     here = (
         "running on this machine"
-        if worker_lives(settings)
+        if is_worker_running(settings)
         else "not running on this machine; start it with robomark up"
     )
-    with _opened(settings) as store:
+    with _open_usable_store(settings) as store:
         if store is None:
             return True, here
-        lately = _lately(store)
+        lately = _load_recent_workers(store)
     if not lately:
         return True, here
     slots = sum(worker.concurrency for worker in lately)
@@ -331,8 +334,8 @@ def _workers(settings: Settings) -> tuple[bool, str]:
     return not problems, "; ".join([told, *problems])
 
 
-def _workers_of_service(_settings: Settings, store: Store) -> tuple[bool, str]:
-    lately = _lately(store)
+def _check_service_workers(_settings: Settings, store: Store) -> tuple[bool, str]:
+    lately = _load_recent_workers(store)
     if not lately:
         return False, "no worker was seen recently"
     fit = [worker for worker in lately if not worker.problem]
@@ -341,20 +344,20 @@ def _workers_of_service(_settings: Settings, store: Store) -> tuple[bool, str]:
     return bool(fit), "; ".join([told, *(f"{count} not ready: {problem}" for problem, count in problems.items())])
 
 
-def _queue(settings: Settings) -> tuple[bool, str]:
-    with _opened(settings) as store:
-        return (True, "empty") if store is None else _queue_of_service(settings, store)
+def _check_queue(settings: Settings) -> tuple[bool, str]:
+    with _open_usable_store(settings) as store:
+        return (True, "empty") if store is None else _check_service_queue(settings, store)
 
 
-def _queue_of_service(_settings: Settings, store: Store) -> tuple[bool, str]:
+def _check_service_queue(_settings: Settings, store: Store) -> tuple[bool, str]:
     with store.reading() as session:
-        metrics = collect_queue(session)
+        metrics = collect_queue_metrics(session)
     waiting = sum(metrics.claimable.values())
     oldest = max(metrics.oldest_seconds.values(), default=0.0)
     dead = metrics.count(JobState.DEAD)
     told = f"{waiting} queued" + (f", the oldest for {timedelta(seconds=round(oldest))}" if waiting else "")
     told += f"; {dead} failed: see robomark batch list and robomark batch retry" if dead else ""
-    if waiting and oldest > _LONG_SECONDS and not any(seen.lately for seen in metrics.workers):
+    if waiting and oldest > _LONG_WAIT_SECONDS and not any(seen.lately for seen in metrics.workers):
         return False, f"{told}; no worker was seen recently"
     # In a long backlog, no job may be running for a moment between two jobs.
     idle = metrics.idle_seconds > _STUCK_SECONDS and not metrics.count(JobState.RUNNING)
@@ -363,35 +366,35 @@ def _queue_of_service(_settings: Settings, store: Store) -> tuple[bool, str]:
     return True, told
 
 
-def _lately(store: Store) -> list[workers.WorkerDescription]:
+def _load_recent_workers(store: Store) -> list[workers.WorkerDescription]:
     with store.reading() as session:
-        return [seen.worker for seen in workers.known_workers(session) if seen.lately]
+        return [seen.worker for seen in workers.load_workers(session) if seen.lately]
 
 
 @contextmanager
-def _opened(settings: Settings) -> Iterator[Store | None]:
+def _open_usable_store(settings: Settings) -> Iterator[Store | None]:
     """Open the database without changes; None if it has no tables of this release."""
     engine = open_engine(settings.database)
     try:
-        yield Store(engine, settings.own_secret) if schema_state(engine).is_usable else None
+        yield Store(engine, settings.own_secret) if load_schema_state(engine).is_usable else None
     finally:
         engine.dispose()
 
 
 CHECKS = (
-    Check("release", _release, _release_of_service),
-    Check("Python", _python),
-    Check("files", _files),
-    Check("simulator", _simulator),
-    Check("sandbox", _sandbox, _sandbox_of_workers),
-    Check("control groups", _control_groups),
-    Check("between trials", _between_trials),
-    Check("home", _home),
-    Check("database", _database, _tables),
-    Check("secret", _secret),
-    Check("broker", _broker, _broker_of_service),
-    Check("clock", _clock),
-    Check("workers", _workers, _workers_of_service),
-    Check("queue", _queue, _queue_of_service),
-    Check("known answer", _known_answer),
+    Check("release", _check_release, _check_service_release),
+    Check("Python", _check_python),
+    Check("files", _check_installed_files),
+    Check("simulator", _check_simulator),
+    Check("sandbox", _check_sandbox, _check_worker_sandboxes),
+    Check("control groups", _check_control_groups),
+    Check("between trials", _check_trial_isolation),
+    Check("home", _check_home),
+    Check("database", _check_database, _check_tables),
+    Check("secret", _check_secret),
+    Check("broker", _check_broker, _check_service_broker),
+    Check("clock", _check_clock),
+    Check("workers", _check_workers, _check_service_workers),
+    Check("queue", _check_queue, _check_service_queue),
+    Check("known answer", _check_known_answer),
 )

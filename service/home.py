@@ -32,33 +32,33 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 #: Robomark's files in the home. Other files there are not changed, but are inaccessible to other users, too.
-_OURS = ("robomark.db*", "run", "log", "broker*", "uploads")
-_OF_OTHERS = 0o077
+_OUR_FILES = ("robomark.db*", "run", "log", "broker*", "uploads")
+_PRIVATE_UMASK = 0o077
 #: Root, and the number of root in a user namespace that does not map it.
-_POWERFUL = (0, 65534)
+_ROOT_USER_IDS = (0, 65534)
 _users_umask: ContextVar[int] = ContextVar("users_umask")
 
 
-def keep_private() -> None:
-    """Make files created by this process readable only by this user, except those created ``for_the_user``."""
+def keep_files_private() -> None:
+    """Make files created by this process readable only by this user, except those created ``user_permissions``."""
     if _users_umask.get(None) is None:
-        _users_umask.set(os.umask(_OF_OTHERS))
+        _users_umask.set(os.umask(_PRIVATE_UMASK))
         # Searched first; differs from Python's loader only in the permissions.
         sys.path_hooks.insert(0, FileFinder.path_hook(*_LOADERS))
         sys.path_importer_cache.clear()
 
 
-class _SharedBytecode(SourceFileLoader):
+class _SharedBytecodeLoader(SourceFileLoader):
     """Loader that stores bytecode readable by all users, including a sandbox's child."""
 
     def set_data(self, path: str, data: ReadableBuffer, *, _mode: int = 0o666) -> None:
         """Write the bytecode with the user's normal permissions."""
-        with for_the_user():
+        with user_permissions():
             super().set_data(path, data, _mode=_mode)
 
 
 @contextmanager
-def for_the_user() -> Iterator[None]:
+def user_permissions() -> Iterator[None]:
     """Create files with the user's own umask within this context."""
     users = _users_umask.get(None)
     if users is None:
@@ -73,7 +73,7 @@ def for_the_user() -> Iterator[None]:
 
 _LOADERS: tuple[tuple[type[Any], list[str]], ...] = (
     (ExtensionFileLoader, EXTENSION_SUFFIXES),
-    (_SharedBytecode, SOURCE_SUFFIXES),
+    (_SharedBytecodeLoader, SOURCE_SUFFIXES),
     (SourcelessFileLoader, BYTECODE_SUFFIXES),
 )
 
@@ -83,12 +83,12 @@ def open_home(home: Path) -> None:
 
     Raises UsageError if another user owns the home or could replace it, HostError if it cannot be created.
     """
-    if home in (Path("/"), *_folders_of_all()):
+    if home in (Path("/"), *_list_home_parents()):
         raise UsageError(f"the home {home} contains other files; expected a separate folder in ROBOMARK_HOME")
     try:
-        _check_way(home)
+        _check_parents(home)
         home.mkdir(mode=0o700, parents=True, exist_ok=True)
-        repaired = _repair(home)
+        repaired = _make_home_private(home)
     except FileExistsError:
         raise UsageError(f"the home {home} is not a folder, expected a separate folder in ROBOMARK_HOME") from None
     except OSError as error:
@@ -100,7 +100,7 @@ def open_home(home: Path) -> None:
         ), home, repaired)  # fmt: skip
 
 
-def _folders_of_all() -> tuple[Path, ...]:
+def _list_home_parents() -> tuple[Path, ...]:
     """Return the folders that contain users' homes."""
     try:
         return tuple(Path.home().parents)
@@ -108,16 +108,16 @@ def _folders_of_all() -> tuple[Path, ...]:
         return ()
 
 
-def _check_way(home: Path) -> None:
+def _check_parents(home: Path) -> None:
     """Check the parents of the home: an owner or writer of one of them could replace the home."""
     for path in (home, *home.parents):
         if path.is_symlink():
-            _check_owner(home, path, path.lstat(), _POWERFUL)
+            _check_owner(home, path, path.lstat(), _ROOT_USER_IDS)
     for folder in dict.fromkeys((*home.parents, *home.resolve().parents)):
         if not folder.exists():
             continue
         found = folder.stat()
-        _check_owner(home, folder, found, _POWERFUL)
+        _check_owner(home, folder, found, _ROOT_USER_IDS)
         if found.st_mode & stat.S_IWOTH and not found.st_mode & stat.S_ISVTX:
             raise UsageError(
                 f"the home {home} is open to other users: all users can write in {folder}; expected another folder in "
@@ -128,39 +128,39 @@ def _check_way(home: Path) -> None:
 def _check_owner(home: Path, path: Path, found: os.stat_result, also: tuple[int, ...] = ()) -> None:
     if found.st_uid not in (os.geteuid(), *also):
         raise UsageError(
-            f"the home {home} has another owner: {path} belongs to {_called(found.st_uid)}, and Robomark runs "
-            f"as {_called(os.geteuid())}; run it as that user, or set another folder in ROBOMARK_HOME"
+            f"the home {home} has another owner: {path} belongs to {_describe_user(found.st_uid)}, and Robomark runs "
+            f"as {_describe_user(os.geteuid())}; run it as that user, or set another folder in ROBOMARK_HOME"
         )
 
 
-def _called(user: int) -> str:
+def _describe_user(user: int) -> str:
     try:
         return pwd.getpwuid(user).pw_name
     except KeyError:
         return f"user {user}"
 
 
-def _repair(home: Path) -> int:
+def _make_home_private(home: Path) -> int:
     """Make the home private, from the top down, and return the number of open paths."""
-    repaired: int = _close(home, home.resolve())
-    for path in sorted(found for name in _OURS for found in home.glob(name)):
-        repaired += _close(home, path)
+    repaired: int = _make_path_private(home, home.resolve())
+    for path in sorted(found for name in _OUR_FILES for found in home.glob(name)):
+        repaired += _make_path_private(home, path)
         if path.is_symlink():
             _check_owner(home, path, path.stat())
             continue
         for folder, folders, files in os.walk(path):
-            repaired += sum(_close(home, Path(folder, name)) for name in (*folders, *files))
+            repaired += sum(_make_path_private(home, Path(folder, name)) for name in (*folders, *files))
     return repaired
 
 
-def _close(home: Path, path: Path) -> bool:
+def _make_path_private(home: Path, path: Path) -> bool:
     """Make a path private and return whether it was open. Rejects files of other users, which would be trusted."""
     try:
         found = path.lstat()
         _check_owner(home, path, found)
-        was_open = not stat.S_ISLNK(found.st_mode) and bool(found.st_mode & _OF_OTHERS)
+        was_open = not stat.S_ISLNK(found.st_mode) and bool(found.st_mode & _PRIVATE_UMASK)
         if was_open:
-            path.chmod(stat.S_IMODE(found.st_mode) & ~_OF_OTHERS)
+            path.chmod(stat.S_IMODE(found.st_mode) & ~_PRIVATE_UMASK)
     except FileNotFoundError:
         # Services create and delete files concurrently.
         return False

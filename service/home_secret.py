@@ -14,15 +14,15 @@ from sim.errors import HostError
 from submissions.seeds import Secret
 
 
-def secret_here(settings: Settings) -> Secret:
+def load_home_secret(settings: Settings) -> Secret:
     """Return the secret of the environment, otherwise that of the database, creating it if necessary.
 
     Raises HostError if it can be neither read nor stored.
     """
-    return settings.own_secret or _read(settings) or _opened(settings)
+    return settings.own_secret or _read_sqlite_secret(settings) or _load_store_secret(settings)
 
 
-def _read(settings: Settings) -> Secret | None:
+def _read_sqlite_secret(settings: Settings) -> Secret | None:
     """Read the secret of a SQLite file; None if there is none yet."""
     file = Path(settings.database.removeprefix("sqlite:///"))
     if not file.is_file():
@@ -35,14 +35,14 @@ def _read(settings: Settings) -> Secret | None:
     return None if row is None else Secret(row[0])
 
 
-def _opened(settings: Settings) -> Secret:
+def _load_store_secret(settings: Settings) -> Secret:
     # Imported here, because this takes as long as a short grading.
     from service.store.engine import open_store
-    from service.store.installation import secret_of
+    from service.store.installation import load_secret
 
     try:
         with open_store(settings) as store:
-            return secret_of(store)
+            return load_secret(store)
     except HostError as error:
         raise HostError(
             f"The secret for trials cannot be saved: {error}. Set ROBOMARK_HOME to a writable folder, or "

@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 from sim.sentences import Sentence
 
-SOURCE = "en"
+SOURCE_LANGUAGE = "en"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,25 +27,30 @@ class Language:
         """Translate a sentence. ``%(name)s`` is replaced by a part, and ``%%`` by a per cent sign."""
         return self.catalogue.gettext(sentence) % parts
 
-    def tell(self, sentence: str | Sentence) -> str:
+    def translate_sentence(self, sentence: str | Sentence) -> str:
         """Translate a sentence created elsewhere, including nested sentences."""
         if isinstance(sentence, str):
             return sentence
         if not sentence.values:
             return self.catalogue.gettext(sentence.template) if sentence.template else ""
-        told = {name: self.tell(part) if isinstance(part, Sentence) else part for name, part in sentence.values.items()}
+        told = {
+            name: self.translate_sentence(part) if isinstance(part, Sentence) else part
+            for name, part in sentence.values.items()
+        }
         return self.say(sentence.template, **told)
 
     def counted(self, one: str, many: str, count: int, /, **parts: object) -> str:
         """Translate a sentence in the singular or plural; ``count`` is available as a part."""
         return self.catalogue.ngettext(one, many, count) % {"count": count, **parts}
 
-    def whole(self, number: int) -> str:
+    def format_integer(self, number: int) -> str:
         """Format an integer with thousands separators; outside English, with spaces instead of commas."""
-        return f"{number:,}" if self.code == SOURCE else f"{number:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+        return (
+            f"{number:,}" if self.code == SOURCE_LANGUAGE else f"{number:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+        )
 
 
-ENGLISH = Language(SOURCE, gettext.NullTranslations())
+ENGLISH = Language(SOURCE_LANGUAGE, gettext.NullTranslations())
 
 
 def translatable(sentence: str) -> str:
@@ -54,7 +59,7 @@ def translatable(sentence: str) -> str:
 
 
 @lru_cache(maxsize=1)
-def languages() -> Mapping[str, str]:
+def list_languages() -> Mapping[str, str]:
     """Return the available languages: a mapping of codes to their own names."""
     # Imported here, because it is slow and English does not need it.
     from importlib.resources import files
@@ -62,14 +67,17 @@ def languages() -> Mapping[str, str]:
     from babel.core import Locale
 
     folder = files("service").joinpath("locale")
-    codes = [SOURCE, *sorted(each.name.removesuffix(".po") for each in folder.iterdir() if each.name.endswith(".po"))]
+    codes = [
+        SOURCE_LANGUAGE,
+        *sorted(each.name.removesuffix(".po") for each in folder.iterdir() if each.name.endswith(".po")),
+    ]
     return MappingProxyType({code: str(Locale.parse(code).get_display_name(code)).capitalize() for code in codes})
 
 
 @lru_cache(maxsize=16)
-def language_called(code: str) -> Language:
+def load_language(code: str) -> Language:
     """Return the language with this code."""
-    if code == SOURCE:
+    if code == SOURCE_LANGUAGE:
         return ENGLISH
     import io
     from importlib.resources import files

@@ -12,10 +12,10 @@ from babel.messages.catalog import Catalog
 from babel.messages.extract import extract_from_dir
 from babel.messages.pofile import read_po, write_po
 
-from service.language import SOURCE, languages
+from service.language import SOURCE_LANGUAGE, list_languages
 
 #: Sources whose messages are translated; everything else is in English.
-_METHODS = [
+_TRANSLATED_SOURCES = [
     ("web/templates/**.html", "jinja2"),
     ("reports/templates/**.html", "jinja2"),
     ("web/**.py", "python"),
@@ -24,7 +24,7 @@ _METHODS = [
     ("grading/verdict_labels.py", "python"),
 ]
 #: Sources of translated errors about submissions: the code that raises them does not know the reader.
-_RAISED = [
+_ERROR_SOURCES = [
     (f"{name}.py", "python")
     for name in (
         "operations/**",
@@ -33,11 +33,11 @@ _RAISED = [
         "store/grades/comments",
         "store/grades/overrides",
         "store/people/lti",
-        "store/queue/tryouts",
+        "store/queue/test_runs",
         "web/pages/mine",
     )
 ]
-_RAISED_OF_FILES = [
+_SUBMISSION_ERROR_SOURCES = [
     (f"{name}.py", "python")
     for name in (
         "bundle",
@@ -51,45 +51,53 @@ _RAISED_OF_FILES = [
 ]
 _KEYWORDS = {"_": None, "translatable": None, "say": None, "gettext": None, "ngettext": (1, 2), "counted": (1, 2)}
 _KEYWORDS |= {"Sentence": None}
-_RAISING = {"Sentence": None, "UsageError": None, "LacksPart": None, "MarksChanged": None, "StudentsKnowAnother": None}
-_RAISING |= {"NotFound": None, "Forbidden": None, "Conflict": None, "Invalid": None, "UnknownPlatform": None}
-_OPTIONS = {pattern: {"silent": "false", "trimmed": "true"} for pattern, kind in _METHODS if kind == "jinja2"}
+_ERROR_KEYWORDS = {
+    "Sentence": None,
+    "UsageError": None,
+    "LacksPart": None,
+    "MarksChanged": None,
+    "StudentsKnowAnother": None,
+}
+_ERROR_KEYWORDS |= {"NotFound": None, "Forbidden": None, "Conflict": None, "Invalid": None, "UnknownPlatform": None}
+_OPTIONS = {
+    pattern: {"silent": "false", "trimmed": "true"} for pattern, kind in _TRANSLATED_SOURCES if kind == "jinja2"
+}
 
 
-def messages() -> Catalog:
+def extract_messages() -> Catalog:
     """Extract all messages of pages and reports, with their locations."""
     catalogue = Catalog(project="Robomark", charset="utf-8")
     service, submissions = (Path(str(files(package))) for package in ("service", "submissions"))
     told = [
-        *extract_from_dir(service, _METHODS, _OPTIONS, keywords=_KEYWORDS),
-        *extract_from_dir(service, _RAISED, keywords=_RAISING),
-        *extract_from_dir(submissions, _RAISED_OF_FILES, keywords=_RAISING),
+        *extract_from_dir(service, _TRANSLATED_SOURCES, _OPTIONS, keywords=_KEYWORDS),
+        *extract_from_dir(service, _ERROR_SOURCES, keywords=_ERROR_KEYWORDS),
+        *extract_from_dir(submissions, _SUBMISSION_ERROR_SOURCES, keywords=_ERROR_KEYWORDS),
     ]
     for name, line, message, comments, context in told:
         catalogue.add(message, None, [(name, line)], auto_comments=comments, context=context)
     return catalogue
 
 
-def catalogue_file(code: str) -> Path:
+def locate_catalogue(code: str) -> Path:
     """Return the catalogue file of a language."""
     return Path(str(files("service"))) / "locale" / f"{code}.po"
 
 
-def update(code: str) -> Catalog:
+def update_catalogue(code: str) -> Catalog:
     """Return a language's catalogue with all current messages and without obsolete ones."""
-    with catalogue_file(code).open("rb") as file:
+    with locate_catalogue(code).open("rb") as file:
         kept = read_po(file, locale=code)
-    kept.update(messages(), no_fuzzy_matching=True)
+    kept.update(extract_messages(), no_fuzzy_matching=True)
     kept.obsolete.clear()
     return kept
 
 
 def main() -> None:
     """Update every catalogue."""
-    for code in languages():
-        if code != SOURCE:
-            updated = update(code)
-            with catalogue_file(code).open("wb") as file:
+    for code in list_languages():
+        if code != SOURCE_LANGUAGE:
+            updated = update_catalogue(code)
+            with locate_catalogue(code).open("wb") as file:
                 write_po(file, updated, width=100, omit_header=False, no_location=True, sort_output=True)
 
 

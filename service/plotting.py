@@ -8,23 +8,23 @@ from __future__ import annotations
 from service.grading.grade import Grade
 from sim.floors.canvas import Pixels
 from submissions.assignment.definition import Assignment
-from submissions.diagram_cells import diagrams_in
+from submissions.diagram_cells import read_diagrams
 from submissions.submission import Submission
 
 
-def draw(grade: Grade, assignment: Assignment, submission: Submission) -> dict[str, bytes]:
+def draw_plots(grade: Grade, assignment: Assignment, submission: Submission) -> dict[str, bytes]:
     """Draw every plot of a grade, with the assignment's own floors and a notebook's diagrams. Maps names to PNG."""
     # Imported here, because a worker does not need it before its first grade.
-    from service.reports.plots.drawn import draw_all
+    from service.reports.plots.grade_plots import draw_all_plots
 
-    return draw_all(grade, own_floors(assignment), diagrams_in(submission.notebook).cells)
+    return draw_all_plots(grade, load_own_floors(assignment), read_diagrams(submission.notebook).cells)
 
 
-def own_floors(assignment: Assignment) -> dict[str, Pixels]:
+def load_own_floors(assignment: Assignment) -> dict[str, Pixels]:
     """Return the assignment's own floor by name; empty if it has none."""
-    from sim.floors import floor_from_image
+    from sim.floors import build_floor_from_image
 
     world = assignment.world
     if world.image is None:
         return {}
-    return {world.background: floor_from_image(world.background, world.image).pixels}
+    return {world.background: build_floor_from_image(world.background, world.image).pixels}

@@ -11,24 +11,31 @@ from pathlib import Path
 
 from sqlalchemy.orm import Session
 
-from service.batch_rows import refused_row, row_of, why_not_shown
+from service.batch_rows import build_rejected_row, build_row, describe_missing_grade
 from service.grading.grade import Grade
 from service.language import ENGLISH, Language
-from service.plotting import draw, own_floors
-from service.reports.html import BatchRow, ReportParts, batch_index, refusal_page, report, report_parts
-from service.reports.replay.document import Pixels, replay_of_grade
-from service.reports.rows import ReportPage, missing_words
-from service.reports.view import (
-    NO_OTHERS,
-    OtherTrials,
-    View,
-    other_trials,
-    scenarios,
-    staff_view,
-    student_view,
-    worst_trial,
+from service.plotting import draw_plots, load_own_floors
+from service.reports.html import (
+    BatchRow,
+    ReportParts,
+    render_batch_index,
+    render_refusal_page,
+    render_report_page,
+    render_report_parts,
 )
-from service.reports.written import file_stems, refused_stems, write_film, write_page, write_replay
+from service.reports.output_files import build_file_stems, build_refused_stems, write_film, write_page, write_replay
+from service.reports.replay.document import Pixels, build_grade_replay
+from service.reports.rows import ReportPage, describe_missing_part
+from service.reports.view import (
+    NO_OVERLAY,
+    OverlayTrials,
+    View,
+    build_staff_view,
+    build_student_view,
+    find_worst_trial,
+    list_scenarios,
+    select_overlay_trials,
+)
 from service.store.batches import intake, rankings
 from service.store.batches.batches import JobLine
 from service.store.courses import policies
@@ -36,17 +43,17 @@ from service.store.engine import Store
 from service.store.grades import plots, results
 from service.store.states import JobState, PlotState, Standing
 from sim.errors import UsageError
-from sim.floors import names
+from sim.floors import list_floor_names
 from sim.recording import Verdict
 from submissions.assignment.folder import REFERENCE
-from submissions.student_identity import Refusal
+from submissions.student_identity import RejectedSubmission
 from submissions.submission import Submission
 
 _INDEX = "index.html"
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class WrittenReport:
     """The report file of a job, and its plots as a mapping of name to PNG."""
 
     path: Path
@@ -61,13 +68,13 @@ def write_report(
     stem: str,
     over: JobLine | None = None,
     language: Language = ENGLISH,
-) -> Written:
+) -> WrittenReport:
     """Write the page of a graded job as ``stem``.html; its replay overlays the trials of ``over``.
 
     Raises UsageError if the folder is not writable, or the reader may not see those trials.
     """
-    html, drawn = _page(store, line, grade, over, language)
-    return Written(write_page(folder, f"{stem}.html", html), drawn)
+    html, drawn = _render_page(store, line, grade, over, language)
+    return WrittenReport(write_page(folder, f"{stem}.html", html), drawn)
 
 
 def write_grade_replay(
@@ -84,10 +91,10 @@ def write_grade_replay(
     """
     with store.reading() as session:
         submission = intake.load_submission(session, line.id)
-        floors = own_floors(intake.load_assignment(session, line.id))
-        view = _view(session, line, grade, language)
-        others = _others(session, line, view, over)
-    write_replay(path, replay_of_grade(view, submission, floors, others=others), language)
+        floors = load_own_floors(intake.load_assignment(session, line.id))
+        view = _build_view(session, line, grade, language)
+        others = _load_other_trials(session, line, view, over)
+    write_replay(path, build_grade_replay(view, submission, floors, others=others), language)
 
 
 def write_grade_film(store: Store, line: JobLine, grade: Grade, path: Path, number: int | None) -> None:
@@ -96,37 +103,44 @@ def write_grade_film(store: Store, line: JobLine, grade: Grade, path: Path, numb
     Raises UsageError if there is none, or the file cannot be written.
     """
     with store.reading() as session:
-        floors = own_floors(intake.load_assignment(session, line.id))
-        seen = _view(session, line, grade).grade
+        floors = load_own_floors(intake.load_assignment(session, line.id))
+        seen = _build_view(session, line, grade).grade
     if not seen.trials:
         raise UsageError(f"{line.id} has no visible trial, so there is no film")
     if number is not None and not 1 <= number <= len(seen.trials):
         raise UsageError(f"--trial {number}: expected 1 to {len(seen.trials)}, as the replay numbers them")
-    index = worst_trial(seen, scenarios(seen)[0]) if number is None else number - 1
+    index = find_worst_trial(seen, list_scenarios(seen)[0]) if number is None else number - 1
     write_film(path, seen.trials[index], floors)
 
 
-def report_pages(store: Store, lines: Sequence[JobLine], refusals: Sequence[Refusal]) -> Iterator[ReportPage]:
+def render_report_pages(
+    store: Store, lines: Sequence[JobLine], refusals: Sequence[RejectedSubmission]
+) -> Iterator[ReportPage]:
     """Yield a page for each graded job, then one for each rejection."""
     for line in lines:
         with store.reading() as session:
-            grade = results.load(session, line.id)
-        yield ReportPage(row_of(line, grade), _page(store, line, grade)[0])
+            grade = results.load_grade(session, line.id)
+        yield ReportPage(build_row(line, grade), _render_page(store, line, grade)[0])
     for refusal in refusals:
-        row = refused_row(refusal)
-        yield ReportPage(row, refusal_page(row))
+        row = build_rejected_row(refusal)
+        yield ReportPage(row, render_refusal_page(row))
 
 
-def write_batch(store: Store, title: str, lines: Sequence[JobLine], refusals: Sequence[Refusal], folder: Path) -> Path:
+def write_batch_reports(
+    store: Store, title: str, lines: Sequence[JobLine], refusals: Sequence[RejectedSubmission], folder: Path
+) -> Path:
     """Write a page for each graded job and rejection, and an index. Returns the path of the index.
 
     Pages are named after the student, and after the assignment if a student has several. Raises UsageError if the
     folder is not writable.
     """
-    graded = [line for line in lines if not why_not_shown(line)]
+    graded = [line for line in lines if not describe_missing_grade(line)]
     names = [(line.student, line.assignment) for line in graded]
-    stems = [*file_stems(names), *refused_stems([(refusal.source, refusal.student.id) for refusal in refusals])]
-    pages = report_pages(store, graded, refusals)
+    stems = [
+        *build_file_stems(names),
+        *build_refused_stems([(refusal.source, refusal.student.id) for refusal in refusals]),
+    ]
+    pages = render_report_pages(store, graded, refusals)
     paths = [write_page(folder, f"{stem}.html", page.html) for stem, page in zip(stems, pages, strict=True)]
     own = {line.id: path.name for line, path in zip(graded, paths, strict=False)}
     rows = [
@@ -136,7 +150,7 @@ def write_batch(store: Store, title: str, lines: Sequence[JobLine], refusals: Se
             line.max_marks,
             None if line.verdict is None else Verdict(line.verdict),
             own.get(line.id),
-            why_not_shown(line) or missing_words(line.missing),
+            describe_missing_grade(line) or describe_missing_part(line.missing),
             line.name if line.name != line.student else "",
         )
         for line in lines
@@ -153,97 +167,100 @@ def write_batch(store: Store, title: str, lines: Sequence[JobLine], refusals: Se
     sandbox = ", ".join(sorted({line.sandbox for line in lines if line.sandbox}))
     rows.sort(key=lambda row: row.student)
     with store.reading() as session:
-        ranks = rankings.rank_tables(session, lines)
-    return write_page(folder, _INDEX, batch_index(rows, title, sandbox, ranks))
+        ranks = rankings.build_rank_tables(session, lines)
+    return write_page(folder, _INDEX, render_batch_index(rows, title, sandbox, ranks))
 
 
-def report_body(store: Store, job_id: str, plotted: PlotState, view: View) -> ReportParts:
+def render_report_body(store: Store, job_id: str, plotted: PlotState, view: View) -> ReportParts:
     """Return the report of a graded job for one reader, as parts of another page.
 
     Plots that are not drawn yet are left out, so that the page does not wait for them.
     """
-    return report_parts(view, *_kept(store, job_id, plotted, view))
+    return render_report_parts(view, *_load_report_data(store, job_id, plotted, view))
 
 
-def report_alone(store: Store, job_id: str, plotted: PlotState, view: View) -> str:
+def render_standalone_report(store: Store, job_id: str, plotted: PlotState, view: View) -> str:
     """Return the report as a standalone page."""
-    return report(view, *_kept(store, job_id, plotted, view))
+    return render_report_page(view, *_load_report_data(store, job_id, plotted, view))
 
 
-def report_each(
+def render_each_report(
     session: Session, views: Iterable[tuple[str, View]], job_ids: Collection[str]
 ) -> Iterator[tuple[str, View, str]]:
     """Yield the id, view and standalone report of each graded job.
 
     All data is read with a fixed number of statements. ``views`` must match ``job_ids``, ordered by id.
     """
-    submissions, drawn = intake.load_each_submission(session, job_ids), plots.load_each(session, job_ids)
+    submissions, drawn = intake.load_each_submission(session, job_ids), plots.load_each_plots(session, job_ids)
     floors: dict[tuple[str, str], Mapping[str, Pixels]] = {}
     for (job_id, view), (_, submission), (_, plotted) in zip(views, submissions, drawn, strict=True):
         version = (view.grade.assignment, view.grade.assignment_version)
-        if not _is_built_in(view) and version not in floors:
-            floors[version] = own_floors(intake.load_assignment(session, job_id))
-        yield job_id, view, report(view, plotted, submission, floors.get(version, {}))
+        if not _has_built_in_floors(view) and version not in floors:
+            floors[version] = load_own_floors(intake.load_assignment(session, job_id))
+        yield job_id, view, render_report_page(view, plotted, submission, floors.get(version, {}))
 
 
-def _is_built_in(view: View) -> bool:
-    return {trial.recording.background for trial in view.grade.trials} <= set(names())
+def _has_built_in_floors(view: View) -> bool:
+    return {trial.recording.background for trial in view.grade.trials} <= set(list_floor_names())
 
 
-def _kept(
+def _load_report_data(
     store: Store, job_id: str, plotted: PlotState, view: View
 ) -> tuple[Mapping[str, bytes], Submission, Mapping[str, Pixels]]:
     """Load the plots, the submission and the floors of a report."""
     with store.reading() as session:
         submission = intake.load_submission(session, job_id)
-        drawn = plots.load(session, job_id) if plotted is PlotState.DONE else {}
-        floors = {} if _is_built_in(view) else own_floors(intake.load_assignment(session, job_id))
+        drawn = plots.load_plots(session, job_id) if plotted is PlotState.DONE else {}
+        floors = {} if _has_built_in_floors(view) else load_own_floors(intake.load_assignment(session, job_id))
     return drawn, submission, floors
 
 
-def _page(
+def _render_page(
     store: Store, line: JobLine, grade: Grade, over: JobLine | None = None, language: Language = ENGLISH
 ) -> tuple[str, Mapping[str, bytes]]:
     """Return the page of a graded job, and its plots."""
     with store.reading() as session:
         submission = intake.load_submission(session, line.id)
-        view = _view(session, line, grade, language)
-        others = _others(session, line, view, over)
-        drawn = plots.load(session, line.id) if line.plots is PlotState.DONE else None
-        built_in = {trial.recording.background for trial in grade.trials} <= set(names())
+        view = _build_view(session, line, grade, language)
+        others = _load_other_trials(session, line, view, over)
+        drawn = plots.load_plots(session, line.id) if line.plots is PlotState.DONE else None
+        built_in = {trial.recording.background for trial in grade.trials} <= set(list_floor_names())
         assignment = None if drawn is not None and built_in else intake.load_assignment(session, line.id)
     if drawn is None and assignment is not None:
-        drawn = draw(grade, assignment, submission)
+        drawn = draw_plots(grade, assignment, submission)
     found = drawn or {}
-    floors = own_floors(assignment) if assignment is not None else {}
-    return report(view, found, submission, floors, others), found
+    floors = load_own_floors(assignment) if assignment is not None else {}
+    return render_report_page(view, found, submission, floors, others), found
 
 
-def _view(session: Session, line: JobLine, grade: Grade, language: Language = ENGLISH) -> View:
+def _build_view(session: Session, line: JobLine, grade: Grade, language: Language = ENGLISH) -> View:
     """Return the part of a job's grade that the reader of its report may see."""
     if line.staff_only is not None:
-        return staff_view(grade, language)
-    return student_view(grade, policies.released(session, line.id), language)
+        return build_staff_view(grade, language)
+    return build_student_view(grade, policies.load_visibilities(session, line.id), language)
 
 
-def _others(session: Session, line: JobLine, view: View, over: JobLine | None) -> OtherTrials:
+def _load_other_trials(session: Session, line: JobLine, view: View, over: JobLine | None) -> OverlayTrials:
     """Return the trials of ``over`` that the reader of the view may see."""
     if over is None:
-        return NO_OTHERS
-    reason = why_not_shown(over)
+        return NO_OVERLAY
+    reason = describe_missing_grade(over)
     if not reason and over.standing is Standing.PROPOSED:
         reason = "a regrade that is not published"
     if reason and (over.state is not JobState.DONE or not view.staff):
         raise UsageError(f"{over.id} cannot be shown over {line.id}: {reason}")
     try:
-        return other_trials(
-            view, results.load(session, over.id), _called(over, line), policies.released(session, line.id)
+        return select_overlay_trials(
+            view,
+            results.load_grade(session, over.id),
+            _label_overlay(over, line),
+            policies.load_visibilities(session, line.id),
         )
     except UsageError as error:
         raise UsageError(f"{over.id} cannot be shown over {line.id}: {error}") from None
 
 
-def _called(over: JobLine, line: JobLine) -> str:
+def _label_overlay(over: JobLine, line: JobLine) -> str:
     """Return the label of the overlaid trials in the report of ``line``."""
     if over.student == REFERENCE:
         return "the reference"

@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from sim.errors import UsageError
-from submissions.seeds import PUBLIC, Secret
+from submissions.seeds import PUBLIC_SECRET, Secret
 
 PREFIX = "ROBOMARK_"
 #: Variable with a folder whose files are named after settings; systemd uses the same name.
 SECRET_FILES = "CREDENTIALS_DIRECTORY"
 _SHORTEST_SECRET = 16
-_READ = "read"
+_PARSER = "read"
 Written = TypeVar("Written", str, Path)
 
 
@@ -35,25 +35,25 @@ def default_home() -> Path:
     return base / "robomark"
 
 
-def _setting(read: Callable[[Any], Any], **default: Any) -> Any:
+def _define_setting(read: Callable[[Any], Any], **default: Any) -> Any:
     """Define a setting; ``read`` converts the written or given value and raises ValueError with the expected form."""
-    return field(**default, metadata={_READ: read})
+    return field(**default, metadata={_PARSER: read})
 
 
-def _folder(written: str | Path) -> Path:
+def _parse_folder(written: str | Path) -> Path:
     try:
         return Path(written).expanduser().absolute()
     except RuntimeError:
         raise ValueError("expected a folder; this user has no home folder") from None
 
 
-def _broker(url: str) -> str:
+def _parse_broker_url(url: str) -> str:
     if url and url.partition("://")[0] not in {"redis", "rediss", "redis+socket"}:
         raise ValueError("expected redis://host:port/number, rediss://... or redis+socket:///path")
     return url
 
 
-def _database(url: str) -> str:
+def _parse_database_url(url: str) -> str:
     if not url:
         return url
     # Imported here, because it takes longer than everything else in the settings.
@@ -71,76 +71,76 @@ def _database(url: str) -> str:
     return url
 
 
-def _address(url: str) -> str:
+def _parse_address(url: str) -> str:
     scheme, _, name = url.rstrip("/").partition("://")
     if url and (scheme not in {"https", "http"} or not name or "/" in name):
         raise ValueError("expected https://name, as in the browser's address bar")
     return url.rstrip("/")
 
 
-def names_in(written: str) -> tuple[str, ...]:
+def split_names(written: str) -> tuple[str, ...]:
     """Split a comma-separated list."""
     return tuple(part for each in written.split(",") if (part := each.strip().lower()))
 
 
-def _networks(written: str) -> str:
-    for each in names_in(written):
+def _parse_networks(written: str) -> str:
+    for each in split_names(written):
         try:
             ip_network(each)
         except ValueError:
             raise ValueError("expected addresses or networks with commas between, like 127.0.0.1, 10.0.0.0/8") from None
-    return ",".join(names_in(written))
+    return ",".join(split_names(written))
 
 
-def _host_names(written: str) -> str:
-    if not all(re.fullmatch(r"[a-z0-9]([a-z0-9._-]*[a-z0-9])?", each) for each in names_in(written)):
+def _parse_host_names(written: str) -> str:
+    if not all(re.fullmatch(r"[a-z0-9]([a-z0-9._-]*[a-z0-9])?", each) for each in split_names(written)):
         raise ValueError("expected names without ports, with commas between, like web, robomark.internal")
-    return ",".join(names_in(written))
+    return ",".join(split_names(written))
 
 
-def _log_level(level: str) -> str:
+def _parse_log_level(level: str) -> str:
     if level.upper() not in {"DEBUG", "INFO", "WARNING", "ERROR"}:
         raise ValueError("expected DEBUG, INFO, WARNING or ERROR")
     return level.upper()
 
 
-def _secret(given: str | Secret) -> Secret:
+def _parse_secret(given: str | Secret) -> Secret:
     text = given.text if isinstance(given, Secret) else given.strip()
     if 0 < len(text) < _SHORTEST_SECRET:
         raise ValueError(f"expected at least {_SHORTEST_SECRET} characters that are hard to guess")
     return Secret(text)
 
 
-def _whether(written: str | bool) -> bool:
+def _parse_boolean(written: str | bool) -> bool:
     known = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
     if str(written).lower() not in known:
         raise ValueError("expected true or false")
     return known[str(written).lower()]
 
 
-def _seconds(least: float, most: float) -> Callable[[Any], float]:
+def _build_seconds_parser(least: float, most: float) -> Callable[[Any], float]:
     def read(written: str | float) -> float:
         try:
             number = float(written)
         except ValueError:
             raise ValueError("input should be a valid number, unable to parse string as a number") from None
-        return _between(least, number, most)
+        return _check_range(least, number, most)
 
     return read
 
 
-def _count(least: int, most: int) -> Callable[[Any], int]:
+def _build_count_parser(least: int, most: int) -> Callable[[Any], int]:
     def read(written: str | int) -> int:
         try:
             number = int(written)
         except ValueError:
             raise ValueError("input should be a valid integer, unable to parse string as an integer") from None
-        return int(_between(least, number, most))
+        return int(_check_range(least, number, most))
 
     return read
 
 
-def _between(least: float, number: float, most: float) -> float:
+def _check_range(least: float, number: float, most: float) -> float:
     if not number >= least:
         raise ValueError(f"input should be greater than or equal to {least}")
     if number > most:
@@ -156,53 +156,55 @@ class Settings:
         UsageError: A value is invalid; names the variable, its value and the expected form.
     """
 
-    home: Path = field(default_factory=default_home, metadata={_READ: _folder})
-    broker_url: str = _setting(_broker, default="")
-    database_url: str = _setting(_database, default="")
-    concurrency: int = _setting(_count(1, 256), default_factory=lambda: len(os.sched_getaffinity(0)))
+    home: Path = field(default_factory=default_home, metadata={_PARSER: _parse_folder})
+    broker_url: str = _define_setting(_parse_broker_url, default="")
+    database_url: str = _define_setting(_parse_database_url, default="")
+    concurrency: int = _define_setting(
+        _build_count_parser(1, 256), default_factory=lambda: len(os.sched_getaffinity(0))
+    )
     #: A worker that has not been seen for this long loses its job.
-    lease_seconds: float = _setting(_seconds(0.5, 3600), default=60.0)
+    lease_seconds: float = _define_setting(_build_seconds_parser(0.5, 3600), default=60.0)
     #: Maximum number of attempts of a job after host faults.
-    max_attempts: int = _setting(_count(1, 20), default=3)
+    max_attempts: int = _define_setting(_build_count_parser(1, 20), default=3)
     #: Delay before the second attempt; doubles with each further one.
-    backoff_seconds: float = _setting(_seconds(0, 3600), default=5.0)
+    backoff_seconds: float = _define_setting(_build_seconds_parser(0, 3600), default=5.0)
     #: Time limit for one whole job in real time, in addition to all other limits.
-    job_seconds: float = _setting(_seconds(1, 86_400), default=900.0)
+    job_seconds: float = _define_setting(_build_seconds_parser(1, 86_400), default=900.0)
     #: Interval between self-tests of each process of a worker.
-    self_test_seconds: float = _setting(_seconds(1, 86_400), default=300.0)
+    self_test_seconds: float = _define_setting(_build_seconds_parser(1, 86_400), default=300.0)
     #: Age after which the notification of a queued job may be repeated.
-    notify_seconds: float = _setting(_seconds(0.1, 3600), default=10.0)
+    notify_seconds: float = _define_setting(_build_seconds_parser(0.1, 3600), default=10.0)
     #: Memory limit for all processes of one grading, if the worker has control groups; an assignment can raise it.
-    slot_memory_mb: int = _setting(_count(256, 1_000_000), default=1536)
-    log_level: str = _setting(_log_level, default="WARNING")
+    slot_memory_mb: int = _define_setting(_build_count_parser(256, 1_000_000), default=1536)
+    log_level: str = _define_setting(_parse_log_level, default="WARNING")
     #: Public address of the web server, if it is reachable from other machines.
-    public_url: str = _setting(_address, default="")
+    public_url: str = _define_setting(_parse_address, default="")
     #: Limit of API calls per token; bursts of the same size are allowed after a pause.
-    api_calls_per_minute: float = _setting(_seconds(1, 1_000_000), default=600.0)
+    api_calls_per_minute: float = _define_setting(_build_seconds_parser(1, 1_000_000), default=600.0)
     #: Maximum total size of one student's submissions to one assignment.
-    student_quota_mb: int = _setting(_count(1, 1_000_000), default=200)
+    student_quota_mb: int = _define_setting(_build_count_parser(1, 1_000_000), default=200)
     #: Proxies whose X-Forwarded-For header is trusted: comma-separated addresses or networks.
-    trusted_proxies: str = _setting(_networks, default="")
+    trusted_proxies: str = _define_setting(_parse_networks, default="")
     #: Comma-separated host names for /health and /metrics, in addition to addresses and the public name.
-    probe_hosts: str = _setting(_host_names, default="")
+    probe_hosts: str = _define_setting(_parse_host_names, default="")
     #: Permit webhooks to private networks, which are rejected otherwise.
-    webhooks_inside: bool = _setting(_whether, default=False)
+    webhooks_inside: bool = _define_setting(_parse_boolean, default=False)
     #: Overrides the database's secret; empty for none.
-    secret: Secret = field(default=PUBLIC, metadata={_READ: _secret})
+    secret: Secret = field(default=PUBLIC_SECRET, metadata={_PARSER: _parse_secret})
 
     def __post_init__(self) -> None:
         for each in fields(self):
             given = getattr(self, each.name)
             try:
-                object.__setattr__(self, each.name, each.metadata[_READ](given))
+                object.__setattr__(self, each.name, each.metadata[_PARSER](given))
             except ValueError as error:
                 shown = "not usable" if each.name == "secret" else repr(given)
-                raise UsageError(f"{_variable(each.name)} is {shown}: {error}") from None
+                raise UsageError(f"{_format_variable(each.name)} is {shown}: {error}") from None
 
     @property
     def own_secret(self) -> Secret | None:
         """The secret of the environment, which overrides the database's; None if there is none."""
-        return None if self.secret == PUBLIC else self.secret
+        return None if self.secret == PUBLIC_SECRET else self.secret
 
     @property
     def database(self) -> str:
@@ -213,10 +215,10 @@ class Settings:
         """Return the same settings with the address of a running broker."""
         return replace(self, broker_url=url)
 
-    def environment(self) -> dict[str, str]:
+    def to_environment(self) -> dict[str, str]:
         """Return the variables that give a child process the same settings, except the secret, which it inherits."""
         told = {name: str(value) for name, value in asdict(self).items() if name != "secret"}
-        return {_variable(name): text for name, text in told.items() if text}
+        return {_format_variable(name): text for name, text in told.items() if text}
 
 
 def load_settings(**overrides: object) -> Settings:
@@ -228,24 +230,24 @@ def load_settings(**overrides: object) -> Settings:
     folder = os.environ.get(SECRET_FILES) or None
     if folder is not None and not Path(folder).is_dir():
         raise UsageError(f"{SECRET_FILES} is {folder!r}: expected a folder with a file for each setting")
-    written = ({} if folder is None else _in_files(Path(folder))) | _of_settings(os.environ)
+    written = ({} if folder is None else _read_secret_files(Path(folder))) | _filter_settings(os.environ)
     return Settings(**(written | overrides))  # type: ignore[arg-type]
 
 
-def _in_files(folder: Path) -> dict[str, str]:
+def _read_secret_files(folder: Path) -> dict[str, str]:
     try:
-        paths = _of_settings({path.name: path for path in folder.iterdir()})
+        paths = _filter_settings({path.name: path for path in folder.iterdir()})
         texts = {name: path.read_text().strip() for name, path in paths.items()}
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(f"{SECRET_FILES}: a file in it cannot be read: {error}") from None
     return {name: text for name, text in texts.items() if text}
 
 
-def _of_settings(named: Mapping[str, Written]) -> dict[str, Written]:
+def _filter_settings(named: Mapping[str, Written]) -> dict[str, Written]:
     """Return the values that belong to settings, skipping empty ones."""
-    variables = {_variable(each.name): each.name for each in fields(Settings)}
+    variables = {_format_variable(each.name): each.name for each in fields(Settings)}
     return {variables[name.upper()]: found for name, found in named.items() if name.upper() in variables and found}
 
 
-def _variable(name: str) -> str:
+def _format_variable(name: str) -> str:
     return f"{PREFIX}{name.upper()}"

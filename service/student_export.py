@@ -15,12 +15,12 @@ from typing import Any
 from sqlalchemy import ColumnElement, and_, or_, select
 from sqlalchemy.orm import Session
 
-from service.report_files import report_each
-from service.reports.formats.json_output import json_document
-from service.reports.view import View, student_view
+from service.report_files import render_each_report
+from service.reports.formats.json_output import build_json_document
+from service.reports.view import View, build_student_view
 from service.store.courses import policies
 from service.store.engine import Store
-from service.store.grades import current, results
+from service.store.grades import current_grades, results
 from service.store.models import Course, Enrolment, Extension, Job, Person, SubmissionRow
 from service.store.people import membership
 from service.store.web_tables import Appeal, Credential
@@ -40,22 +40,24 @@ def export_student(store: Store, enrolment_id: int, without: Set[str] = frozense
         query = select(Enrolment, Course.name, Person).join(Course, Enrolment.course_id == Course.id)
         query = query.join(Person, Enrolment.person_id == Person.id).where(Enrolment.id == enrolment_id)
         enrolment, course, person = session.execute(query).one()
-        student = _student(session, enrolment, course) | ({} if without else _moments(session, enrolment, person))
+        student = _build_student(session, enrolment, course) | (
+            {} if without else _load_times(session, enrolment, person)
+        )
         mine = and_(SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment.not_in(without))
         folders, told = {}, []
-        for submission_id, document, packed in _submissions(session, mine):
+        for submission_id, document, packed in _load_submissions(session, mine):
             folder = f"submissions/{re.sub('[^a-zA-Z0-9._-]', '_', document['assignment'])}-{document['attempt']}"
             archive.writestr(f"{folder}/submission.zip", packed)
             folders[submission_id] = folder
             told.append({**document, "folder": folder})
-        for submission_id, view, report in _seen_grades(session, mine):
-            archive.writestr(f"{folders[submission_id]}/grade.json", _written(json_document(view)))
+        for submission_id, view, report in _load_seen_grades(session, mine):
+            archive.writestr(f"{folders[submission_id]}/grade.json", _encode_json(build_json_document(view)))
             archive.writestr(f"{folders[submission_id]}/report.html", report)
-        archive.writestr("student.json", _written({**student, "submissions": told}))
+        archive.writestr("student.json", _encode_json({**student, "submissions": told}))
     return sink.getvalue()
 
 
-def _student(session: Session, enrolment: Enrolment, course: str) -> dict[str, Any]:
+def _build_student(session: Session, enrolment: Enrolment, course: str) -> dict[str, Any]:
     allowed = select(Extension).where(Extension.enrolment_id == enrolment.id).order_by(Extension.id)
     return {
         "course": course,
@@ -64,25 +66,27 @@ def _student(session: Session, enrolment: Enrolment, course: str) -> dict[str, A
         "name": enrolment.name,
         "email": enrolment.email,
         "role": enrolment.role.value,
-        "extensions": [_columns(row, ("assignment", "due_at", "more_attempts")) for row in session.scalars(allowed)],
+        "extensions": [
+            _read_columns(row, ("assignment", "due_at", "more_attempts")) for row in session.scalars(allowed)
+        ],
     }
 
 
-def _moments(session: Session, enrolment: Enrolment, person: Person) -> dict[str, Any]:
+def _load_times(session: Session, enrolment: Enrolment, person: Person) -> dict[str, Any]:
     """Return the times of enrolment and sign-ins that belong to this course."""
     here = Credential.course_id == enrolment.course_id
-    if not membership.is_more_than(session, enrolment):
+    if not membership.has_other_access(session, enrolment):
         # The student has only this course, so unlimited credentials belong to it, too.
         here = or_(here, Credential.course_id.is_(None))
     signs_in = select(Credential).where(Credential.person_id == person.id, here).order_by(Credential.created_at)
     names = ("kind", "name", "created_at", "expires_at", "used_at", "revoked_at")
     return {
         "since": person.created_at.date(),
-        "signed_in_with": [_columns(row, names) for row in session.scalars(signs_in)],
+        "signed_in_with": [_read_columns(row, names) for row in session.scalars(signs_in)],
     }
 
 
-def _submissions(session: Session, mine: ColumnElement[bool]) -> Iterator[tuple[int, dict[str, Any], bytes]]:
+def _load_submissions(session: Session, mine: ColumnElement[bool]) -> Iterator[tuple[int, dict[str, Any], bytes]]:
     """Yield the id, the data and the packed files of each submission, ordered by id."""
     asked = select(Appeal).join(SubmissionRow, Appeal.submission_id == SubmissionRow.id).where(mine)
     appeals: dict[int, list[Appeal]] = {}
@@ -92,24 +96,24 @@ def _submissions(session: Session, mine: ColumnElement[bool]) -> Iterator[tuple[
     columns = ("text", "asked_at", "answer", "answered_at")
     query = select(SubmissionRow, SubmissionRow.packed).where(mine).order_by(SubmissionRow.id)
     for row, packed in session.execute(query, execution_options={"yield_per": _AT_ONCE}):
-        own = [_columns(each, columns) for each in appeals.get(row.id, ())]
-        yield row.id, {**_columns(row, names), "appeals": own}, packed
+        own = [_read_columns(each, columns) for each in appeals.get(row.id, ())]
+        yield row.id, {**_read_columns(row, names), "appeals": own}, packed
 
 
-def _seen_grades(session: Session, mine: ColumnElement[bool]) -> Iterator[tuple[int, View, str]]:
+def _load_seen_grades(session: Session, mine: ColumnElement[bool]) -> Iterator[tuple[int, View, str]]:
     """Yield the id, view and report of each submission whose grade the student may see."""
     query = select(Job.id, Job.submission_id).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
-    submission_of = dict(session.execute(query.where(mine, *current.CAN_COUNT)).all())
-    released = policies.released_of_each(session, submission_of)
-    graded = results.load_each(session, submission_of)
-    views = ((job_id, student_view(grade, released[job_id])) for job_id, grade in graded)
-    for job_id, view, report in report_each(session, views, submission_of):
+    submission_of = dict(session.execute(query.where(mine, *current_grades.CAN_COUNT)).all())
+    released = policies.load_visibilities_by_job(session, submission_of)
+    graded = results.load_each_grade(session, submission_of)
+    views = ((job_id, build_student_view(grade, released[job_id])) for job_id, grade in graded)
+    for job_id, view, report in render_each_report(session, views, submission_of):
         yield submission_of[job_id], view, report
 
 
-def _columns(row: object, names: Sequence[str]) -> dict[str, Any]:
+def _read_columns(row: object, names: Sequence[str]) -> dict[str, Any]:
     return {name: getattr(row, name) for name in names}
 
 
-def _written(document: Mapping[str, Any]) -> bytes:
+def _encode_json(document: Mapping[str, Any]) -> bytes:
     return (json.dumps(document, indent=2, default=str) + "\n").encode()

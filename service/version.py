@@ -11,10 +11,10 @@ from pathlib import Path
 
 GRADER_VERSION = version("robomark")
 
-_PACKAGES = Path(__file__).parent.parent
+_ROOT = Path(__file__).parent.parent
 #: Code and data that affect marks; assignments have their own hash.
-_DECIDING = ("sim", "models", "responders", "submissions", "service/grading")
-_NOT_DECIDING = {"__pycache__", "catalogue", "examples"}
+_GRADER_FOLDERS = ("sim", "models", "responders", "submissions", "service/grading")
+_IGNORED_NAMES = {"__pycache__", "catalogue", "examples"}
 #: Libraries imported by that code, and the libraries that these compute with.
 _DISTRIBUTIONS = (
     *("pybullet", "numpy", "scipy", "scikit-learn", "joblib", "threadpoolctl", "pandas", "pillow", "google-re2"),
@@ -22,30 +22,30 @@ _DISTRIBUTIONS = (
 )
 
 
-def release_problem() -> str:
+def describe_release_problem() -> str:
     """Return the reason why this process must be restarted: a different release is installed.
 
     Empty if there is none.
     """
-    installed = _version("robomark")
+    installed = _find_version("robomark")
     if installed == GRADER_VERSION:
         return ""
     return f"the installed release ({installed}) differs from the running one ({GRADER_VERSION}); restart"
 
 
 @cache
-def grader_sha256() -> str:
+def hash_grader() -> str:
     """Return the hash of the grading code, its data and libraries. Equal hashes mean equal marks."""
     digest = hashlib.sha256(platform.python_version().encode())
     for name in _DISTRIBUTIONS:
-        digest.update(f"{name} {_version(name)}\n".encode())
-    for path in _files():
+        digest.update(f"{name} {_find_version(name)}\n".encode())
+    for path in _list_grader_files():
         data = path.read_bytes()
-        digest.update(f"{path.relative_to(_PACKAGES)}:{len(data)}:".encode() + data)
+        digest.update(f"{path.relative_to(_ROOT)}:{len(data)}:".encode() + data)
     return digest.hexdigest()
 
 
-def _version(distribution: str) -> str:
+def _find_version(distribution: str) -> str:
     """Return the version that is installed now; "none" for a missing library."""
     try:
         return version(distribution)
@@ -53,8 +53,8 @@ def _version(distribution: str) -> str:
         return "none"
 
 
-def _files() -> Iterator[Path]:
-    for room in _DECIDING:
-        for path in sorted((_PACKAGES / room).rglob("*")):
-            if path.is_file() and _NOT_DECIDING.isdisjoint(path.relative_to(_PACKAGES).parts):
+def _list_grader_files() -> Iterator[Path]:
+    for room in _GRADER_FOLDERS:
+        for path in sorted((_ROOT / room).rglob("*")):
+            if path.is_file() and _IGNORED_NAMES.isdisjoint(path.relative_to(_ROOT).parts):
                 yield path

@@ -15,14 +15,14 @@ from typing import Self
 
 import structlog
 
-from service.outside import Networks, NotReached, ask
+from service.outgoing_requests import Networks, RequestFailure, send_request
 from service.store import outbox
 from service.store.engine import Store
 from service.store.outbox import ClaimedDelivery
 from service.version import GRADER_VERSION
 
 _log = structlog.get_logger(__name__)
-_LOOK_SECONDS = 2.0
+_POLL_SECONDS = 2.0
 _AT_ONCE = 8
 
 
@@ -45,30 +45,30 @@ class WebhookSender:
         self._thread.join(timeout=1.0)
 
     def _run(self) -> None:
-        while not self._ended.wait(_LOOK_SECONDS):
+        while not self._ended.wait(_POLL_SECONDS):
             try:
-                while not self._ended.is_set() and send_due(self._store, self._others):
+                while not self._ended.is_set() and send_due_deliveries(self._store, self._others):
                     pass
             except Exception:
                 _log.exception("webhooks.failed")
 
 
-def send_due(store: Store, others: Networks) -> int:
+def send_due_deliveries(store: Store, others: Networks) -> int:
     """Send some of the due deliveries. Returns their number."""
-    claimed = outbox.claim(store, _AT_ONCE)
+    claimed = outbox.claim_deliveries(store, _AT_ONCE)
     if claimed:
         with ThreadPoolExecutor(_AT_ONCE) as pool:
-            list(pool.map(lambda each: _send(store, each, others), claimed))
+            list(pool.map(lambda each: _send_delivery(store, each, others), claimed))
     return len(claimed)
 
 
-def signature(secret: str, at: int, body: bytes) -> str:
+def sign_body(secret: str, at: int, body: bytes) -> str:
     """Return the value of the ``Robomark-Signature`` header for a body sent at this second."""
     signed = hmac.new(secret.encode(), f"{at}.".encode() + body, hashlib.sha256).hexdigest()
     return f"t={at},v1={signed}"
 
 
-def _send(store: Store, claimed: ClaimedDelivery, others: Networks) -> None:
+def _send_delivery(store: Store, claimed: ClaimedDelivery, others: Networks) -> None:
     body = json.dumps(
         {"id": claimed.id, "event": claimed.event, "made_at": claimed.made_at.isoformat(), **claimed.payload}
     ).encode()
@@ -77,14 +77,14 @@ def _send(store: Store, claimed: ClaimedDelivery, others: Networks) -> None:
         "User-Agent": f"Robomark/{GRADER_VERSION}",
         "Robomark-Event": claimed.event,
         "Robomark-Delivery": claimed.id,
-        "Robomark-Signature": signature(claimed.secret, int(time.time()), body),
+        "Robomark-Signature": sign_body(claimed.secret, int(time.time()), body),
     }
     try:
-        status = ask(claimed.url, method="POST", body=body, headers=headers, others=others).status
-    except NotReached as error:
-        outbox.failed(store, claimed, str(error))
+        status = send_request(claimed.url, method="POST", body=body, headers=headers, others=others).status
+    except RequestFailure as error:
+        outbox.record_failure(store, claimed, str(error))
         return
     if 200 <= status < 300:
-        outbox.delivered(store, claimed)
+        outbox.record_delivery(store, claimed)
     else:
-        outbox.failed(store, claimed, f"answered {status}, expected 200 or another of 2xx")
+        outbox.record_failure(store, claimed, f"answered {status}, expected 200 or another of 2xx")

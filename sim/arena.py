@@ -9,7 +9,18 @@ import math
 
 from sim.bullet import Client, pb
 from sim.camera import HEIGHT, WIDTH
-from sim.motion import FreeMotion, Motion, Physics, Rectangle, SolidMotion, add_block, add_body, gap, place_body, walls
+from sim.motion import (
+    FreeMotion,
+    Motion,
+    Physics,
+    Rectangle,
+    SolidMotion,
+    add_block,
+    add_body,
+    build_walls,
+    measure_gap,
+    place_body,
+)
 from sim.rigid_wheels import RigidWheels
 from sim.robot import Robot
 from sim.trigonometry import round_half_up, sincos
@@ -46,7 +57,7 @@ class Arena:
                 _VERTICAL,
             ),
         }
-        blocks = walls() | {f"obstacle {number}": box for number, box in enumerate(obstacles, 1)}
+        blocks = build_walls() | {f"obstacle {number}": box for number, box in enumerate(obstacles, 1)}
         self._blocks = [(name, box, self._add_block(box)) for name, box in blocks.items()]
         self._bodies: dict[str, int] = {}
         self._motions: dict[tuple[str, Physics], Motion] = {}
@@ -57,7 +68,7 @@ class Arena:
         for motion in self._motions.values():
             motion.close()
 
-    def motion(self, robot: Robot, physics: Physics, x: float, y: float, heading: float) -> Motion:
+    def place_motion(self, robot: Robot, physics: Physics, x: float, y: float, heading: float) -> Motion:
         """Return the motion of ``robot`` in this arena, placed at this pose; heading in radians.
 
         The object is reused, so it can serve only one trial at a time.
@@ -70,10 +81,10 @@ class Arena:
 
     def _make_motion(self, robot: Robot, physics: Physics) -> Motion:
         if physics.drive == "wheels":
-            return RigidWheels(robot, (*walls().values(), *self.obstacles) if physics.solid else ())
+            return RigidWheels(robot, (*build_walls().values(), *self.obstacles) if physics.solid else ())
         return SolidMotion(robot, self.obstacles) if physics.solid else FreeMotion(robot)
 
-    def distance(self, x: float, y: float, heading: float, forward: float) -> float:
+    def measure_distance(self, x: float, y: float, heading: float, forward: float) -> float:
         """Return the ultrasonic reading in mm, 0..2550, from ``forward`` mm in front of the axle; heading in radians.
 
         The sensor uses seven rays within 21 degrees. It detects an edge if the edge's direction and the central heading
@@ -104,7 +115,7 @@ class Arena:
         nearest = min(hit[2] for hit in hits)
         return min(max(round_half_up(nearest * _RANGE), 0.0), _RANGE)
 
-    def stands_between(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
+    def is_blocked_between(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
         """Return whether an edge of the floor or of an obstacle crosses the straight line between two points, mm.
 
         Walls and obstacles are taller than every sensor, so the height of the ray does not matter.
@@ -114,27 +125,27 @@ class Arena:
         ((body, *_),) = pb.rayTestBatch(ray[:1], ray[1:], collisionFilterMask=edges, physicsClientId=self._client.id)
         return bool(body >= 0)
 
-    def touching(self, robot: Robot, x: float, y: float, heading: float) -> tuple[str, ...]:
+    def find_contacts(self, robot: Robot, x: float, y: float, heading: float) -> tuple[str, ...]:
         """Return the names of walls and obstacles that overlap the robot's body or are within half a millimetre."""
-        near = [(name, block) for name, box, block in self._blocks if gap(box, x, y) <= robot.reach + TOUCH]
+        near = [(name, block) for name, box, block in self._blocks if measure_gap(box, x, y) <= robot.reach + TOUCH]
         if not near:
             return ()
         body = self._body(robot)
         place_body(body, x, y, heading, self._client)
-        return tuple(name for name, block in near if self._meet(body, block))
+        return tuple(name for name, block in near if self._is_in_contact(body, block))
 
-    def _meet(self, body: int, other: int) -> bool:
+    def _is_in_contact(self, body: int, other: int) -> bool:
         return bool(pb.getClosestPoints(body, other, TOUCH * _METRE, physicsClientId=self._client.id))
 
     def _body(self, robot: Robot) -> int:
         if robot.name not in self._bodies:
-            self._bodies[robot.name] = self._group(add_body(robot, self._client, 0), 1)
+            self._bodies[robot.name] = self._assign_collision_group(add_body(robot, self._client, 0), 1)
         return self._bodies[robot.name]
 
     def _add_block(self, box: Rectangle) -> int:
-        return self._group(add_block(box, self._client), 1)
+        return self._assign_collision_group(add_block(box, self._client), 1)
 
-    def _group(self, body: int, group: int, mask: int = 1) -> int:
+    def _assign_collision_group(self, body: int, group: int, mask: int = 1) -> int:
         pb.setCollisionFilterGroupMask(body, -1, group, mask, physicsClientId=self._client.id)
         return body
 

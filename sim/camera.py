@@ -28,23 +28,23 @@ _TILE = 128
 class LightCamera(Protocol):
     """Camera that returns windows of ``side`` x ``side`` pixels; (column, row) is the upper left pixel on the floor."""
 
-    def window(self, column: int, row: int, side: int) -> Bytes:
+    def render_window(self, column: int, row: int, side: int) -> Bytes:
         """Return the window as RGB, shape (side, side, 3), top row first; black outside the floor."""
         ...
 
-    def sums(self, column: int, row: int, side: int) -> tuple[int, int, int]:
+    def measure_sums(self, column: int, row: int, side: int) -> tuple[int, int, int]:
         """Return the sums of R, G and B over the pixels that a round sensor of diameter ``side`` sees."""
         ...
 
 
-def sensor_mask(side: int) -> NDArray[np.bool_]:
+def build_sensor_mask(side: int) -> NDArray[np.bool_]:
     """Return the mask of the round sensor, shape (side, side): 305 pixels for a side of 20 (robolab section 4)."""
     radius = side / 2
     rows, columns = np.mgrid[0:side, 0:side]
     return np.asarray((rows - radius) ** 2 + (columns - radius) ** 2 < radius**2)
 
 
-def _orthographic(half: float, shift: float) -> tuple[float, ...]:
+def _build_projection(half: float, shift: float) -> tuple[float, ...]:
     """Return the projection of a square of 2 x ``half`` metres, shifted by ``shift``, for heights 0 to 1 m."""
     left, right = -half + shift, half + shift
     scale, offset = 2 / (right - left), -(right + left) / (right - left)
@@ -78,31 +78,31 @@ class BulletCamera:
             Image.fromarray(padded).save(file)
             texture = pb.loadTexture(str(file), physicsClientId=self._client.id)
         pb.changeVisualShape(body, -1, textureUniqueId=texture, physicsClientId=self._client.id)
-        self._shoot(0, 0, 2, light=True)
+        self._render(0, 0, 2, light=True)
 
     def close(self) -> None:
         """Disconnect from Bullet. The camera cannot take images afterwards."""
         self._client.close()
 
-    def window(self, column: int, row: int, side: int) -> Bytes:
+    def render_window(self, column: int, row: int, side: int) -> Bytes:
         """Return the window as RGB, shape (side, side, 3), top row first; black outside the floor."""
         if not (-side < column < self._width and -side < row < self._height):
             return np.zeros((side, side, 3), np.uint8)
-        return self._shoot(column, row, side)
+        return self._render(column, row, side)
 
-    def sums(self, column: int, row: int, side: int) -> tuple[int, int, int]:
+    def measure_sums(self, column: int, row: int, side: int) -> tuple[int, int, int]:
         """Return the sums of R, G and B over the pixels that a round sensor of diameter ``side`` sees."""
         mask = self._masks.get(side)
         if mask is None:
-            mask = self._masks[side] = sensor_mask(side)
-        red, green, blue = self.window(column, row, side)[mask].sum(axis=0, dtype=np.int64).tolist()
+            mask = self._masks[side] = build_sensor_mask(side)
+        red, green, blue = self.render_window(column, row, side)[mask].sum(axis=0, dtype=np.int64).tolist()
         return red, green, blue
 
-    def _shoot(self, column: int, row: int, side: int, light: bool = False) -> Bytes:
+    def _render(self, column: int, row: int, side: int, light: bool = False) -> Bytes:
         x = (column + side / 2) * _METRE
         y = (self._height - row - side / 2) * _METRE
         view = (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -x, -y, -0.5, 1)
-        projection = _orthographic(side * _METRE / 2, _METRE / 2)
+        projection = _build_projection(side * _METRE / 2, _METRE / 2)
         # Ambient light alone gives the texture's own colours. The client keeps this setting.
         lighting = (
             {
@@ -129,7 +129,7 @@ class BulletCamera:
         return rgb
 
 
-class _Part(NamedTuple):
+class _FloorPart(NamedTuple):
     """Part of the floor in pixels. Areas beyond the floor's borders are empty."""
 
     left: int
@@ -137,7 +137,7 @@ class _Part(NamedTuple):
     right: int
     bottom: int
 
-    def has(self, column: int, row: int, side: int) -> bool:
+    def contains_window(self, column: int, row: int, side: int) -> bool:
         """Return whether this part contains the whole window, ignoring areas off the floor."""
         return (
             self.left <= max(column, 0)
@@ -147,7 +147,7 @@ class _Part(NamedTuple):
         )
 
 
-_WHOLE = _Part(0, 0, WIDTH, HEIGHT)
+_WHOLE = _FloorPart(0, 0, WIDTH, HEIGHT)
 
 
 class CachedCamera:
@@ -174,57 +174,57 @@ class CachedCamera:
             self._camera.close()
             self._camera = None
 
-    def window(self, column: int, row: int, side: int) -> Bytes:
+    def render_window(self, column: int, row: int, side: int) -> Bytes:
         """Return the window as RGB, shape (side, side, 3), top row first; black outside the floor."""
         if not (-side < column < WIDTH and -side < row < HEIGHT):
             return np.zeros((side, side, 3), np.uint8)
-        tile = self._tile(column // _TILE, row // _TILE, side)
+        tile = self._load_tile(column // _TILE, row // _TILE, side)
         column, row = column % _TILE, row % _TILE
         return tile[row : row + side, column : column + side]
 
-    def sums(self, column: int, row: int, side: int) -> tuple[int, int, int]:
+    def measure_sums(self, column: int, row: int, side: int) -> tuple[int, int, int]:
         """Return the sums of R, G and B over the pixels that a round sensor of diameter ``side`` sees."""
         if not (-side < column < WIDTH and -side < row < HEIGHT):
             return 0, 0, 0
         key = (column // _TILE, row // _TILE, side)
         table = self._sums.get(key)
         if table is None:
-            table = self._sums[key] = _disc_sums(self._tile(*key), side)
+            table = self._sums[key] = _compute_disc_sums(self._load_tile(*key), side)
         column, row = column % _TILE, row % _TILE
         return table[row, column, 0], table[row, column, 1], table[row, column, 2]
 
-    def _tile(self, tile_column: int, tile_row: int, side: int) -> Bytes:
+    def _load_tile(self, tile_column: int, tile_row: int, side: int) -> Bytes:
         key = (tile_column, tile_row, side)
         tile = self._tiles.get(key)
         if tile is None:
-            tile = self._tiles[key] = self._photograph(tile_column * _TILE, tile_row * _TILE, _TILE + side)
+            tile = self._tiles[key] = self._render_tile(tile_column * _TILE, tile_row * _TILE, _TILE + side)
         return tile
 
-    def _photograph(self, column: int, row: int, side: int) -> Bytes:
+    def _render_tile(self, column: int, row: int, side: int) -> Bytes:
         if 0 <= column <= WIDTH - side and 0 <= row <= HEIGHT - side:
             printed = self._pixels[row : row + side, column : column + side]
             if (printed == printed[0, 0]).all():
                 # A rendering of a single colour equals the print, so PyBullet is not needed.
                 return printed
         if self._camera is None:
-            self._see(_Part(column - _TILE, row - _TILE, column + 3 * _TILE, row + 3 * _TILE))
-        elif not self._seen.has(column, row, side):
+            self._open_camera(_FloorPart(column - _TILE, row - _TILE, column + 3 * _TILE, row + 3 * _TILE))
+        elif not self._seen.contains_window(column, row, side):
             self.close()
-            self._see(_WHOLE)
+            self._open_camera(_WHOLE)
         assert self._camera is not None
-        return self._camera.window(column - self._seen.left, row - self._seen.top, side)
+        return self._camera.render_window(column - self._seen.left, row - self._seen.top, side)
 
-    def _see(self, part: _Part) -> None:
-        self._seen = _Part(max(part.left, 0), max(part.top, 0), part.right, part.bottom)
+    def _open_camera(self, part: _FloorPart) -> None:
+        self._seen = _FloorPart(max(part.left, 0), max(part.top, 0), part.right, part.bottom)
         self._camera = BulletCamera(self._pixels[self._seen.top : part.bottom, self._seen.left : part.right])
 
 
-def _disc_sums(tile: Bytes, side: int) -> memoryview:
+def _compute_disc_sums(tile: Bytes, side: int) -> memoryview:
     """Return the masked sums of every window in a tile, shape (128, 128, 3), computed from running sums by mask row."""
     running = np.zeros((_TILE + side, _TILE + side + 1, 3), np.int64)
     np.cumsum(tile, axis=1, out=running[:, 1:])
     total = np.zeros((_TILE, _TILE, 3), np.int64)
-    for row, counted in enumerate(sensor_mask(side)):
+    for row, counted in enumerate(build_sensor_mask(side)):
         columns = np.flatnonzero(counted)
         if columns.size:
             first, last = int(columns[0]), int(columns[-1]) + 1
@@ -242,7 +242,7 @@ class Cameras:
         # The keys are object ids. Holding the image prevents reuse of its id.
         self._cameras: OrderedDict[int, tuple[Bytes, CachedCamera]] = OrderedDict()
 
-    def camera(self, pixels: Bytes) -> CachedCamera:
+    def open_camera(self, pixels: Bytes) -> CachedCamera:
         """Return the camera over the floor ``pixels``, which must not change afterwards."""
         held = self._cameras.pop(id(pixels), None)
         self.close()

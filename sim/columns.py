@@ -41,7 +41,7 @@ class Column:
     name: str = ""  # name of the array in ``Ticks``
     width: int = 1
     whole: bool = False
-    told_as: str = ""  # attribute of ``Ticks`` that traces and plots use instead
+    display_attribute: str = ""  # attribute of ``Ticks`` that traces and plots use instead
     sensor: str = ""
     reading: str = ""
     panel: Panel | None = None
@@ -55,7 +55,7 @@ class Column:
 
         return np.int64 if self.whole else np.float64
 
-    def unknown(self, rows: int) -> NDArray[Any]:
+    def build_unknown_values(self, rows: int) -> NDArray[Any]:
         """Return the values for a recording that was made without this column."""
         import numpy as np
 
@@ -67,8 +67,11 @@ def column(unit: str, source: str, **more: Any) -> Any:
     return field(default=None, metadata={"column": Column(unit, source, **more)})
 
 
-def columns_of(table: type) -> tuple[Column, ...]:
+def collect_columns(table: type) -> tuple[Column, ...]:
     """Return the columns of a class, those of the chain first."""
     found = (replace(each.metadata["column"], name=each.name) for each in fields(table) if "column" in each.metadata)
-    named = (replace(each, told_as=each.told_as or each.name, reading=each.reading or each.source) for each in found)
+    named = (
+        replace(each, display_attribute=each.display_attribute or each.name, reading=each.reading or each.source)
+        for each in found
+    )
     return tuple(sorted(named, key=lambda each: not each.in_chain))

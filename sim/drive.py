@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-from sim.chance import Stream
 from sim.motion import Motion
+from sim.random_streams import RandomStream
 from sim.robot import MAX_SPEED, Robot
 from sim.trigonometry import round_half_up
 
@@ -103,8 +103,8 @@ class Drive:
     heading: float
     noise: float = 0.0
     both_directions: bool = False  # noise also for negative speeds
-    left_chance: Stream | None = None
-    right_chance: Stream | None = None
+    left_chance: RandomStream | None = None
+    right_chance: RandomStream | None = None
     turns: int = 0
     gyro_angle: float = 0.0  # degrees, clockwise
     gyro_rate: float = 0.0
@@ -126,7 +126,7 @@ class Drive:
         left = self.left.travel(clock) * mm_per_degree
         right = self.right.travel(clock) * mm_per_degree
         before = self.x, self.y
-        self.x, self.y, turned = self.motion.moved(self.x, self.y, self.heading, left, right)
+        self.x, self.y, turned = self.motion.compute_move(self.x, self.y, self.heading, left, right)
         if turned == 0.0 and (self.x, self.y) == before:
             self.gyro_rate = 0.0
             return
@@ -138,7 +138,7 @@ class Drive:
         self.gyro_angle -= degrees
         self.gyro_rate = -degrees * 30
 
-    def _noise(self, chance: Stream | None, clock: int) -> float:
+    def _noise(self, chance: RandomStream | None, clock: int) -> float:
         if self.noise <= 0 or chance is None:
             return 0.0
         return chance.between(-self.noise, self.noise, clock)

@@ -17,8 +17,8 @@ class RobomarkError(Exception):
     """
 
     def __init__(self, sentence: str | Sentence = "", /, **values: object) -> None:
-        self.said = Sentence(sentence, values) if isinstance(sentence, str) else sentence
-        super().__init__(str(self.said))
+        self.message = Sentence(sentence, values) if isinstance(sentence, str) else sentence
+        super().__init__(str(self.message))
 
 
 class UsageError(RobomarkError):

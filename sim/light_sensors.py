@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.camera import HEIGHT, LightCamera, sensor_mask
-from sim.chance import Stream
+from sim.camera import HEIGHT, LightCamera, build_sensor_mask
+from sim.random_streams import RandomStream
 from sim.robot import LightSensor
 
 #: Pixel value outside the round window in the original.
@@ -28,7 +28,7 @@ class Footprint:
     y: float
 
 
-def footprint(sensor: LightSensor, x: float, y: float, sine: float, cosine: float) -> Footprint:
+def compute_footprint(sensor: LightSensor, x: float, y: float, sine: float, cosine: float) -> Footprint:
     """Return the position of ``sensor`` on a robot at (x, y); sine and cosine are of the heading minus a right angle.
 
     The operations have the original's order (robolab section 4), because the result is truncated.
@@ -42,36 +42,36 @@ def footprint(sensor: LightSensor, x: float, y: float, sine: float, cosine: floa
 class LightReader:
     """One light sensor over one floor, with new noise per pixel in each tick."""
 
-    def __init__(self, sensor: LightSensor, camera: LightCamera, noise: float, chance: Stream) -> None:
+    def __init__(self, sensor: LightSensor, camera: LightCamera, noise: float, chance: RandomStream) -> None:
         self.sensor = sensor
         self._camera = camera
         self._noise = noise
         self._chance = chance
-        self._mask = sensor_mask(sensor.diameter)
+        self._mask = build_sensor_mask(sensor.diameter)
         self.pixels = int(self._mask.sum())
 
-    def sums(self, where: Footprint, tick: int) -> tuple[int, int, int]:
+    def measure_sums(self, where: Footprint, tick: int) -> tuple[int, int, int]:
         """Return the sums of R, G and B over the sensor's pixels, including noise."""
         if self._noise <= 0:
-            return self._camera.sums(where.column, where.row, self.sensor.diameter)
-        red, green, blue = self._noisy(where, tick).sum(axis=0, dtype=np.int64).tolist()
+            return self._camera.measure_sums(where.column, where.row, self.sensor.diameter)
+        red, green, blue = self._add_noise(where, tick).sum(axis=0, dtype=np.int64).tolist()
         return red, green, blue
 
-    def image(self, where: Footprint, tick: int) -> bytes:
+    def render_image(self, where: Footprint, tick: int) -> bytes:
         """Return RGBA bytes, row-major, top row first. Outside the round window, pixels have the original's colour."""
         side = self.sensor.diameter
         rgba = np.empty((side, side, 4), np.uint8)
         rgba[:, :, :3] = _OUTSIDE
         rgba[:, :, 3] = 255
         if self._noise <= 0:
-            seen = self._camera.window(where.column, where.row, side)[self._mask]
+            seen = self._camera.render_window(where.column, where.row, side)[self._mask]
         else:
-            seen = self._noisy(where, tick)
+            seen = self._add_noise(where, tick)
         rgba[self._mask, :3] = seen
         return rgba.tobytes()
 
-    def _noisy(self, where: Footprint, tick: int) -> NDArray[np.uint8]:
+    def _add_noise(self, where: Footprint, tick: int) -> NDArray[np.uint8]:
         """Return the visible pixels with uniform noise, rounded half up and clamped, shape (pixels, 3)."""
-        seen = self._camera.window(where.column, where.row, self.sensor.diameter)[self._mask]
+        seen = self._camera.render_window(where.column, where.row, self.sensor.diameter)[self._mask]
         offsets = self._chance.uniforms(tick, self.pixels * 3).reshape(-1, 3) * (2 * self._noise) - self._noise
         return np.clip(np.floor(seen + offsets + 0.5), 0, 255).astype(np.uint8)

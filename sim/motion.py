@@ -34,7 +34,7 @@ class Motion(Protocol):
         """Release resources."""
         ...
 
-    def moved(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
+    def compute_move(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
         """Return the new x and y and the turn in radians; ``left`` and ``right`` are the wheels' travel in mm."""
         ...
 
@@ -63,7 +63,7 @@ class FreeMotion:
     def place(self, x: float, y: float, heading: float) -> None:
         """Do nothing; no state is kept between ticks."""
 
-    def moved(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
+    def compute_move(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
         """Return the new x and y in mm and the turn in radians, computed by the equations alone."""
         if left == 0.0 and right == 0.0:
             return x, y, 0.0
@@ -83,7 +83,7 @@ class SolidMotion:
         self._free = FreeMotion(robot)
         self._reach = robot.reach
         self._partner = partner
-        self._boxes = (*walls().values(), *obstacles)
+        self._boxes = (*build_walls().values(), *obstacles)
         self._client = Client()
         client = self._client.id
         for box in self._boxes:
@@ -117,12 +117,14 @@ class SolidMotion:
     def place(self, x: float, y: float, heading: float) -> None:
         """Do nothing; no state is kept between ticks."""
 
-    def moved(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
+    def compute_move(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
         """Return the new x and y in mm and the turn in radians. Bullet is used only near walls and obstacles."""
-        new_x, new_y, turned = self._free.moved(x, y, heading, left, right)
+        new_x, new_y, turned = self._free.compute_move(x, y, heading, left, right)
         far = self._reach + math.hypot(new_x - x, new_y - y)
         partner = self._partner
-        if all(gap(box, x, y) > far for box in self._boxes) and (partner is None or partner.gap(x, y) > far):
+        if all(measure_gap(box, x, y) > far for box in self._boxes) and (
+            partner is None or partner.measure_gap(x, y) > far
+        ):
             return new_x, new_y, turned
         client = self._client.id
         pb.restoreState(self._state, physicsClientId=client)
@@ -137,7 +139,7 @@ class SolidMotion:
         )
         pb.stepSimulation(physicsClientId=client)
         (met_x, met_y, _), turn = pb.getBasePositionAndOrientation(self._body, physicsClientId=client)
-        met_x, met_y, met_turn = met_x / _METRE, met_y / _METRE, turn_between(heading, turn)
+        met_x, met_y, met_turn = met_x / _METRE, met_y / _METRE, compute_turn(heading, turn)
         # A contact may begin and end within the tick. Therefore the result is compared, not the remaining contacts.
         free = math.hypot(met_x - new_x, met_y - new_y) < _UNTOUCHED and abs(met_turn - turned) < _UNTOUCHED
         return (new_x, new_y, turned) if free else (round(met_x, 6), round(met_y, 6), round(met_turn, 9))
@@ -152,19 +154,19 @@ class Partner:
     y: float = 0.0
     heading: float = 0.0
 
-    def gap(self, x: float, y: float) -> float:
+    def measure_gap(self, x: float, y: float) -> float:
         """Return the lower bound of the distance from a point to its body in mm, for any heading."""
         return math.hypot(x - self.x, y - self.y) - self.robot.reach
 
 
-def turn_between(heading: float, quaternion: tuple[float, float, float, float]) -> float:
+def compute_turn(heading: float, quaternion: tuple[float, float, float, float]) -> float:
     """Return the angle from ``heading`` to the yaw of a quaternion (x, y, z, w) in radians, between -pi and pi."""
     x, y, z, w = quaternion
     yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     return (yaw - heading + math.pi) % (2 * math.pi) - math.pi
 
 
-def walls() -> dict[str, Rectangle]:
+def build_walls() -> dict[str, Rectangle]:
     """Return the four walls round the floor by name."""
     return {
         "left wall": (-WALL, -WALL, WALL, HEIGHT + 2 * WALL),
@@ -203,7 +205,7 @@ def place_body(body: int, x: float, y: float, heading: float, client: Client) ->
     )
 
 
-def gap(box: Rectangle, x: float, y: float) -> float:
+def measure_gap(box: Rectangle, x: float, y: float) -> float:
     """Return the distance from a point to a rectangle in mm."""
     left, bottom, width, height = box
     return math.hypot(max(left - x, 0, x - left - width), max(bottom - y, 0, y - bottom - height))

@@ -18,7 +18,7 @@ from typing import Any
 #: Working folder of all processes started here, and of services. Only root can create files in it.
 SAFE_FOLDER = "/"
 #: Variables that make a library run or read an arbitrary file.
-_LEFT_OUT = frozenset({"MATPLOTLIBRC", "MPLBACKEND", "CELERY_CONFIG_MODULE", "CELERY_LOADER"})
+_REMOVED_VARIABLES = frozenset({"MATPLOTLIBRC", "MPLBACKEND", "CELERY_CONFIG_MODULE", "CELERY_LOADER"})
 #: One thread, and one iteration order for sets of texts.
 _SAME_ORDER: Mapping[str, str] = MappingProxyType(
     {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONHASHSEED": "0"}
@@ -32,22 +32,24 @@ _KERNELS_NEED = frozenset({"avx2", "fma"})
 _OUR_PACKAGES = str(Path(__file__).absolute().parents[1])
 
 
-def python_command(*arguments: str) -> list[str]:
+def build_python_command(*arguments: str) -> list[str]:
     """Return the command line of this interpreter, without the current folder and the user's packages on its path."""
     return [sys.executable, "-P", "-s", *arguments]
 
 
-def clean_environment(extra: Mapping[str, str]) -> dict[str, str]:
+def build_clean_environment(extra: Mapping[str, str]) -> dict[str, str]:
     """Return the environment without variables that redirect Python or libraries, plus the variables in ``extra``."""
     kept = {
-        name: value for name, value in os.environ.items() if not name.startswith("PYTHON") and name not in _LEFT_OUT
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith("PYTHON") and name not in _REMOVED_VARIABLES
     }
     # For child processes of the started process, such as the pool children of a worker.
     return kept | {"PYTHONSAFEPATH": "1", "PYTHONNOUSERSITE": "1"} | dict(extra)
 
 
 @functools.cache
-def same_arithmetic() -> dict[str, str]:
+def build_arithmetic_environment() -> dict[str, str]:
     """Return the variables that make a process compute the same bits on every machine.
 
     Processors without AVX2 or FMA, such as x86-64 servers until 2013, use their own kernels.
@@ -59,13 +61,15 @@ def same_arithmetic() -> dict[str, str]:
     return dict(_SAME_ORDER) | (dict(_SAME_KERNELS) if set(flags.split()) >= _KERNELS_NEED else {})
 
 
-def start(command: Sequence[str], extra: Mapping[str, str] | None = None, **options: Any) -> subprocess.Popen[Any]:
+def launch_process(
+    command: Sequence[str], extra: Mapping[str, str] | None = None, **options: Any
+) -> subprocess.Popen[Any]:
     """Start ``command``; ``options`` are those of ``subprocess.Popen``, without folder and environment.
 
     Raises:
         OSError: The process cannot be started.
     """
-    return subprocess.Popen(command, cwd=SAFE_FOLDER, env=clean_environment(extra or {}), **options)
+    return subprocess.Popen(command, cwd=SAFE_FOLDER, env=build_clean_environment(extra or {}), **options)
 
 
 def leave_current_folder() -> None:

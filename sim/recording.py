@@ -12,7 +12,7 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 
-from sim.columns import Panel, column, columns_of
+from sim.columns import Panel, collect_columns, column
 
 if TYPE_CHECKING:
     import numpy as np
@@ -81,7 +81,7 @@ class Ticks:
         "left_sums",
         width=3,
         whole=True,
-        told_as="left_rgb",
+        display_attribute="left_rgb",
         sensor="left",
         reading="left_means",
         panel=_LIGHT,
@@ -92,7 +92,7 @@ class Ticks:
         "right_sums",
         width=3,
         whole=True,
-        told_as="right_rgb",
+        display_attribute="right_rgb",
         sensor="right",
         reading="right_means",
         panel=_LIGHT,
@@ -114,14 +114,14 @@ class Ticks:
     def __post_init__(self) -> None:
         for each in COLUMNS:
             if getattr(self, each.name) is None:
-                object.__setattr__(self, each.name, each.unknown(len(self.x)))
+                object.__setattr__(self, each.name, each.build_unknown_values(len(self.x)))
 
     def __len__(self) -> int:
         return len(self.x)
 
-    def told(self) -> dict[str, Floats]:
+    def to_displayed_columns(self) -> dict[str, Floats]:
         """Return the columns as readers see them, seconds first; every array has n rows."""
-        return {"t": self.t, **{each.told_as: getattr(self, each.told_as) for each in COLUMNS}}
+        return {"t": self.t, **{each.display_attribute: getattr(self, each.display_attribute) for each in COLUMNS}}
 
     @property
     def t(self) -> Floats:
@@ -147,13 +147,13 @@ class Ticks:
 
 
 #: In the order of the chain's rows.
-COLUMNS = columns_of(Ticks)
+COLUMNS = collect_columns(Ticks)
 #: Readings of programs: each sensor, and the path of its value in the world.
 SENSORS: Mapping[str, str] = MappingProxyType({each.sensor: each.reading for each in COLUMNS if each.sensor})
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class TimedText:
     """A printed or spoken text and its time in seconds."""
 
     t: float
@@ -172,7 +172,7 @@ class ProgramLine(NamedTuple):
 
 
 #: Prefix of the simulator's answers when there is no responder; the text itself follows.
-STAND_IN = "pingpong "
+STAND_IN_PREFIX = "pingpong "
 #: Reason why the channel lost a text; empty if it was delivered.
 LossReason = Literal["", "chance", "out of range", "facing away", "blocked"]
 
@@ -181,7 +181,7 @@ LossReason = Literal["", "chance", "out of range", "facing away", "blocked"]
 class Message:
     """One text sent over the bridge.
 
-    ``t`` is the sending time; ``delivered`` is the arrival time, or None if the text was lost. ``reply_to`` is the
+    ``t`` is the sending time; ``delivered`` is the arrival time, or None if the text was lost. ``reply`` is the
     index of the answered text in the recording's messages. ``note`` lists effects of the channel: lost, duplicated,
     malformed.
 
@@ -211,7 +211,7 @@ class Message:
 class AgentMessage:
     """One text between the responder and an agent, or between two agents, during the answer to a robot's message.
 
-    ``message`` is the index of the robot's message, -1 while the responder is loaded. ``reply_to`` is the index of the
+    ``message`` is the index of the robot's message, -1 while the responder is loaded. ``reply`` is the index of the
     answered text in the recording's agent messages. For an unanswered question, ``note`` has the reason.
     """
 
@@ -266,7 +266,7 @@ class Call:
 
 
 @dataclass(frozen=True, slots=True)
-class Datum:
+class DatalogEntry:
     """One datalog line: ``Light_left: 42 1.5`` has name Light_left, value 42.0, simtime 1.5."""
 
     t: float
@@ -326,12 +326,12 @@ class Recording:
     ticks: Ticks
     verdict: Verdict
     sha256: str
-    printed: tuple[Line, ...] = ()
-    spoken: tuple[Line, ...] = ()
+    printed: tuple[TimedText, ...] = ()
+    spoken: tuple[TimedText, ...] = ()
     messages: tuple[Message, ...] = ()
     images: tuple[Image, ...] = ()
     calls: tuple[Call, ...] = ()
-    datalog: tuple[Datum, ...] = ()
+    datalog: tuple[DatalogEntry, ...] = ()
     image_log: tuple[tuple[str, str, int], ...] = ()  # (side, csv, tick) of each ``image_data left|right|both``
     touches: tuple[Touch, ...] = ()
     faults: tuple[Fault, ...] = ()

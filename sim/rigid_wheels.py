@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from sim.bullet import Client, pb
-from sim.motion import Partner, Rectangle, add_block, add_body, place_body, turn_between
+from sim.motion import Partner, Rectangle, add_block, add_body, compute_turn, place_body
 from sim.robot import Robot
 from sim.trigonometry import sincos
 
@@ -68,7 +68,7 @@ class RigidWheels:
             self._body, (*position, self._radius * _METRE), (0, 0, half[0], half[1]), physicsClientId=client
         )
 
-    def moved(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
+    def compute_move(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
         """Return the new x and y in mm and the turn in radians; ``x`` and ``y`` are the previous position."""
         client = self._client.id
         if self._partner is not None:
@@ -85,7 +85,7 @@ class RigidWheels:
         for _ in range(_STEPS):
             pb.stepSimulation(physicsClientId=client)
         (met_x, met_y, _), turn = pb.getBasePositionAndOrientation(self._body, physicsClientId=client)
-        turned = round(turn_between(heading, turn), 9)
+        turned = round(compute_turn(heading, turn), 9)
         sine, cosine = sincos(heading + turned)
         met_x, met_y = met_x / _METRE - self._mass_ahead * cosine, met_y / _METRE - self._mass_ahead * sine
         return round(met_x, 6), round(met_y, 6), turned

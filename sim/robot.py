@@ -96,17 +96,17 @@ _COURSES: Mapping[str, Robot] = MappingProxyType(
 )
 
 
-def _widened(robot: Robot) -> Robot:
+def _widen_robot(robot: Robot) -> Robot:
     left, right = replace(robot.left_light, x=-60), replace(robot.right_light, x=60)
     return replace(robot, name=WIDENED[robot.name], left_light=left, right_light=right)
 
 
 ROBOTS: Mapping[str, Robot] = MappingProxyType(
-    {**_COURSES, **{wide.name: wide for wide in map(_widened, _COURSES.values())}}
+    {**_COURSES, **{wide.name: wide for wide in map(_widen_robot, _COURSES.values())}}
 )
 
 
-def robot(name: str) -> Robot:
+def get_robot(name: str) -> Robot:
     """Return the robot called ``name``.
 
     Raises:
@@ -118,6 +118,6 @@ def robot(name: str) -> Robot:
         raise UsageError(f"there is no robot called {name!r}; expected one of {', '.join(ROBOTS)}") from None
 
 
-def usual_robot(background: str) -> str:
+def get_default_robot_name(background: str) -> str:
     """Return the name of the default robot of a background (robolab section 1.1)."""
     return WIDENED["Default_Robot"] if background == "Radial_grey" else "Default_Robot"

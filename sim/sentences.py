@@ -20,7 +20,7 @@ class Sentence:
         return self.template % self.values if self.values else self.template
 
 
-def listed(parts: Sequence[str | Sentence]) -> str | Sentence:
+def join_with_and(parts: Sequence[str | Sentence]) -> str | Sentence:
     """Join the parts with "and"; empty for no parts."""
     *before, last = parts or ("",)
-    return Sentence("%(these)s and %(last)s", {"these": listed(before), "last": last}) if before else last
+    return Sentence("%(these)s and %(last)s", {"these": join_with_and(before), "last": last}) if before else last

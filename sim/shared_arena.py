@@ -6,7 +6,7 @@ The second robot is at the pose where it was last placed. Light sensors see only
 from __future__ import annotations
 
 from sim.arena import TOUCH, Arena
-from sim.motion import FreeMotion, Motion, Partner, Physics, Rectangle, SolidMotion, add_body, place_body, walls
+from sim.motion import FreeMotion, Motion, Partner, Physics, Rectangle, SolidMotion, add_body, build_walls, place_body
 from sim.rigid_wheels import RigidWheels
 from sim.robot import Robot
 
@@ -21,7 +21,7 @@ class SharedArena(Arena):
         super().__init__(obstacles)
         self._partner = Partner(partner)
         self._name = name
-        self._partners_body = self._group(add_body(partner, self._client, 0), _PARTNER, -1)
+        self._partners_body = self._assign_collision_group(add_body(partner, self._client, 0), _PARTNER, -1)
 
     def place_partner(self, x: float, y: float, heading: float) -> None:
         """Set the pose of the other robot, in mm and radians."""
@@ -29,24 +29,24 @@ class SharedArena(Arena):
         partner.x, partner.y, partner.heading = x, y, heading
         place_body(self._partners_body, x, y, heading, self._client)
 
-    def distance(self, x: float, y: float, heading: float, forward: float) -> float:
+    def measure_distance(self, x: float, y: float, heading: float, forward: float) -> float:
         """Return the distance as in an arena. The other robot has no smooth sides, so rays detect it at any angle."""
-        nearest = super().distance(x, y, heading, forward)
-        if self._partner.gap(x, y) > nearest + forward:
+        nearest = super().measure_distance(x, y, heading, forward)
+        if self._partner.measure_gap(x, y) > nearest + forward:
             return nearest
         return min(nearest, self._nearest_hit(x, y, heading, forward, _PARTNER))
 
-    def touching(self, robot: Robot, x: float, y: float, heading: float) -> tuple[str, ...]:
+    def find_contacts(self, robot: Robot, x: float, y: float, heading: float) -> tuple[str, ...]:
         """Return the objects touched as in an arena, and the partner's name if the bodies touch."""
-        touched = super().touching(robot, x, y, heading)
-        if self._partner.gap(x, y) > robot.reach + TOUCH:
+        touched = super().find_contacts(robot, x, y, heading)
+        if self._partner.measure_gap(x, y) > robot.reach + TOUCH:
             return touched
         body = self._body(robot)
         place_body(body, x, y, heading, self._client)
-        return (*touched, self._name) if self._meet(body, self._partners_body) else touched
+        return (*touched, self._name) if self._is_in_contact(body, self._partners_body) else touched
 
     def _make_motion(self, robot: Robot, physics: Physics) -> Motion:
         if physics.drive == "wheels":
-            blocks = (*walls().values(), *self.obstacles) if physics.solid else ()
+            blocks = (*build_walls().values(), *self.obstacles) if physics.solid else ()
             return RigidWheels(robot, blocks, self._partner if physics.solid else None)
         return SolidMotion(robot, self.obstacles, self._partner) if physics.solid else FreeMotion(robot)

@@ -18,10 +18,10 @@ import numpy as np
 
 from sim.arena import Arena
 from sim.camera import LightCamera
-from sim.chance import Stream
 from sim.drive import Drive
-from sim.light_sensors import Footprint, LightReader, footprint
+from sim.light_sensors import Footprint, LightReader, compute_footprint
 from sim.motion import COURSE_PHYSICS, Physics
+from sim.random_streams import RandomStream
 from sim.recording import COLUMNS, SECOND, SENSORS, TICK, Pose, Ticks, Touch
 from sim.robot import Robot
 from sim.trigonometry import sincos
@@ -34,8 +34,8 @@ _TABLE = np.dtype(
 _CHAINED = 8 + 8 * sum(each.width for each in COLUMNS if each.in_chain)  # bytes
 _sources = ", ".join(f"*world.{each.source}" if each.width > 1 else f"world.{each.source}" for each in COLUMNS)
 # Compiled to one expression, because it runs at every tick; a loop over the table would take 5 % of the tick.
-_row_of: Callable[[World], tuple[float, ...]] = eval(f"lambda world: ({_sources},)")
-_readings = attrgetter(*SENSORS.values())
+_collect_row: Callable[[World], tuple[float, ...]] = eval(f"lambda world: ({_sources},)")
+_collect_readings = attrgetter(*SENSORS.values())
 _RIGHT_ANGLE = math.pi / 2
 
 
@@ -51,7 +51,7 @@ class Noise:
     both_directions: bool = False
 
 
-class Chain:
+class HashChain:
     """SHA-256 over all events in order."""
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ class Chain:
         self.add_bytes(f"{kind}:{time}:{len(data)}:".encode() + data)
 
     @staticmethod
-    def timeless(kind: str, numbers: str) -> bytes:
+    def encode_without_time(kind: str, numbers: str) -> bytes:
         """Return the bytes that ``add`` adds for these numbers, with ``%d`` for the time. Used for frequent events."""
         return f"{kind}:%d:{len(numbers)}:{numbers}".encode()
 
@@ -84,7 +84,7 @@ class World:
         pose: Pose,
         noise: Noise,
         seed: int,
-        chain: Chain,
+        chain: HashChain,
         physics: Physics = COURSE_PHYSICS,
         tick: int = TICK,
     ) -> None:
@@ -94,21 +94,21 @@ class World:
         self.clock = 0
         self.drive = Drive(
             robot,
-            arena.motion(robot, physics, pose.x, pose.y, math.radians(pose.heading)),
+            arena.place_motion(robot, physics, pose.x, pose.y, math.radians(pose.heading)),
             pose.x,
             pose.y,
             math.radians(pose.heading),
             noise.motor,
             noise.both_directions,
-            Stream(seed, "left wheel"),
-            Stream(seed, "right wheel"),
+            RandomStream(seed, "left wheel"),
+            RandomStream(seed, "right wheel"),
         )
         self._arena = arena
         self.obstacles = arena.obstacles
         self._chain = chain
         self._lights = (
-            LightReader(robot.left_light, camera, noise.light, Stream(seed, "left light")),
-            LightReader(robot.right_light, camera, noise.light, Stream(seed, "right light")),
+            LightReader(robot.left_light, camera, noise.light, RandomStream(seed, "left light")),
+            LightReader(robot.right_light, camera, noise.light, RandomStream(seed, "right light")),
         )
         self._noisy = noise.light > 0
         self._footprints: tuple[Footprint, Footprint]
@@ -116,9 +116,9 @@ class World:
         self.ultrasonic = 0.0
         self.touches: list[Touch] = []
         # Contacts at the start pose do not count as touches: several of the course's poses overlap a wall.
-        self._touching = arena.touching(robot, pose.x, pose.y, self.drive.heading)
+        self._touching = arena.find_contacts(robot, pose.x, pose.y, self.drive.heading)
         self._rows: list[bytes] = []
-        self._sense(moved=True, listen=True)
+        self._read_sensors(moved=True, listen=True)
 
     @property
     def pose(self) -> Pose:
@@ -139,34 +139,34 @@ class World:
 
     def sense(self, moved: bool) -> None:
         """Run the second half of a tick, after all robots have moved: read the sensors and write the row."""
-        self._sense(moved, listen=self.clock % 3 == 0)
-        row = _ROW.pack(self.clock * self._tick, *_row_of(self))
+        self._read_sensors(moved, listen=self.clock % 3 == 0)
+        row = _ROW.pack(self.clock * self._tick, *_collect_row(self))
         self._rows.append(row)
         self._chain.add_bytes(row[:_CHAINED])
 
-    def readings(self) -> dict[str, Any]:
+    def collect_readings(self) -> dict[str, Any]:
         """Return the readings of every sensor after the last tick."""
-        return dict(zip(SENSORS, _readings(self), strict=True))
+        return dict(zip(SENSORS, _collect_readings(self), strict=True))
 
     @property
     def left_means(self) -> list[float]:
         """Mean R, G, B of the left light sensor."""
-        return _means(self.left_sums, self._lights[0].pixels)
+        return _compute_means(self.left_sums, self._lights[0].pixels)
 
     @property
     def right_means(self) -> list[float]:
         """Mean R, G, B of the right light sensor."""
-        return _means(self.right_sums, self._lights[1].pixels)
+        return _compute_means(self.right_sums, self._lights[1].pixels)
 
     @property
     def gyro_angle_and_rate(self) -> list[float]:
         """The gyro's angle in degrees and its rate in degrees per second, both clockwise."""
         return [self.drive.gyro_angle, self.drive.gyro_rate]
 
-    def images(self) -> tuple[bytes, bytes]:
+    def render_images(self) -> tuple[bytes, bytes]:
         """Return the RGBA bytes of the left and the right light sensor after the last tick."""
         left, right = (
-            reader.image(where, self.clock) for reader, where in zip(self._lights, self._footprints, strict=True)
+            reader.render_image(where, self.clock) for reader, where in zip(self._lights, self._footprints, strict=True)
         )
         return left, right
 
@@ -185,30 +185,30 @@ class World:
             length=self._tick,
         )
 
-    def _sense(self, moved: bool, listen: bool) -> None:
+    def _read_sensors(self, moved: bool, listen: bool) -> None:
         drive = self.drive
         if moved:
             sine, cosine = sincos(drive.heading - _RIGHT_ANGLE)
             left, right = self.robot.left_light, self.robot.right_light
             self._footprints = (
-                footprint(left, drive.x, drive.y, sine, cosine),
-                footprint(right, drive.x, drive.y, sine, cosine),
+                compute_footprint(left, drive.x, drive.y, sine, cosine),
+                compute_footprint(right, drive.x, drive.y, sine, cosine),
             )
-            self._feel()
+            self._record_touches()
         if moved or self._noisy:
-            self.left_sums = self._lights[0].sums(self._footprints[0], self.clock)
-            self.right_sums = self._lights[1].sums(self._footprints[1], self.clock)
+            self.left_sums = self._lights[0].measure_sums(self._footprints[0], self.clock)
+            self.right_sums = self._lights[1].measure_sums(self._footprints[1], self.clock)
         if listen:
-            self.ultrasonic = self._arena.distance(drive.x, drive.y, drive.heading, self.robot.ultrasonic_y)
+            self.ultrasonic = self._arena.measure_distance(drive.x, drive.y, drive.heading, self.robot.ultrasonic_y)
 
-    def _feel(self) -> None:
-        touching = self._arena.touching(self.robot, self.drive.x, self.drive.y, self.drive.heading)
+    def _record_touches(self) -> None:
+        touching = self._arena.find_contacts(self.robot, self.drive.x, self.drive.y, self.drive.heading)
         for what in touching:
             if what not in self._touching:
                 self.touches.append(Touch(self.clock * self._tick / SECOND, what, self.pose))
         self._touching = touching
 
 
-def _means(sums: tuple[int, int, int], pixels: int) -> list[float]:
+def _compute_means(sums: tuple[int, int, int], pixels: int) -> list[float]:
     red, green, blue = sums
     return [red / pixels, green / pixels, blue / pixels]

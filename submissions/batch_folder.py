@@ -14,18 +14,18 @@ from functools import cache, partial
 from pathlib import Path
 
 from sim.errors import UsageError
+from submissions.archive_extraction import unzip
 from submissions.assignment.definition import Assignment
-from submissions.assignment.folder import catalogue
+from submissions.assignment.folder import list_catalogue_ids
 from submissions.assignment.reader import find_assignment, find_in_catalogue, read_assignment
-from submissions.bundle import fit_parts, read_submission, submission_of
-from submissions.downloads import IGNORED, DownloadedFiles, is_one_students, student_files
+from submissions.bundle import build_submission, fit_parts, read_submission
+from submissions.downloads import IGNORED, DownloadedFiles, is_student_folder, list_student_files
 from submissions.grading_request import GradingRequest
-from submissions.names import LONGEST_NAME, alike, cannot_be_told, shown_name
-from submissions.raw_files import read_listed, shown
-from submissions.roster import RosterRow, file_inside, read_roster
-from submissions.student_identity import People, Refusal, Student
+from submissions.raw_files import read_paths, sanitise_name
+from submissions.roster import RosterRow, read_roster, resolve_file
+from submissions.student_identity import People, RejectedSubmission, Student
+from submissions.student_names import LONGEST_NAME, describe_look_alikes, find_look_alikes, normalise_name
 from submissions.submission import Submission
-from submissions.unzipping import unzip
 
 _log = logging.getLogger(__name__)
 _PARTS = {"robot.py", "program.py", "responder.py"}
@@ -40,11 +40,11 @@ class BatchContents:
     """Contents of a batch: submissions that can be graded, and rejected submissions."""
 
     grading_requests: tuple[GradingRequest, ...]
-    refusals: tuple[Refusal, ...]
+    refusals: tuple[RejectedSubmission, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class _Row:
+class _BatchRow:
     """One row: its displayed name, its student as written, and a function that reads it or raises UsageError."""
 
     name: str
@@ -74,35 +74,35 @@ def read_batch_for(path: Path, asked: Assignment | None, people: People | None =
         UsageError: ``path`` itself cannot be used.
     """
     if path.is_file() and path.suffix.lower() == ".csv":
-        find = cache(partial(_roster_assignment, path.parent))
-        return _read(
-            _row(
-                shown(f"line {row.line}: {row.student.id}" if row.student.id else f"line {row.line}"),
+        find = cache(partial(_find_roster_assignment, path.parent))
+        return _read_rows(
+            _build_row(
+                sanitise_name(f"line {row.line}: {row.student.id}" if row.student.id else f"line {row.line}"),
                 row.student,
                 people if row.student.id else None,
                 row.assignment or (asked.id if asked else ""),
-                partial(_roster_request, path.parent, row, asked, find),
+                partial(_build_roster_request, path.parent, row, asked, find),
                 row.problem,
             )
             for row in read_roster(path)
         )
     with _opened(path) as folder:
         find_own = cache(find_in_catalogue)
-        return _read(
-            _row(
+        return _read_rows(
+            _build_row(
                 found.source,
                 found.student,
                 people,
                 asked.id if asked else "",
-                partial(_request, found, folder.name, asked, find_own),
+                partial(_build_request, found, folder.name, asked, find_own),
                 found.problem,
                 found.number,
             )
-            for found in _found(folder, asked)
+            for found in _list_submissions(folder, asked)
         )
 
 
-def _row(
+def _build_row(
     name: str,
     written: Student,
     people: People | None,
@@ -110,25 +110,27 @@ def _row(
     read: Callable[[Student], GradingRequest],
     problem: str,
     number: str = "",
-) -> _Row:
+) -> _BatchRow:
     student = written
     try:
         student = people.find(written, number) if people is not None else written
     except UsageError as error:
         problem = problem or str(error)
-    return _Row(name, student, assignment, partial(read, student), problem)
+    return _BatchRow(name, student, assignment, partial(read, student), problem)
 
 
-def _read(rows: Iterable[_Row]) -> BatchContents:
+def _read_rows(rows: Iterable[_BatchRow]) -> BatchContents:
     rows = list(rows)
-    near = alike(row.student.id for row in rows if row.student.id)
+    near = find_look_alikes(row.student.id for row in rows if row.student.id)
     found: list[GradingRequest | str] = []
     for row in rows:
         try:
             if row.problem:
                 raise UsageError(row.problem)
             if row.student.id in near:
-                raise UsageError(f"{cannot_be_told(near[row.student.id])}; expected names that are clearly different.")
+                raise UsageError(
+                    f"{describe_look_alikes(near[row.student.id])}; expected names that are clearly different."
+                )
             found.append(row.read())
         except UsageError as error:
             found.append(" ".join(str(error).split()).removeprefix(f"{row.name}: "))
@@ -136,18 +138,18 @@ def _read(rows: Iterable[_Row]) -> BatchContents:
             # An internal error with one submission must not reject a whole class.
             _log.exception("%s could not be read", row.name)
             found.append("cannot be read because of a fault in Robomark; its log has the details. Report this fault.")
-    found = _one_each(rows, found)
+    found = _reject_duplicates(rows, found)
     return BatchContents(
         tuple(each for each in found if isinstance(each, GradingRequest)),
         tuple(
-            Refusal(row.name, each, row.student, row.assignment)
+            RejectedSubmission(row.name, each, row.student, row.assignment)
             for row, each in zip(rows, found, strict=True)
             if isinstance(each, str)
         ),
     )
 
 
-def _one_each(rows: Sequence[_Row], found: Sequence[GradingRequest | str]) -> list[GradingRequest | str]:
+def _reject_duplicates(rows: Sequence[_BatchRow], found: Sequence[GradingRequest | str]) -> list[GradingRequest | str]:
     """Keep one submission per student and assignment. If several differ, reject all of them."""
     places: dict[tuple[str, str], dict[int, GradingRequest]] = {}
     for place, each in enumerate(found):
@@ -171,13 +173,13 @@ def _one_each(rows: Sequence[_Row], found: Sequence[GradingRequest | str]) -> li
     return left
 
 
-def _request(
+def _build_request(
     found: DownloadedFiles, folder: str, asked: Assignment | None, find: Callable[[str], Assignment], student: Student
 ) -> GradingRequest:
-    length = len(shown_name(student.id))
+    length = len(normalise_name(student.id))
     if not 0 < length <= LONGEST_NAME:
         raise UsageError(f"has a student's name of {length} characters, expected from 1 to {LONGEST_NAME}.")
-    submission, own = _submission(found, folder, asked, student), asked
+    submission, own = _read_student_submission(found, folder, asked, student), asked
     if own is None:
         if submission.assignment is None:
             raise UsageError("has no assignment; name it with -a or in its submission.toml.")
@@ -186,36 +188,38 @@ def _request(
     return GradingRequest(submission, own, found.source, found.submitted_at, student)
 
 
-def _submission(found: DownloadedFiles, folder: str, asked: Assignment | None, student: Student) -> Submission:
+def _read_student_submission(
+    found: DownloadedFiles, folder: str, asked: Assignment | None, student: Student
+) -> Submission:
     parts = None if asked is None else asked.parts
     if isinstance(found.files, Path):
         return read_submission(found.files, student=student.id, asked=parts)
-    raw = read_listed(found.files, found.source)
-    return submission_of(raw, found.source, student.id, found.assignment or folder, parts)
+    raw = read_paths(found.files, found.source)
+    return build_submission(raw, found.source, student.id, found.assignment or folder, parts)
 
 
-def _roster_request(
+def _build_roster_request(
     folder: Path, row: RosterRow, asked: Assignment | None, find: Callable[[str], Assignment], student: Student
 ) -> GradingRequest:
     if not row.assignment and asked is None:
         raise UsageError("has no assignment; name it with -a or in a column assignment.")
-    path = file_inside(folder, row.file)
+    path = resolve_file(folder, row.file)
     assignment = find(row.assignment) if row.assignment or asked is None else asked
     submission = read_submission(path, student=student.id, asked=assignment.parts)
-    return GradingRequest(submission, assignment, shown(row.file), row.submitted_at, student)
+    return GradingRequest(submission, assignment, sanitise_name(row.file), row.submitted_at, student)
 
 
-def _roster_assignment(folder: Path, name: str) -> Assignment:
+def _find_roster_assignment(folder: Path, name: str) -> Assignment:
     """Read a catalogue assignment by its id, or an assignment folder relative to the roster."""
-    if name in catalogue():
+    if name in list_catalogue_ids():
         return find_assignment(name)
-    path = file_inside(folder, name)
+    path = resolve_file(folder, name)
     return read_assignment(path) if path.is_dir() else find_assignment(name)
 
 
-def _found(folder: Path, asked: Assignment | None) -> list[DownloadedFiles]:
+def _list_submissions(folder: Path, asked: Assignment | None) -> list[DownloadedFiles]:
     """Return the submissions in a folder. If a platform exported several assignments, select the requested one."""
-    found = student_files(folder)
+    found = list_student_files(folder)
     parts = [entry.name for entry in folder.iterdir() if entry.name.lower() in _PARTS]
     if parts:
         raise UsageError(
@@ -229,7 +233,8 @@ def _found(folder: Path, asked: Assignment | None) -> list[DownloadedFiles]:
         return found
     if asked.id not in several:
         raise UsageError(
-            f"{folder.name}: has submissions for {', '.join(map(shown, list(several)[:5]))}, expected for {asked.id}, "
+            f"{folder.name}: has submissions for {', '.join(map(sanitise_name, list(several)[:5]))}, expected for "
+            f"{asked.id}, "
             "or for one assignment alone."
         )
     return [each for each in found if each.assignment == asked.id]
@@ -245,7 +250,7 @@ def _opened(path: Path) -> Iterator[Path]:
             folder = Path(name) / (path.stem or "batch")
             folder.mkdir()
             unzip(path, folder, _MOST_ENTRIES, min(_MOST_BYTES, _ALWAYS_BYTES + _MOST_TIMES * path.stat().st_size))
-            yield _stepped_into(folder)
+            yield _enter_only_folder(folder)
     elif not path.exists():
         raise UsageError(f"{path}: does not exist, expected a folder or a .zip of submissions, or a .csv roster.")
     else:
@@ -254,10 +259,10 @@ def _opened(path: Path) -> Iterator[Path]:
         )
 
 
-def _stepped_into(folder: Path) -> Path:
+def _enter_only_folder(folder: Path) -> Path:
     """Return the only subfolder, if an archive has one around all submissions. A single student's folder is kept."""
     inside = [entry for entry in folder.iterdir() if entry.name not in IGNORED]
     if len(inside) != 1 or not inside[0].is_dir():
         return folder
     files = {entry.name.lower() for entry in inside[0].iterdir()}
-    return folder if files & _PARTS or is_one_students(inside[0]) else inside[0]
+    return folder if files & _PARTS or is_student_folder(inside[0]) else inside[0]

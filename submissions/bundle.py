@@ -13,27 +13,27 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from responders.code import Code
+from responders.source_file import SourceFile
 from sim.errors import UsageError
-from sim.sentences import Sentence, listed
-from submissions.file_kinds import advice_on_kind, advice_on_names, is_compiled
-from submissions.marked_run import named_run, runs_of
-from submissions.names import LONGEST_NAME, shown_name
+from sim.sentences import Sentence, join_with_and
+from submissions.file_kinds import advise_on_kind, advise_on_names, is_compiled
+from submissions.marked_run import find_run, find_runs
 from submissions.notebook import is_script, read_notebook, read_script
-from submissions.part_notes import PART_WORDS, missing_part_note, taken_for_note
-from submissions.raw_files import RawFiles, read_folder, read_single_file, read_zip, shown
+from submissions.part_notes import PART_WORDS, build_missing_part_note, build_part_use_note
+from submissions.raw_files import RawFiles, read_folder, read_single_file, read_zip, sanitise_name
 from submissions.source_text import decode_source
+from submissions.student_names import LONGEST_NAME, normalise_name
 from submissions.submission import (
-    META,
+    META_FILE,
     PART_FILES,
     SECOND_PROGRAM,
     Notebook,
     Part,
     Submission,
-    agent_of,
+    find_agent,
+    get_meta_run,
+    get_meta_text,
     read_meta,
-    run_of,
-    text_of,
 )
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def read_submission(path: Path, *, student: str | None = None, asked: Parts | No
         UsageError: The path cannot be read as a submission.
     """
     path = Path(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow a link
-    where = shown(path.name)
+    where = sanitise_name(path.name)
     if path.is_symlink():
         raise UsageError("%(where)s: is a link, expected the file or folder itself.", where=where)
     if not path.exists():
@@ -78,27 +78,27 @@ def read_submission(path: Path, *, student: str | None = None, asked: Parts | No
     elif suffix in (".py", _NOTEBOOK):
         raw = RawFiles({os.fsencode(path.name).decode("utf-8", "replace"): read_single_file(path)})
     else:
-        advice = advice_on_kind([path.name])
+        advice = advise_on_kind([path.name])
         if advice is not None:
             raise UsageError(Sentence("%(advice)s.", {"advice": advice}))
         raise UsageError(
             "%(where)s: is of a kind that cannot be read, expected a .py file, a notebook, a folder or a .zip.",
             where=where,
         )
-    return submission_of(raw, where, student or named_by(path), path.parent.name, asked)
+    return build_submission(raw, where, student or derive_student_name(path), path.parent.name, asked)
 
 
-def submission_of(raw: RawFiles, where: str, student: str, candidate: str, asked: Parts | None = None) -> Submission:
+def build_submission(raw: RawFiles, where: str, student: str, candidate: str, asked: Parts | None = None) -> Submission:
     """Return the submission in these files, for the assignment ``candidate`` unless the files name another.
 
     Raises:
         UsageError: As for ``read_submission``; ``where`` names the files in the message.
     """
-    submission = _assemble(raw, where, student, candidate)
+    submission = _assemble_submission(raw, where, student, candidate)
     return submission if asked is None else fit_parts(submission, asked, where=where)
 
 
-def named_by(path: Path) -> str:
+def derive_student_name(path: Path) -> str:
     """Return the student named by a file or folder. For a part such as robot.py, use the name of its folder."""
     path = Path(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow a link
     if path.suffix.lower() == ".py" and path.name.lower() in _NAMES:
@@ -118,9 +118,9 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
     where = where or submission.student
     if submission.notebook is not None:
         return _fit_notebook(submission, submission.notebook, asked, where)
-    submission = _with_agents(submission, asked, where)
+    submission = _add_agents(submission, asked, where)
     notes = list(submission.notes)
-    parts: dict[Part, Code | None] = {"program": submission.program, "responder": submission.responder}
+    parts: dict[Part, SourceFile | None] = {"program": submission.program, "responder": submission.responder}
     givers: dict[Part, str] = {"program": asked.program, "responder": asked.responder}
     wanted = [part for part, who in givers.items() if who == "student"]
     submitted = [part for part, source in parts.items() if source is not None]
@@ -128,41 +128,41 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
         lone = parts[submitted[0]]
         if lone is not None and lone.name.lower() not in _NAMES:
             parts = {submitted[0]: None, wanted[0]: lone}
-            notes = [note for note in notes if note != taken_for_note(lone.name, submitted[0])]
-            notes.append(taken_for_note(lone.name, wanted[0]))
+            notes = [note for note in notes if note != build_part_use_note(lone.name, submitted[0])]
+            notes.append(build_part_use_note(lone.name, wanted[0]))
     missing = [part for part in wanted if parts.get(part) is None]
     files = [PART_FILES[part] for part in missing]
-    needed = [_needed(PART_FILES[part], PART_WORDS[part]) for part in wanted]
+    needed = [_describe_file(PART_FILES[part], PART_WORDS[part]) for part in wanted]
     if asked.second_program == "student":
-        needed.append(_needed(SECOND_PROGRAM, Sentence("the second robot's program")))
+        needed.append(_describe_file(SECOND_PROGRAM, Sentence("the second robot's program")))
         files += [SECOND_PROGRAM] if SECOND_PROGRAM not in submission.files else []
     # With two robots, both programs are needed.
     if files and (len(missing) == len(wanted) or asked.second_program != "none"):
         raise UsageError(
             "%(where)s: has no %(names)s, expected %(expected)s%(renamed)s.",
             where=where,
-            names=listed(files),
-            expected=listed(needed),
-            renamed=advice_on_names(missing, submission.files),
+            names=join_with_and(files),
+            expected=join_with_and(needed),
+            renamed=advise_on_names(missing, submission.files),
         )
-    notes += [missing_part_note(part, submission.files) for part in missing]
+    notes += [build_missing_part_note(part, submission.files) for part in missing]
     for part, source in parts.items():
         if source is not None and part not in wanted:
-            notes.append(f"{shown(source.name)} was left out: the assignment does not need {PART_WORDS[part]}.")
+            notes.append(f"{sanitise_name(source.name)} was left out: the assignment does not need {PART_WORDS[part]}.")
             parts[part] = None
     fitted = dataclasses.replace(submission, program=parts.get("program"), responder=parts.get("responder"))
-    notes += [f"{name} is empty." for name in empty_parts(fitted)]
+    notes += [f"{name} is empty." for name in find_empty_parts(fitted)]
     return dataclasses.replace(fitted, notes=tuple(notes))
 
 
-def empty_parts(submission: Submission) -> Iterator[str]:
+def find_empty_parts(submission: Submission) -> Iterator[str]:
     """Yield the names of parts that contain only whitespace."""
     for code in (submission.program, submission.responder):
         if code is not None and not code.text.strip():
-            yield shown(code.name)
+            yield sanitise_name(code.name)
 
 
-def missing_part(submission: Submission, asked: Parts) -> Part | None:
+def find_missing_part(submission: Submission, asked: Parts) -> Part | None:
     """Return the missing part if one of two was submitted; None if both or neither were."""
     if (asked.program, asked.responder) == ("student", "student"):
         if submission.program is None and submission.responder is not None:
@@ -174,21 +174,21 @@ def missing_part(submission: Submission, asked: Parts) -> Part | None:
 
 def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, where: str) -> Submission:
     """Keep the notebook if it is needed, otherwise the files beside it."""
-    parts: dict[Part, Code | None] = {"program": submission.program, "responder": submission.responder}
+    parts: dict[Part, SourceFile | None] = {"program": submission.program, "responder": submission.responder}
     givers: dict[Part, str] = {"program": asked.program, "responder": asked.responder}
     if all(parts[part] is not None for part, who in givers.items() if who == "student"):
-        note = f"{shown(notebook.name)} was left out: the assignment needs the other files."
+        note = f"{sanitise_name(notebook.name)} was left out: the assignment needs the other files."
         alone = dataclasses.replace(submission, notebook=None, notes=(*submission.notes, note))
         return fit_parts(alone, asked, where=where)
     if asked.program == "student":
-        named_run(notebook, asked.cell, submission.run)
+        find_run(notebook, asked.cell, submission.run)
     files, notes = dict(submission.files), list(submission.notes)
     for source in (submission.program, submission.responder):
         if source is not None:
             files[source.name] = source.text.encode("utf-8", "surrogatepass")
-            notes.append(f"{shown(source.name)} is not used: the notebook is run instead.")
-    if asked.program != "student" and runs_of(notebook):
-        notes.append(f"{shown(notebook.name)}: the assignment provides the robot program.")
+            notes.append(f"{sanitise_name(source.name)} is not used: the notebook is run instead.")
+    if asked.program != "student" and find_runs(notebook):
+        notes.append(f"{sanitise_name(notebook.name)}: the assignment provides the robot program.")
     alone = dataclasses.replace(
         submission,
         program=None,
@@ -196,10 +196,10 @@ def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, wher
         files=MappingProxyType(dict(sorted(files.items()))),
         notes=tuple(notes),
     )
-    return _with_agents(alone, asked, where)
+    return _add_agents(alone, asked, where)
 
 
-def _with_agents(submission: Submission, asked: Parts, where: str) -> Submission:
+def _add_agents(submission: Submission, asked: Parts, where: str) -> Submission:
     """Return the submission with each agent among its files, including agents first read as another part.
 
     A notebook can contain an agent in a cell that begins with ``%%writefile``.
@@ -211,33 +211,35 @@ def _with_agents(submission: Submission, asked: Parts, where: str) -> Submission
         return submission
     program, responder = submission.program, submission.responder
     files, notes = dict(submission.files), list(submission.notes)
-    parts: dict[Part, Code | None] = {"program": program, "responder": responder}
+    parts: dict[Part, SourceFile | None] = {"program": program, "responder": responder}
     for part, code in parts.items():
-        if code is not None and agent_of(code.name, asked.agents):
+        if code is not None and find_agent(code.name, asked.agents):
             files[code.name] = code.text.encode("utf-8", "surrogatepass")
-            notes = [note for note in notes if note != taken_for_note(code.name, part)]
+            notes = [note for note in notes if note != build_part_use_note(code.name, part)]
             program = None if part == "program" else program
             responder = None if part == "responder" else responder
     for name in [
-        each for each in files if asked.agents.get(agent_of(each, asked.agents) or "", "student") != "student"
+        each for each in files if asked.agents.get(find_agent(each, asked.agents) or "", "student") != "student"
     ]:
         del files[name]
-        notes.append(f"{shown(name)} was left out: the assignment provides this agent.")
+        notes.append(f"{sanitise_name(name)} was left out: the assignment provides this agent.")
     if submission.notebook is not None:
-        files = _written_by_cells(submission.notebook, asked.agents) | files
-    there = {agent_of(name, asked.agents) for name in files}
+        files = _collect_written_agents(submission.notebook, asked.agents) | files
+    there = {find_agent(name, asked.agents) for name in files}
     missing = [f"{name}.py" for name, who in asked.agents.items() if who == "student" and name not in there]
     if missing and submission.notebook is not None:
         raise UsageError(
             "%(where)s: has no %(missing)s; put each agent in a file beside the notebook, or in a cell that begins "
             "with %%%%writefile %(first)s.",
             where=where,
-            missing=listed(missing),
+            missing=join_with_and(missing),
             first=missing[0],
         )
     if missing:
         raise UsageError(
-            "%(where)s: has no %(missing)s, expected a file for each agent.", where=where, missing=listed(missing)
+            "%(where)s: has no %(missing)s, expected a file for each agent.",
+            where=where,
+            missing=join_with_and(missing),
         )
     return dataclasses.replace(
         submission,
@@ -248,54 +250,56 @@ def _with_agents(submission: Submission, asked: Parts, where: str) -> Submission
     )
 
 
-def _written_by_cells(notebook: Notebook, agents: Mapping[str, str]) -> dict[str, bytes]:
+def _collect_written_agents(notebook: Notebook, agents: Mapping[str, str]) -> dict[str, bytes]:
     """Return the student's agents that cells of the notebook write to files."""
     written = {}
     for cell in notebook.cells:
         match = _WRITEFILE.match(cell.source)
-        if match is not None and agents.get(agent_of(match["name"], agents) or "") == "student":
+        if match is not None and agents.get(find_agent(match["name"], agents) or "") == "student":
             written[match["name"]] = cell.source[match.end() :].encode("utf-8", "surrogatepass")
     return written
 
 
-def _assemble(raw: RawFiles, where: str, name: str, candidate: str) -> Submission:
+def _assemble_submission(raw: RawFiles, where: str, name: str, candidate: str) -> Submission:
     files = dict(raw.files)
     notes = list(raw.notes)
-    meta = read_meta(files.pop(META, b""), where)
+    meta = read_meta(files.pop(META_FILE, b""), where)
     left_out = [each for each, data in files.items() if is_compiled(each, data)]
     for compiled in left_out:
         del files[compiled]
-        notes.append(f"{shown(compiled)} was left out: it is compiled code; submit its Python source.")
+        notes.append(f"{sanitise_name(compiled)} was left out: it is compiled code; submit its Python source.")
     if left_out and not files:
         raise UsageError(
             "%(where)s: has only %(names)s in it, which is not Python source, expected robot.py and responder.py.",
             where=where,
-            names=listed([shown(each) for each in left_out[:3]]),
+            names=join_with_and([sanitise_name(each) for each in left_out[:3]]),
         )
     if not files:
         raise UsageError("%(where)s: has no files in it, expected robot.py and responder.py.", where=where)
     notebook = _find_notebook(files, where, notes)
     parts = _find_parts(files, where, notes, alone=notebook is None)
-    sources: dict[Part, Code] = {}
+    sources: dict[Part, SourceFile] = {}
     for part, file_name in parts.items():
-        decoded = decode_source(files.pop(file_name), shown(file_name))
-        sources[part] = Code(file_name, decoded.text)
+        decoded = decode_source(files.pop(file_name), sanitise_name(file_name))
+        sources[part] = SourceFile(file_name, decoded.text)
         if decoded.note:
             notes.append(decoded.note)
-    assignment = text_of(meta, "assignment", where)
-    student = shown_name(name)[:LONGEST_NAME].strip() or UNNAMED
-    named = shown_name(text_of(meta, "student", where) or student)
+    assignment = get_meta_text(meta, "assignment", where)
+    student = normalise_name(name)[:LONGEST_NAME].strip() or UNNAMED
+    named = normalise_name(get_meta_text(meta, "student", where) or student)
     if named != student:
-        notes.append(f"{META} names the student {shown(named)}, but the student is {shown(student)}.")
-    run = run_of(meta, where)
+        notes.append(
+            f"{META_FILE} names the student {sanitise_name(named)}, but the student is {sanitise_name(student)}."
+        )
+    run = get_meta_run(meta, where)
     if run is not None and notebook is None:
-        notes.append(f"{META} says run = {shown_name(run)}, which is not used: there is no notebook.")
+        notes.append(f"{META_FILE} says run = {normalise_name(run)}, which is not used: there is no notebook.")
     return Submission(
         student=student,
         program=sources.get("program"),
         responder=sources.get("responder"),
         files=MappingProxyType(dict(sorted(files.items()))),
-        assignment=shown_name(assignment or candidate) or UNNAMED,
+        assignment=normalise_name(assignment or candidate) or UNNAMED,
         notes=tuple(notes),
         notebook=notebook,
         run=run if notebook is not None else None,
@@ -309,11 +313,11 @@ def _find_notebook(files: dict[str, bytes], where: str, notes: list[str]) -> Not
     if len(parts) == len(PART_FILES):
         for name in names:
             del files[name]
-            notes.append(f"{shown(name)} is a notebook and was left out.")
+            notes.append(f"{sanitise_name(name)} is a notebook and was left out.")
         return None
     try:
         if len(names) > 1:
-            found = ", ".join(map(shown, names[:5]))
+            found = ", ".join(map(sanitise_name, names[:5]))
             raise UsageError(
                 "%(where)s: has %(count)s notebooks in it (%(found)s), expected one.",
                 where=where,
@@ -321,13 +325,13 @@ def _find_notebook(files: dict[str, bytes], where: str, notes: list[str]) -> Not
                 found=found,
             )
         if names:
-            read = read_notebook(files[names[0]], shown(names[0]))
+            read = read_notebook(files[names[0]], sanitise_name(names[0]))
             del files[names[0]]
             notes.extend(read.notes)
             return read.notebook
     except UsageError as error:
         named = str(error).startswith(where)
-        sentence = error.said if named else Sentence("%(where)s: %(why)s", {"where": where, "why": error.said})
+        sentence = error.message if named else Sentence("%(where)s: %(why)s", {"where": where, "why": error.message})
         if not parts:
             raise UsageError(sentence) from None
         # The .py file beside it may contain the requested parts.
@@ -338,12 +342,12 @@ def _find_notebook(files: dict[str, bytes], where: str, notes: list[str]) -> Not
     scripts = [name for name in sorted(files) if name.lower().endswith(".py") and _is_script(files[name], name)]
     if len(scripts) != 1:
         return None
-    notes.append(f"{shown(scripts[0])} was read as the notebook that it was exported from.")
-    return read_script(decode_source(files.pop(scripts[0]), shown(scripts[0])).text, shown(scripts[0]))
+    notes.append(f"{sanitise_name(scripts[0])} was read as the notebook that it was exported from.")
+    return read_script(decode_source(files.pop(scripts[0]), sanitise_name(scripts[0])).text, sanitise_name(scripts[0]))
 
 
 def _is_script(data: bytes, name: str) -> bool:
-    return b"get_ipython" in data and is_script(decode_source(data, shown(name)).text)
+    return b"get_ipython" in data and is_script(decode_source(data, sanitise_name(name)).text)
 
 
 def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alone: bool) -> dict[Part, str]:
@@ -367,16 +371,16 @@ def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alo
     python = sorted(name for name in files if name.lower().endswith(".py"))
     looks: dict[Part, list[str]] = {"program": [], "responder": []}
     for name in python[:3]:
-        looks[_looks_like(files[name], name)].append(name)
+        looks[_guess_part(files[name], name)].append(name)
     if len(python) == 1 or (len(python) == 2 and all(len(names) == 1 for names in looks.values())):
         found: dict[Part, str] = {part: names[0] for part, names in looks.items() if names}
         for part, name in found.items():
-            notes.append(taken_for_note(name, part))
+            notes.append(build_part_use_note(name, part))
         return found
-    found_names = ", ".join(shown(name) for name in sorted(files)[:5])
-    advice = advice_on_kind(sorted(files))
+    found_names = ", ".join(sanitise_name(name) for name in sorted(files)[:5])
+    advice = advise_on_kind(sorted(files))
     instead = Sentence("; %(advice)s", {"advice": advice}) if advice is not None else ""
-    renamed = advice_on_names(PART_FILES, files) or instead
+    renamed = advise_on_names(PART_FILES, files) or instead
     raise UsageError(
         "%(where)s: has no robot.py or responder.py (found %(found)s), expected one or both%(renamed)s.",
         where=where,
@@ -385,10 +389,10 @@ def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alo
     )
 
 
-def _looks_like(data: bytes, name: str) -> Part:
-    text = decode_source(data, shown(name)).text
+def _guess_part(data: bytes, name: str) -> Part:
+    text = decode_source(data, sanitise_name(name)).text
     return "responder" if _LOOKS_LIKE_RESPONDER.search(text) else "program"
 
 
-def _needed(file: str, what: Sentence) -> Sentence:
+def _describe_file(file: str, what: Sentence) -> Sentence:
     return Sentence("%(file)s (%(what)s)", {"file": file, "what": what})

@@ -10,14 +10,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from sim.errors import UsageError
-from sim.readers.csv_text import CsvRecord, records
-from sim.readers.unreadable import Unreadable
+from sim.readers.csv_text import CsvRecord, read_records
+from sim.readers.reader_errors import UnreadableDataError
 
 _MOST_BYTES = 10_000_000
 _SEPARATORS = (",", ";", "\t")
 #: Maximum number of lines of the header row.
 _LONGEST_HEADING = 20
-_QUOTES = 'has quotation marks that do not match (one inside a cell is written "").'
+_QUOTES_PROBLEM = 'has quotation marks that do not match (one inside a cell is written "").'
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,17 +46,17 @@ def read_csv(path: Path, columns: Mapping[str, Sequence[str]], usual: str) -> Cs
     Raises:
         UsageError: The file as a whole cannot be read.
     """
-    lines = _text(path).splitlines(keepends=True)
+    lines = _read_text(path).splitlines(keepends=True)
     if not lines:
         raise UsageError(f"{path.name}: is empty, expected the columns {usual}.")
     by_heading = {heading: column for column, headings in columns.items() for heading in headings}
     try:
-        header, *others = records(lines, _separator(lines, by_heading))
-    except Unreadable as error:
+        header, *others = read_records(lines, _detect_separator(lines, by_heading))
+    except UnreadableDataError as error:
         raise UsageError(f"{path.name}: cannot be read: {error}, expected a list of students.") from None
-    places = _places(header, by_heading, path.name)
+    places = _find_columns(header, by_heading, path.name)
     rows = [
-        _row(record, places, len(header.cells))
+        _build_row(record, places, len(header.cells))
         for record in others
         if record.broken or any(map(str.strip, record.cells))
     ]
@@ -65,7 +65,7 @@ def read_csv(path: Path, columns: Mapping[str, Sequence[str]], usual: str) -> Cs
     return CsvTable(frozenset(places), tuple(rows))
 
 
-def _text(path: Path) -> str:
+def _read_text(path: Path) -> str:
     try:
         with path.open("rb") as stream:
             data = stream.read(_MOST_BYTES + 1)
@@ -83,20 +83,20 @@ def _text(path: Path) -> str:
     return text.translate({ord(character): " " for character in "\v\f\x1c\x1d\x1e\x85\u2028\u2029"})
 
 
-def _separator(lines: Sequence[str], by_heading: Mapping[str, str]) -> str:
+def _detect_separator(lines: Sequence[str], by_heading: Mapping[str, str]) -> str:
     """Return the separator with which the first line contains most of the requested columns."""
 
     def found(separator: str) -> int:
-        cells = next(records(lines[:_LONGEST_HEADING], separator)).cells
+        cells = next(read_records(lines[:_LONGEST_HEADING], separator)).cells
         return sum(cell.strip().casefold() in by_heading for cell in cells)
 
     return max(_SEPARATORS, key=found)
 
 
-def _places(header: CsvRecord, by_heading: Mapping[str, str], name: str) -> Mapping[str, int]:
+def _find_columns(header: CsvRecord, by_heading: Mapping[str, str], name: str) -> Mapping[str, int]:
     """Return the positions of the columns."""
     if header.broken:
-        raise UsageError(f"{name}: line 1 {_QUOTES}")
+        raise UsageError(f"{name}: line 1 {_QUOTES_PROBLEM}")
     places: dict[str, int] = {}
     headings = [cell.strip() for cell in header.cells]
     for place, cell in enumerate(headings):
@@ -110,9 +110,9 @@ def _places(header: CsvRecord, by_heading: Mapping[str, str], name: str) -> Mapp
     return places
 
 
-def _row(record: CsvRecord, places: Mapping[str, int], columns: int) -> CsvRow:
+def _build_row(record: CsvRecord, places: Mapping[str, int], columns: int) -> CsvRow:
     if record.broken:
-        return CsvRow(record.line, problem=_QUOTES)
+        return CsvRow(record.line, problem=_QUOTES_PROBLEM)
     found = [cell.strip() for cell in record.cells]
     if any(found[columns:]):
         return CsvRow(

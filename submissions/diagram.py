@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 DiagramKind = Literal["blockdiag", "seqdiag"]
-Line = Literal["solid", "dashed", "dotted"]
-Heads = Literal["target", "both", "none"]
+LineStyle = Literal["solid", "dashed", "dotted"]
+ArrowHeads = Literal["target", "both", "none"]
 _CHARACTERS_OF_PART = 200
 
 
@@ -23,7 +23,7 @@ class DiagramActor:
     shape: str = "box"
     colour: str = ""
     text_colour: str = ""
-    line: Line = "solid"
+    line: LineStyle = "solid"
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +33,8 @@ class DiagramArrow:
     source: str
     target: str
     label: str = ""
-    line: Line = "solid"
-    heads: Heads = "target"
+    line: LineStyle = "solid"
+    heads: ArrowHeads = "target"
     open_head: bool = False  # ->>, a message without waiting
     failed: bool = False
     colour: str = ""

@@ -12,7 +12,7 @@ from typing import cast
 from sim.errors import UsageError
 from submissions.diagram import Diagram, DiagramKind
 from submissions.diagram_text import read_diagram
-from submissions.source_text import magic_place
+from submissions.source_text import find_magic_line
 from submissions.submission import Notebook
 
 MOST_DIAGRAMS = 20
@@ -37,7 +37,7 @@ class NotebookDiagrams:
     problems: tuple[str, ...] = ()
 
 
-def diagrams_in(notebook: Notebook | None) -> NotebookDiagrams:
+def read_diagrams(notebook: Notebook | None) -> NotebookDiagrams:
     """Read the first ``MOST_DIAGRAMS`` diagrams of a notebook; without a notebook there are none.
 
     A diagram is omitted if it exceeds ``MOST_PARTS`` together with the earlier ones.
@@ -46,7 +46,7 @@ def diagrams_in(notebook: Notebook | None) -> NotebookDiagrams:
     found: list[DiagramCell] = []
     problems: list[str] = []
     for cell in notebook.cells if notebook is not None else ():
-        place = magic_place(cell.source)
+        place = find_magic_line(cell.source)
         lines = cell.source.split("\n")
         magic = _MAGIC.match(lines[place].lstrip("\ufeff").strip()) if place is not None else None
         if place is None or magic is None:

@@ -11,19 +11,19 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from sim.errors import UsageError
-from submissions.diagram import ActorGroup, Diagram, DiagramActor, DiagramArrow, DiagramKind, Divider, Heads
-from submissions.diagram_tokens import DiagramToken, mistake, tokens_of
+from submissions.diagram import ActorGroup, ArrowHeads, Diagram, DiagramActor, DiagramArrow, DiagramKind, Divider
+from submissions.diagram_tokens import DiagramToken, build_error, tokenize
 from submissions.diagram_vocabulary import (
+    ACTOR_ATTRIBUTES,
+    ARROW_ATTRIBUTES,
     ARROWS,
+    DIAGRAM_ATTRIBUTES,
     DIRECTIONS,
     FRAGMENTS,
-    LINES,
-    OF_ACTORS,
-    OF_ARROWS,
-    OF_DIAGRAMS,
-    OF_GROUPS,
+    GROUP_ATTRIBUTES,
+    LINE_STYLES,
     SHAPES,
-    meant,
+    suggest_word,
 )
 
 MAX_ACTORS = 16
@@ -43,10 +43,10 @@ def read_diagram(kind: DiagramKind, text: str, first_line: int = 1) -> Diagram:
     Raises:
         UsageError: The text is not in the language or exceeds a limit. The message begins with the line.
     """
-    return _Reader(kind, tokens_of(text, first_line), first_line).diagram()
+    return _DiagramParser(kind, tokenize(text, first_line), first_line).diagram()
 
 
-class _Reader:
+class _DiagramParser:
     """Parser state: the position in the text, and the elements found so far."""
 
     def __init__(self, kind: DiagramKind, tokens: Sequence[DiagramToken], first_line: int) -> None:
@@ -63,17 +63,17 @@ class _Reader:
     def diagram(self) -> Diagram:
         """Parse the whole text, with or without a frame such as ``seqdiag { }``."""
         framed = self._enter_frame()
-        self._statements(0)
+        self._parse_statements(0)
         if framed:
             self._expect("}")
         if self._place < len(self._tokens):
-            raise self._unexpected("the end of the text")
+            raise self._build_unexpected_error("the end of the text")
         if not self._actors:
-            raise mistake(self._last_line, "there is nothing to draw, expected lines like a -> b;")
+            raise build_error(self._last_line, "there is nothing to draw, expected lines like a -> b;")
         return Diagram(
             self._kind,
-            tuple(self._actor(name, attributes) for name, attributes in self._actors.items()),
-            self._numbered(),
+            tuple(self._build_actor(name, attributes) for name, attributes in self._actors.items()),
+            self._number_steps(),
             tuple(self._groups),
             self._settings.get("orientation", "").lower() == "portrait",
         )
@@ -89,10 +89,10 @@ class _Reader:
 
     # Tokens.
 
-    def _next(self) -> DiagramToken | None:
+    def _peek_token(self) -> DiagramToken | None:
         return self._tokens[self._place] if self._place < len(self._tokens) else None
 
-    def _is(self, sign: str, ahead: int = 0) -> bool:
+    def _is_sign(self, sign: str, ahead: int = 0) -> bool:
         place = self._place + ahead
         if place >= len(self._tokens):
             return False
@@ -100,26 +100,26 @@ class _Reader:
         return token.text == sign and token.kind == "sign"
 
     def _take(self, sign: str) -> bool:
-        found = self._is(sign)
+        found = self._is_sign(sign)
         self._place += found
         return found
 
     def _expect(self, sign: str) -> None:
         if not self._take(sign):
-            raise self._unexpected(sign)
+            raise self._build_unexpected_error(sign)
 
-    def _word(self, what: str) -> str:
-        token = self._next()
+    def _take_word(self, what: str) -> str:
+        token = self._peek_token()
         if token is None or token.kind not in ("name", "text"):
-            raise self._unexpected(what)
+            raise self._build_unexpected_error(what)
         self._place += 1
         return token.text
 
-    def _unexpected(self, expected: str) -> UsageError:
-        token = self._next()
+    def _build_unexpected_error(self, expected: str) -> UsageError:
+        token = self._peek_token()
         if token is None:
-            return mistake(self._last_line, f"the text ends here, expected {expected}")
-        return mistake(token.line, f"{token.text[:40]!r} stands here, expected {expected}")
+            return build_error(self._last_line, f"the text ends here, expected {expected}")
+        return build_error(token.line, f"{token.text[:40]!r} stands here, expected {expected}")
 
     def _line(self) -> int:
         """Return the line of the last token."""
@@ -127,68 +127,72 @@ class _Reader:
 
     # Statements.
 
-    def _statements(self, depth: int) -> None:
+    def _parse_statements(self, depth: int) -> None:
         self._check_depth(depth)
-        while (token := self._next()) is not None and not self._is("}"):
+        while (token := self._peek_token()) is not None and not self._is_sign("}"):
             if self._take(";"):
                 continue
             if token.kind == "divider":
                 self._place += 1
-                self._divide(token)
-            elif token.kind == "name" and token.text in ("class", "plugin") and not self._is("=", 1):
+                self._parse_divider(token)
+            elif token.kind == "name" and token.text in ("class", "plugin") and not self._is_sign("=", 1):
                 self._place += 1
-                self._class(token.text)
+                self._parse_class(token.text)
             elif self._begins_group():
-                self._group(depth)
+                self._parse_group(depth)
             elif token.text in FRAGMENTS and self._begins_braces():
-                self._fragment(depth)
-            elif self._is("=", 1):
-                self._setting()
+                self._parse_fragment(depth)
+            elif self._is_sign("=", 1):
+                self._parse_setting()
             else:
-                self._actors_or_arrows(depth)
+                self._parse_actors_or_arrows(depth)
 
     def _begins_group(self) -> bool:
-        token = self._next()
+        token = self._peek_token()
         return token is not None and token.text == "group" and self._begins_braces()
 
     def _begins_braces(self) -> bool:
         """Return whether the keyword is followed by braces, with an optional name between them."""
-        return self._is("{", 1) or (self._is("{", 2) and self._tokens[self._place + 1].kind in ("name", "text"))
+        return self._is_sign("{", 1) or (
+            self._is_sign("{", 2) and self._tokens[self._place + 1].kind in ("name", "text")
+        )
 
     def _check_depth(self, depth: int) -> None:
         if depth > MAX_DEPTH:
-            raise mistake(self._line(), f"braces are nested too deeply, expected at most {MAX_DEPTH} of them")
+            raise build_error(self._line(), f"braces are nested too deeply, expected at most {MAX_DEPTH} of them")
 
-    def _divide(self, token: DiagramToken) -> None:
+    def _parse_divider(self, token: DiagramToken) -> None:
         if self._kind != "seqdiag":
-            raise mistake(token.line, "a block diagram has no dividers, expected lines like a -> b;")
+            raise build_error(token.line, "a block diagram has no dividers, expected lines like a -> b;")
         self._add(Divider(token.text[3:-3].strip(), delay=token.text.startswith("...")))
 
-    def _class(self, keyword: str) -> None:
-        name = self._word("the name of a class")
-        attributes = self._attributes(OF_ACTORS | OF_ARROWS if keyword == "class" else None, "a class")
+    def _parse_class(self, keyword: str) -> None:
+        name = self._take_word("the name of a class")
+        attributes = self._parse_attributes(
+            ACTOR_ATTRIBUTES | ARROW_ATTRIBUTES if keyword == "class" else None, "a class"
+        )
         self._classes[name] = attributes
 
-    def _fragment(self, depth: int) -> None:
-        kind = self._word("alt or loop")
-        label = "" if self._is("{") else self._word("a label")
+    def _parse_fragment(self, depth: int) -> None:
+        kind = self._take_word("alt or loop")
+        label = "" if self._is_sign("{") else self._take_word("a label")
         self._expect("{")
         self._add(Divider(f"{kind} {label}".strip()))
-        self._statements(depth + 1)
+        self._parse_statements(depth + 1)
         self._expect("}")
         self._add(Divider(f"end of {kind}"))
 
-    def _setting(self) -> None:
-        name, value = self._assignment(OF_DIAGRAMS, "a diagram")
+    def _parse_setting(self) -> None:
+        name, value = self._parse_assignment(DIAGRAM_ATTRIBUTES, "a diagram")
         if name == "default_shape":
             self._check_shape(value)
         self._settings[name] = value
 
-    def _group(self, depth: int) -> list[str]:
+    def _parse_group(self, depth: int) -> list[str]:
         """Parse a frame round actors, with an optional name. Actors in nested frames belong to the outer frame too."""
-        self._word("group")
+        self._take_word("group")
         self._check_depth(depth)
-        label = "" if self._is("{") else self._word("{")
+        label = "" if self._is_sign("{") else self._take_word("{")
         attributes: Attributes = {}
         members: list[str] = []
         self._expect("{")
@@ -196,148 +200,148 @@ class _Reader:
             if self._take(";"):
                 continue
             if self._begins_group():
-                members += self._group(depth + 1)
-            elif self._is("=", 1):
-                name, value = self._assignment(OF_GROUPS, "a group")
+                members += self._parse_group(depth + 1)
+            elif self._is_sign("=", 1):
+                name, value = self._parse_assignment(GROUP_ATTRIBUTES, "a group")
                 attributes[name] = value
             else:
-                members += self._actors_or_arrows(depth)
+                members += self._parse_actors_or_arrows(depth)
         if len(self._groups) >= MAX_GROUPS:
-            raise mistake(self._line(), f"there are too many groups, expected at most {MAX_GROUPS}")
-        colour = _colour(attributes.get("color", self._settings.get("default_group_color", "")))
+            raise build_error(self._line(), f"there are too many groups, expected at most {MAX_GROUPS}")
+        colour = _clean_colour(attributes.get("color", self._settings.get("default_group_color", "")))
         self._groups.append(ActorGroup(attributes.get("label", label), tuple(dict.fromkeys(members)), colour))
         return members
 
-    def _actors_or_arrows(self, depth: int) -> list[str]:
+    def _parse_actors_or_arrows(self, depth: int) -> list[str]:
         """Parse ``a;`` or ``a, b [shape = box];`` or ``a -> b <- c [label = "x"];`` and return the actors named."""
-        chain = [self._names()]
+        chain = [self._parse_names()]
         signs: list[DiagramToken] = []
-        while (token := self._next()) is not None and token.kind == "arrow":
+        while (token := self._peek_token()) is not None and token.kind == "arrow":
             if token.text not in ARROWS[self._kind]:
-                raise self._unexpected(f"one of {' '.join(ARROWS[self._kind])}")
+                raise self._build_unexpected_error(f"one of {' '.join(ARROWS[self._kind])}")
             self._place += 1
             signs.append(token)
-            chain.append(self._names())
+            chain.append(self._parse_names())
         if signs:
-            self._arrows(chain, signs, depth)
+            self._parse_arrows(chain, signs, depth)
         else:
-            attributes = self._attributes(OF_ACTORS, "an actor")
+            attributes = self._parse_attributes(ACTOR_ATTRIBUTES, "an actor")
             self._check_shape(attributes.get("shape", "box"))
             for name in chain[0]:
                 self._actors[name].update(attributes)
         return [name for names in chain for name in names]
 
-    def _arrows(self, chain: Sequence[Sequence[str]], signs: Sequence[DiagramToken], depth: int) -> None:
-        attributes = self._attributes(OF_ARROWS, "an arrow")
+    def _parse_arrows(self, chain: Sequence[Sequence[str]], signs: Sequence[DiagramToken], depth: int) -> None:
+        attributes = self._parse_attributes(ARROW_ATTRIBUTES, "an arrow")
         returns: list[DiagramArrow] = []
         for sign, left, right in zip(signs, chain[:-1], chain[1:], strict=True):
             for one in left:
                 for other in right:
-                    arrow = self._arrow(one, sign.text, other, attributes)
+                    arrow = self._build_arrow(one, sign.text, other, attributes)
                     self._add(arrow)
                     if sign.text == "=>" and self._kind == "seqdiag":
                         label = attributes.get("return", "")
                         returns.append(replace(arrow, source=other, target=one, label=label, line="dashed", note=""))
-        if self._is("{"):
+        if self._is_sign("{"):
             self._expect("{")
-            self._statements(depth + 1)
+            self._parse_statements(depth + 1)
             self._expect("}")
         for arrow in reversed(returns):
             self._add(arrow)
 
-    def _arrow(self, one: str, sign: str, other: str, attributes: Attributes) -> DiagramArrow:
+    def _build_arrow(self, one: str, sign: str, other: str, attributes: Attributes) -> DiagramArrow:
         said = attributes.get("dir", "").lower()
         sign = DIRECTIONS.get(said, said) if said else sign
         back = sign.startswith("<") and sign != "<->"
-        heads: Heads = "both" if sign == "<->" else "none" if sign == "--" else "target"
+        heads: ArrowHeads = "both" if sign == "<->" else "none" if sign == "--" else "target"
         dashed = "--" in sign and sign != "--"
         side = next((name for name in ("leftnote", "rightnote", "note") if name in attributes), "")
         return DiagramArrow(
             other if back else one,
             one if back else other,
             attributes.get("label", ""),
-            LINES.get(attributes.get("style", "").lower(), "dashed" if dashed else "solid"),
+            LINE_STYLES.get(attributes.get("style", "").lower(), "dashed" if dashed else "solid"),
             heads,
             ">>" in sign or "<<" in sign or "async" in attributes,
             "failed" in attributes,
-            _colour(attributes.get("color", "")),
+            _clean_colour(attributes.get("color", "")),
             attributes.get(side, ""),
             "left" if side == "leftnote" else "right",
         )
 
     # Parts of statements.
 
-    def _names(self) -> list[str]:
+    def _parse_names(self) -> list[str]:
         """Parse one or more actors separated by commas, and add them to the diagram."""
-        names = [self._name()]
+        names = [self._parse_name()]
         while self._take(","):
-            names.append(self._name())
+            names.append(self._parse_name())
         return names
 
-    def _name(self) -> str:
-        name = self._word("the name of an actor")
+    def _parse_name(self) -> str:
+        name = self._take_word("the name of an actor")
         if not name.strip() or len(name) > LONGEST_NAME:
-            raise mistake(
+            raise build_error(
                 self._line(), f"an actor's name is empty or too long, expected 1 to {LONGEST_NAME} characters"
             )
         self._actors.setdefault(name, {})
         if len(self._actors) > MAX_ACTORS:
-            raise mistake(self._line(), f"there are too many actors, expected at most {MAX_ACTORS}")
+            raise build_error(self._line(), f"there are too many actors, expected at most {MAX_ACTORS}")
         return name
 
-    def _attributes(self, known: frozenset[str] | None, whose: str) -> Attributes:
+    def _parse_attributes(self, known: frozenset[str] | None, whose: str) -> Attributes:
         """Parse ``[label = "x", failed]`` any number of times, and replace a class by its attributes."""
         found: Attributes = {}
         while self._take("["):
             while not self._take("]"):
                 if self._take(",") or self._take(";"):
                     continue
-                if self._is("=", 1):
-                    name, value = self._assignment(known, whose)
+                if self._is_sign("=", 1):
+                    name, value = self._parse_assignment(known, whose)
                 else:
-                    name, value = self._known(self._word("]"), known, whose), ""
+                    name, value = self._check_known(self._take_word("]"), known, whose), ""
                 found |= self._classes.get(value, {}) if name == "class" else {name: value}
         return found
 
-    def _assignment(self, known: frozenset[str] | None, whose: str) -> tuple[str, str]:
-        name = self._known(self._word("the name of an attribute"), known, whose)
+    def _parse_assignment(self, known: frozenset[str] | None, whose: str) -> tuple[str, str]:
+        name = self._check_known(self._take_word("the name of an attribute"), known, whose)
         self._expect("=")
-        return name, self._word(f"what {name} is")
+        return name, self._take_word(f"what {name} is")
 
-    def _known(self, name: str, known: frozenset[str] | None, whose: str) -> str:
+    def _check_known(self, name: str, known: frozenset[str] | None, whose: str) -> str:
         if known is None or name in known:
             return name
-        raise mistake(
-            self._line(), f"{name[:40]!r} is not an attribute of {whose}{meant(name, known, 'label or color')}"
+        raise build_error(
+            self._line(), f"{name[:40]!r} is not an attribute of {whose}{suggest_word(name, known, 'label or color')}"
         )
 
     def _check_shape(self, shape: str) -> None:
         if shape not in SHAPES:
-            expected = meant(shape, SHAPES, "box, ellipse or diamond")
-            raise mistake(self._line(), f"there is no shape {shape[:40]!r}{expected}")
+            expected = suggest_word(shape, SHAPES, "box, ellipse or diamond")
+            raise build_error(self._line(), f"there is no shape {shape[:40]!r}{expected}")
 
     def _add(self, step: DiagramArrow | Divider) -> None:
         if len(self._steps) >= MAX_STEPS:
-            raise mistake(self._line(), f"there are too many arrows, expected at most {MAX_STEPS}")
+            raise build_error(self._line(), f"there are too many arrows, expected at most {MAX_STEPS}")
         self._steps.append(step)
 
-    def _actor(self, name: str, attributes: Attributes) -> DiagramActor:
+    def _build_actor(self, name: str, attributes: Attributes) -> DiagramActor:
         return DiagramActor(
             name,
             attributes.get("label", name),
             attributes.get("shape", self._settings.get("default_shape", "box")),
-            _colour(attributes.get("color", self._settings.get("default_node_color", ""))),
-            _colour(attributes.get("textcolor", "")),
-            LINES.get(attributes.get("style", "").lower(), "solid"),
+            _clean_colour(attributes.get("color", self._settings.get("default_node_color", ""))),
+            _clean_colour(attributes.get("textcolor", "")),
+            LINE_STYLES.get(attributes.get("style", "").lower(), "solid"),
         )
 
-    def _numbered(self) -> tuple[DiagramArrow | Divider, ...]:
+    def _number_steps(self) -> tuple[DiagramArrow | Divider, ...]:
         if self._settings.get("autonumber", "false").lower() == "false":
             return tuple(self._steps)
-        return tuple(_with_numbers(self._steps))
+        return tuple(_add_numbers(self._steps))
 
 
-def _with_numbers(steps: Iterable[DiagramArrow | Divider]) -> Iterable[DiagramArrow | Divider]:
+def _add_numbers(steps: Iterable[DiagramArrow | Divider]) -> Iterable[DiagramArrow | Divider]:
     number = 0
     for step in steps:
         if isinstance(step, DiagramArrow):
@@ -346,6 +350,6 @@ def _with_numbers(steps: Iterable[DiagramArrow | Divider]) -> Iterable[DiagramAr
         yield step
 
 
-def _colour(text: str) -> str:
+def _clean_colour(text: str) -> str:
     """Return the text if it is a valid colour, otherwise an empty text."""
     return text if _COLOUR.fullmatch(text) else ""

@@ -26,7 +26,7 @@ _TOKEN = re.compile(
 )
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
 _ESCAPED = {"n": "\n", "\n": ""}
-_NEVER_ENDS = {'"': "a text in quotes", "'": "a text in quotes", "/": "a comment"}
+_UNCLOSED = {'"': "a text in quotes", "'": "a text in quotes", "/": "a comment"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,40 +38,40 @@ class DiagramToken:
     line: int
 
 
-def mistake(line: int, what: str) -> UsageError:
+def build_error(line: int, what: str) -> UsageError:
     """Return an error for a line."""
     return UsageError(f"line {line}: {what}")
 
 
-def tokens_of(text: str, first_line: int = 1) -> list[DiagramToken]:
+def tokenize(text: str, first_line: int = 1) -> list[DiagramToken]:
     """Return the tokens of ``text`` without whitespace and comments.
 
     Raises:
         UsageError: The text contains an unknown sign. The message has the line.
     """
     if len(text) > MAX_CHARACTERS:
-        raise mistake(first_line, f"the text is too long, expected at most {MAX_CHARACTERS} characters")
+        raise build_error(first_line, f"the text is too long, expected at most {MAX_CHARACTERS} characters")
     found: list[DiagramToken] = []
     place, line = 0, first_line
     while place < len(text):
         match = _TOKEN.match(text, place)
         if match is None:
-            raise mistake(line, _strange(text[place:]))
+            raise build_error(line, _describe_unknown_sign(text[place:]))
         kind, piece = str(match.lastgroup), match[0]
         if kind not in ("space", "comment"):
-            found.append(DiagramToken(kind, _content(kind, piece), line))
+            found.append(DiagramToken(kind, _extract_content(kind, piece), line))
         line += piece.count("\n")
         place = match.end()
     return found
 
 
-def _content(kind: str, piece: str) -> str:
+def _extract_content(kind: str, piece: str) -> str:
     if kind == "text":
         return _ESCAPE.sub(lambda match: _ESCAPED.get(match[1], match[1]), piece[1:-1])
     return piece
 
 
-def _strange(rest: str) -> str:
-    if rest[0] in _NEVER_ENDS and (rest[0] != "/" or rest.startswith("/*")):
-        return f"{_NEVER_ENDS[rest[0]]} never ends"
+def _describe_unknown_sign(rest: str) -> str:
+    if rest[0] in _UNCLOSED and (rest[0] != "/" or rest.startswith("/*")):
+        return f"{_UNCLOSED[rest[0]]} never ends"
     return f"{rest[0]!r} is not valid here, expected a name, an arrow such as ->, or a text in quotes"

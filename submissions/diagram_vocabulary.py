@@ -9,35 +9,35 @@ import difflib
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from submissions.diagram import Line
+from submissions.diagram import LineStyle
 
 
-def _words(text: str) -> frozenset[str]:
+def _split_words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-_FONT = _words("class fontfamily fontsize fontstyle href")
-OF_ACTORS = _FONT | _words(
+_FONT = _split_words("class fontfamily fontsize fontstyle href")
+ACTOR_ATTRIBUTES = _FONT | _split_words(
     "label shape color textcolor style linecolor width height colwidth colheight numbered icon background description "
     "rotate stacked"
 )
-OF_ARROWS = _FONT | _words(
+ARROW_ATTRIBUTES = _FONT | _split_words(
     "label color textcolor style dir hstyle folded nofolded thick async diagonal failed return activate noactivate "
     "note leftnote rightnote"
 )
-OF_GROUPS = _FONT | _words("label color textcolor shape thick style orientation width height icon")
-OF_DIAGRAMS = _words(
+GROUP_ATTRIBUTES = _FONT | _split_words("label color textcolor shape thick style orientation width height icon")
+DIAGRAM_ATTRIBUTES = _split_words(
     "activation autonumber orientation edge_height edge_length edge_layout page_padding node_width node_height "
     "span_width span_height default_fontsize default_fontfamily default_fontstyle default_shape default_node_color "
     "default_node_style default_group_color default_linecolor default_textcolor default_note_color shape_namespace "
     "width height"
 )
-SHAPES = _words(
+SHAPES = _split_words(
     "box square roundedbox circle ellipse diamond minidiamond note mail cloud actor dots beginpoint endpoint textbox "
     "none flowchart.condition flowchart.database flowchart.input flowchart.loopin flowchart.loopout "
     "flowchart.terminator"
 )
-LINES: Mapping[str, Line] = MappingProxyType(
+LINE_STYLES: Mapping[str, LineStyle] = MappingProxyType(
     {"solid": "solid", "dashed": "dashed", "dotted": "dotted", "none": "solid"}
 )
 #: The arrow for each value of an arrow's ``dir``.
@@ -51,7 +51,7 @@ ARROWS = MappingProxyType(
 FRAGMENTS = ("alt", "loop")
 
 
-def meant(word: str, known: frozenset[str], otherwise: str) -> str:
+def suggest_word(word: str, known: frozenset[str], otherwise: str) -> str:
     """Return the end of a message about an unknown word: the probable meaning, or the expected words."""
     near = difflib.get_close_matches(word[:40], sorted(known), 1)
     return f"; did you mean {near[0]}?" if near else f", expected one such as {otherwise}"

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from submissions.raw_files import shown
-from submissions.student_identity import NAMELESS, NOBODY, Student, told_apart
+from submissions.raw_files import sanitise_name
+from submissions.student_identity import HIDDEN_NAME, UNKNOWN_STUDENT, Student, make_unique_ids
 
 IGNORED = {"__MACOSX", "__pycache__", "Thumbs.db", "desktop.ini"}
 #: Moodle replaces underscores in a name by spaces, so the first number between underscores is Moodle's own.
@@ -40,97 +40,105 @@ class DownloadedFiles:
     problem: str = ""
 
 
-def student_files(folder: Path) -> list[DownloadedFiles]:
+def list_student_files(folder: Path) -> list[DownloadedFiles]:
     """Return the content of a folder, one row per student.
 
     Raises:
         UsageError: The platform's list of submissions cannot be read.
     """
-    # Imported here, because callers of ``moodle_number`` do not read submissions.
-    from submissions.bundle import named_by
+    # Imported here, because callers of ``parse_moodle_number`` do not read submissions.
+    from submissions.bundle import derive_student_name
 
-    entries = _visible(folder)
+    entries = _list_visible(folder)
     if (folder / _GRADESCOPE_LIST).is_file():
-        return list(_gradescope(folder, entries))
+        return list(_read_gradescope(folder, entries))
     if _is_nbgrader(folder, entries):
-        return list(_nbgrader(entries))
+        return list(_read_nbgrader(entries))
     moodle = {entry: found for entry in entries if (found := _MOODLE.fullmatch(entry.name))}
     plain = [
-        DownloadedFiles(shown(entry.name), Student(named_by(entry)), entry) for entry in entries if entry not in moodle
+        DownloadedFiles(sanitise_name(entry.name), Student(derive_student_name(entry)), entry)
+        for entry in entries
+        if entry not in moodle
     ]
-    return [*_moodle(moodle), *plain]
+    return [*_read_moodle(moodle), *plain]
 
 
-def is_one_students(folder: Path) -> bool:
+def is_student_folder(folder: Path) -> bool:
     """Return whether the folder name is one that Moodle gives to a single student's folder."""
     return _MOODLE.fullmatch(folder.name) is not None
 
 
-def moodle_number(source: str) -> str:
+def parse_moodle_number(source: str) -> str:
     """Return Moodle's number in the name of a submission; empty for other sources."""
     found = _MOODLE.fullmatch(source)
     return found["number"] if found else ""
 
 
-def _visible(folder: Path) -> list[Path]:
+def _list_visible(folder: Path) -> list[Path]:
     return sorted(entry for entry in folder.iterdir() if not entry.name.startswith(".") and entry.name not in IGNORED)
 
 
-def _moodle(found: Mapping[Path, re.Match[str]]) -> Iterator[DownloadedFiles]:
+def _read_moodle(found: Mapping[Path, re.Match[str]]) -> Iterator[DownloadedFiles]:
     """Yield a row for each number, with its folder or with the files that begin with it."""
     by_number: dict[str, list[Path]] = {}
     for path, match in found.items():
         by_number.setdefault(match["number"], []).append(path)
     names = {number: found[paths[0]]["name"] for number, paths in by_number.items()}
     people = {number: _GROUP.sub("", name, count=1).strip() for number, name in names.items()}
-    ids = told_apart((name, number) for number, name in people.items())
+    ids = make_unique_ids((name, number) for number, name in people.items())
     for (number, paths), own in zip(by_number.items(), ids, strict=True):
         name = people[number]
-        hidden = name == NAMELESS
-        student = Student(f"{NAMELESS} {number}") if hidden else Student(own, name)
+        hidden = name == HIDDEN_NAME
+        student = Student(f"{HIDDEN_NAME} {number}") if hidden else Student(own, name)
         files = {(found[path]["file"] or path.name): path for path in paths if found[path]["plugin"] == "file"}
         folders = [path for path in files.values() if path.is_dir()]
         problem = "" if files else "was typed into Moodle's text box, expected files."
         # Messages use the folder's own name. A shortened name would lose the number.
         own_name = folders[0].name if len(folders) == 1 else ""
-        source = own_name if own_name == shown(own_name) != "" else f"{shown(names[number])}_{number}_{_SUFFIX}"
+        source = (
+            own_name
+            if own_name == sanitise_name(own_name) != ""
+            else f"{sanitise_name(names[number])}_{number}_{_SUFFIX}"
+        )
         yield DownloadedFiles(source, student, folders[0] if len(folders) == 1 else files, number, problem=problem)
 
 
-def _gradescope(folder: Path, entries: Sequence[Path]) -> Iterator[DownloadedFiles]:
+def _read_gradescope(folder: Path, entries: Sequence[Path]) -> Iterator[DownloadedFiles]:
     """Yield a row for each student of a joint submission."""
     # Imported here, because only Gradescope exports need it.
-    from submissions.gradescope_list import read_list
+    from submissions.gradescope_list import read_gradescope_list
 
-    listed = read_list(folder / _GRADESCOPE_LIST)
+    listed = read_gradescope_list(folder / _GRADESCOPE_LIST)
     there = [entry.name for entry in entries if _is_folder(entry)]
     for name in dict.fromkeys([*listed, *there]):
         own = listed.get(name)
-        submitters = list(_submitters(own))
+        submitters = list(_read_submitters(own))
         problem = "" if submitters else f"is nobody's in {_GRADESCOPE_LIST}, expected its submitters there."
         if name not in there:
             problem = f"is in {_GRADESCOPE_LIST} and not beside it, expected a folder of that name."
         when = own.get(":created_at") if isinstance(own, dict) else None
-        for student in submitters or [NOBODY]:
-            yield DownloadedFiles(shown(name), student, folder / name, submitted_at=_moment(when), problem=problem)
+        for student in submitters or [UNKNOWN_STUDENT]:
+            yield DownloadedFiles(
+                sanitise_name(name), student, folder / name, submitted_at=_parse_time(when), problem=problem
+            )
 
 
-def _submitters(own: object) -> Iterator[Student]:
+def _read_submitters(own: object) -> Iterator[Student]:
     listed = own.get(":submitters") if isinstance(own, dict) else None
     for each in listed if isinstance(listed, list) else []:
-        sid, name, email = (_text(each, key) for key in (":sid", ":name", ":email"))
+        sid, name, email = (_read_text(each, key) for key in (":sid", ":name", ":email"))
         if sid or name or email:
             yield Student(sid or email or name, name, email)
 
 
-def _text(table: object, key: str) -> str:
+def _read_text(table: object, key: str) -> str:
     value = table.get(key) if isinstance(table, dict) else None
     return value.strip() if isinstance(value, str) and value.strip() not in ("~", "null") else ""
 
 
-def _moment(written: object) -> datetime | None:
+def _parse_time(written: object) -> datetime | None:
     """Parse a Ruby timestamp, which is inside a table if it has a zone; None if it cannot be read."""
-    text = _text(written, "utc") if isinstance(written, dict) else written
+    text = _read_text(written, "utc") if isinstance(written, dict) else written
     found = re.match(r"(\d{4}-\d\d-\d\d)[ T](\d\d:\d\d:\d\d)(\.\d+)?\s*(Z|UTC|[+-]\d\d:?\d\d)?", str(text))
     if found is None:
         return None
@@ -143,26 +151,30 @@ def _moment(written: object) -> datetime | None:
 
 def _is_nbgrader(folder: Path, entries: Sequence[Path]) -> bool:
     """Return whether the folder has student folders that contain only assignment folders."""
-    inside = [entry for student in entries if _is_folder(student) for entry in _visible(student)]
+    inside = [entry for student in entries if _is_folder(student) for entry in _list_visible(student)]
     folders_alone = all(_is_folder(entry) for entry in (*entries, *inside))
     timed = any((entry / _NBGRADER_TIME).is_file() for entry in inside)
     return bool(inside) and folders_alone and (timed or folder.name == _NBGRADER)
 
 
-def _nbgrader(entries: Sequence[Path]) -> Iterator[DownloadedFiles]:
+def _read_nbgrader(entries: Sequence[Path]) -> Iterator[DownloadedFiles]:
     for student in entries:
-        for own in _visible(student):
-            files = {path.name: path for path in _visible(own) if path.name != _NBGRADER_TIME and not path.is_dir()}
+        for own in _list_visible(student):
+            files = {
+                path.name: path for path in _list_visible(own) if path.name != _NBGRADER_TIME and not path.is_dir()
+            }
             stamp = own / _NBGRADER_TIME
-            when = _beginning(stamp) if stamp.is_file() else ""
-            source = shown(f"{student.name}/{own.name}")
-            yield DownloadedFiles(source, Student(student.name), files, assignment=own.name, submitted_at=_moment(when))
+            when = _read_beginning(stamp) if stamp.is_file() else ""
+            source = sanitise_name(f"{student.name}/{own.name}")
+            yield DownloadedFiles(
+                source, Student(student.name), files, assignment=own.name, submitted_at=_parse_time(when)
+            )
 
 
 def _is_folder(path: Path) -> bool:
     return path.is_dir() and not path.is_symlink()
 
 
-def _beginning(path: Path) -> str:
+def _read_beginning(path: Path) -> str:
     with path.open("rb") as stream:
         return stream.read(100).decode("utf-8", "replace").strip()

@@ -11,10 +11,10 @@ from io import BytesIO
 from pathlib import PurePosixPath
 from types import MappingProxyType
 
-from sim.readers.unreadable import Unreadable
+from sim.readers.reader_errors import UnreadableDataError
 from sim.readers.zip_archive import is_zip, open_zip
-from sim.sentences import Sentence, listed
-from submissions.raw_files import shown
+from sim.sentences import Sentence, join_with_and
+from submissions.raw_files import sanitise_name
 from submissions.submission import PART_FILES, SECOND_PROGRAM, Part
 
 _COPY = Sentence("copy the text of the program into a file called robot.py, and submit that file")
@@ -54,17 +54,17 @@ _ELF = b"\x7fELF"
 _MOST_ENTRIES = 2000
 
 
-def advice_on_kind(names: Iterable[str]) -> Sentence | None:
+def advise_on_kind(names: Iterable[str]) -> Sentence | None:
     """Return advice for the first file of a type that is not a program; None if there is none."""
     for name in names:
         known = _KINDS.get(PurePosixPath(name.lower()).suffix)
         if known is not None:
-            values = {"name": shown(name), "kind": known[0], "advice": known[1]}
+            values = {"name": sanitise_name(name), "kind": known[0], "advice": known[1]}
             return Sentence("%(name)s is %(kind)s, not a program: %(advice)s", values)
     return None
 
 
-def meant_as(part: Part, names: Iterable[str]) -> str:
+def find_similar_file(part: Part, names: Iterable[str]) -> str:
     """Return the file whose name is most similar to the part's name; empty if none is similar."""
     word = PART_FILES[part].removesuffix(".py")
     texts = ((name, name.lower().removesuffix(".txt")) for name in sorted(names) if name != SECOND_PROGRAM)
@@ -73,15 +73,15 @@ def meant_as(part: Part, names: Iterable[str]) -> str:
     return next((name for name, stem in stems.items() if word in stem or stem in near), "")
 
 
-def advice_on_names(missing: Iterable[Part], files: Iterable[str]) -> str | Sentence:
+def advise_on_names(missing: Iterable[Part], files: Iterable[str]) -> str | Sentence:
     """Return advice to rename similar files to the missing parts; empty if no name is similar."""
-    found = {part: meant_as(part, files) for part in missing}
+    found = {part: find_similar_file(part, files) for part in missing}
     renamed = [
-        Sentence("%(name)s to %(part)s", {"name": shown(name), "part": PART_FILES[part]})
+        Sentence("%(name)s to %(part)s", {"name": sanitise_name(name), "part": PART_FILES[part]})
         for part, name in found.items()
         if name
     ]
-    return Sentence("; rename %(files)s", {"files": listed(renamed)}) if renamed else ""
+    return Sentence("; rename %(files)s", {"files": join_with_and(renamed)}) if renamed else ""
 
 
 def is_compiled(name: str, data: bytes) -> bool:
@@ -99,5 +99,5 @@ def _has_modules(data: bytes) -> bool:
     try:
         with open_zip(BytesIO(data), _MOST_ENTRIES) as archive:
             return any(entry.lower().endswith(_MODULES) for entry in archive.namelist())
-    except Unreadable:
+    except UnreadableDataError:
         return True

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from sim.errors import UsageError
-from sim.readers.unreadable import Unreadable
+from sim.readers.reader_errors import UnreadableDataError
 from sim.readers.yaml_text import MOST_BYTES, read_yaml
 
 
-def read_list(path: Path) -> dict[str, Any]:
+def read_gradescope_list(path: Path) -> dict[str, Any]:
     """Return the submissions by folder. All values are texts; YAML tags and merge keys have no effect.
 
     Raises:
@@ -24,7 +24,7 @@ def read_list(path: Path) -> dict[str, Any]:
             listed = read_yaml(stream.read(MOST_BYTES + 1))
     except OSError as error:
         raise UsageError(f"{path.name}: cannot be read: {error.strerror}.") from None
-    except Unreadable as error:
+    except UnreadableDataError as error:
         raise UsageError(f"{path.name}: cannot be read: {error}, expected the file exported from Gradescope.") from None
     if not isinstance(listed, dict):
         raise UsageError(f"{path.name}: is not a list of submissions, expected the file exported from Gradescope.")

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import TYPE_CHECKING
 
-from submissions.student_identity import NOBODY, Student
+from submissions.student_identity import UNKNOWN_STUDENT, Student
 from submissions.submission import Submission
 
 if TYPE_CHECKING:
@@ -21,9 +21,11 @@ class GradingRequest:
     assignment: Assignment
     source: str
     submitted_at: datetime | None = None  # time of submission by the student, if known
-    whose: Student = NOBODY  # as written in the source, if known
+    listed_student: Student = UNKNOWN_STUDENT  # as written in the source, if known
 
     @property
     def student(self) -> Student:
         """The student's id as written."""
-        return self.whose if self.whose.id else replace(self.whose, id=self.submission.student)
+        return (
+            self.listed_student if self.listed_student.id else replace(self.listed_student, id=self.submission.student)
+        )

@@ -11,18 +11,18 @@ import shlex
 from dataclasses import dataclass, field, replace
 
 from sim.errors import UsageError
-from sim.floors import OBSTACLE_PRESETS, names, start_of
+from sim.floors import OBSTACLE_PRESETS, get_floor_start, list_floor_names
 from sim.recording import Pose
-from sim.robot import WIDENED, usual_robot
-from submissions.nearest import did_you_mean
-from submissions.source_text import PREAMBLES, Preamble, magic_place
+from sim.robot import WIDENED, get_default_robot_name
+from submissions.source_text import PREAMBLES, Preamble, find_magic_line
+from submissions.suggestions import suggest_name
 
 _X_MOST, _Y_MOST, _ANGLE_MOST = 2362, 1143, 360
 _LIGHT_NOISE_MOST, _MOTOR_NOISE_MOST = 128, 500
 _PEN_COLOURS = ("red", "orange", "green")
 
 #: Pose of the robot in a new simulator, and after a robot is chosen.
-_FRESH = Pose(200, 800, 0)
+_FRESH_POSE = Pose(200, 800, 0)
 _AFTER_ROBOT = Pose(200, 943, 0)
 
 _VALUED = {
@@ -79,13 +79,13 @@ class Flags:
         given = {key: value for key, value in values.items() if value is not None}
         return replace(self, values=self.values | given)
 
-    def without(self, flag: str) -> Flags:
+    def remove_value(self, flag: str) -> Flags:
         """Return these flags without one value."""
         return replace(self, values={key: value for key, value in self.values.items() if key != flag})
 
 
 @dataclass(frozen=True, slots=True)
-class Setup:
+class SimulatorSettings:
     """Simulator settings after applying the flags of a magic line."""
 
     background: str
@@ -100,24 +100,24 @@ class Setup:
 
 
 def split_program(text: str) -> tuple[Flags, str]:
-    """Return the flags of a program's magic line and ``without_magic``; the preloaded preamble if it has none.
+    """Return the flags of a program's magic line and ``comment_out_magic``; the preloaded preamble if it has none.
 
     Raises:
         UsageError: A magic or a flag does not exist.
     """
-    place = magic_place(text)
+    place = find_magic_line(text)
     if place is None:
         return Flags(), text
-    return parse_magic(text.split("\n")[place].lstrip("\ufeff").strip(), place + 1), _without(place, text)
+    return parse_magic(text.split("\n")[place].lstrip("\ufeff").strip(), place + 1), _comment_out_lines(place, text)
 
 
-def without_magic(text: str) -> str:
+def comment_out_magic(text: str) -> str:
     """Return the program with its magic line as an empty comment, so that line numbers stay the same."""
-    place = magic_place(text)
-    return text if place is None else _without(place, text)
+    place = find_magic_line(text)
+    return text if place is None else _comment_out_lines(place, text)
 
 
-def _without(place: int, text: str) -> str:
+def _comment_out_lines(place: int, text: str) -> str:
     lines = text.split("\n")
     lines[: place + 1] = ["#" if line.lstrip("\ufeff \t").startswith("%") else line for line in lines[: place + 1]]
     return "\n".join(lines)
@@ -146,23 +146,23 @@ def parse_flags(name: str, arguments: str) -> Flags:
     """
     if name not in PREAMBLES:
         expected = ", ".join(f"%%{known}" for known in PREAMBLES)
-        near = did_you_mean(f"%%{name[:40]}", (f"%%{known}" for known in PREAMBLES))
+        near = suggest_name(f"%%{name[:40]}", (f"%%{known}" for known in PREAMBLES))
         raise UsageError(f"%{name[:40]} is not a magic that starts a program; expected one of {expected}{near}")
-    flags = _flags(_words(name, arguments), PREAMBLES[name])
+    flags = _parse_words(_split_arguments(name, arguments), PREAMBLES[name])
     foreign = sorted(flags.switches & _PLAIN_ONLY)
     if name != "sim_magic" and foreign:
         raise UsageError(f"%%{name} has no flag -{foreign[0]}; only %sim_magic has it")
     return flags
 
 
-def _words(name: str, arguments: str) -> list[str]:
+def _split_arguments(name: str, arguments: str) -> list[str]:
     try:
         return shlex.split(arguments, comments=False)
     except ValueError as error:
         raise UsageError(f"the flags of %%{name} cannot be read: {str(error).lower()}") from None
 
 
-def _flags(words: list[str], preamble: Preamble) -> Flags:
+def _parse_words(words: list[str], preamble: Preamble) -> Flags:
     values: dict[str, str] = {}
     switches: set[str] = set()
     waiting = list(words)
@@ -172,37 +172,37 @@ def _flags(words: list[str], preamble: Preamble) -> Flags:
             long, equals, value = word[2:].partition("=")
             if long == _PREVIEW_CODE and preamble != "none":
                 continue
-            short = _short_of(long)
+            short = _find_short_flag(long)
             if short in _VALUED:
-                values[short] = value if equals else _next(waiting, word)
+                values[short] = value if equals else _take_value(waiting, word)
             else:
                 switches.add(short)
         elif word.startswith("-") and len(word) > 1:
-            _short_flags(word[1:], waiting, values, switches)
+            _parse_short_flags(word[1:], waiting, values, switches)
         else:
             raise UsageError(f"{word[:40]!r} is not a flag")
     return Flags(preamble, values, frozenset(switches))
 
 
-def _short_of(long: str) -> str:
+def _find_short_flag(long: str) -> str:
     """Return the letter of a long flag. Like the course's magics, accept any unambiguous prefix."""
     found = [long] if long in _LONG else [name for name in _LONG if long and name.startswith(long)]
     if len(found) == 1:
         return _LONG[found[0]]
     if found:
         raise UsageError(f"--{long[:40]} may be {' or '.join(f'--{name}' for name in found)}")
-    near = did_you_mean(f"--{long[:40]}", (f"--{name}" for name in _LONG))
+    near = suggest_name(f"--{long[:40]}", (f"--{name}" for name in _LONG))
     raise UsageError(f"there is no flag --{long[:40]}" + (near or "; --help of the course's magic lists them"))
 
 
-def _short_flags(letters: str, waiting: list[str], values: dict[str, str], switches: set[str]) -> None:
+def _parse_short_flags(letters: str, waiting: list[str], values: dict[str, str], switches: set[str]) -> None:
     """Parse combined short flags (-HWZ). A flag with a value takes the rest of the word, or the next word."""
     for place, letter in enumerate(letters):
         if letter in _SWITCHES:
             switches.add(letter)
         elif letter in _VALUED:
             rest = letters[place + 1 :].removeprefix("=")
-            values[letter] = rest if rest else _next(waiting, f"-{letter}")
+            values[letter] = rest if rest else _take_value(waiting, f"-{letter}")
             return
         else:
             other = letter.swapcase()
@@ -210,22 +210,22 @@ def _short_flags(letters: str, waiting: list[str], values: dict[str, str], switc
             raise UsageError(f"there is no flag -{letter}{near}")
 
 
-def _next(waiting: list[str], flag: str) -> str:
+def _take_value(waiting: list[str], flag: str) -> str:
     if not waiting:
         raise UsageError(f"{flag} needs a value")
     return waiting.pop(0)
 
 
-def setup(flags: Flags) -> Setup:
+def apply_flags(flags: Flags) -> SimulatorSettings:
     """Return the settings of a new simulator with these flags.
 
     Raises:
         UsageError: A value is not a number.
     """
-    return Simulator().apply(flags)
+    return SimulatorPage().apply(flags)
 
 
-class Simulator:
+class SimulatorPage:
     """Model of the original's page: sliders with limits, and moves that read all three sliders.
 
     Settings persist until another flag changes them; switches apply to one magic. No program runs here.
@@ -235,13 +235,13 @@ class Simulator:
         self.background = "Empty_Map"
         self.robot = self._chosen = "Default_Robot"
         self.obstacles: tuple[tuple[float, float, float, float], ...] = ()
-        self.pose = _FRESH
+        self.pose = _FRESH_POSE
         self._angle_slider = 0
         self._noise = {"N": 0.0, "M": 0.0}
         self._noise_is_heard = True
         self._notes: list[str] = []
 
-    def apply(self, flags: Flags) -> Setup:
+    def apply(self, flags: Flags) -> SimulatorSettings:
         """Apply the flags and return the resulting settings.
 
         Raises:
@@ -249,7 +249,7 @@ class Simulator:
         """
         self._notes = []
         values = flags.values
-        wanted = {flag: self._slider(flag, values, most) for flag, most in _SLIDERS.items()}
+        wanted = {flag: self._parse_slider(flag, values, most) for flag, most in _SLIDERS.items()}
         if "r" in values:
             self._choose_robot(values["r"])
         if "b" in values:
@@ -261,8 +261,8 @@ class Simulator:
             self._move(x, y, angle)
         self._choose_noise(wanted["N"], wanted["M"])
         if "P" in values and values["P"] not in _PEN_COLOURS:
-            self._note(f"-P {values['P'][:40]} is not a pen colour; expected one of {', '.join(_PEN_COLOURS)}")
-        return Setup(
+            self._add_note(f"-P {values['P'][:40]} is not a pen colour; expected one of {', '.join(_PEN_COLOURS)}")
+        return SimulatorSettings(
             self.background,
             self.robot,
             self.obstacles,
@@ -274,14 +274,14 @@ class Simulator:
             tuple(self._notes),
         )
 
-    def leave_at(self, pose: Pose) -> None:
+    def set_pose(self, pose: Pose) -> None:
         """Set the robot's pose after a run."""
         self.pose = pose
 
     def _choose_robot(self, name: str) -> None:
         if name not in WIDENED:
-            near = did_you_mean(name[:40], WIDENED)
-            self._note(f"-r {name[:40]} is not a robot; Default_Robot is used, as in the simulator{near}")
+            near = suggest_name(name[:40], WIDENED)
+            self._add_note(f"-r {name[:40]} is not a robot; Default_Robot is used, as in the simulator{near}")
             name = "Default_Robot"
         self.robot = self._chosen = name
         self.pose = _AFTER_ROBOT
@@ -289,18 +289,18 @@ class Simulator:
         self._noise_is_heard = True
 
     def _choose_background(self, name: str) -> None:
-        if name not in names():
-            near = did_you_mean(name[:40], names())
-            self._note(f"-b {name[:40]} is not a background; Empty_Map is used, as in the simulator{near}")
+        if name not in list_floor_names():
+            near = suggest_name(name[:40], list_floor_names())
+            self._add_note(f"-b {name[:40]} is not a background; Empty_Map is used, as in the simulator{near}")
             name = "Empty_Map"
         self.background = name
-        self.pose, self.obstacles = start_of(name)
+        self.pose, self.obstacles = get_floor_start(name)
         if 0 <= self.pose.heading <= _ANGLE_MOST:
             self._angle_slider = round(self.pose.heading)
         # The original keeps this change of the robot for the rest of the session; here it ends with the background.
         self.robot = self._chosen
-        if usual_robot(name) == WIDENED["Default_Robot"]:
-            self._note("-b Radial_grey also sets the light sensors 60 mm to either side, as in the simulator")
+        if get_default_robot_name(name) == WIDENED["Default_Robot"]:
+            self._add_note("-b Radial_grey also sets the light sensors 60 mm to either side, as in the simulator")
             self.robot = WIDENED[self._chosen]
             self._noise = {"N": 0.0, "M": 0.0}
             self._noise_is_heard = False
@@ -309,26 +309,30 @@ class Simulator:
         if name in OBSTACLE_PRESETS and name != "None":
             self.obstacles = OBSTACLE_PRESETS[name]
         elif name != "None":
-            near = did_you_mean(name[:40], OBSTACLE_PRESETS)
-            self._note(f"-o {name[:40]} is not a set of obstacles; they stay as they are, as in the simulator{near}")
+            near = suggest_name(name[:40], OBSTACLE_PRESETS)
+            self._add_note(
+                f"-o {name[:40]} is not a set of obstacles; they stay as they are, as in the simulator{near}"
+            )
         elif self.obstacles:
-            self._note(
+            self._add_note(
                 "-o None leaves the obstacles as they are, as in the simulator; choosing a background clears them"
             )
 
     def _choose_noise(self, light: int | None, motor: int | None) -> None:
         if (light or motor) and not self._noise_is_heard:
-            self._note("-N and -M do nothing after -b Radial_grey until a robot is chosen (-r), as in the simulator")
+            self._add_note(
+                "-N and -M do nothing after -b Radial_grey until a robot is chosen (-r), as in the simulator"
+            )
         if light is not None:
             self._noise["N"] = light if self._noise_is_heard else 0.0
             before = self.pose
             self._move(None, None, None)
             if before.heading != self.pose.heading:
-                self._note(f"-N also turns the robot to {self.pose.heading:g} degrees, as in the simulator")
+                self._add_note(f"-N also turns the robot to {self.pose.heading:g} degrees, as in the simulator")
         if motor is not None:
             self._noise["M"] = motor if self._noise_is_heard else 0.0
 
-    def _slider(self, flag: str, values: dict[str, str], most: int) -> int | None:
+    def _parse_slider(self, flag: str, values: dict[str, str], most: int) -> int | None:
         """Return a whole number, clamped to the slider's range."""
         if flag not in values:
             return None
@@ -338,7 +342,7 @@ class Simulator:
             raise UsageError(f"-{flag} {values[flag][:40]}: expected a whole number between 0 and {most}") from None
         value = min(max(wanted, 0), most)
         if value != wanted:
-            self._note(f"-{flag} {values[flag][:40]} becomes {value}: the simulator's slider goes from 0 to {most}")
+            self._add_note(f"-{flag} {values[flag][:40]} becomes {value}: the simulator's slider goes from 0 to {most}")
         return value
 
     def _move(self, x: int | None, y: int | None, angle: int | None) -> None:
@@ -348,13 +352,13 @@ class Simulator:
         """
         if angle is not None:
             self._angle_slider = angle
-        x = _on_slider(self.pose.x, _X_MOST) if x is None else x
-        y = _on_slider(self.pose.y, _Y_MOST) if y is None else y
+        x = _to_slider_value(self.pose.x, _X_MOST) if x is None else x
+        y = _to_slider_value(self.pose.y, _Y_MOST) if y is None else y
         if angle is None and self.pose.heading != self._angle_slider:
-            self._note(f"setting the position turns the robot to {self._angle_slider} degrees; add -a to choose")
+            self._add_note(f"setting the position turns the robot to {self._angle_slider} degrees; add -a to choose")
         self.pose = Pose(x, y, self._angle_slider)
 
-    def _note(self, text: str) -> None:
+    def _add_note(self, text: str) -> None:
         if text not in self._notes:
             self._notes.append(text)
 
@@ -362,6 +366,6 @@ class Simulator:
 _SLIDERS = {"x": _X_MOST, "y": _Y_MOST, "a": _ANGLE_MOST, "N": _LIGHT_NOISE_MOST, "M": _MOTOR_NOISE_MOST}
 
 
-def _on_slider(value: float, most: int) -> int:
+def _to_slider_value(value: float, most: int) -> int:
     """Return the slider value for a coordinate. JavaScript rounds halves up."""
     return min(max(math.floor(value + 0.5), 0), most)

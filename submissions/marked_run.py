@@ -12,15 +12,15 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from responders.sandbox.inside.cell_source import WRAPPERS, cell_magic
+from responders.sandbox.inside.cell_source import WRAPPERS, parse_cell_magic
 from sim.errors import UsageError
 from sim.readers.python_source import parse_module
-from sim.readers.unreadable import Unreadable
+from sim.readers.reader_errors import UnreadableDataError
 from sim.sentences import Sentence
 from submissions.assignment.definition import Assignment
-from submissions.magics import parse_flags, parse_magic, without_magic
-from submissions.notebook import near_program
-from submissions.source_text import is_program_magic, magic_place
+from submissions.magics import comment_out_magic, parse_flags, parse_magic
+from submissions.notebook import describe_near_program
+from submissions.source_text import find_magic_line, is_program_magic
 from submissions.submission import Cell, Notebook
 
 LAST = "last"
@@ -40,7 +40,7 @@ _MOST_SHOWN = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Site:
+class RunSite:
     """A line of a cell (both counted from 1) that loads or starts a robot program."""
 
     cell: int
@@ -48,7 +48,7 @@ class Site:
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class ProgramRun:
     """A run of the notebook, numbered from 1.
 
     ``program`` is the cell with its robot program: the run's own cell, or the last one loaded before. ``floor`` is the
@@ -56,7 +56,7 @@ class Run:
     """
 
     number: int
-    site: Site
+    site: RunSite
     program: Cell | None
     begins: bool  # the site is the first line of the program
     floor: str | None
@@ -70,37 +70,37 @@ class RunChoice:
     ``notes`` explain the choice if there was one.
     """
 
-    run: Run
+    run: ProgramRun
     only: bool
-    others: tuple[Site, ...] = ()
+    others: tuple[RunSite, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
-    def site(self) -> Site:
+    def site(self) -> RunSite:
         """The start of the run."""
         return self.run.site
 
 
 @functools.lru_cache(maxsize=4)
-def runs_of(notebook: Notebook) -> tuple[Run, ...]:
+def find_runs(notebook: Notebook) -> tuple[ProgramRun, ...]:
     """Return all runs from the top: cells that begin with ``%%sim_magic...``, and lines that restart their program.
 
     The results for the last notebooks are cached, because intake and grading use the same ones.
     """
-    found: list[Run] = []
+    found: list[ProgramRun] = []
     program: Cell | None = None
     floor: str | None = None
     for cell in notebook.cells:
-        begin = _program_line(cell)
+        begin = _find_program_line(cell)
         program = program if begin is None else cell
-        magic = cell_magic(cell.source)
+        magic = parse_cell_magic(cell.source)
         is_python = begin is None and (magic is None or magic.name in WRAPPERS)
         for number, line in enumerate(cell.source.split("\n"), 1):
             flags = _LINE.search(line)
-            floor = _floor(line, flags, number == begin) or floor
-            if number == begin or (is_python and _starts_again(line, flags)):
+            floor = _parse_floor(line, flags, number == begin) or floor
+            if number == begin or (is_python and _is_restart(line, flags)):
                 known = None if floor is None or _EXPANDED.search(floor) else floor
-                found.append(Run(len(found) + 1, Site(cell.number, number), program, number == begin, known))
+                found.append(ProgramRun(len(found) + 1, RunSite(cell.number, number), program, number == begin, known))
     return tuple(found)
 
 
@@ -110,20 +110,20 @@ def choose_run(notebook: Notebook, assignment: Assignment, asked: str | None) ->
     Raises:
         UsageError: The run does not exist.
     """
-    marked = named_run(notebook, assignment.parts.cell, asked)
+    marked = find_run(notebook, assignment.parts.cell, asked)
     if assignment.parts.cell != LAST:
         named = f"run = {asked} is not used: the assignment says which run is marked"
         return RunChoice(marked, True, notes=(named,) if asked is not None else ())
-    runs = runs_of(notebook)
-    misfits = {run: tuple(_misfits(run, assignment)) for run in runs}
+    runs = find_runs(notebook)
+    misfits = {run: tuple(_find_mismatches(run, assignment)) for run in runs}
     if asked is not None:
-        return RunChoice(marked, True, notes=_choice_notes(misfits, marked, f"as run = {asked} asks"))
+        return RunChoice(marked, True, notes=_explain_choice(misfits, marked, f"as run = {asked} asks"))
     best, *others = sorted(runs, key=lambda run: (len(misfits[run]), -run.number))
     why = "the last that fits" if not misfits[best] else f"which fits best, though {', '.join(misfits[best])}"
-    return RunChoice(best, False, tuple(run.site for run in others), _choice_notes(misfits, best, why))
+    return RunChoice(best, False, tuple(run.site for run in others), _explain_choice(misfits, best, why))
 
 
-def named_run(notebook: Notebook, which: str, asked: str | None = None) -> Run:
+def find_run(notebook: Notebook, which: str, asked: str | None = None) -> ProgramRun:
     """Return the run for ``which``: ``last``, ``tag:NAME``, or the number of a robot program, from 1.
 
     ``last`` leaves the choice to the submission: ``asked`` is the number of a run, or a tag.
@@ -131,33 +131,33 @@ def named_run(notebook: Notebook, which: str, asked: str | None = None) -> Run:
     Raises:
         UsageError: The run does not exist. The message lists the existing runs.
     """
-    runs = runs_of(notebook)
+    runs = find_runs(notebook)
     if not runs:
         raise UsageError(
             "%(name)s: has no robot program, expected a cell that begins with %%%%sim_magic_preloaded%(near)s.",
             name=notebook.name,
-            near=near_program(notebook),
+            near=describe_near_program(notebook),
         )
     if which == LAST and asked is not None:
-        return _asked_run(notebook, runs, asked)
+        return _find_requested_run(notebook, runs, asked)
     if which == LAST:
         return runs[-1]
     if not which.isdecimal():
-        return _tagged(notebook, runs, which.removeprefix(_TAG))
+        return _find_tagged_run(notebook, runs, which.removeprefix(_TAG))
     number, programs = int(which), [run for run in runs if run.begins]
     if number > len(programs):
         raise UsageError(
             "%(name)s: has %(count)s, expected at least %(number)s: number %(number)s is marked.",
             name=notebook.name,
-            count=_count(len(programs)),
+            count=_format_count(len(programs)),
             number=number,
         )
     return programs[number - 1]
 
 
-def _asked_run(notebook: Notebook, runs: Sequence[Run], asked: str) -> Run:
+def _find_requested_run(notebook: Notebook, runs: Sequence[ProgramRun], asked: str) -> ProgramRun:
     if not asked.isdecimal():
-        return _tagged(notebook, runs, asked.removeprefix(_TAG))
+        return _find_tagged_run(notebook, runs, asked.removeprefix(_TAG))
     if not 1 <= int(asked) <= len(runs):
         raise UsageError(
             "%(name)s: has no run %(asked)s, expected a number from 1 to %(most)s, or a tag.",
@@ -168,7 +168,7 @@ def _asked_run(notebook: Notebook, runs: Sequence[Run], asked: str) -> Run:
     return runs[int(asked) - 1]
 
 
-def _tagged(notebook: Notebook, runs: Sequence[Run], tag: str) -> Run:
+def _find_tagged_run(notebook: Notebook, runs: Sequence[ProgramRun], tag: str) -> ProgramRun:
     tagged = [cell.number for cell in notebook.cells if tag in cell.tags]
     if not tagged:
         raise UsageError(
@@ -189,10 +189,10 @@ def _tagged(notebook: Notebook, runs: Sequence[Run], tag: str) -> Run:
     return found[-1]
 
 
-def _choice_notes(misfits: dict[Run, tuple[str, ...]], marked: Run, why: str) -> tuple[str, ...]:
+def _explain_choice(misfits: dict[ProgramRun, tuple[str, ...]], marked: ProgramRun, why: str) -> tuple[str, ...]:
     if len(misfits) < 2:
         return ()
-    others = [_other_run(run, found) for run, found in misfits.items() if run != marked]
+    others = [_describe_other_run(run, found) for run, found in misfits.items() if run != marked]
     more = f" and {len(others) - _MOST_SHOWN} more" if len(others) > _MOST_SHOWN else ""
     return (
         f"that is run {marked.number} of {len(misfits)}, {why}; the others are {', '.join(others[:_MOST_SHOWN])}{more}",
@@ -200,12 +200,12 @@ def _choice_notes(misfits: dict[Run, tuple[str, ...]], marked: Run, why: str) ->
     )
 
 
-def _other_run(run: Run, misfits: Sequence[str]) -> str:
+def _describe_other_run(run: ProgramRun, misfits: Sequence[str]) -> str:
     why = f": {misfits[0]}" if misfits else ""
     return f"run {run.number} (cell {run.site.cell}{why})"
 
 
-def _misfits(run: Run, assignment: Assignment) -> Iterator[str]:
+def _find_mismatches(run: ProgramRun, assignment: Assignment) -> Iterator[str]:
     """Yield the reasons why a run does not fit the assignment."""
     world, answered = assignment.world, assignment.parts.responder != "none"
     text = run.program.source if run.program is not None else ""
@@ -214,7 +214,7 @@ def _misfits(run: Run, assignment: Assignment) -> Iterator[str]:
     sends = any(word in text for word in _SENDS)
     if answered and not sends:
         yield "it sends nothing to the responder"
-    if not (answered and sends) and _is_test(without_magic(text)):
+    if not (answered and sends) and _is_test(comment_out_magic(text)):
         yield "it only prints"
 
 
@@ -226,26 +226,26 @@ def _is_test(text: str) -> bool:
         return False
     try:
         nodes = list(ast.walk(parse_module(code)))
-    except (SyntaxError, Unreadable):
+    except (SyntaxError, UnreadableDataError):
         return False
     statements = [node for node in nodes if isinstance(node, ast.stmt)]
     called = [ast.unparse(node.func) for node in nodes if isinstance(node, ast.Call)]
     return len(statements) <= _TEST_STATEMENTS and set(called) <= {"print"}
 
 
-def _program_line(cell: Cell) -> int | None:
+def _find_program_line(cell: Cell) -> int | None:
     """Return the line, from 1, of the magic that makes the cell a robot program."""
-    place = magic_place(cell.source)
+    place = find_magic_line(cell.source)
     if place is None or not is_program_magic(cell.source.split("\n")[place]):
         return None
     return place + 1
 
 
-def _starts_again(line: str, flags: re.Match[str] | None) -> bool:
+def _is_restart(line: str, flags: re.Match[str] | None) -> bool:
     return bool(_CALL.search(line) or (flags and _AUTORUN.search(flags["flags"])))
 
 
-def _floor(line: str, again: re.Match[str] | None, begins: bool) -> str | None:
+def _parse_floor(line: str, again: re.Match[str] | None, begins: bool) -> str | None:
     """Return the background named in a magic's line."""
     try:
         if begins:
@@ -259,7 +259,7 @@ def _floor(line: str, again: re.Match[str] | None, begins: bool) -> str | None:
     return flags.values.get("b")
 
 
-def _count(number: int) -> Sentence:
+def _format_count(number: int) -> Sentence:
     if number == 1:
         return Sentence("1 robot program")
     return Sentence("%(count)s robot programs", {"count": number})

@@ -16,9 +16,9 @@ from typing import Any
 from sim.errors import UsageError
 from sim.readers.json_text import JSONDecodeError, read_json
 from sim.readers.python_source import parse_module
-from sim.readers.unreadable import TooMany, Unreadable
+from sim.readers.reader_errors import TooManyValuesError, UnreadableDataError
 from sim.sentences import Sentence
-from submissions.raw_files import shown
+from submissions.raw_files import sanitise_name
 from submissions.source_text import MAX_SOURCE_BYTES, is_program_magic
 from submissions.submission import Cell, Notebook
 
@@ -40,44 +40,44 @@ _CELL_MAGIC_CALL = re.compile(r"^get_ipython\(\)\.run_cell_magic\(")
 
 
 @dataclass(frozen=True, slots=True)
-class ReadNotebook:
+class LoadedNotebook:
     """A notebook, and notes on omitted or corrected content."""
 
     notebook: Notebook
     notes: tuple[str, ...] = ()
 
 
-def read_notebook(data: bytes, name: str) -> ReadNotebook:
+def read_notebook(data: bytes, name: str) -> LoadedNotebook:
     """Read the code cells of an .ipynb file, in any version of the format that has cells.
 
     Raises:
         UsageError: The file is not a notebook, has no code, is too large, or is not for Python.
     """
-    text, note = _decoded(data, name)
+    text, note = _decode_text(data, name)
     notes = [note] if note else []
-    document = _parsed(text, name)
+    document = _parse_document(text, name)
     _check_language(document, name)
     cells: list[Cell] = []
     markdown: list[int] = []
     responders: list[str] = []
-    for place, raw in enumerate(_raw_cells(document, name), 1):
-        problem = _cell_problem(raw)
+    for place, raw in enumerate(_collect_raw_cells(document, name), 1):
+        problem = _describe_cell_problem(raw)
         if problem:
             if len(notes) < _MAX_NOTES:
                 notes.append(f"{name}: cell {place} from the top was left out: {problem}.")
             continue
-        source = _source(raw)
+        source = _read_source(raw)
         if raw["cell_type"] == "code" and source.strip():
-            cells.append(Cell(len(cells) + 1, source, _tags(raw)))
+            cells.append(Cell(len(cells) + 1, source, _read_tags(raw)))
         elif raw["cell_type"] != "code" and any(map(is_program_magic, source.split("\n", _MAX_LOOKED_AT))):
             markdown.append(place)
         elif raw["cell_type"] == "raw":
             responders += _RESPONDER.findall(source)
     found = Notebook(name, tuple(cells), tuple(markdown), tuple(responders[:_MOST_RAW]))
-    return ReadNotebook(_checked(found), tuple(notes))
+    return LoadedNotebook(_check_notebook(found), tuple(notes))
 
 
-def _as_code_cell(place: int) -> Sentence:
+def _ask_for_code_cell(place: int) -> Sentence:
     """Return a sentence that asks for a code cell, for a robot program in a Markdown cell."""
     return Sentence(
         "cell %(place)s from the top has a robot program, but is a Markdown cell. Change it to a code cell",
@@ -85,20 +85,25 @@ def _as_code_cell(place: int) -> Sentence:
     )
 
 
-def near_program(notebook: Notebook) -> str | Sentence:
+def describe_near_program(notebook: Notebook) -> str | Sentence:
     """Describe a line that is almost a program's magic, or is one in the wrong place such as a Markdown cell."""
     for place in notebook.markdown_programs:
-        return Sentence("; %(near)s", {"near": _as_code_cell(place)})
+        return Sentence("; %(near)s", {"near": _ask_for_code_cell(place)})
     for cell in notebook.cells:
         for number, line in enumerate(cell.source.split("\n"), 1):
             begin = _BEGIN.search(line[:200]) if NEARLY_MAGIC.match(line[:200]) else None
             if begin is not None:
-                values = {"line": number, "cell": cell.number, "word": shown(begin[0]), "why": _why_not(line)}
+                values = {
+                    "line": number,
+                    "cell": cell.number,
+                    "word": sanitise_name(begin[0]),
+                    "why": _explain_near_magic(line),
+                }
                 return Sentence("; line %(line)s of cell %(cell)s has %(word)s, %(why)s", values)
     return ""
 
 
-def _why_not(line: str) -> Sentence:
+def _explain_near_magic(line: str) -> Sentence:
     """Return the reason why such a line does not start a program."""
     if is_program_magic(line):
         return Sentence("below other code: make it the first line")
@@ -122,7 +127,7 @@ def read_script(text: str, name: str) -> Notebook:
     """
     chunks: list[list[str]] = [[]]
     for line in text.replace("\r\n", "\n").split("\n"):
-        magic = _cell_magic(line)
+        magic = _parse_cell_magic(line)
         if magic is not None:
             chunks += [[magic], []]
         elif _MARKER.match(line):
@@ -131,7 +136,7 @@ def read_script(text: str, name: str) -> Notebook:
             chunks[-1].append(line)
     sources = ["\n".join(chunk).strip("\n") for chunk in chunks]
     code = [source for source in sources if any(map(_is_code, source.split("\n")))]
-    return _checked(Notebook(name, tuple(Cell(number, source) for number, source in enumerate(code, 1))))
+    return _check_notebook(Notebook(name, tuple(Cell(number, source) for number, source in enumerate(code, 1))))
 
 
 def pack_notebook(notebook: Notebook) -> bytes:
@@ -154,7 +159,7 @@ def pack_notebook(notebook: Notebook) -> bytes:
     return json.dumps(document, indent=1).encode("ascii")
 
 
-def _decoded(data: bytes, name: str) -> tuple[str, str]:
+def _decode_text(data: bytes, name: str) -> tuple[str, str]:
     """Return the text, and a note on its encoding if it is not UTF-8."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         try:
@@ -169,17 +174,17 @@ def _decoded(data: bytes, name: str) -> tuple[str, str]:
         return data.decode("latin-1"), f"{name} is not UTF-8 and was read as Latin-1; save it with Jupyter."
 
 
-def _parsed(text: str, name: str) -> Mapping[str, Any]:
+def _parse_document(text: str, name: str) -> Mapping[str, Any]:
     if not text.strip():
         raise UsageError("%(name)s: is an empty file, expected a notebook.", name=name)
     try:
         document = read_json(text, most_values=_MAX_VALUES, strict=False)
-    except TooMany:
+    except TooManyValuesError:
         raise UsageError(
             "%(name)s: has too much output in it, expected a notebook whose outputs were cleared before it was saved.",
             name=name,
         ) from None
-    except Unreadable:
+    except UnreadableDataError:
         raise UsageError(
             "%(name)s: is nested too deeply, expected a notebook as Jupyter saves it.", name=name
         ) from None
@@ -197,9 +202,9 @@ def _parsed(text: str, name: str) -> Mapping[str, Any]:
 
 
 def _check_language(document: Mapping[str, Any], name: str) -> None:
-    metadata = _table(document, "metadata")
+    metadata = _get_table(document, "metadata")
     for table, key in (("language_info", "name"), ("kernelspec", "language")):
-        language = _table(metadata, table).get(key)
+        language = _get_table(metadata, table).get(key)
         if isinstance(language, str) and language and not language.lower().startswith(("python", "ipython")):
             raise UsageError(
                 "%(name)s: is a notebook for %(language)s, expected one for Python.",
@@ -208,31 +213,31 @@ def _check_language(document: Mapping[str, Any], name: str) -> None:
             )
 
 
-def _table(table: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+def _get_table(table: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     value = table.get(key)
     return value if isinstance(value, dict) else {}
 
 
-def _raw_cells(document: Mapping[str, Any], name: str) -> list[Any]:
+def _collect_raw_cells(document: Mapping[str, Any], name: str) -> list[Any]:
     """Return the cells of nbformat 4, or of all worksheets in earlier formats."""
     if isinstance(document.get("cells"), list):
         return list(document["cells"])
     sheets = document.get("worksheets")
     if isinstance(sheets, list):
-        return [cell for sheet in sheets if isinstance(sheet, dict) for cell in _list(sheet.get("cells"))]
+        return [cell for sheet in sheets if isinstance(sheet, dict) for cell in _as_list(sheet.get("cells"))]
     raise UsageError("%(name)s: has no list of cells, expected a notebook as Jupyter saves it.", name=name)
 
 
-def _list(value: object) -> list[Any]:
+def _as_list(value: object) -> list[Any]:
     return value if isinstance(value, list) else []
 
 
-def _cell_problem(raw: object) -> str:
+def _describe_cell_problem(raw: object) -> str:
     if not isinstance(raw, dict):
         return "it is not a cell"
     if not isinstance(raw.get("cell_type"), str):
         return "it has no cell type"
-    lines = _lines(raw)
+    lines = _get_lines(raw)
     if raw["cell_type"] != "code" or isinstance(lines, str):
         return ""
     if not isinstance(lines, list) or not all(isinstance(line, str) for line in lines):
@@ -240,25 +245,25 @@ def _cell_problem(raw: object) -> str:
     return ""
 
 
-def _lines(raw: Mapping[str, Any]) -> object:
+def _get_lines(raw: Mapping[str, Any]) -> object:
     return raw["source"] if "source" in raw else raw.get("input")
 
 
-def _source(raw: Mapping[str, Any]) -> str:
-    lines = _lines(raw)
-    text = lines if isinstance(lines, str) else "".join(map(str, _list(lines)))
+def _read_source(raw: Mapping[str, Any]) -> str:
+    lines = _get_lines(raw)
+    text = lines if isinstance(lines, str) else "".join(map(str, _as_list(lines)))
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def _tags(raw: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(tag for tag in _list(_table(raw, "metadata").get("tags")) if isinstance(tag, str))
+def _read_tags(raw: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(tag for tag in _as_list(_get_table(raw, "metadata").get("tags")) if isinstance(tag, str))
 
 
-def _checked(notebook: Notebook) -> Notebook:
+def _check_notebook(notebook: Notebook) -> Notebook:
     name, cells = notebook.name, notebook.cells
     if not cells and notebook.markdown_programs:
         raise UsageError(
-            "%(name)s: has no code cells; %(near)s.", name=name, near=_as_code_cell(notebook.markdown_programs[0])
+            "%(name)s: has no code cells; %(near)s.", name=name, near=_ask_for_code_cell(notebook.markdown_programs[0])
         )
     if not cells:
         raise UsageError("%(name)s: has no code cells, expected a notebook with Python code.", name=name)
@@ -285,22 +290,22 @@ def _is_code(line: str) -> bool:
     return bool(line.strip()) and not line.lstrip().startswith("#")
 
 
-def _cell_magic(line: str) -> str | None:
+def _parse_cell_magic(line: str) -> str | None:
     """Return the cell of a line ``get_ipython().run_cell_magic('name', 'flags', 'body')``."""
     if not _CELL_MAGIC_CALL.match(line):
         return None
-    words = list(_constants(line))
+    words = list(_parse_text_arguments(line))
     if len(words) != 3:
         return None
     name, arguments, body = words
     return f"%%{name} {arguments}".rstrip() + f"\n{body}".rstrip("\n")
 
 
-def _constants(line: str) -> Iterator[str]:
+def _parse_text_arguments(line: str) -> Iterator[str]:
     """Yield the arguments of a call if all are texts; nothing otherwise."""
     try:
         body = parse_module(line).body
-    except (SyntaxError, Unreadable):
+    except (SyntaxError, UnreadableDataError):
         return
     tree = body[0].value if len(body) == 1 and isinstance(body[0], ast.Expr) else None
     if isinstance(tree, ast.Call) and not tree.keywords:

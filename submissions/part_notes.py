@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from sim.sentences import Sentence
-from submissions.raw_files import shown
+from submissions.raw_files import sanitise_name
 from submissions.submission import PART_FILES, Part
 
 PART_WORDS: Mapping[Part, Sentence] = MappingProxyType(
@@ -17,13 +17,13 @@ PART_WORDS: Mapping[Part, Sentence] = MappingProxyType(
 )
 
 
-def taken_for_note(name: str, part: Part) -> str:
+def build_part_use_note(name: str, part: Part) -> str:
     """Return the note that a file with another name was used as a part."""
-    return f"{shown(name)} was used as {PART_WORDS[part]}."
+    return f"{sanitise_name(name)} was used as {PART_WORDS[part]}."
 
 
-def missing_part_note(part: Part, files: Mapping[str, bytes]) -> str:
+def build_missing_part_note(part: Part, files: Mapping[str, bytes]) -> str:
     """Return the note that a part is missing; ``files`` are the other files of the submission."""
-    others = [shown(name) for name in files if name.lower().endswith(".py")]
+    others = [sanitise_name(name) for name in files if name.lower().endswith(".py")]
     beside = f" (other files: {', '.join(others[:3])})" if others else ""
     return f"There is no {PART_FILES[part]}{beside}; criteria that need {PART_WORDS[part]} get no marks."

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 from sim.errors import UsageError
-from sim.readers.unreadable import TooMany, Unreadable
-from sim.readers.zip_archive import CHUNK, PLAIN_COMPRESSION, ZipFile, ZipInfo, entry_chunks, open_zip
+from sim.readers.reader_errors import TooManyValuesError, UnreadableDataError
+from sim.readers.zip_archive import CHUNK, PLAIN_COMPRESSION, ZipFile, ZipInfo, open_zip, read_entry_chunks
 from sim.sentences import Sentence
 
 MEGABYTE = 1024 * 1024
@@ -40,7 +40,7 @@ class RawFiles:
 
 
 @dataclass(frozen=True, slots=True)
-class SentFile:
+class UploadedFile:
     """A file as submitted; its name is arbitrary."""
 
     name: str
@@ -60,7 +60,7 @@ class _Budget:
     total: int = 0
     count: int = 0
 
-    def one_more(self) -> None:
+    def count_file(self) -> None:
         self.count += 1
         if self.count > MAX_FILES:
             raise UsageError(
@@ -79,7 +79,7 @@ class _Budget:
             size += len(chunk)
             self.total += len(chunk)
             if size > MAX_FILE_BYTES:
-                raise UsageError(self._too_large(name))
+                raise UsageError(self._describe_too_large(name))
             if self.total > MAX_TOTAL_BYTES:
                 raise UsageError(
                     "%(where)s: is too large, expected at most %(most)s MB in all.",
@@ -89,28 +89,28 @@ class _Budget:
             chunks.append(chunk)
         return b"".join(chunks)
 
-    def _too_large(self, name: str) -> Sentence:
+    def _describe_too_large(self, name: str) -> Sentence:
         notebook = name.lower().endswith(".ipynb")
         values = {
-            "what": _within(self.where, shown(name)),
+            "what": _format_location(self.where, sanitise_name(name)),
             "most": MAX_FILE_BYTES // MEGABYTE,
             "advice": Sentence("; clear its outputs before you save it") if notebook else "",
         }
         return Sentence("%(what)s is too large, expected at most %(most)s MB a file%(advice)s.", values)
 
 
-def _within(where: str, name: str) -> str:
+def _format_location(where: str, name: str) -> str:
     """Return the file with its container, or only the file if both names are the same."""
     return f"{where}:" if where == name else f"{where}: {name}"
 
 
-def _twice(where: str, name: str) -> UsageError:
+def _build_duplicate_error(where: str, name: str) -> UsageError:
     if where == name:
         return UsageError("%(where)s: is included twice, expected every file once.", where=where)
     return UsageError("%(where)s: has %(name)s twice, expected every file once.", where=where, name=name)
 
 
-def shown(name: str) -> str:
+def sanitise_name(name: str) -> str:
     """Return a student's file name in a safe and short form for messages."""
     clean = "".join("?" if unicodedata.category(c)[0] in "CZ" and c != " " else c for c in name)
     return clean if len(clean) <= 80 else clean[:77] + "..."
@@ -122,8 +122,8 @@ def read_single_file(path: Path) -> bytes:
     Raises:
         UsageError: It is not a regular file, or it is too large.
     """
-    budget = _Budget(shown(path.name))
-    with _regular_file(path.name, os.fspath(path), None) as stream:
+    budget = _Budget(sanitise_name(path.name))
+    with _open_regular_file(path.name, os.fspath(path), None) as stream:
         return budget.read(path.name, stream)
 
 
@@ -133,7 +133,7 @@ def read_folder(path: Path) -> RawFiles:
     Raises:
         UsageError: There are nested folders, or the submission exceeds a limit on number or size of files.
     """
-    where = shown(path.name)
+    where = sanitise_name(path.name)
     notes: list[str] = []
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
@@ -147,23 +147,23 @@ def read_folder(path: Path) -> RawFiles:
             inner = os.open(folders[0], os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=descriptor)
             os.close(descriptor)
             descriptor = inner
-            notes.append(f"The files were read from the folder {shown(folders[0])} in it.")
+            notes.append(f"The files were read from the folder {sanitise_name(folders[0])} in it.")
             names, folders = _list_folder(descriptor, where, notes)
         if folders:
             raise UsageError(
                 "%(where)s: has the folder %(name)s in it, %(expected)s.",
                 where=where,
-                name=shown(folders[0]),
+                name=sanitise_name(folders[0]),
                 expected=_EXPECTED_FLAT,
             )
         budget = _Budget(where)
         files = {}
         for name in names:
             _check_name(where, name)
-            budget.one_more()
-            with _regular_file(f"{where}/{name}", name, descriptor) as stream:
+            budget.count_file()
+            with _open_regular_file(f"{where}/{name}", name, descriptor) as stream:
                 files[name] = budget.read(name, stream)
-        return _with_archive_opened(RawFiles(files, tuple(notes)))
+        return _expand_single_archive(RawFiles(files, tuple(notes)))
     except OSError as error:
         raise UsageError(
             "%(where)s: cannot be read (%(reason)s), expected a readable folder.", where=where, reason=error.strerror
@@ -172,7 +172,7 @@ def read_folder(path: Path) -> RawFiles:
         os.close(descriptor)
 
 
-def read_listed(paths: Mapping[str, Path], where: str) -> RawFiles:
+def read_paths(paths: Mapping[str, Path], where: str) -> RawFiles:
     """Read the files at ``paths`` under the given names.
 
     Raises:
@@ -182,13 +182,13 @@ def read_listed(paths: Mapping[str, Path], where: str) -> RawFiles:
     files = {}
     for name, path in paths.items():
         _check_name(where, name)
-        budget.one_more()
-        with _regular_file(f"{where}/{name}", os.fspath(path), None) as stream:
+        budget.count_file()
+        with _open_regular_file(f"{where}/{name}", os.fspath(path), None) as stream:
             files[name] = budget.read(name, stream)
-    return _with_archive_opened(RawFiles(files))
+    return _expand_single_archive(RawFiles(files))
 
 
-def read_sent(sent: Iterable[SentFile], where: str) -> RawFiles:
+def read_uploaded(sent: Iterable[UploadedFile], where: str) -> RawFiles:
     """Read submitted files by their flat names.
 
     Raises:
@@ -202,20 +202,20 @@ def read_sent(sent: Iterable[SentFile], where: str) -> RawFiles:
             continue
         _check_name(where, name)
         if name in files:
-            raise _twice(where, shown(name))
-        budget.one_more()
+            raise _build_duplicate_error(where, sanitise_name(name))
+        budget.count_file()
         files[name] = budget.read(name, each.stream)
-    return _with_archive_opened(RawFiles(files))
+    return _expand_single_archive(RawFiles(files))
 
 
-def _with_archive_opened(raw: RawFiles) -> RawFiles:
+def _expand_single_archive(raw: RawFiles) -> RawFiles:
     """Replace a single archive by its files, unless there is code beside it."""
     archives = [name for name in raw.files if name.lower().endswith(".zip")]
     if len(archives) != 1 or any(name.lower().endswith((".py", ".ipynb")) for name in raw.files):
         return raw
-    inside = unzip(raw.files[archives[0]], shown(archives[0]))
+    inside = read_zip_bytes(raw.files[archives[0]], sanitise_name(archives[0]))
     beside = {name: data for name, data in raw.files.items() if name != archives[0]}
-    note = f"The files were read from the archive {shown(archives[0])} in it."
+    note = f"The files were read from the archive {sanitise_name(archives[0])} in it."
     return RawFiles({**beside, **inside.files}, (*raw.notes, note, *inside.notes))
 
 
@@ -226,21 +226,21 @@ def read_zip(path: Path) -> RawFiles:
         UsageError: The archive is not a plain archive of flat files. Examples are paths outside it, links, encrypted or
             nested entries, repeated names, and files that exceed the limits once decompressed.
     """
-    return _with_archive_opened(unzip(read_single_file(path), shown(path.name)))
+    return _expand_single_archive(read_zip_bytes(read_single_file(path), sanitise_name(path.name)))
 
 
-def unzip(data: bytes, where: str) -> RawFiles:
+def read_zip_bytes(data: bytes, where: str) -> RawFiles:
     """Read an archive's bytes as ``read_zip`` does; ``where`` names it in messages."""
     if not data:
         raise UsageError(
             "%(where)s: is an empty file, expected a zip archive with robot.py and responder.py.", where=where
         )
     with _opened(data, where) as archive:
-        entries = _plain_entries(archive.infolist(), where)
+        entries = _check_entries(archive.infolist(), where)
         notes: list[str] = []
         tops = {parts[0] for parts, _ in entries}
         if len(tops) == 1 and all(len(parts) > 1 for parts, _ in entries):
-            notes.append(f"The files were read from the folder {shown(next(iter(tops)))} in it.")
+            notes.append(f"The files were read from the folder {sanitise_name(next(iter(tops)))} in it.")
             entries = [(parts[1:], info) for parts, info in entries]
         budget = _Budget(where)
         files: dict[str, bytes] = {}
@@ -249,19 +249,19 @@ def unzip(data: bytes, where: str) -> RawFiles:
                 raise UsageError(
                     "%(where)s: has %(name)s in a folder, %(expected)s.",
                     where=where,
-                    name=shown("/".join(parts)),
+                    name=sanitise_name("/".join(parts)),
                     expected=_EXPECTED_FLAT,
                 )
             if parts[0] in files:
-                raise _twice(where, shown(parts[0]))
-            budget.one_more()
+                raise _build_duplicate_error(where, sanitise_name(parts[0]))
+            budget.count_file()
             try:
-                files[parts[0]] = budget.join(parts[0], entry_chunks(archive, info))
-            except Unreadable:
+                files[parts[0]] = budget.join(parts[0], read_entry_chunks(archive, info))
+            except UnreadableDataError:
                 raise UsageError(
                     "%(where)s: %(name)s is damaged in the archive, expected one that unpacks without errors.",
                     where=where,
-                    name=shown(parts[0]),
+                    name=sanitise_name(parts[0]),
                 ) from None
     return RawFiles(files, tuple(notes))
 
@@ -272,18 +272,18 @@ def _opened(data: bytes, where: str) -> Iterator[ZipFile]:
         try:
             # The limit also covers ignored entries and those of stored archives.
             archive = held.enter_context(open_zip(BytesIO(data), 8 * MAX_FILES))
-        except TooMany:
+        except TooManyValuesError:
             raise UsageError(
                 "%(where)s: has too many files, expected at most %(most)s.", where=where, most=MAX_FILES
             ) from None
-        except Unreadable:
+        except UnreadableDataError:
             raise UsageError(
                 "%(where)s: is not a zip archive that can be read, expected an ordinary .zip.", where=where
             ) from None
         yield archive
 
 
-def _plain_entries(infos: Iterable[ZipInfo], where: str) -> list[tuple[tuple[str, ...], ZipInfo]]:
+def _check_entries(infos: Iterable[ZipInfo], where: str) -> list[tuple[tuple[str, ...], ZipInfo]]:
     """Return the path parts of every relevant file. Malicious entries are rejected before any is read."""
     entries = []
     for info in infos:
@@ -293,24 +293,26 @@ def _plain_entries(infos: Iterable[ZipInfo], where: str) -> list[tuple[tuple[str
             raise UsageError(
                 "%(where)s: has an entry that leads outside (%(name)s), expected plain file names.",
                 where=where,
-                name=shown(original),
+                name=sanitise_name(original),
             )
         kind = stat.S_IFMT(info.external_attr >> 16)
         if kind == stat.S_IFLNK:
             raise UsageError(
-                "%(where)s: contains a link (%(name)s), expected the file itself.", where=where, name=shown(original)
+                "%(where)s: contains a link (%(name)s), expected the file itself.",
+                where=where,
+                name=sanitise_name(original),
             )
         if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
             raise UsageError(
                 "%(where)s: contains an entry that is not a file (%(name)s), expected files.",
                 where=where,
-                name=shown(original),
+                name=sanitise_name(original),
             )
         if info.flag_bits & (0x1 | 0x40 | 0x2000):
             raise UsageError(
                 "%(where)s: is encrypted (%(name)s), expected a zip without a password.",
                 where=where,
-                name=shown(original),
+                name=sanitise_name(original),
             )
         if original.endswith("/") or kind == stat.S_IFDIR or not parts or _is_ignored(parts):
             continue
@@ -320,7 +322,7 @@ def _plain_entries(infos: Iterable[ZipInfo], where: str) -> list[tuple[tuple[str
             raise UsageError(
                 "%(where)s: %(name)s is compressed in an unusual way, expected an ordinary .zip.",
                 where=where,
-                name=shown(original),
+                name=sanitise_name(original),
             )
         entries.append((parts, info))
     return entries
@@ -340,7 +342,7 @@ def _check_name(where: str, name: str) -> None:
             "%(where)s: has a file name that cannot be used (%(name)s), expected printable characters, "
             "at most %(most)s bytes.",
             where=where,
-            name=shown(name),
+            name=sanitise_name(name),
             most=_MAX_NAME_BYTES,
         )
     if "\\" in name or ":" in name:
@@ -348,7 +350,7 @@ def _check_name(where: str, name: str) -> None:
             "%(where)s: has a file name with a backslash or a colon in it (%(name)s), expected a name that every "
             "system can have: rename the file.",
             where=where,
-            name=shown(name),
+            name=sanitise_name(name),
         )
 
 
@@ -368,23 +370,23 @@ def _list_folder(descriptor: int, where: str, notes: list[str]) -> tuple[list[st
             elif entry.is_file(follow_symlinks=False):
                 files.append(entry.name)
             elif entry.is_symlink():
-                notes.append(f"{shown(entry.name)} is a link and was left out.")
+                notes.append(f"{sanitise_name(entry.name)} is a link and was left out.")
             else:
-                notes.append(f"{shown(entry.name)} is not a regular file and was left out.")
+                notes.append(f"{sanitise_name(entry.name)} is not a regular file and was left out.")
     return sorted(files), sorted(folders)
 
 
-def _regular_file(where: str, name: str, folder: int | None) -> contextlib.AbstractContextManager[BinaryIO]:
+def _open_regular_file(where: str, name: str, folder: int | None) -> contextlib.AbstractContextManager[BinaryIO]:
     """Open a file without following links, and without blocking on a pipe."""
     try:
         descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=folder)
     except OSError as error:
         raise UsageError(
             "%(where)s: cannot be opened (%(reason)s), expected a readable file.",
-            where=shown(where),
+            where=sanitise_name(where),
             reason=error.strerror,
         ) from None
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise UsageError("%(where)s: is not a regular file, expected a readable file.", where=shown(where))
+        raise UsageError("%(where)s: is not a regular file, expected a readable file.", where=sanitise_name(where))
     return os.fdopen(descriptor, "rb")

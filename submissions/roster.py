@@ -11,12 +11,12 @@ from pathlib import Path, PurePosixPath
 
 from sim.errors import UsageError
 from submissions.csv_table import CsvRow, read_csv
-from submissions.names import LONGEST_NAME, shown_name
-from submissions.raw_files import shown
-from submissions.student_identity import NOBODY, PERSON_COLUMNS, Student
+from submissions.raw_files import sanitise_name
+from submissions.student_identity import PERSON_COLUMNS, UNKNOWN_STUDENT, Student
+from submissions.student_names import LONGEST_NAME, normalise_name
 
 _OWN_COLUMNS = ("file", "assignment", "submitted_at")
-_USUAL = "student (or id), file, assignment"
+_USUAL_COLUMNS = "student (or id), file, assignment"
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class RosterRow:
     """One row. ``line`` is its first line, from 1. With a ``problem``, the other fields cannot be used."""
 
     line: int
-    student: Student = NOBODY
+    student: Student = UNKNOWN_STUDENT
     file: str = ""
     assignment: str = ""
     problem: str = ""
@@ -37,17 +37,17 @@ def read_roster(path: Path) -> list[RosterRow]:
     Raises:
         UsageError: The file as a whole is not a roster.
     """
-    table = read_csv(path, {**PERSON_COLUMNS, **{column: (column,) for column in _OWN_COLUMNS}}, _USUAL)
+    table = read_csv(path, {**PERSON_COLUMNS, **{column: (column,) for column in _OWN_COLUMNS}}, _USUAL_COLUMNS)
     missing = [said for column, said in (("id", "student"), ("file", "file")) if column not in table.columns]
     if missing:
         raise UsageError(
             f"{path.name}: has no column {' and no column '.join(missing)} in its first line, expected "
-            f"{_USUAL} (assignment may be left out with -a)."
+            f"{_USUAL_COLUMNS} (assignment may be left out with -a)."
         )
-    return [_row(row) for row in table.rows]
+    return [_build_row(row) for row in table.rows]
 
 
-def file_inside(folder: Path, name: str) -> Path:
+def resolve_file(folder: Path, name: str) -> Path:
     """Return the path of a file that a roster names.
 
     Raises:
@@ -62,27 +62,28 @@ def file_inside(folder: Path, name: str) -> Path:
     except (OSError, ValueError):
         outside = True
     if outside:
-        raise UsageError(f"{shown(name)} is outside the roster's folder, expected a path below it.")
+        raise UsageError(f"{sanitise_name(name)} is outside the roster's folder, expected a path below it.")
     return path
 
 
-def _row(row: CsvRow) -> RosterRow:
+def _build_row(row: CsvRow) -> RosterRow:
     if row.problem:
         return RosterRow(row.line, problem=row.problem)
     found = row.cells
-    student = Student(shown_name(found["id"]), shown_name(found.get("name", "")), found.get("email", ""))
-    problem = _problem(student.id, found["file"])
+    student = Student(normalise_name(found["id"]), normalise_name(found.get("name", "")), found.get("email", ""))
+    problem = _find_problem(student.id, found["file"])
     try:
-        submitted_at = moment(found["submitted_at"]) if found.get("submitted_at") else None
+        submitted_at = parse_time(found["submitted_at"]) if found.get("submitted_at") else None
     except ValueError:
         submitted_at = None
         problem = (
-            problem or f"has {shown(found['submitted_at'])} for submitted_at, expected a moment like 2026-11-30 17:00."
+            problem
+            or f"has {sanitise_name(found['submitted_at'])} for submitted_at, expected a moment like 2026-11-30 17:00."
         )
     return RosterRow(row.line, student, found["file"], found.get("assignment", ""), problem, submitted_at)
 
 
-def moment(text: str, *, end_of_day: bool = False) -> datetime:
+def parse_time(text: str, *, end_of_day: bool = False) -> datetime:
     """Parse a date, or a date and time, in this machine's time zone unless it names another.
 
     A date alone means its first moment, or its last with ``end_of_day``.
@@ -96,7 +97,7 @@ def moment(text: str, *, end_of_day: bool = False) -> datetime:
     return read.astimezone()
 
 
-def _problem(student: str, file: str) -> str:
+def _find_problem(student: str, file: str) -> str:
     if not student:
         return "has no student."
     if len(student) > LONGEST_NAME:

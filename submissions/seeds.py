@@ -1,6 +1,6 @@
 """Seeds of a grading, computed as hashes of the installation's secret.
 
-``sim.chance`` draws random numbers, and ``service`` stores the secret.
+``sim.random_streams`` draws random numbers, and ``service`` stores the secret.
 """
 
 from __future__ import annotations
@@ -23,30 +23,30 @@ class Secret:
     @property
     def name(self) -> str:
         """The displayed name: the first digits of the hash."""
-        return name_of(self.sha256)
+        return format_secret_name(self.sha256)
 
 
 #: For self-tests, examples and other results that must be the same on every installation.
-PUBLIC = Secret("")
+PUBLIC_SECRET = Secret("")
 
 
-def name_of(secret_sha256: str) -> str:
+def format_secret_name(secret_sha256: str) -> str:
     """Return the displayed name of a secret with this hash."""
     return secret_sha256[:8]
 
 
-def world_seed(secret: Secret, named: str) -> int:
+def compute_world_seed(secret: Secret, named: str) -> int:
     """Return 63 bits as the seed of the named world, the same for every student of an installation."""
-    return _bits(f"{secret.text}{named}")
+    return _hash_to_bits(f"{secret.text}{named}")
 
 
-def child_seed(seed: int, submission: str) -> int:
+def compute_child_seed(seed: int, submission: str) -> int:
     """Return 63 bits as the seed for a submission's own processes, from which ``seed`` cannot be inferred.
 
     ``submission`` is its SHA-256. Another submission gets another seed, so that random numbers do not identify a trial.
     """
-    return _bits(f"{seed}\n{submission}")
+    return _hash_to_bits(f"{seed}\n{submission}")
 
 
-def _bits(text: str) -> int:
+def _hash_to_bits(text: str) -> int:
     return int.from_bytes(hashlib.sha256(text.encode("utf-8", "surrogateescape")).digest()[:8], "big") >> 1

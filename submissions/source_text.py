@@ -86,7 +86,7 @@ def _decode(data: bytes, name: str) -> DecodedText:
             return DecodedText(data.decode("utf-16"), f"{name} was read as UTF-16; save it as UTF-8.")
         except UnicodeDecodeError:
             raise UsageError("%(name)s: is damaged UTF-16 text, expected Python source in UTF-8.", name=name) from None
-    encoding = _cookie(data)
+    encoding = _find_encoding_cookie(data)
     if encoding and encoding != "utf-8":
         try:
             return DecodedText(data.decode(encoding))
@@ -102,7 +102,7 @@ def _decode(data: bytes, name: str) -> DecodedText:
         )
 
 
-def _cookie(data: bytes) -> str | None:
+def _find_encoding_cookie(data: bytes) -> str | None:
     """Return the encoding named in the first two lines, if it is a text encoding."""
     for line in data.split(b"\n", 2)[:2]:
         match = _COOKIE.match(line)
@@ -117,7 +117,7 @@ def _cookie(data: bytes) -> str | None:
     return None
 
 
-def magic_place(text: str) -> int | None:
+def find_magic_line(text: str) -> int | None:
     """Return the index of the magic before any code; the last one after wrapper magics. None without a magic."""
     found = None
     for place, line in enumerate(text.split("\n")):
@@ -127,7 +127,7 @@ def magic_place(text: str) -> int | None:
         if not stripped.startswith("%"):
             return found
         found = place
-        if not stripped.startswith("%%") or magic_name(stripped) not in WRAPPERS:
+        if not stripped.startswith("%%") or parse_magic_name(stripped) not in WRAPPERS:
             return place
     return found
 
@@ -135,15 +135,15 @@ def magic_place(text: str) -> int | None:
 def is_program_magic(line: str) -> bool:
     """Return whether a line makes its cell a robot program: ``%%sim_magic`` does, ``%sim_magic`` does not."""
     stripped = line.lstrip("\ufeff").strip()
-    return stripped.startswith("%%") and magic_name(stripped) in PREAMBLES
+    return stripped.startswith("%%") and parse_magic_name(stripped) in PREAMBLES
 
 
-def magic_name(magic: str) -> str:
+def parse_magic_name(magic: str) -> str:
     """Return the name of a magic, without its percent signs and flags."""
     return (magic.split(maxsplit=1) or [""])[0].lstrip("%")
 
 
-def modules_of(text: str, read: Callable[[str], bytes | None]) -> Mapping[str, str]:
+def find_modules(text: str, read: Callable[[str], bytes | None]) -> Mapping[str, str]:
     """Return the modules that a text can import, directly or through other modules, by name.
 
     A text can import only names on its import lines, so rules about code read no other files. ``read`` returns a file's
@@ -154,9 +154,9 @@ def modules_of(text: str, read: Callable[[str], bytes | None]) -> Mapping[str, s
     left = _MOST_TEXT
     waiting = [text]
     while waiting:
-        for name in sorted(_named(waiting.pop()) - looked):
+        for name in sorted(_find_imported_names(waiting.pop()) - looked):
             looked.add(name)
-            module = _module(name, read)
+            module = _read_module(name, read)
             if module is not None and len(module) <= left:
                 left -= len(module)
                 found[name] = module
@@ -164,12 +164,12 @@ def modules_of(text: str, read: Callable[[str], bytes | None]) -> Mapping[str, s
     return found
 
 
-def _named(text: str) -> set[str]:
+def _find_imported_names(text: str) -> set[str]:
     lines = _IMPORTING.findall(text.replace("\\\n", " "))
     return {name for line in lines for name in _WORD.findall(line)}
 
 
-def _module(name: str, read: Callable[[str], bytes | None]) -> str | None:
+def _read_module(name: str, read: Callable[[str], bytes | None]) -> str | None:
     data = read(f"{name}.py")
     if data is None:
         return None

@@ -14,9 +14,9 @@ from types import MappingProxyType
 
 from sim.errors import UsageError
 from submissions.csv_table import CsvRow, read_csv
-from submissions.names import shown_name
-from submissions.nearest import did_you_mean
-from submissions.raw_files import shown
+from submissions.raw_files import sanitise_name
+from submissions.student_names import normalise_name
+from submissions.suggestions import suggest_name
 
 #: Column names in a table of people, here and in Moodle and Gradescope.
 PERSON_COLUMNS: Mapping[str, Sequence[str]] = MappingProxyType(
@@ -33,7 +33,7 @@ _COLUMNS = {
     "identifier": ("identifier",),
 }
 #: Moodle's name for every student if names are hidden from markers.
-NAMELESS = "Participant"
+HIDDEN_NAME = "Participant"
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,16 +45,16 @@ class Student:
     email: str = ""
 
 
-NOBODY = Student()
+UNKNOWN_STUDENT = Student()
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class RejectedSubmission:
     """A rejected submission of a batch: the submitted name, the reason, and the student if known."""
 
     source: str
     reason: str
-    student: Student = NOBODY
+    student: Student = UNKNOWN_STUDENT
     assignment: str = ""
 
     @property
@@ -68,8 +68,8 @@ class People:
     """The people of a course by their names in other systems. A name can belong to several people."""
 
     file: str
-    numbers: Mapping[str, Student]  # Moodle's number of a person in one assignment
-    called: Mapping[str, tuple[Student, ...]]
+    by_number: Mapping[str, Student]  # Moodle's number of a person in one assignment
+    by_name: Mapping[str, tuple[Student, ...]]
 
     def find(self, written: Student, number: str = "") -> Student:
         """Return the person with this identity, optionally by a number from another system.
@@ -77,28 +77,30 @@ class People:
         Raises:
             UsageError: No person matches, or several do.
         """
-        whole = {_key(each): each for each in (written.id, written.email, written.name) if each}
-        known = self.numbers.get(number)
+        whole = {_normalise_key(each): each for each in (written.id, written.email, written.name) if each}
+        known = self.by_number.get(number)
         if known is not None:
-            if written.name in ("", NAMELESS) or _key(written.name).endswith(_key(known.name)):
+            if written.name in ("", HIDDEN_NAME) or _normalise_key(written.name).endswith(_normalise_key(known.name)):
                 return known
             raise UsageError(
-                f"{self.file} has {shown(known.name)} as Participant {number}, not {shown(written.name)}; expected "
+                f"{self.file} has {sanitise_name(known.name)} as Participant {number}, not "
+                f"{sanitise_name(written.name)}; expected "
                 "the table of this assignment."
             )
         # With group submissions, Moodle puts the group before the name: Group 1-Ada.
         for key in (*whole, *(key.partition("-")[2] for key in whole)):
-            found = self.called.get(key, ())
+            found = self.by_name.get(key, ())
             if len(found) == 1:
                 return found[0]
             if found:
                 raise UsageError(
-                    f"{len(found)} people in {self.file} are called {shown(whole.get(key, key))}, expected a table "
+                    f"{len(found)} people in {self.file} are called {sanitise_name(whole.get(key, key))}, "
+                    "expected a table "
                     "that distinguishes them by the Identifier of Moodle's worksheet, or by id."
                 )
         name = written.name or written.id
-        hint = did_you_mean(name, {each.name or each.id for several in self.called.values() for each in several})
-        raise UsageError(f"{shown(name)} is not in {self.file}, expected one of its people{hint or '.'}")
+        hint = suggest_name(name, {each.name or each.id for several in self.by_name.values() for each in several})
+        raise UsageError(f"{sanitise_name(name)} is not in {self.file}, expected one of its people{hint or '.'}")
 
 
 def read_people(path: Path) -> People:
@@ -112,56 +114,57 @@ def read_people(path: Path) -> People:
         raise UsageError(f"{path.name}: has no column id, name or email in its first line, expected one of them.")
     numbers: dict[str, Student] = {}
     called: dict[str, list[Student]] = {}
-    for row, student in _students(table.rows, path.name):
+    for row, student in _read_students(table.rows, path.name):
         if number := re.search(r"\d+$", row.cells.get("identifier", "")):
             numbers[number[0]] = student
-        for key in {_key(each) for each in (student.id, student.email, student.name) if each}:
+        for key in {_normalise_key(each) for each in (student.id, student.email, student.name) if each}:
             called.setdefault(key, []).append(student)
     return People(path.name, numbers, {key: tuple(several) for key, several in called.items()})
 
 
-def students_of(people: People) -> list[Student]:
+def list_known_students(people: People) -> list[Student]:
     """Return every person once, in the order of the table."""
-    return list(dict.fromkeys(each for several in people.called.values() for each in several))
+    return list(dict.fromkeys(each for several in people.by_name.values() for each in several))
 
 
-def told_apart(names: Iterable[tuple[str, str]]) -> list[str]:
+def make_unique_ids(names: Iterable[tuple[str, str]]) -> list[str]:
     """Return an id for each (name, number): the name, with the number added if others have the same name."""
     names = list(names)
     times = Counter(name for name, _ in dict.fromkeys(names))
     return [f"{name} ({number})" if name and times[name] > 1 else name for name, number in names]
 
 
-def _students(rows: Sequence[CsvRow], file: str) -> Iterator[tuple[CsvRow, Student]]:
+def _read_students(rows: Sequence[CsvRow], file: str) -> Iterator[tuple[CsvRow, Student]]:
     """Yield every person with an id: the given id, or the name, with address or number added if it is not unique."""
     for row in rows:
         if row.problem:
             raise UsageError(f"{file}: line {row.line} {row.problem}")
-    names = [shown_name(row.cells.get("name", "")) or _joined(row) for row in rows]
+    names = [normalise_name(row.cells.get("name", "")) or _join_names(row) for row in rows]
     emails = [row.cells.get("email", "") for row in rows]
     others = [
         emails[place] or re.sub(r"\D", "", row.cells.get("identifier", "")) or f"line {row.line}"
         for place, row in enumerate(rows)
     ]
-    usual = told_apart(zip(names, others, strict=True))
+    usual = make_unique_ids(zip(names, others, strict=True))
     ids = [row.cells.get("id") or usual[place] or emails[place] for place, row in enumerate(rows)]
     lines: dict[str, list[str]] = {}
     for row, own in zip(rows, ids, strict=True):
-        lines.setdefault(_key(own), []).append(str(row.line))
+        lines.setdefault(_normalise_key(own), []).append(str(row.line))
     for row, own, name, email in zip(rows, ids, names, emails, strict=True):
         if not own:
             raise UsageError(f"{file}: line {row.line} has no id, name or e-mail address, expected one of them.")
-        if len(lines[_key(own)]) > 1:
+        if len(lines[_normalise_key(own)]) > 1:
             raise UsageError(
-                f"{file}: lines {' and '.join(lines[_key(own)][:5])}: {shown(own)} is the id of several students, "
+                f"{file}: lines {' and '.join(lines[_normalise_key(own)][:5])}: {sanitise_name(own)} is the id of "
+                "several students, "
                 "expected a different id for each."
             )
         yield row, Student(own, name, email)
 
 
-def _joined(row: CsvRow) -> str:
-    return shown_name(f"{row.cells.get('first', '')} {row.cells.get('last', '')}")
+def _join_names(row: CsvRow) -> str:
+    return normalise_name(f"{row.cells.get('first', '')} {row.cells.get('last', '')}")
 
 
-def _key(text: str) -> str:
-    return shown_name(text).casefold()
+def _normalise_key(text: str) -> str:
+    return normalise_name(text).casefold()

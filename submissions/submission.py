@@ -13,11 +13,11 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Literal
 
-from responders.code import Code
+from responders.source_file import SourceFile
 from sim.errors import UsageError
+from sim.readers.reader_errors import UnreadableDataError
 from sim.readers.toml_text import read_toml
-from sim.readers.unreadable import Unreadable
-from submissions.raw_files import shown
+from submissions.raw_files import sanitise_name
 from submissions.source_text import decode_source
 
 Part = Literal["program", "responder"]
@@ -25,7 +25,7 @@ Part = Literal["program", "responder"]
 PART_FILES: Mapping[Part, str] = MappingProxyType({"program": "robot.py", "responder": "responder.py"})
 #: File name of the second robot's program, which is among the additional files.
 SECOND_PROGRAM = "robot2.py"
-META = "submission.toml"
+META_FILE = "submission.toml"
 _MOST_META_BYTES = 64 * 1024
 
 
@@ -57,8 +57,8 @@ class Submission:
     """One submission. ``files`` are the additional files by flat name; a notebook replaces both sources."""
 
     student: str
-    program: Code | None = None
-    responder: Code | None = None
+    program: SourceFile | None = None
+    responder: SourceFile | None = None
     files: Mapping[str, bytes] = field(default_factory=lambda: MappingProxyType({}))
     assignment: str | None = None  # named in submission.toml or by the parent folder
     notes: tuple[str, ...] = ()  # files ignored, folders entered and names changed during reading
@@ -66,16 +66,16 @@ class Submission:
     run: str | None = None  # number or tag of the notebook run to be marked, if named
 
     @cached_property
-    def python_files(self) -> Mapping[str, Code]:
+    def python_files(self) -> Mapping[str, SourceFile]:
         """The readable Python files among ``files`` by name: modules, agents, the second robot's program."""
-        found: dict[str, Code] = {}
+        found: dict[str, SourceFile] = {}
         for name, data in self.files.items():
             if name.lower().endswith(".py"):
                 with contextlib.suppress(UsageError):
-                    found[name] = _decoded(name, data)
+                    found[name] = _decode_file(name, data)
         return MappingProxyType(found)
 
-    def code(self, name: str) -> Code | None:
+    def find_code(self, name: str) -> SourceFile | None:
         """Return the file with this name among ``files``, or None.
 
         Raises:
@@ -83,30 +83,30 @@ class Submission:
         """
         if name not in self.files:
             return None
-        return self.python_files.get(name) or _decoded(name, self.files[name])
+        return self.python_files.get(name) or _decode_file(name, self.files[name])
 
-    def agent(self, agent: str) -> Code | None:
+    def find_agent_code(self, agent: str) -> SourceFile | None:
         """Return the file of this agent, or None. The file of ``parser`` is ``parser.py``.
 
         Raises:
             UsageError: The file is not text.
         """
-        return next((self.code(name) for name in self.files if agent_of(name, (agent,))), None)
+        return next((self.find_code(name) for name in self.files if find_agent(name, (agent,))), None)
 
     def files_without(self, agents: Iterable[str]) -> Mapping[str, bytes]:
         """Return the files without those of these agents, which other processes must not read."""
         agents = tuple(agents)
-        return {name: data for name, data in self.files.items() if not agent_of(name, agents)}
+        return {name: data for name, data in self.files.items() if not find_agent(name, agents)}
 
     @property
     def sha256(self) -> str:
         """SHA-256 of the content, independent of the student and of the packing."""
         digest = hashlib.sha256()
-        for piece in self.hashed():
+        for piece in self.iterate_hash_data():
             digest.update(piece)
         return digest.hexdigest()
 
-    def hashed(self) -> Iterator[bytes]:
+    def iterate_hash_data(self) -> Iterator[bytes]:
         """Yield the hashed data: records of fields, each preceded by its length.
 
         Different submissions therefore give different data. Names are included, because programs and reports can depend
@@ -134,13 +134,13 @@ class Submission:
             yield "file", name, self.files[name]
 
 
-def agent_of(file: str, agents: Iterable[str]) -> str | None:
+def find_agent(file: str, agents: Iterable[str]) -> str | None:
     """Return the agent whose program is in this file, or None."""
     return next((name for name in agents if file.lower() == f"{name}.py"), None)
 
 
-def _decoded(name: str, data: bytes) -> Code:
-    return Code(name, decode_source(data, shown(name)).text)
+def _decode_file(name: str, data: bytes) -> SourceFile:
+    return SourceFile(name, decode_source(data, sanitise_name(name)).text)
 
 
 def read_meta(data: bytes, where: str) -> dict[str, object]:
@@ -152,7 +152,7 @@ def read_meta(data: bytes, where: str) -> dict[str, object]:
     if not data:
         return {}
     if len(data) > _MOST_META_BYTES:
-        raise UsageError("%(where)s: %(file)s is too large, expected a few lines.", where=where, file=META)
+        raise UsageError("%(where)s: %(file)s is too large, expected a few lines.", where=where, file=META_FILE)
     return parse_meta(data, where)
 
 
@@ -161,16 +161,16 @@ def parse_meta(data: bytes, where: str) -> dict[str, object]:
     try:
         return read_toml(data.decode("utf-8-sig"))
     except ValueError as error:
-        problem = error.said if isinstance(error, Unreadable) else str(error)[:200]
+        problem = error.message if isinstance(error, UnreadableDataError) else str(error)[:200]
         raise UsageError(
             '%(where)s: %(file)s cannot be read (%(problem)s), expected lines like assignment = "echo-responder".',
             where=where,
-            file=META,
+            file=META_FILE,
             problem=problem,
         ) from None
 
 
-def text_of(meta: Mapping[str, object], key: str, where: str) -> str | None:
+def get_meta_text(meta: Mapping[str, object], key: str, where: str) -> str | None:
     """Return a text of the file, or None if it is missing.
 
     Raises:
@@ -182,14 +182,14 @@ def text_of(meta: Mapping[str, object], key: str, where: str) -> str | None:
             '%(where)s: %(key)s in %(file)s is not a text, expected %(key)s = "..." there.',
             where=where,
             key=key,
-            file=META,
+            file=META_FILE,
         )
     return value
 
 
-def run_of(meta: Mapping[str, object], where: str) -> str | None:
+def get_meta_run(meta: Mapping[str, object], where: str) -> str | None:
     """Return the run of a notebook that is to be marked: a number, or the tag of a cell."""
     value = meta.get("run")
     if isinstance(value, int) and not isinstance(value, bool):
         return str(value)
-    return text_of(meta, "run", where)
+    return get_meta_text(meta, "run", where)

@@ -17,7 +17,7 @@ Coordinates = tuple[tuple[str, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Varied:
+class VariedCondition:
     """A condition: its name, its unit and the range of valid levels."""
 
     words: str
@@ -26,15 +26,15 @@ class Varied:
     most: float
 
 
-CONDITIONS: Mapping[str, Varied] = MappingProxyType(
+CONDITIONS: Mapping[str, VariedCondition] = MappingProxyType(
     {
-        "offset_x": Varied("start offset in x", "mm", -100, 100),
-        "offset_y": Varied("start offset in y", "mm", -100, 100),
-        "heading": Varied("heading offset", "degrees", -180, 180),
-        "light_noise": Varied("light noise", "grey levels", 0, 128),
-        "motor_noise": Varied("motor noise", "degrees per second", 0, 500),
-        "loss": Varied("message loss", "share of messages", 0, 1),
-        "delay": Varied("message delay", "s", 0, 60),
+        "offset_x": VariedCondition("start offset in x", "mm", -100, 100),
+        "offset_y": VariedCondition("start offset in y", "mm", -100, 100),
+        "heading": VariedCondition("heading offset", "degrees", -180, 180),
+        "light_noise": VariedCondition("light noise", "grey levels", 0, 128),
+        "motor_noise": VariedCondition("motor noise", "degrees per second", 0, 500),
+        "loss": VariedCondition("message loss", "share of messages", 0, 1),
+        "delay": VariedCondition("message delay", "s", 0, 60),
     }
 )
 

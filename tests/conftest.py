@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_database
+from benchmarks.harness.postgresql_server import PostgresqlServer, create_database
 from builders import opened, settings_in
 from service.grading.trial_runner import TrialRunner
 from service.settings import Settings
@@ -70,7 +70,7 @@ def service_settings(request: pytest.FixtureRequest, tmp_path: Path) -> Settings
     """Return settings with an empty database, for each kind of database."""
     if request.param == "sqlite":
         return settings_in(tmp_path)
-    return settings_in(tmp_path, database_url=fresh_database(request.getfixturevalue("postgresql")))
+    return settings_in(tmp_path, database_url=create_database(request.getfixturevalue("postgresql")))
 
 
 @pytest.fixture

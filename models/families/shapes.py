@@ -17,10 +17,10 @@ from PIL import Image
 
 from models.images import LabelledPose, Photographer, Shift
 from models.perceptrons import Perceptron
-from models.preprocessing import SIDE, Grey, features, noisy
-from models.tasks import Altered, Examples, Task, Test, register
-from sim.chance import Stream
+from models.preprocessing import SIDE, Grey, add_noise, compute_features
+from models.tasks import AlterationTest, ClassifierTest, Examples, Task, register
 from sim.floors import SHAPES
+from sim.random_streams import RandomStream
 from sim.recording import Pose
 
 _SEED = 20201107
@@ -40,7 +40,7 @@ _SIZES = tuple(float(percent) for percent in range(50, 141, 10))
 _COVERS = (2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
 
 
-def places() -> tuple[LabelledPose, ...]:
+def list_shape_poses() -> tuple[LabelledPose, ...]:
     """Return the course's poses, which put the left sensor over the middle of each shape."""
     return tuple(LabelledPose("Simple_Shapes", 0, Pose(200 + 80 * code, 900, 0), code) for code in range(len(SHAPES)))
 
@@ -58,10 +58,10 @@ class Alteration:
     cover: tuple[int, int, int, int, int] | None = None  # left, top, width and height in pixels, and the grey level
 
 
-def altered(code: int, alteration: Alteration) -> Grey:
+def render_altered_shape(code: int, alteration: Alteration) -> Grey:
     """Return the grey focus over a shape with this alteration, shape (14, 14)."""
     shape = np.full((SIDE + 2 * _MARGIN, SIDE + 2 * _MARGIN), _WHITE, np.uint8)
-    shape[_MARGIN:-_MARGIN, _MARGIN:-_MARGIN] = _printed()[code]
+    shape[_MARGIN:-_MARGIN, _MARGIN:-_MARGIN] = _render_printed_shapes()[code]
     angle = math.radians(alteration.turned)
     cosine, sine = math.cos(angle) / alteration.scale, math.sin(angle) / alteration.scale
     x, y = SIDE / 2 + alteration.x, SIDE / 2 - alteration.y
@@ -79,43 +79,45 @@ def altered(code: int, alteration: Alteration) -> Grey:
 
 
 @functools.cache
-def _printed() -> tuple[Grey, ...]:
+def _render_printed_shapes() -> tuple[Grey, ...]:
     """Return the focus over each shape of Simple_Shapes at the course's poses."""
     with Photographer() as photographer:
-        return tuple(photographer.image(place, Shift()) for place in places())
+        return tuple(photographer.take_image(place, Shift()) for place in list_shape_poses())
 
 
-def _examples() -> Examples:
+def _build_examples() -> Examples:
     """Return the training images: the course's floor ``_ROUNDS`` times, then altered shapes."""
-    images, labels = _on_the_floor()
-    own = [(code, _own(code, number)) for code in range(len(SHAPES)) for number in range(_OWN_EACH)]
-    rows = np.array([features(grey) for _, grey in own])
+    images, labels = _build_floor_examples()
+    own = [(code, _build_altered_example(code, number)) for code in range(len(SHAPES)) for number in range(_OWN_EACH)]
+    rows = np.array([compute_features(grey) for _, grey in own])
     return (
         np.concatenate([images] * _ROUNDS + [rows]),
         np.concatenate([labels] * _ROUNDS + [np.array([code for code, _ in own], np.int64)]),
     )
 
 
-def _on_the_floor() -> Examples:
+def _build_floor_examples() -> Examples:
     """Return every shape at every offset, with and without noise. The shapes on the spot occur more often."""
     images, labels = [], []
     with Photographer() as photographer:
-        for place, dx, dy in itertools.product(places(), _OFFSETS, _OFFSETS):
+        for place, dx, dy in itertools.product(list_shape_poses(), _OFFSETS, _OFFSETS):
             noises = (*_NOISES, *(_NOISES_ON_THE_SPOT if dx == dy == 0 else ()))
             for draw, noise in enumerate(noises):
                 name = f"{_SEED}:{place.label}:{dx}:{dy}:{draw}"
-                grey = photographer.image(place, Shift(x=dx, y=dy, noise=noise), Stream(0, name).integer(0) >> 1)
-                images.append(features(grey))
+                grey = photographer.take_image(
+                    place, Shift(x=dx, y=dy, noise=noise), RandomStream(0, name).integer(0) >> 1
+                )
+                images.append(compute_features(grey))
                 labels.append(place.label)
     return np.array(images), np.array(labels, np.int64)
 
 
-def _own(code: int, number: int) -> Grey:
+def _build_altered_example(code: int, number: int) -> Grey:
     """Return an altered training image of a shape; large rotations get small offsets.
 
     A triangle rotated by 30 degrees looks like another shape apart from its position.
     """
-    chance = Stream(_SEED, f"own image {code}")
+    chance = RandomStream(_SEED, f"own image {code}")
     kind = chance.uniform(number, 0)
     if kind < 0.35:
         turn, smallest, largest, reach = 22.0, 0.75, 1.15, 0.5
@@ -124,7 +126,7 @@ def _own(code: int, number: int) -> Grey:
     else:
         turn, smallest, largest, reach = 0.0, 1.0, 1.0, 3.0
     covered = kind >= 0.75 or chance.uniform(number, 1) < 0.35
-    grey = altered(
+    grey = render_altered_shape(
         code,
         Alteration(
             turned=chance.between(-turn, turn, number, 2),
@@ -133,57 +135,59 @@ def _own(code: int, number: int) -> Grey:
             y=chance.between(-reach, reach, number, 5),
             ink=chance.integer(number, 6) % _PALEST if chance.uniform(number, 7) < 0.3 else _BLACK,
             resampling=_RESAMPLINGS[chance.integer(number, 8) % len(_RESAMPLINGS)],
-            cover=_cover(chance, number) if covered else None,
+            cover=_choose_cover(chance, number) if covered else None,
         ),
     )
     noise = _OWN_NOISES[chance.integer(number, 9) % len(_OWN_NOISES)]
-    return noisy(grey, noise, Stream(_SEED, f"own noise {code}"), number) if noise else grey
+    return add_noise(grey, noise, RandomStream(_SEED, f"own noise {code}"), number) if noise else grey
 
 
-def _cover(chance: Stream, number: int) -> tuple[int, int, int, int, int]:
+def _choose_cover(chance: RandomStream, number: int) -> tuple[int, int, int, int, int]:
     width, height = (2 + chance.integer(number, index) % 6 for index in (10, 11))
     left, top = (chance.integer(number, index) % (SIDE - side + 1) for index, side in ((12, width), (13, height)))
     colour = (_BLACK, _WHITE, chance.integer(number, 14) % (_WHITE + 1))[chance.integer(number, 15) % 3]
     return left, top, width, height, colour
 
 
-def _turned(degrees: float) -> Iterator[tuple[int, Grey]]:
-    yield from _printed_so(lambda resampling: [Alteration(turned=degrees, resampling=resampling)])
+def _render_turned_shapes(degrees: float) -> Iterator[tuple[int, Grey]]:
+    yield from _render_alterations(lambda resampling: [Alteration(turned=degrees, resampling=resampling)])
 
 
-def _scaled(percent: float) -> Iterator[tuple[int, Grey]]:
+def _render_scaled_shapes(percent: float) -> Iterator[tuple[int, Grey]]:
     moves = tuple(itertools.product((-1, 0, 1), repeat=2))
-    yield from _printed_so(
+    yield from _render_alterations(
         lambda resampling: [Alteration(scale=percent / 100, x=x, y=y, resampling=resampling) for x, y in moves]
     )
 
 
-def _covered(side: float) -> Iterator[tuple[int, Grey]]:
+def _render_covered_shapes(side: float) -> Iterator[tuple[int, Grey]]:
     """Yield the shapes covered by a black, grey or white square at every position in their 10 x 10 pixels."""
     width = int(side)
     corners = range(2, 2 + 10 - width + 1)
     for code in range(len(SHAPES)):
         for left, top, colour in itertools.product(corners, corners, (_BLACK, 128, _WHITE)):
-            yield code, altered(code, Alteration(cover=(left, top, width, width, colour)))
+            yield code, render_altered_shape(code, Alteration(cover=(left, top, width, width, colour)))
 
 
-def _printed_so(ways: Callable[[Image.Resampling], Sequence[Alteration]]) -> Iterator[tuple[int, Grey]]:
+def _render_alterations(ways: Callable[[Image.Resampling], Sequence[Alteration]]) -> Iterator[tuple[int, Grey]]:
     for code in range(len(SHAPES)):
         for resampling in (Image.Resampling.NEAREST, Image.Resampling.BILINEAR):
             for alteration in ways(resampling):
-                yield code, altered(code, alteration)
+                yield code, render_altered_shape(code, alteration)
 
 
-def _test() -> Test:
+def _build_test() -> ClassifierTest:
     noises = ((0, 1), (10, 20), (32, 20), (64, 20), (128, 20))
     words = "the six shapes where the course stands the robot, without noise once, with light noise 10, 32, 64 and 128 "
     words += "twenty times each"
     curves = (
-        Altered("turned image", "degrees", "about the window's middle", _TURNS, _turned),
-        Altered("size of the image", "%", "on the spot and 1 mm beside", _SIZES, _scaled),
-        Altered("covered square", "mm each way", "black, grey or white, wherever it is", _COVERS, _covered),
+        AlterationTest("turned image", "degrees", "about the window's middle", _TURNS, _render_turned_shapes),
+        AlterationTest("size of the image", "%", "on the spot and 1 mm beside", _SIZES, _render_scaled_shapes),
+        AlterationTest(
+            "covered square", "mm each way", "black, grey or white, wherever it is", _COVERS, _render_covered_shapes
+        ),
     )
-    return Test(places(), noises, places(), (0, 32), 20, words, curves)
+    return ClassifierTest(list_shape_poses(), noises, list_shape_poses(), (0, 32), 20, words, curves)
 
 
 TASK = register(
@@ -194,10 +198,10 @@ TASK = register(
         classes=SHAPES,
         side=14,
         plan=Perceptron(hidden=150, stages=((1e-3, 30), (2e-4, 10)), decay=1e-3, seed=_SEED),
-        examples=_examples,
+        examples=_build_examples,
         training_words=f"Simple_Shapes as the simulated left sensor sees it: every whole mm up to {max(_OFFSETS)} off "
         "each way, light noise 0, 16, 32, 64, 96 and 128; on the spot more often with 128; and as an image of one's "
         "own may have them: turned up to 22 degrees, of 55 to 130 %, paler, covered up to 7 x 7 mm, beside the spot",
-        test=_test,
+        test=_build_test,
     )
 )

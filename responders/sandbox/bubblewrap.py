@@ -13,33 +13,41 @@ import sys
 from pathlib import Path
 
 _PROGRAM = shutil.which("bwrap", path="/usr/bin:/bin:/usr/local/bin")
-_SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/etc/alternatives", "/etc/localtime", "/etc/ld.so.cache")
+_SYSTEM_PATHS = ("/usr", "/lib", "/lib64", "/bin", "/etc/alternatives", "/etc/localtime", "/etc/ld.so.cache")
 _DEVICES = ("/dev/null", "/dev/zero")
-_SPACES = ("--unshare-ipc", "--unshare-pid", "--unshare-net", "--unshare-uts", "--unshare-cgroup-try")
+_NAMESPACE_OPTIONS = ("--unshare-ipc", "--unshare-pid", "--unshare-net", "--unshare-uts", "--unshare-cgroup-try")
 #: Capabilities for a zygote that runs as root. It needs them to run each child as a separate user, and SETPCAP to keep
 #: its addresses fixed; it drops SETPCAP at its start. Children drop all of them.
-_POWERS = ("CHOWN", "DAC_OVERRIDE", "KILL", "SETGID", "SETPCAP", "SETUID")
-_TRY_SECONDS = 20.0
+_CAPABILITIES = ("CHOWN", "DAC_OVERRIDE", "KILL", "SETGID", "SETPCAP", "SETUID")
+_TRIAL_SECONDS = 20.0
 
 
-def wrapping(readable: list[str], writable: Path) -> list[str]:
+def build_command_prefix(readable: list[str], writable: Path) -> list[str]:
     """Return the command prefix that runs the interpreter in its own namespaces.
 
     Besides the interpreter, the process can read ``readable`` and write ``writable``. It is the first process in its
     PID namespace, so no other process there outlives it.
     """
-    command = [_PROGRAM or "bwrap", *_SPACES, "--die-with-parent", "--as-pid-1", "--new-session", "--hostname", "robot"]
+    command = [
+        _PROGRAM or "bwrap",
+        *_NAMESPACE_OPTIONS,
+        "--die-with-parent",
+        "--as-pid-1",
+        "--new-session",
+        "--hostname",
+        "robot",
+    ]
     command += ["--cap-drop", "ALL"]
     if os.geteuid() == 0:
-        for power in _POWERS:
+        for power in _CAPABILITIES:
             command += ["--cap-add", f"CAP_{power}"]
     else:
         command.append("--unshare-user")
-    shown = (*_interpreter(), *readable)
-    for folder in _folders_above(*_SYSTEM, *_DEVICES, *shown, str(writable)):
+    shown = (*_list_interpreter_folders(), *readable)
+    for folder in _list_parent_folders(*_SYSTEM_PATHS, *_DEVICES, *shown, str(writable)):
         # Folders that bubblewrap creates itself are accessible only to root.
         command += ["--dir", folder]
-    for path in _SYSTEM:
+    for path in _SYSTEM_PATHS:
         command += ["--ro-bind-try", path, path]
     for path in shown:
         command += ["--ro-bind", path, path]
@@ -48,11 +56,11 @@ def wrapping(readable: list[str], writable: Path) -> list[str]:
     return [*command, "--bind", str(writable), str(writable), "--proc", "/proc", "--chdir", "/", "--"]
 
 
-def _folders_above(*paths: str) -> list[str]:
+def _list_parent_folders(*paths: str) -> list[str]:
     return sorted({str(folder) for path in paths for folder in Path(path).parents} - {"/"})
 
 
-def why_not(wrapping: list[str]) -> str | None:
+def check_available(wrapping: list[str]) -> str | None:
     """Run an interpreter that does nothing. Return the reason if that fails here, or None if it works."""
     if _PROGRAM is None:
         return "bwrap is not installed"
@@ -64,7 +72,7 @@ def why_not(wrapping: list[str]) -> str | None:
             capture_output=True,
             text=True,
             errors="replace",
-            timeout=_TRY_SECONDS,
+            timeout=_TRIAL_SECONDS,
             check=False,
         )
     except (OSError, subprocess.TimeoutExpired) as error:
@@ -75,7 +83,7 @@ def why_not(wrapping: list[str]) -> str | None:
     return None
 
 
-def _interpreter() -> list[str]:
+def _list_interpreter_folders() -> list[str]:
     """Return the folders of the interpreter and its packages, including the base of a virtual environment."""
     program = Path(sys.executable)
     found = {sys.prefix, sys.base_prefix, str(program.parent.parent), str(program.resolve().parent.parent)}

@@ -22,7 +22,7 @@ _NEEDED = frozenset({"memory", "pids"})
 _WANTED = _NEEDED | {"io"}
 _MEGABYTE = 1 << 20
 #: Memory of zygotes, and of children beyond their limits.
-_BESIDE_LIMITS = 400 * _MEGABYTE
+_EXTRA_MEMORY = 400 * _MEGABYTE
 #: A zygote for each role, some inside bubblewrap, and their children. None of them may start a thread.
 _MOST_PROCESSES = 32
 #: The default weight is 100.
@@ -38,13 +38,13 @@ class _NotDelegated(Exception):
     """Raised when a worker can't have groups here. The message is the end of a sentence."""
 
 
-def divide(proc: Path = _PROC) -> str | None:
+def divide_group(proc: Path = _PROC) -> str | None:
     """Create space for slot groups below this process's group, and move the process into a separate one.
 
     Call it before the process has children. Return the reason if it fails, with nothing changed, otherwise None.
     """
     try:
-        group = _delegated(proc)
+        group = _locate_delegated_group(proc)
     except _NotDelegated as reason:
         return str(reason)
     service = group / _SERVICE
@@ -61,10 +61,10 @@ def divide(proc: Path = _PROC) -> str | None:
     return None
 
 
-def why_not(proc: Path = _PROC) -> str | None:
+def check_available(proc: Path = _PROC) -> str | None:
     """Return why a worker started from here can't have groups, or None if it can. Changes nothing."""
     try:
-        _delegated(proc)
+        _locate_delegated_group(proc)
     except _NotDelegated as reason:
         return str(reason)
     return None
@@ -84,11 +84,11 @@ class ControlGroup:
         _remove_left_overs(folder.parent)
         try:
             folder.mkdir(exist_ok=True)
-            self._write("memory.max", self._least)
-            self._write("pids.max", _MOST_PROCESSES)
+            self._write_setting("memory.max", self._least)
+            self._write_setting("pids.max", _MOST_PROCESSES)
         except OSError as error:
             raise HostError(f"the control group {folder} cannot be made: {error.strerror}") from None
-        disk = _disk(Path(tempfile.gettempdir()))
+        disk = _find_disk_number(Path(tempfile.gettempdir()))
         for file, value in (
             ("memory.swap.max", "0"),
             ("io.weight", f"default {_DISK_WEIGHT}"),
@@ -96,29 +96,29 @@ class ControlGroup:
         ):
             # Not supported by all kernels and disks.
             with contextlib.suppress(OSError):
-                self._write(file, value)
+                self._write_setting(file, value)
 
     @property
-    def joining(self) -> list[str]:
+    def command_prefix(self) -> list[str]:
         """The command prefix that runs a process in the group."""
         return ["/bin/sh", "-c", 'echo 0 > "$0" && exec "$@"', str(self._folder / "cgroup.procs")]
 
-    def make_room(self, limits_bytes: int) -> None:
+    def adjust_memory_limit(self, limits_bytes: int) -> None:
         """Set the group's limit so that its processes can have the memory that an assignment allows them together."""
         try:
-            self._write("memory.max", max(self._least, limits_bytes + _BESIDE_LIMITS))
+            self._write_setting("memory.max", max(self._least, limits_bytes + _EXTRA_MEMORY))
         except OSError as error:
             raise HostError(f"the control group {self._folder} cannot be changed: {error.strerror}") from None
 
-    def watch(self) -> Callable[[], bool]:
+    def watch_memory_kills(self) -> Callable[[], bool]:
         """Return a predicate: whether the kernel has since killed a process for exceeding this group's memory limit.
 
         The counter ``oom_kill`` is not enough, because it also counts processes killed for a full parent group.
         """
-        killed, full = self._events()
+        killed, full = self._read_events()
 
         def overran() -> bool:
-            killed_now, full_now = self._events()
+            killed_now, full_now = self._read_events()
             return killed_now > killed and full_now > full
 
         return overran
@@ -126,12 +126,12 @@ class ControlGroup:
     def close(self) -> None:
         """Kill the remaining processes and remove the group."""
         with contextlib.suppress(OSError):
-            self._write("cgroup.kill", 1)
+            self._write_setting("cgroup.kill", 1)
         until = time.monotonic() + _END_SECONDS
-        while not _removed(self._folder) and time.monotonic() < until:
+        while not _try_remove(self._folder) and time.monotonic() < until:
             time.sleep(0.01)
 
-    def _events(self) -> tuple[int, int]:
+    def _read_events(self) -> tuple[int, int]:
         try:
             lines = (self._folder / "memory.events").read_text().splitlines()
         except OSError:
@@ -139,18 +139,18 @@ class ControlGroup:
         counts = dict(line.split() for line in lines)
         return int(counts.get("oom_kill", 0)), int(counts.get("oom", 0))
 
-    def _write(self, file: str, value: object) -> None:
+    def _write_setting(self, file: str, value: object) -> None:
         (self._folder / file).write_text(str(value))
 
 
-def for_this_process(memory_mb: int, proc: Path = _PROC) -> ControlGroup | None:
+def create_slot_group(memory_mb: int, proc: Path = _PROC) -> ControlGroup | None:
     """Return the group of this process's slot if the worker could ``divide`` its own, otherwise None.
 
     Raises:
         HostError: If the group can't be created.
     """
     try:
-        own = _own(proc)
+        own = _locate_own_group(proc)
     except _NotDelegated:
         return None
     if own.name != _SERVICE:
@@ -158,13 +158,13 @@ def for_this_process(memory_mb: int, proc: Path = _PROC) -> ControlGroup | None:
     return ControlGroup(own.parent / f"{_SLOT}{os.getpid()}", memory_mb)
 
 
-def _delegated(proc: Path) -> Path:
+def _locate_delegated_group(proc: Path) -> Path:
     """Return the group that can be divided or already is.
 
     Raises:
         _NotDelegated: If there is none.
     """
-    own = _own(proc)
+    own = _locate_own_group(proc)
     group = own.parent if own.name == _SERVICE else own
     try:
         missing = _NEEDED - set((group / "cgroup.controllers").read_text().split())
@@ -181,7 +181,7 @@ def _delegated(proc: Path) -> Path:
     return group
 
 
-def _own(proc: Path) -> Path:
+def _locate_own_group(proc: Path) -> Path:
     """Return the folder of this process's group.
 
     Raises:
@@ -207,10 +207,10 @@ def _remove_left_overs(group: Path) -> None:
     """Remove the groups of slots whose process was killed before it could remove them."""
     for folder in group.glob(f"{_SLOT}*"):
         if not Path(f"/proc/{folder.name.removeprefix(_SLOT)}").exists():
-            _removed(folder)
+            _try_remove(folder)
 
 
-def _removed(folder: Path) -> bool:
+def _try_remove(folder: Path) -> bool:
     try:
         folder.rmdir()
     except FileNotFoundError:
@@ -220,7 +220,7 @@ def _removed(folder: Path) -> bool:
     return True
 
 
-def _disk(folder: Path) -> str:
+def _find_disk_number(folder: Path) -> str:
     """Return the device number of the whole disk with this folder, or the folder's own if it is on no disk."""
     number = folder.stat().st_dev
     name = f"{os.major(number)}:{os.minor(number)}"

@@ -12,42 +12,50 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 
-from responders.sandbox import reading_dates
+from responders.sandbox import access_times
 from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.inside import grants
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import PrivateFolders
 from responders.sandbox.running_child import Child, ChildLimits, ServedChild
-from responders.sandbox.zygote import FULL, ROLES, WITH_LIBRARIES, Isolation, Role, Zygote, own_modules
+from responders.sandbox.zygote import (
+    FULL_ISOLATION,
+    ROLES,
+    WITH_LIBRARIES,
+    ChildRole,
+    Isolation,
+    Zygote,
+    find_module_folder,
+)
 
 #: Returns a real or a replayed child, from its role, its folder, its job's meter and a function that creates it.
-StandIn = Callable[[str, Path | None, JobMeter | None, Callable[[], Child]], ServedChild]
+ChildProvider = Callable[[str, Path | None, JobMeter | None, Callable[[], Child]], ServedChild]
 
 
 class Sandboxes:
     """The zygotes of one worker: started when first needed, closed together, all in one ``group`` if given."""
 
-    def __init__(self, isolation: Isolation = FULL, group: ControlGroup | None = None) -> None:
+    def __init__(self, isolation: Isolation = FULL_ISOLATION, group: ControlGroup | None = None) -> None:
         self.isolation = isolation
         self._group = group
         self._living: list[tuple[Child, int]] = []  # children in the group, with their memory limit
-        self._zygotes: dict[tuple[Role, tuple[str, ...]], Zygote] = {}
+        self._zygotes: dict[tuple[ChildRole, tuple[str, ...]], Zygote] = {}
         self._folders = PrivateFolders()
         self._blamed = False
-        self._stand_in: StandIn | None = None
+        self._stand_in: ChildProvider | None = None
         self._forgets_until = 0.0
         self._cpu_of_closed = 0.0
         self._given_libraries: JobMeter | None = None  # the meter of the last job that needed them
 
-    def begin(self, role: Role, without: tuple[str, ...]) -> None:
+    def begin(self, role: ChildRole, without: tuple[str, ...]) -> None:
         """Start the zygote for this role without waiting for it. Errors appear when it is used."""
         with contextlib.suppress(OSError):
-            self._zygote(role, without).begin()
+            self._provide_zygote(role, without).begin()
 
     def spawn(
-        self, role: Role, limits: ChildLimits, folder: Path | None = None, meter: JobMeter | None = None
+        self, role: ChildRole, limits: ChildLimits, folder: Path | None = None, meter: JobMeter | None = None
     ) -> ServedChild:
-        """Return a fresh child for a role, with or without a ``private_folder``.
+        """Return a fresh child for a role, with or without a private folder.
 
         ``meter``, the meter of its job, counts its costs.
         """
@@ -55,18 +63,18 @@ class Sandboxes:
             return self._stand_in(role, folder, meter, lambda: self._fork(role, limits, folder, meter))
         return self._fork(role, limits, folder, meter)
 
-    def _fork(self, role: Role, limits: ChildLimits, folder: Path | None, meter: JobMeter | None) -> Child:
+    def _fork(self, role: ChildRole, limits: ChildLimits, folder: Path | None, meter: JobMeter | None) -> Child:
         if self._group is not None:
-            self._living = [(child, allowed) for child, allowed in self._living if not child.closed]
-            self._group.make_room(sum(allowed for _, allowed in self._living) + limits.memory_bytes)
+            self._living = [(child, allowed) for child, allowed in self._living if not child.is_closed]
+            self._group.adjust_memory_limit(sum(allowed for _, allowed in self._living) + limits.memory_bytes)
         if meter is not None and meter is self._given_libraries:
             role = WITH_LIBRARIES[role]
-        child = self._zygote(role, limits.without).spawn(limits, folder, meter, blamed=self._blamed)
+        child = self._provide_zygote(role, limits.excluded_modules).spawn(limits, folder, meter, blamed=self._blamed)
         if self._group is not None:
             self._living.append((child, limits.memory_bytes))
         return child
 
-    def give_libraries(self, meter: JobMeter) -> None:
+    def enable_libraries(self, meter: JobMeter) -> None:
         """Load libraries in all further children of the job with this meter."""
         self._given_libraries = meter
 
@@ -80,7 +88,7 @@ class Sandboxes:
             self._blamed = False
 
     @contextlib.contextmanager
-    def standing_in(self, stand_in: StandIn) -> Iterator[None]:
+    def replacing_children(self, stand_in: ChildProvider) -> Iterator[None]:
         """Within this context, ``stand_in`` decides between a real child and a replayed one."""
         self._stand_in = stand_in
         try:
@@ -88,40 +96,40 @@ class Sandboxes:
         finally:
             self._stand_in = None
 
-    def check(self, role: Role = "robot") -> str:
+    def check_isolation(self, role: ChildRole = "robot") -> str:
         """Run escape attempts in a child and return the layers that blocked them.
 
         Raises:
             SandboxMissing: If a required layer fails.
         """
-        return self._zygote(role).try_isolation()
+        return self._provide_zygote(role).check_isolation()
 
-    def why_no_bubblewrap(self, role: Role = "robot") -> str | None:
+    def check_bubblewrap(self, role: ChildRole = "robot") -> str | None:
         """Return why bubblewrap, which is optional, does not isolate children of ``role``; None if it does."""
-        self.check(role)
-        return self._zygote(role).without_bubblewrap
+        self.check_isolation(role)
+        return self._provide_zygote(role).without_bubblewrap
 
-    def remembers(self) -> str | None:
+    def check_data_leaks(self) -> str | None:
         """Return how a trial could leave data for a later one here, or None if it can't for the next hours."""
         now = time.time()
-        if not 0 < self._forgets_until - now <= reading_dates.HOLDS_SECONDS:
-            zygote = self._zygote("robot")
-            zygote.try_isolation()
+        if not 0 < self._forgets_until - now <= access_times.VALID_SECONDS:
+            zygote = self._provide_zygote("robot")
+            zygote.check_isolation()
             if zygote.without_doorkeeper is not None:
                 return f"nobody decides which paths it may name ({zygote.without_doorkeeper})"
             if zygote.without_bubblewrap is not None:  # bubblewrap mounts read-only, so access times don't change
-                own = [own_modules(role) for role in ROLES]
-                dated = reading_dates.read_beforehand(grants.readable(own), grants.listable(own))
+                own = [find_module_folder(role) for role in ROLES]
+                dated = access_times.read_beforehand(grants.list_readable_paths(own), grants.list_listable_folders(own))
                 if dated is not None:
                     return dated
-            self._forgets_until = now + reading_dates.HOLDS_SECONDS
+            self._forgets_until = now + access_times.VALID_SECONDS
         return None
 
-    def private_folder(self) -> contextlib.AbstractContextManager[Path]:
+    def open_private_folder(self) -> contextlib.AbstractContextManager[Path]:
         """Return a context manager for the folder of one trial, which is removed afterwards with all its content."""
         return self._folders.one()
 
-    def _zygote(self, role: Role, without: tuple[str, ...] = ()) -> Zygote:
+    def _provide_zygote(self, role: ChildRole, without: tuple[str, ...] = ()) -> Zygote:
         """Return the zygote for a role. Without some third-party packages, a second zygote is kept for the current job.
 
         Modules of Python's standard library are loaded in both and hidden in the child.

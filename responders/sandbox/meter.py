@@ -39,7 +39,7 @@ class JobLimits:
 
 
 @dataclass(frozen=True, slots=True)
-class Spent:
+class JobCosts:
     """The costs of a job so far."""
 
     kept_bytes: int = 0
@@ -57,9 +57,9 @@ class JobMeter:
         self._cpu = self._sleep = 0.0  # of ended children
 
     @property
-    def spent(self) -> Spent:
+    def spent(self) -> JobCosts:
         """The costs of the job so far. Seconds include only ended children."""
-        return Spent(self._kept, self._cpu, self._sleep)
+        return JobCosts(self._kept, self._cpu, self._sleep)
 
     @property
     def limits(self) -> JobLimits:
@@ -79,7 +79,7 @@ class JobMeter:
         except Exception as error:
             raise HostError(f"the job's heartbeat failed: {type(error).__name__}: {error}") from error
 
-    def keep(self, size: int) -> None:
+    def charge_bytes(self, size: int) -> None:
         """Charge for an object with ``size`` bytes of text before it is stored.
 
         Raises:
@@ -120,11 +120,11 @@ class JobMeter:
                 f"all trials together slept for more than {self._limits.sleep_seconds:g} seconds of real time",
             )
 
-    def child_ended(self, cpu_seconds: float, sleep_seconds: float) -> None:
+    def charge_child(self, cpu_seconds: float, sleep_seconds: float) -> None:
         """Count the seconds of an ended child. The first seconds asleep are free."""
         self._cpu += cpu_seconds
         self._sleep += max(0.0, sleep_seconds - _FREE_SLEEP_SECONDS)
 
-    def give_back(self, before: Spent) -> None:
+    def refund_since(self, before: JobCosts) -> None:
         """Refund the costs since ``before``, because the host caused the failure."""
         self._kept, self._cpu, self._sleep = before.kept_bytes, before.cpu_seconds, before.sleep_seconds

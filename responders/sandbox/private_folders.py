@@ -20,9 +20,9 @@ _PREFIX = "robomark-trials-"
 #: Other users may traverse the folder, as children with their own user must, but not list it.
 _MODE = 0o711
 #: Number of inodes that each trial consumes where they are counted up: several times the limit for a child.
-_NUMBERS = 1024
+_INODES_PER_TRIAL = 1024
 #: Maximum number of low inodes reserved during a trial, several times the number that others use meanwhile.
-_TAKEN = 64
+_MAX_RESERVED_INODES = 64
 
 
 class PrivateFolders:
@@ -37,22 +37,22 @@ class PrivateFolders:
     def path(self) -> Path:
         """The parent folder, created again if it was deleted."""
         if self._path is None or not self._path.is_dir():
-            self._make(self._path)
+            self._create_parent(self._path)
         assert self._path is not None
         return self._path
 
     @contextlib.contextmanager
     def one(self) -> Iterator[Path]:
         """Yield the folder of one trial and remove it afterwards."""
-        with self._telling_nothing():
+        with self._hidden_inode_numbers():
             folder = Path(tempfile.mkdtemp(dir=self.path))
             try:
                 yield folder
             finally:
-                _remove(folder)
+                _remove_folder(folder)
 
     @contextlib.contextmanager
-    def _telling_nothing(self) -> Iterator[None]:
+    def _hidden_inode_numbers(self) -> Iterator[None]:
         """Prevent inode numbers from revealing how many files an earlier trial has created.
 
         Some file systems count up (tmpfs, Btrfs): there every trial consumes the same number of inodes. Others reuse
@@ -61,40 +61,40 @@ class PrivateFolders:
         """
         folder = self.path
         if self._counting:
-            end = _number(folder) + _NUMBERS
+            end = _read_inode_number(folder) + _INODES_PER_TRIAL
             try:
                 yield
             finally:
-                for _ in range(_NUMBERS):
-                    if _number(folder) >= end:
+                for _ in range(_INODES_PER_TRIAL):
+                    if _read_inode_number(folder) >= end:
                         break
             return
         taking = Path(tempfile.mkdtemp(dir=folder))
         try:
-            for place in range(secrets.randbelow(_TAKEN)):
+            for place in range(secrets.randbelow(_MAX_RESERVED_INODES)):
                 (taking / str(place)).touch(0o600)
             yield
         finally:
-            _remove(taking)
+            _remove_folder(taking)
 
     def close(self) -> None:
         """Remove the folder and release its lock."""
         if self._path is not None:
-            _remove(self._path)
+            _remove_folder(self._path)
             self._path = None
         if self._lock >= 0:
             os.close(self._lock)
             self._lock = -1
 
-    def _make(self, path: Path | None) -> None:
-        path, locked = locked_folder(_PREFIX, _MODE, path)
+    def _create_parent(self, path: Path | None) -> None:
+        path, locked = create_locked_folder(_PREFIX, _MODE, path)
         if self._lock >= 0:
             os.close(self._lock)
         self._path, self._lock = path, locked
-        self._counting = len({_number(path) for _ in range(4)}) == 4
+        self._counting = len({_read_inode_number(path) for _ in range(4)}) == 4
 
 
-def _number(folder: Path) -> int:
+def _read_inode_number(folder: Path) -> int:
     """Return the inode number of a new file in ``folder``; the file is deleted."""
     path = folder / "number"
     path.touch(0o600)
@@ -104,7 +104,7 @@ def _number(folder: Path) -> int:
         path.unlink()
 
 
-def locked_folder(prefix: str, mode: int, path: Path | None = None) -> tuple[Path, int]:
+def create_locked_folder(prefix: str, mode: int, path: Path | None = None) -> tuple[Path, int]:
     """Create a temporary folder, at ``path`` if given.
 
     Returns:
@@ -127,14 +127,14 @@ def remove_left_overs(prefix: str = _PREFIX) -> None:
     """
     for folder in Path(tempfile.gettempdir()).glob(f"{prefix}*"):
         # Another worker may be removing it at the same time.
-        with contextlib.suppress(OSError), _opened(folder) as descriptor:
+        with contextlib.suppress(OSError), _open_folder(folder) as descriptor:
             if os.fstat(descriptor).st_uid == os.getuid():
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                _remove(folder)
+                _remove_folder(folder)
 
 
 @contextlib.contextmanager
-def _opened(folder: Path) -> Iterator[int]:
+def _open_folder(folder: Path) -> Iterator[int]:
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
         yield descriptor
@@ -142,7 +142,7 @@ def _opened(folder: Path) -> Iterator[int]:
         os.close(descriptor)
 
 
-def _remove(folder: Path) -> None:
+def _remove_folder(folder: Path) -> None:
     try:
         shutil.rmtree(folder, ignore_errors=True)
     except RecursionError:

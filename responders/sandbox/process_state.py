@@ -13,23 +13,23 @@ import signal
 from pathlib import Path
 
 
-def busy_seconds(pid: int) -> float:
+def read_busy_seconds(pid: int) -> float:
     """Return the seconds that a process has run or waited for a processor; infinity if unknown."""
     try:
-        return sum(_scheduled(pid))
+        return sum(_read_schedule(pid))
     except (OSError, ValueError):
         return math.inf
 
 
-def seconds_queued() -> float:
+def read_queued_seconds() -> float:
     """Return the seconds that this thread has waited for a processor; 0 if unknown."""
     try:
-        return _scheduled("thread-self")[1]
+        return _read_schedule("thread-self")[1]
     except (OSError, ValueError):
         return 0.0
 
 
-def runnable(pid: int) -> bool:
+def is_runnable(pid: int) -> bool:
     """Return whether the process is runnable: then the machine is busy, and the program isn't waiting."""
     try:
         state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
@@ -38,7 +38,7 @@ def runnable(pid: int) -> bool:
     return state == "R"
 
 
-def signal_name(number: int) -> str:
+def find_signal_name(number: int) -> str:
     """Return the name of a signal, or its number."""
     try:
         return signal.Signals(number).name
@@ -46,7 +46,7 @@ def signal_name(number: int) -> str:
         return f"signal {number}"
 
 
-def folder_content(folder: Path, most: int) -> tuple[int, int]:
+def measure_folder(folder: Path, most: int) -> tuple[int, int]:
     """Return the total size in bytes and the number of files in a flat folder, up to ``most`` files."""
     size = count = 0
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
@@ -57,7 +57,7 @@ def folder_content(folder: Path, most: int) -> tuple[int, int]:
     return size, count
 
 
-def _scheduled(process: int | str) -> tuple[float, float]:
+def _read_schedule(process: int | str) -> tuple[float, float]:
     """Return the seconds that a process has run and has waited for a processor, from ``/proc``."""
     run, queued, _ = Path(f"/proc/{process}/schedstat").read_text().split()
     return int(run) / 1e9, int(queued) / 1e9

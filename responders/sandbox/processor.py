@@ -24,14 +24,14 @@ def one_processor() -> Iterator[None]:
         yield
         return
     with contextlib.ExitStack() as kept:
-        processor = _free_one(allowed, kept)
+        processor = _reserve_processor(allowed, kept)
         if processor is not None:
             os.sched_setaffinity(0, {processor})
             kept.callback(os.sched_setaffinity, 0, allowed)
         yield
 
 
-def _free_one(allowed: Set[int], kept: contextlib.ExitStack) -> int | None:
+def _reserve_processor(allowed: Set[int], kept: contextlib.ExitStack) -> int | None:
     """Reserve a free processor until ``kept`` is closed, preferably the current one. Return None if none is free."""
     here = _libc.sched_getcpu()
     for processor in sorted(allowed, key=lambda each: each != here):

@@ -16,33 +16,33 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from responders import packed, wire
-from responders.sandbox import child_ends, process_state
+from responders import packets, wire
+from responders.sandbox import child_exit, process_state
 from responders.sandbox.meter import ChildStopped, JobMeter
 from sim.errors import HostError, RobomarkError
 from sim.recording import Verdict
 
 _POLL_SECONDS = 0.02
 #: Bytes per read. Most frames are far shorter.
-_AT_ONCE = 8192
+_READ_BYTES = 8192
 #: Minimum CPU seconds charged per frame, per byte and per action in a packet. They are slightly above the worker's
 #: costs for reading, so a child pays for the many or long frames that it sends.
 _FRAME_CPU_SECONDS, _BYTE_CPU_SECONDS, _ACT_CPU_SECONDS = 1e-5, 1e-8, 5e-6
 _STALLED_SECONDS = 5.0
 #: Limit for reporting the last place: the child's CPU seconds, and real seconds once it is not runnable.
-_LAST_WORD_CPU_SECONDS = 0.04
-_LAST_WORD_SECONDS = 0.1
+_LAST_PLACE_CPU_SECONDS = 0.04
+_LAST_PLACE_SECONDS = 0.1
 #: Maximum number of bytes read while a stopped child reports its last place.
 _UNREAD_BYTES = 1 << 20
 #: Time for a process to end after it has closed the wire.
 _END_SECONDS = 1.0
 #: Frames that programs repeat thousands of times; each distinct one is validated once.
-_REPEATED = frozenset({"motor_state", "until"})
+_REPEATED_FRAMES = frozenset({"motor_state", "until"})
 _MOST_KNOWN, _LONGEST_KNOWN = 100, 200
 #: Space in a responder's folder, in addition to the given files.
 _FOLDER_BYTES = 16 << 20
 _FOLDER_FILES = 256
-_MOST_GIVEN = 10_000
+_MAX_GIVEN_FILES = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class ChildLimits:
 
     cpu_seconds: float
     memory_bytes: int
-    without: tuple[str, ...] = ()
+    excluded_modules: tuple[str, ...] = ()
 
 
 class LibrariesNeeded(RobomarkError):
@@ -76,10 +76,10 @@ class ServedChild(Protocol):
             ChildStopped: If the child was stopped or has ended.
         """
 
-    def cpu_seconds(self) -> float:
+    def measure_cpu_seconds(self) -> float:
         """Return the CPU seconds of the child so far."""
 
-    def last_place(self) -> wire.Frame:
+    def stop_and_locate(self) -> wire.Frame:
         """Return the current ``line`` and ``file`` of the child, and stop it: it can't be served afterwards."""
 
     def close(self) -> None:
@@ -106,7 +106,7 @@ class Child:
         self.sandbox = ""
         self._reap = reap
         self._folder = folder
-        self._given = (0, 0) if folder is None else process_state.folder_content(folder, _MOST_GIVEN)
+        self._given = (0, 0) if folder is None else process_state.measure_folder(folder, _MAX_GIVEN_FILES)
         self._pid = pid
         self._pidfd = pidfd
         # A round trip over pipes costs little more than half of one over a socket.
@@ -129,7 +129,7 @@ class Child:
         self._clock = (~pid << 3) | 2  # the CPU clock of another process, see clock_getcpuclockid(3)
         self._checked = 0.0
         self._waited = 0.0  # real seconds in which the worker only waited for the child
-        self._queued_before = process_state.seconds_queued()
+        self._queued_before = process_state.read_queued_seconds()
 
     def begin(
         self, meter: JobMeter, blamed: bool, has_libraries: bool, overran: Callable[[], bool] | None = None
@@ -146,13 +146,13 @@ class Child:
 
     def send(self, frame: dict[str, Any], arrived: Sequence[str] = ()) -> None:
         """Send one frame. ``arrived`` holds JSON texts. Write errors appear at the next ``receive``."""
-        self._send(wire.encode(frame, self._sent, arrived))
+        self._send_bytes(wire.encode_frame(frame, self._sent, arrived))
 
     def send_readings(self, units: int, values: Sequence[float]) -> None:
         """Send readings, without arrivals: the time, and the values of all sensors."""
-        self._send(packed.pack_readings(units, values, self._sent))
+        self._send_bytes(packets.pack_readings(units, values, self._sent))
 
-    def _send(self, frame: bytes) -> None:
+    def _send_bytes(self, frame: bytes) -> None:
         self._sent += 1
         try:
             frame = frame[os.write(self._writing, frame) :]
@@ -173,7 +173,7 @@ class Child:
             except BlockingIOError:
                 self._check_cpu()
                 if time.monotonic() - began > _STALLED_SECONDS:
-                    raise self._stalled() from None
+                    raise self._build_stall_stop() from None
             except OSError:
                 return
         self._waited += time.monotonic() - began
@@ -185,18 +185,18 @@ class Child:
             ChildStopped: If the child was stopped or has ended.
             LibrariesNeeded: If it has imported a library and none are loaded.
         """
-        data = self._pending or self._more()
+        data = self._pending or self._read_more()
         try:
-            if data[0] == packed.MARK and "acts" in schema:
-                return {"do": "acts", "acts": self._acts(data)}
-            line, self._pending = self._line(data)
-            number, line = wire.unnumbered(line)
-            self._count(number)
+            if data[0] == packets.PACKET_MARK and "acts" in schema:
+                return {"do": "acts", "acts": self._read_actions(data)}
+            line, self._pending = self._read_line(data)
+            number, line = wire.split_number(line)
+            self._check_number(number)
             self._charged += len(line) * _BYTE_CPU_SECONDS
             frame = self._known.get(line)
             if frame is not None:
                 return frame
-            frame = wire.parse(line, schema)
+            frame = wire.parse_frame(line, schema)
         except wire.WireError as error:
             # A frame may be invalid because the CPU limit cut it short, which is reported instead.
             self._check_cpu()
@@ -204,40 +204,40 @@ class Child:
                 Verdict.SANDBOX_VIOLATION, f"the program's process sent {error}, which no allowed call does"
             ) from None
         if frame["do"] == "busy":
-            raise child_ends.too_busy(self._limits.cpu_seconds, frame)
+            raise child_exit.build_cpu_stop(self._limits.cpu_seconds, frame)
         if frame["do"] == "libraries":
             if self._has_libraries:
                 raise ChildStopped(Verdict.SANDBOX_VIOLATION, "its process asked for libraries that it has")
             raise LibrariesNeeded("student code imports a library at run time")
-        if frame["do"] not in wire.NOTHING_KEPT:
-            self._meter.keep(len(line))
-        elif frame["do"] in _REPEATED and len(self._known) < _MOST_KNOWN and len(line) <= _LONGEST_KNOWN:
+        if frame["do"] not in wire.UNCHARGED_FRAMES:
+            self._meter.charge_bytes(len(line))
+        elif frame["do"] in _REPEATED_FRAMES and len(self._known) < _MOST_KNOWN and len(line) <= _LONGEST_KNOWN:
             self._known[line] = frame
         return frame
 
-    def _acts(self, data: bytes) -> list[packed.Act]:
+    def _read_actions(self, data: bytes) -> list[packets.Action]:
         """Return the actions of the packet that begins with ``data``. They are not stored, so no bytes are charged."""
-        while len(data) < packed.HEADER_BYTES:
-            data += self._more()
-        size, number = packed.read_header(data)
+        while len(data) < packets.HEADER_BYTES:
+            data += self._read_more()
+        size, number = packets.read_header(data)
         if len(data) < size:
-            data = self._at_least(data, size)
+            data = self._read_at_least(data, size)
         self._pending = data[size:]
-        acts = packed.acts_of(data[:size])
-        self._count(number)
+        acts = packets.unpack_actions(data[:size])
+        self._check_number(number)
         self._charged += len(acts) * _ACT_CPU_SECONDS
         return acts
 
-    def _at_least(self, data: bytes, size: int) -> bytes:
+    def _read_at_least(self, data: bytes, size: int) -> bytes:
         """Read until there are at least ``size`` bytes, beginning with ``data``."""
         pieces = [data]
         size -= len(data)
         while size > 0:
-            pieces.append(self._more())
+            pieces.append(self._read_more())
             size -= len(pieces[-1])
         return b"".join(pieces)
 
-    def _count(self, number: int) -> None:
+    def _check_number(self, number: int) -> None:
         if number != self._received:
             raise wire.WireError(f"frame {number} where frame {self._received} was due")
         self._received += 1
@@ -249,44 +249,44 @@ class Child:
         return self._limits.cpu_seconds
 
     @property
-    def closed(self) -> bool:
+    def is_closed(self) -> bool:
         """Whether the child has been closed."""
         return self._closed
 
-    def cpu_seconds(self) -> float:
+    def measure_cpu_seconds(self) -> float:
         """Return the CPU seconds of the child so far, by the scheduler's clock."""
         try:
             return time.clock_gettime(self._clock)
         except OSError:
             return 0.0
 
-    def last_place(self) -> wire.Frame:
+    def stop_and_locate(self) -> wire.Frame:
         """Return the current ``line`` and ``file`` of the child, and stop it: it can't be served afterwards.
 
         A child that waits for a reply reports the same line in every run.
         """
-        return self._last_word()
+        return self._request_place()
 
     def close(self) -> None:
         """Kill the child and wait until it has ended."""
         if self._closed:
             return
-        self._leave()
+        self._kill_and_charge()
         with contextlib.suppress(HostError):
             self._reap()
 
-    def _line(self, data: bytes) -> tuple[bytes, bytes]:
+    def _read_line(self, data: bytes) -> tuple[bytes, bytes]:
         """Return the line that begins with ``data``, and the bytes after it."""
         pieces, size = [data], len(data)
         while b"\n" not in pieces[-1]:
-            if size > wire.MOST:
+            if size > wire.MAX_FRAME_BYTES:
                 raise ChildStopped(Verdict.SANDBOX_VIOLATION, "the program's process sent an endless frame")
-            pieces.append(self._more())
+            pieces.append(self._read_more())
             size += len(pieces[-1])
         line, _, rest = b"".join(pieces).partition(b"\n")
         return line, rest
 
-    def _more(self) -> bytes:
+    def _read_more(self) -> bytes:
         """Return the next bytes from the child, at least one."""
         last_cpu, still_since = -1.0, time.monotonic()
         began = still_since
@@ -297,17 +297,17 @@ class Child:
             self._meter.heartbeat()
             used = self._check_cpu()
             self._check_sleep()
-            if used != last_cpu or process_state.runnable(self._pid):
+            if used != last_cpu or process_state.is_runnable(self._pid):
                 last_cpu, still_since = used, now
             elif now - still_since > _STALLED_SECONDS:
                 if self.measured:
-                    self._watch_on(computing=False)
-                raise self._stalled()
+                    self._watch_beyond_limit(computing=False)
+                raise self._build_stall_stop()
         now = time.monotonic()
         self._waited += now - began
-        data = os.read(self._reading, _AT_ONCE)
+        data = os.read(self._reading, _READ_BYTES)
         if not data:
-            raise self._gone()
+            raise self._explain_end()
         if now - self._checked > _POLL_SECONDS:
             self._checked = now
             self._meter.heartbeat()
@@ -322,23 +322,23 @@ class Child:
             ChildStopped: If they exceed the limit, or the folder has grown too large.
         """
         self._check_folder()
-        used = self.cpu_seconds()
+        used = self.measure_cpu_seconds()
         charged = max(used, self._charged)
         if charged > self._limits.cpu_seconds:
             if self.measured:
-                self._watch_on(computing=True)
-            raise child_ends.too_busy(self._limits.cpu_seconds, self._last_word())
+                self._watch_beyond_limit(computing=True)
+            raise child_exit.build_cpu_stop(self._limits.cpu_seconds, self._request_place())
         self._meter.check_cpu(charged)
         return used
 
-    def _watch_on(self, computing: bool) -> None:
+    def _watch_beyond_limit(self, computing: bool) -> None:
         """Check whether a child at its limit continues without output up to twice the limit, computing or asleep."""
-        used, still_since = self.cpu_seconds(), time.monotonic()
+        used, still_since = self.measure_cpu_seconds(), time.monotonic()
         with contextlib.suppress(ChildStopped):
             while not self._answered.poll(_POLL_SECONDS * 1000):
                 self._meter.heartbeat()
                 self._check_folder()
-                before, used = used, self.cpu_seconds()
+                before, used = used, self.measure_cpu_seconds()
                 slept_on = time.monotonic() - still_since > _STALLED_SECONDS
                 if used > 2 * self._limits.cpu_seconds or (slept_on and not computing):
                     self.outlasted = True
@@ -356,17 +356,17 @@ class Child:
         No permitted function sleeps in real time, and repeated short sleeps delay the worker. Time in which the worker
         waits for a processor is subtracted, because the child's frames may be unread then.
         """
-        slept = self._slept_seconds()
+        slept = self._measure_sleep()
         if slept > 2 * _STALLED_SECONDS:
-            raise self._stalled()
+            raise self._build_stall_stop()
         self._meter.check_sleep(slept)
 
-    def _slept_seconds(self) -> float:
+    def _measure_sleep(self) -> float:
         return max(
             0.0,
             self._waited
-            - process_state.busy_seconds(self._pid)
-            - (process_state.seconds_queued() - self._queued_before),
+            - process_state.read_busy_seconds(self._pid)
+            - (process_state.read_queued_seconds() - self._queued_before),
         )
 
     def _check_folder(self) -> None:
@@ -374,50 +374,50 @@ class Child:
         if self._folder is None:
             return
         most_bytes, most_files = self._given[0] + _FOLDER_BYTES, self._given[1] + _FOLDER_FILES
-        size, count = process_state.folder_content(self._folder, most_files + 1)
+        size, count = process_state.measure_folder(self._folder, most_files + 1)
         if size > most_bytes or count > most_files:
             raise ChildStopped(
                 Verdict.OUTPUT_LIMIT,
                 f"it wrote more than {_FOLDER_BYTES >> 20} MB or {_FOLDER_FILES} files into its folder",
             )
 
-    def _last_word(self) -> wire.Frame:
+    def _request_place(self) -> wire.Frame:
         """Ask the child for its current place and wait briefly for the reply."""
         with contextlib.suppress(OSError):
             signal.pidfd_send_signal(self._pidfd, signal.SIGXCPU)
-        deadline = time.monotonic() + _LAST_WORD_SECONDS
-        enough = self.cpu_seconds() + _LAST_WORD_CPU_SECONDS
+        deadline = time.monotonic() + _LAST_PLACE_SECONDS
+        enough = self.measure_cpu_seconds() + _LAST_PLACE_CPU_SECONDS
         data = self._pending
-        while len(data) < _UNREAD_BYTES and self.cpu_seconds() < enough:
-            if time.monotonic() > deadline and not process_state.runnable(self._pid):
+        while len(data) < _UNREAD_BYTES and self.measure_cpu_seconds() < enough:
+            if time.monotonic() > deadline and not process_state.is_runnable(self._pid):
                 break
             if self._answered.poll(_POLL_SECONDS * 1000):
-                more = os.read(self._reading, wire.MOST)
+                more = os.read(self._reading, wire.MAX_FRAME_BYTES)
                 if not more:
                     break
                 data += more
-        return child_ends.place_of(data)
+        return child_exit.parse_place(data)
 
-    def _stalled(self) -> ChildStopped:
+    def _build_stall_stop(self) -> ChildStopped:
         return ChildStopped(
             Verdict.STALLED,
             f"it did nothing for {_STALLED_SECONDS:g} seconds of real time: it waits for something that never comes",
         )
 
-    def _gone(self) -> ChildStopped:
+    def _explain_end(self) -> ChildStopped:
         """Return why a child has closed the wire.
 
         Raises:
             KilledFromOutside: If neither the worker nor the child ended it.
         """
-        used = self.cpu_seconds()
+        used = self.measure_cpu_seconds()
         ended = self._has_ended()
-        self._leave()
-        stopped = child_ends.by_itself(self._reap(), used, self._limits.cpu_seconds)
+        self._kill_and_charge()
+        stopped = child_exit.explain_exit_status(self._reap(), used, self._limits.cpu_seconds)
         if stopped is not None:
             return stopped
         overran = ended and self._overran is not None and self._overran()
-        return child_ends.killed(ended, overran, self._blamed)
+        return child_exit.explain_kill(ended, overran, self._blamed)
 
     def _has_ended(self) -> bool:
         """Return whether the child ends within a second: a dying process closes the wire a moment earlier."""
@@ -426,14 +426,14 @@ class Child:
         self._waited += time.monotonic() - began
         return ended
 
-    def _leave(self) -> None:
+    def _kill_and_charge(self) -> None:
         """Kill the child and report its costs to the meter."""
         self._closed = True
-        cpu_seconds, slept = max(self.cpu_seconds(), self._charged), self._slept_seconds()
+        cpu_seconds, slept = max(self.measure_cpu_seconds(), self._charged), self._measure_sleep()
         if self.measured:
             # The extra time for measuring is not charged.
             cpu_seconds, slept = min(cpu_seconds, self._limits.cpu_seconds), min(slept, _STALLED_SECONDS)
-        self._meter.child_ended(cpu_seconds, slept)
+        self._meter.charge_child(cpu_seconds, slept)
         self._kill()
         for fd in (self._reading, self._writing, self._pidfd):
             os.close(fd)

@@ -27,15 +27,15 @@ from typing import Any, Literal
 
 from responders import wire
 from responders.sandbox import bubblewrap, zygote_command
-from responders.sandbox.child_ends import KilledFromOutside
+from responders.sandbox.child_exit import KilledFromOutside
 from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.private_folders import PrivateFolders
 from responders.sandbox.running_child import Child, ChildLimits
 from sim.errors import HostError
 
-Role = Literal["robot", "robot with libraries", "responder", "responder with libraries"]
-Work = Literal["role", "battery"]
+ChildRole = Literal["robot", "robot with libraries", "responder", "responder with libraries"]
+ChildWork = Literal["role", "battery"]
 
 _HERE = Path(__file__).resolve().parent
 _START_SECONDS = 60.0
@@ -44,17 +44,17 @@ _FILE_BYTES = 4 << 20
 _RECYCLE_AFTER = 1000
 _MOST_PROCESSORS = 1024
 #: Report of an ended child: wait status, and user and system time as seconds and microseconds.
-_ENDED = struct.Struct("=i4x4q")
+_EXIT_REPORT = struct.Struct("=i4x4q")
 _BATTERY_LIMITS = ChildLimits(2.0, 64 << 20)
-_FOLDERS: dict[Role, tuple[str, str]] = {
+_FOLDERS: dict[ChildRole, tuple[str, str]] = {
     "robot": ("sim", "brick"),
     "robot with libraries": ("sim", "brick"),
     "responder": ("responders", "kit"),
     "responder with libraries": ("responders", "kit"),
 }
-ROLES: tuple[Role, ...] = tuple(_FOLDERS)
+ROLES: tuple[ChildRole, ...] = tuple(_FOLDERS)
 #: Each role and its variant with loaded libraries.
-WITH_LIBRARIES: Mapping[Role, Role] = MappingProxyType(
+WITH_LIBRARIES: Mapping[ChildRole, ChildRole] = MappingProxyType(
     {
         "robot": "robot with libraries",
         "robot with libraries": "robot with libraries",
@@ -86,12 +86,12 @@ class Isolation:
 
 
 #: Required for every grading.
-FULL = Isolation()
+FULL_ISOLATION = Isolation()
 #: Only limits on the process, for development.
-NONE = Isolation(landlock=0, seccomp=False, doorkeeper=False, bubblewrap=False)
+NO_ISOLATION = Isolation(landlock=0, seccomp=False, doorkeeper=False, bubblewrap=False)
 
 
-def stamp(standing: wire.Frame, bubblewrap: bool, control_group: bool) -> str:
+def describe_layers(standing: wire.Frame, bubblewrap: bool, control_group: bool) -> str:
     """Return the sandbox layers as shown in grades and reports."""
     layers = [f"Landlock {standing['landlock']}"] * bool(standing["landlock"]) + ["seccomp"] * standing["seccomp"]
     layers += ["doorkeeper"] * (standing["without_doorkeeper"] is None) + ["own user"] * standing["own_user"]
@@ -106,7 +106,7 @@ class Zygote:
 
     def __init__(
         self,
-        role: Role,
+        role: ChildRole,
         sandbox: Isolation,
         folders: PrivateFolders,
         group: ControlGroup | None = None,
@@ -132,7 +132,7 @@ class Zygote:
         limits: ChildLimits,
         folder: Path | None = None,
         meter: JobMeter | None = None,
-        work: Work = "role",
+        work: ChildWork = "role",
         blamed: bool = False,
     ) -> Child:
         """Return a fresh child, in a private ``folder`` or with none.
@@ -154,7 +154,7 @@ class Zygote:
                     raise HostError(f"the {self._role} zygote does not answer ({error})") from error
         raise AssertionError
 
-    def try_isolation(self) -> str:
+    def check_isolation(self) -> str:
         """Run the short battery of escape attempts in a child. Return the layers that blocked them.
 
         Raises:
@@ -168,11 +168,11 @@ class Zygote:
         try:
             told = child.receive(wire.BATTERY)
         except ChildStopped as stop:
-            raise _sandbox_missing(f"the battery of escapes did not come to its end ({stop.message})") from None
+            raise _build_missing_error(f"the battery of escapes did not come to its end ({stop.message})") from None
         finally:
             child.close()
         if told["through"] and self._sandbox.landlock and self._sandbox.seccomp:
-            raise _sandbox_missing(f"they let through: {', '.join(str(name)[:60] for name in told['through'])}")
+            raise _build_missing_error(f"they let through: {', '.join(str(name)[:60] for name in told['through'])}")
         refused = told["tried"] - len(told["through"])
         return f"{child.sandbox} (battery {told['version']}: {refused} of {told['tried']} refused)"
 
@@ -183,9 +183,9 @@ class Zygote:
             HostError: If the zygote has ended.
         """
         try:
-            ended, _ = self._order(pid)
+            ended, _ = self._send_order(pid)
             self._living -= 1
-            status, *used = _ENDED.unpack_from(ended)
+            status, *used = _EXIT_REPORT.unpack_from(ended)
             self.children_cpu_seconds += sum(used[0::2]) + sum(used[1::2]) / 1e6
             return int(status)
         except (OSError, EOFError, struct.error) as error:
@@ -210,7 +210,7 @@ class Zygote:
             self._folders_inside = -1
         self._forks = self._living = 0
 
-    def _spawn(self, limits: ChildLimits, folder: Path | None, meter: JobMeter, work: Work, blamed: bool) -> Child:
+    def _spawn(self, limits: ChildLimits, folder: Path | None, meter: JobMeter, work: ChildWork, blamed: bool) -> Child:
         self._start()
         folders = []
         if folder is not None:
@@ -222,10 +222,10 @@ class Zygote:
             data, received = self._fork(
                 {
                     "work": work,
-                    "processors": _mask(os.sched_getaffinity(0)),
+                    "processors": _encode_processors(os.sched_getaffinity(0)),
                     "cpu": limits.cpu_seconds,
                     "memory": limits.memory_bytes,
-                    "without": limits.without,
+                    "without": limits.excluded_modules,
                     "file_size": _FILE_BYTES,
                     "folder": folder is not None,
                     "landlock": self._sandbox.landlock,
@@ -235,50 +235,50 @@ class Zygote:
                 [their_writing, their_reading, *folders],
             )
         except BaseException:
-            _close(reading, writing)
+            _close_descriptors(reading, writing)
             raise
         finally:
-            _close(their_writing, their_reading, *folders)
+            _close_descriptors(their_writing, their_reading, *folders)
         answer = json.loads(data)
         if "missing" in answer:
-            _close(reading, writing)
-            raise _sandbox_missing(answer["missing"])
+            _close_descriptors(reading, writing)
+            raise _build_missing_error(answer["missing"])
         self._living += 1
         inside = answer["pid"]  # the id inside the zygote's namespace
         reap = functools.partial(self.reap, inside)
-        child = Child(reap, _pid(received[0]), received[0], (reading, writing), limits, folder)
+        child = Child(reap, _read_pid(received[0]), received[0], (reading, writing), limits, folder)
         try:
-            _try_to_signal(received[0])
-            self._check_isolation(child)
+            _check_signal(received[0])
+            self._check_layers(child)
         except BaseException:
             child.close()
             raise
-        watch = self._group.watch() if self._group is not None else None
+        watch = self._group.watch_memory_kills() if self._group is not None else None
         child.begin(meter, blamed, self._role in WITH_LIBRARIES.values(), watch)
         return child
 
-    def _check_isolation(self, child: Child) -> None:
+    def _check_layers(self, child: Child) -> None:
         """Check the child's first frame, sent before any student code: every requested layer must be active."""
         try:
             standing = child.receive(wire.SANDBOX)
         except ChildStopped as stop:
             raise EOFError(stop.message) from None
         if standing["missing"] is not None:
-            raise _sandbox_missing(standing["missing"])
+            raise _build_missing_error(standing["missing"])
         if bool(standing["landlock"]) != bool(self._sandbox.landlock) or standing["seccomp"] != self._sandbox.seccomp:
-            raise _sandbox_missing("a layer that was asked for does not stand")
+            raise _build_missing_error("a layer that was asked for does not stand")
         self.without_doorkeeper = standing["without_doorkeeper"]
-        child.sandbox = stamp(standing, self.without_bubblewrap is None, self._group is not None)
+        child.sandbox = describe_layers(standing, self.without_bubblewrap is None, self._group is not None)
 
     def _start(self) -> None:
         """Start the zygote if necessary and wait until its imports are loaded."""
         self.begin()
-        if self._folders_inside >= 0 or self._comes_up():
+        if self._folders_inside >= 0 or self._wait_until_ready():
             return
         if self.without_bubblewrap is None:
             self.without_bubblewrap = "what Python needs cannot be seen in it"
-            self._exec([])
-            if self._comes_up():
+            self._start_process([])
+            if self._wait_until_ready():
                 return
         raise HostError(f"the {self._role} zygote did not start")
 
@@ -290,39 +290,45 @@ class Zygote:
         """
         if self._process is not None and self._process.poll() is None:
             return
-        keep_bytecode(_HERE / "inside")
-        keep_bytecode(Path(own_modules(self._role)))
+        compile_bytecode(_HERE / "inside")
+        compile_bytecode(Path(find_module_folder(self._role)))
         wrapping: list[str] = []
         if self._sandbox.bubblewrap:
-            wrapping = bubblewrap.wrapping([str(_HERE), own_modules(self._role)], self._folders.path)
-            self.without_bubblewrap = bubblewrap.why_not(wrapping)
-        self._exec(wrapping if self.without_bubblewrap is None else [])
+            wrapping = bubblewrap.build_command_prefix([str(_HERE), find_module_folder(self._role)], self._folders.path)
+            self.without_bubblewrap = bubblewrap.check_available(wrapping)
+        self._start_process(wrapping if self.without_bubblewrap is None else [])
 
-    def _comes_up(self) -> bool:
+    def _wait_until_ready(self) -> bool:
         try:
-            _, received = self._answer()
+            _, received = self._receive_answer()
         except (OSError, EOFError):
             self.close()
             return False
         self._folders_inside = received[0]
         return True
 
-    def _exec(self, wrapping: list[str]) -> None:
+    def _start_process(self, wrapping: list[str]) -> None:
         """Start a clean process without our environment."""
         self.close()
         pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(2)]
         ours, theirs = zip(*pairs, strict=True)
         numbers = [each.fileno() for each in theirs]
-        joining = self._group.joining if self._group is not None else []
-        arguments = [str(_HERE), self._role, str(self._folders.path), " ".join(self._without), own_modules(self._role)]
+        joining = self._group.command_prefix if self._group is not None else []
+        arguments = [
+            str(_HERE),
+            self._role,
+            str(self._folders.path),
+            " ".join(self._without),
+            find_module_folder(self._role),
+        ]
         try:
             self._process = subprocess.Popen(
-                [*joining, *wrapping, *zygote_command.command(numbers, arguments)],
+                [*joining, *wrapping, *zygote_command.build_command(numbers, arguments)],
                 pass_fds=numbers,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 cwd="/",
-                env=zygote_command.environment(),
+                env=zygote_command.build_environment(),
             )
         finally:
             for each in theirs:
@@ -331,18 +337,18 @@ class Zygote:
 
     def _fork(self, spec: dict[str, Any], descriptors: list[int]) -> tuple[bytes, list[int]]:
         """Fork a child with this spec and these descriptors. Return the zygote's reply."""
-        _, specs = self._running()
+        _, specs = self._require_sockets()
         payload = array.array("i", descriptors)
         specs.sendmsg([json.dumps(spec).encode()], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, payload)])
-        return self._order(0, answers=1)
+        return self._send_order(0, answers=1)
 
-    def _order(self, number: int, answers: int = 0) -> tuple[bytes, list[int]]:
+    def _send_order(self, number: int, answers: int = 0) -> tuple[bytes, list[int]]:
         """Send an order to the zygote: 0 for a fork, or the child to reap. Return the reply from the socket."""
-        self._running()[0].send(number.to_bytes(4, "little"))
-        return self._answer(answers)
+        self._require_sockets()[0].send(number.to_bytes(4, "little"))
+        return self._receive_answer(answers)
 
-    def _answer(self, which: int = 0) -> tuple[bytes, list[int]]:
-        sockets = self._running()
+    def _receive_answer(self, which: int = 0) -> tuple[bytes, list[int]]:
+        sockets = self._require_sockets()
         answered, control = sockets[which], sockets[0]
         ready = select.select({answered, control}, [], [], _START_SECONDS)[0]
         if not ready:
@@ -355,50 +361,50 @@ class Zygote:
             found.frombytes(part[: len(part) - len(part) % 4])
         return data, list(found)
 
-    def _running(self) -> tuple[socket.socket, ...]:
+    def _require_sockets(self) -> tuple[socket.socket, ...]:
         if not self._sockets:
             raise EOFError("it is not running")
         return self._sockets
 
 
-def _mask(processors: Set[int]) -> str:
+def _encode_processors(processors: Set[int]) -> str:
     """Return the processors as a bit mask of constant length, because the length of a spec affects addresses."""
     return sum(1 << number for number in processors).to_bytes(_MOST_PROCESSORS // 8, "little").hex()
 
 
-def _close(*descriptors: int) -> None:
+def _close_descriptors(*descriptors: int) -> None:
     for fd in descriptors:
         os.close(fd)
 
 
-def _pid(pidfd: int) -> int:
+def _read_pid(pidfd: int) -> int:
     """Return the process id outside the zygote's namespaces, where it may have another number."""
     lines = Path(f"/proc/self/fdinfo/{pidfd}").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("Pid:"))
 
 
-def _try_to_signal(pidfd: int) -> None:
+def _check_signal(pidfd: int) -> None:
     try:
         signal.pidfd_send_signal(pidfd, 0)
     except OSError as error:
-        raise _sandbox_missing(f"pidfd_send_signal: {error.strerror}") from None
+        raise _build_missing_error(f"pidfd_send_signal: {error.strerror}") from None
 
 
-def _sandbox_missing(what: str) -> SandboxMissing:
+def _build_missing_error(what: str) -> SandboxMissing:
     return SandboxMissing(
         f"this machine cannot enclose student code: {what}; "
         "Robomark needs Linux 5.13 or later with Landlock and seccomp (in a container: Docker 23 or later)"
     )
 
 
-def own_modules(role: Role) -> str:
+def find_module_folder(role: ChildRole) -> str:
     """Return the folder of our modules that the children of a role import."""
     package, folder = _FOLDERS[role]
-    return str(_package_folder(package) / folder)
+    return str(_find_package_folder(package) / folder)
 
 
 @functools.cache
-def keep_bytecode(folder: Path) -> None:
+def compile_bytecode(folder: Path) -> None:
     """Compile these modules to bytecode on disk, because zygotes write none and would compile them every time."""
     if sys.dont_write_bytecode:
         return
@@ -411,7 +417,7 @@ def keep_bytecode(folder: Path) -> None:
             found.loader.get_code(file.stem)
 
 
-def _package_folder(name: str) -> Path:
+def _find_package_folder(name: str) -> Path:
     specification = importlib.util.find_spec(name)
     assert specification is not None
     assert specification.submodule_search_locations

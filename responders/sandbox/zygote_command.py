@@ -9,12 +9,12 @@ import sys
 from collections.abc import Sequence
 
 from responders.sandbox.processor import ALLOWED
-from sim.processes import python_command, same_arithmetic
+from sim.processes import build_arithmetic_environment, build_python_command
 
 #: Start of a command with fixed memory addresses, because objects are hashed by address. The setting is inherited, so
 #: it is made in a separate process, not in the worker. An exec that restores root's capabilities resets it;
 #: bubblewrap's root process keeps the right to give them up (SECBIT_NOROOT) only for this.
-_FIXED_ADDRESSES = (
+_FIXED_ADDRESS_COMMAND = (
     sys.executable,
     *("-I", "-S", "-c"),
     "import ctypes, os, sys; libc = ctypes.CDLL(None); "
@@ -24,7 +24,7 @@ _FIXED_ADDRESSES = (
     "in_bubblewrap and libc.prctl(PR_CAP_AMBIENT, LOWER, CAP_SETPCAP, 0, 0); "
     "libc.personality(0x40000); os.execv(sys.argv[1], sys.argv[1:])",
 )
-_BEGIN = (
+_START_CODE = (
     f"import os, sys; os.sched_setaffinity(0, {sorted(ALLOWED)}); "
     "high = [os.dup2(int(fd), 100 + place) for place, fd in enumerate(sys.argv[1:3])]; "
     "os.dup2(high[0], 3); os.dup2(high[1], 4); os.closerange(5, 1 << 16); sys.path.insert(0, sys.argv[3]); "
@@ -32,7 +32,7 @@ _BEGIN = (
 )
 
 
-def command(sockets: Sequence[int], arguments: Sequence[str]) -> list[str]:
+def build_command(sockets: Sequence[int], arguments: Sequence[str]) -> list[str]:
     """Return the command of a zygote with these two socket descriptors.
 
     ``arguments`` are its code folder, its role, the parent of private folders, the excluded modules and the import
@@ -40,10 +40,10 @@ def command(sockets: Sequence[int], arguments: Sequence[str]) -> list[str]:
     """
     padded = [f"{number:05}" for number in sockets]  # constant length, because a command's length affects addresses
     # -I would ignore the hash seed.
-    return [*_FIXED_ADDRESSES, *python_command("-B", "-c", _BEGIN, *padded, *arguments)]
+    return [*_FIXED_ADDRESS_COMMAND, *build_python_command("-B", "-c", _START_CODE, *padded, *arguments)]
 
 
-def environment() -> dict[str, str]:
+def build_environment() -> dict[str, str]:
     """Return the environment of a zygote, which contains nothing of the worker's environment."""
     return {
         "PATH": "/usr/bin:/bin",
@@ -53,5 +53,5 @@ def environment() -> dict[str, str]:
         "LOKY_MAX_CPU_COUNT": "1",
         "JOBLIB_MULTIPROCESSING": "0",
         "ORT_DISABLE_TELEMETRY": "1",
-        **same_arithmetic(),
+        **build_arithmetic_environment(),
     }

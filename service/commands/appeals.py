@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from service.commands.operating import operating
-from service.commands.shown import document, show, table, tell
+from service.commands.installation import open_installation
+from service.commands.output import create_table, print_json, print_line, print_renderables
 from service.operations import appeals, courses
 from service.operations.courses import DEFAULT_COURSE
 
@@ -19,19 +19,19 @@ def list_appeals(
     answered: Annotated[bool, typer.Option("--answered", help="Include answered appeals.")] = False,
 ) -> None:
     """List the open appeals of a course, the longest waiting first."""
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         course_id = courses.find(service, actor, course)
         found = appeals.list_open(service, actor, course_id)
         found += appeals.list_answered(service, actor, course_id) if answered else []
-    document(appeals=found)
+    print_json(appeals=found)
     if not found:
-        tell("no open appeals")
+        print_line("no open appeals")
         return
-    listed = table("number", "asked", "student", "assignment", "grade", "text", "answer", right=("number",))
+    listed = create_table("number", "asked", "student", "assignment", "grade", "text", "answer", right=("number",))
     for each in found:
         asked = each.asked_at.astimezone().strftime("%Y-%m-%d %H:%M")
         listed.add_row(str(each.id), asked, each.who, each.assignment, each.job_id, each.text, each.answer or "")
-    show(listed)
+    print_renderables(listed)
 
 
 def answer(
@@ -40,7 +40,7 @@ def answer(
     course: Course = DEFAULT_COURSE,
 ) -> None:
     """Answer and close an appeal."""
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         appeals.answer(service, actor, courses.find(service, actor, course), number, text)
-    document(appeal=number)
-    tell(f"appeal {number} answered")
+    print_json(appeal=number)
+    print_line(f"appeal {number} answered")

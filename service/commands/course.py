@@ -12,31 +12,31 @@ from typing import Annotated
 
 import typer
 
-from service.commands.operating import operating
-from service.commands.shown import document, show, table, tell
+from service.commands.installation import open_installation
+from service.commands.output import create_table, print_json, print_line, print_renderables
 from service.operations import assignments, courses, policies
 from service.operations import people as people_operations
 from service.operations.assignments import CourseAssignment
 from service.operations.courses import DEFAULT_COURSE
 from service.operations.policies import ExtensionRequest, PolicyLimits
 from sim.errors import UsageError
-from submissions.roster import moment
-from submissions.student_identity import read_people, students_of
+from submissions.roster import parse_time
+from submissions.student_identity import list_known_students, read_people
 
-Assignment = Annotated[
+AssignmentOption = Annotated[
     str,
     typer.Option(
         "-a", "--assignment", help="Only for this assignment. Default: all assignments without their own setting."
     ),
 ]
-Own = Annotated[str, typer.Argument(help="The assignment's id in the course.")]
-InCourse = Annotated[str, typer.Option("--course", help="The course.")]
-Due = Annotated[str | None, typer.Option(help="A date (end of the day), or a date and time: 2026-11-30T17:00.")]
+AssignmentId = Annotated[str, typer.Argument(help="The assignment's id in the course.")]
+CourseOption = Annotated[str, typer.Option("--course", help="The course.")]
+DueOption = Annotated[str | None, typer.Option(help="A date (end of the day), or a date and time: 2026-11-30T17:00.")]
 
 
 def policy(
-    assignment: Assignment = "",
-    due: Due = None,
+    assignment: AssignmentOption = "",
+    due: DueOption = None,
     late_days: Annotated[
         int, typer.Option(min=0, max=365, help="Late submissions accepted for this number of days.")
     ] = 0,
@@ -47,34 +47,34 @@ def policy(
     drop: Annotated[
         bool, typer.Option("--drop", help="Remove the policy. The policy for all assignments applies.")
     ] = False,
-    course: InCourse = DEFAULT_COURSE,
+    course: CourseOption = DEFAULT_COURSE,
 ) -> None:
     """Set the policy, which replaces the earlier one; without options, show it."""
-    allowed = PolicyLimits(_due(due), late_days, attempts, cool_down * 60)
+    allowed = PolicyLimits(_parse_due(due), late_days, attempts, cool_down * 60)
     if drop and allowed != PolicyLimits():
         raise UsageError("--drop removes all limits, expected no other limits with it")
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         course_id = courses.find(service, actor, course)
         if drop:
             policies.drop_policy(service, actor, course_id, assignment)
         elif allowed != PolicyLimits():
             policies.set_policy(service, actor, course_id, assignment, allowed)
-        _show(policies.list_policies(service, actor, course_id))
+        _show_policies(policies.list_policies(service, actor, course_id))
 
 
 def extend(
     student: Annotated[str, typer.Argument(help="The student's name, as submitted.")],
-    assignment: Assignment = "",
-    due: Due = None,
+    assignment: AssignmentOption = "",
+    due: DueOption = None,
     more_attempts: Annotated[int, typer.Option(min=0, max=1000, help="Additional attempts.")] = 0,
-    course: InCourse = DEFAULT_COURSE,
+    course: CourseOption = DEFAULT_COURSE,
 ) -> None:
     """Allow one student more time or attempts. Replaces an earlier extension.
 
     Students who have not submitted yet are enrolled first.
     """
-    due_at = _due(due)
-    with operating() as (service, actor):
+    due_at = _parse_due(due)
+    with open_installation() as (service, actor):
         course_id = courses.find(service, actor, course)
         member = people_operations.find(service, actor, course, student)
         request = ExtensionRequest(assignment, due_at, more_attempts)
@@ -82,94 +82,94 @@ def extend(
     student = member.id
     until = "" if due_at is None else f" until {due_at:%Y-%m-%d %H:%M}"
     more = f", {more_attempts} more attempts" if more_attempts else ""
-    document(student=student, assignment=assignment, due=due_at, more_attempts=more_attempts)
-    tell(f"{student}: {assignment or 'every assignment'} may be submitted{until}{more}")
+    print_json(student=student, assignment=assignment, due=due_at, more_attempts=more_attempts)
+    print_line(f"{student}: {assignment or 'every assignment'} may be submitted{until}{more}")
 
 
 def enrol(
     people: Annotated[
         Path, typer.Argument(help="A .csv file with id, name and email, such as Moodle's grading worksheet.")
     ],
-    course: InCourse = DEFAULT_COURSE,
+    course: CourseOption = DEFAULT_COURSE,
 ) -> None:
     """Enrol students before they submit, or add names and addresses to enrolled ids."""
-    listed = students_of(read_people(people))
-    with operating() as (service, actor):
+    listed = list_known_students(read_people(people))
+    with open_installation() as (service, actor):
         people_operations.enrol(service, actor, courses.find(service, actor, course), listed)
-    document(students=len(listed))
-    tell(f"{len(listed)} {'student is' if len(listed) == 1 else 'students are'} in the course")
+    print_json(students=len(listed))
+    print_line(f"{len(listed)} {'student is' if len(listed) == 1 else 'students are'} in the course")
 
 
 def prepare(
     assignment: Annotated[str, typer.Argument(help="An assignment's id in the catalogue, or a folder.")],
-    course: InCourse = DEFAULT_COURSE,
+    course: CourseOption = DEFAULT_COURSE,
 ) -> None:
     """Add an assignment to a course without opening it; run it again to use the current version."""
     # This import loads all kinds of criteria, which other commands do not need.
     from submissions.assignment.reader import find_assignment
 
     found = find_assignment(assignment)
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         made = assignments.prepare(service, actor, courses.find(service, actor, course), found)
-    _tell_state(made)
+    _print_state(made)
 
 
-def open_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
+def open_assignment(assignment: AssignmentId, course: CourseOption = DEFAULT_COURSE) -> None:
     """Let students see a prepared assignment and submit to it on the web."""
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         made = assignments.open_for_students(service, actor, courses.find(service, actor, course), assignment)
-    _tell_state(made)
+    _print_state(made)
 
 
-def close_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
+def close_assignment(assignment: AssignmentId, course: CourseOption = DEFAULT_COURSE) -> None:
     """Stop web submissions to an assignment; existing submissions stay."""
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         made = assignments.close(service, actor, courses.find(service, actor, course), assignment)
-    _tell_state(made)
+    _print_state(made)
 
 
-def remove_assignment(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
+def remove_assignment(assignment: AssignmentId, course: CourseOption = DEFAULT_COURSE) -> None:
     """Remove an assignment from a course if no student has seen it. Graded batches stay."""
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         assignments.remove(service, actor, courses.find(service, actor, course), assignment)
-    document(assignment=assignment)
-    tell(f"{assignment} is removed from the course")
+    print_json(assignment=assignment)
+    print_line(f"{assignment} is removed from the course")
 
 
-def hide_names(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
+def hide_names(assignment: AssignmentId, course: CourseOption = DEFAULT_COURSE) -> None:
     """Hide the students' names of an assignment from all who mark it."""
-    _set_names(assignment, course, hidden=True)
+    _set_names_hidden(assignment, course, hidden=True)
 
 
-def show_names(assignment: Own, course: InCourse = DEFAULT_COURSE) -> None:
+def show_names(assignment: AssignmentId, course: CourseOption = DEFAULT_COURSE) -> None:
     """Show the students' names of an assignment to all who mark it."""
-    _set_names(assignment, course, hidden=False)
+    _set_names_hidden(assignment, course, hidden=False)
 
 
 def list_courses() -> None:
     """List the courses of this installation."""
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         found = courses.list_courses(service, actor)
-    document(courses=found)
+    print_json(courses=found)
     if not found:
-        tell("no courses yet")
+        print_line("no courses yet")
         return
-    listed = table("name", "instructors", "students", right=("instructors", "students"))
+    listed = create_table("name", "instructors", "students", right=("instructors", "students"))
     for each in found:
         listed.add_row(each.name, str(each.instructors), str(each.students))
-    show(listed)
+    print_renderables(listed)
 
 
-def _set_names(assignment: str, course: str, *, hidden: bool) -> None:
-    with operating() as (service, actor):
+def _set_names_hidden(assignment: str, course: str, *, hidden: bool) -> None:
+    with open_installation() as (service, actor):
         course_id = courses.find(service, actor, course)
         assignments.hide_names(service, actor, course_id, assignment, hidden=hidden)
-    document(assignment=assignment, names_hidden=hidden)
-    tell(f"{assignment}: names are {'hidden' if hidden else 'shown'}")
+    print_json(assignment=assignment, names_hidden=hidden)
+    print_line(f"{assignment}: names are {'hidden' if hidden else 'shown'}")
 
 
-def _tell_state(line: CourseAssignment) -> None:
-    document(
+def _print_state(line: CourseAssignment) -> None:
+    print_json(
         assignment=line.assignment,
         title=line.title,
         open=line.open,
@@ -178,27 +178,27 @@ def _tell_state(line: CourseAssignment) -> None:
         version=line.version,
     )
     state = "is open" if line.open else "is closed" if line.closed_at else "is not open yet"
-    tell(f"{line.assignment} {state}")
+    print_line(f"{line.assignment} {state}")
 
 
-def _due(text: str | None) -> datetime | None:
+def _parse_due(text: str | None) -> datetime | None:
     if text is None:
         return None
     try:
-        return moment(text, end_of_day=True)
+        return parse_time(text, end_of_day=True)
     except ValueError:
         raise UsageError(f"--due is {text!r}, expected a date or a date and time, like 2026-11-30T17:00") from None
 
 
-def _show(found: dict[str, PolicyLimits]) -> None:
-    document(policies=[{"assignment": name, **asdict(allowed)} for name, allowed in found.items()])
+def _show_policies(found: dict[str, PolicyLimits]) -> None:
+    print_json(policies=[{"assignment": name, **asdict(allowed)} for name, allowed in found.items()])
     if not found:
-        tell("no policy: all submissions are marked at any time")
+        print_line("no policy: all submissions are marked at any time")
         return
-    listed = table("assignment", "due", "late days", "attempts", "cool-down")
+    listed = create_table("assignment", "due", "late days", "attempts", "cool-down")
     for assignment, allowed in found.items():
         due = "" if allowed.due_at is None else allowed.due_at.astimezone().strftime("%Y-%m-%d %H:%M")
         attempts = "" if allowed.attempts is None else str(allowed.attempts)
         cool_down = f"{allowed.cool_down_seconds / 60:g} min" if allowed.cool_down_seconds else ""
         listed.add_row(assignment or "all others", due, str(allowed.late_days), attempts, cool_down)
-    show(listed)
+    print_renderables(listed)

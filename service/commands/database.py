@@ -11,19 +11,19 @@ from typing import Annotated
 
 import typer
 
-from service.commands.operating import operating
-from service.commands.shown import document, note, tell
+from service.commands.installation import open_installation
+from service.commands.output import print_json, print_line, print_note
 from service.operations import database, privacy
 from service.settings import load_settings
 from sim.errors import UsageError
-from submissions.roster import moment
+from submissions.roster import parse_time
 
 
 def upgrade_tables() -> None:
     """Upgrade the tables to this release. Every command does this when it starts."""
     revision = database.upgrade(load_settings())
-    document(revision=revision)
-    tell(f"the database is at revision {revision}")
+    print_json(revision=revision)
+    print_line(f"the database is at revision {revision}")
 
 
 def backup_database(
@@ -31,16 +31,16 @@ def backup_database(
 ) -> None:
     """Back up the database while it is in use, to a SQLite file that only you can read."""
     size = database.back_up(load_settings(), file)
-    document(file=file, bytes=size)
-    tell(f"{file}: {size} bytes")
+    print_json(file=file, bytes=size)
+    print_line(f"{file}: {size} bytes")
 
 
 def restore_database(file: Annotated[Path, typer.Argument(help="A file created by db backup.")]) -> None:
     """Restore a backup into a database without submissions, SQLite or PostgreSQL."""
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         where = database.restore(service, actor, file)
-    document(database=where, file=file)
-    tell(f"{where} restored from {file}")
+    print_json(database=where, file=file)
+    print_line(f"{where} restored from {file}")
 
 
 def purge_database(
@@ -53,18 +53,20 @@ def purge_database(
     Without --archive or --for-good, show how much would be removed.
     """
     try:
-        earliest_kept = moment(before)
+        earliest_kept = parse_time(before)
     except ValueError:
         raise UsageError(f"--before {before}: expected a date like 2025-09-01") from None
     if archive is not None and for_good:
         raise UsageError("--archive keeps a copy and --for-good keeps none; use one of them")
     only_count = archive is None and not for_good
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         if archive is not None:
-            note(f"{archive}: {privacy.archive(service, actor, archive)} bytes")
-        gone = (database.count_old if only_count else database.remove_old)(service, actor, earliest_kept)
+            print_note(f"{archive}: {privacy.archive(service, actor, archive)} bytes")
+        gone = (database.count_old_submissions if only_count else database.remove_old_submissions)(
+            service, actor, earliest_kept
+        )
     counted = f"{gone.submissions} submissions, {gone.grades} grades, {gone.students} students"
-    document(removed=not only_count, archive=archive, **asdict(gone))
-    tell(
+    print_json(removed=not only_count, archive=archive, **asdict(gone))
+    print_line(
         f"{counted} to remove; use --archive FILE or --for-good to remove them" if only_count else f"removed: {counted}"
     )

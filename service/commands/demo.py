@@ -15,6 +15,6 @@ def demo(
 ) -> None:
     """Grade the example submissions of one assignment through a real worker, and print the path of the report."""
     from service.commands.batch.submit import submit_and_wait
-    from submissions.assignment.examples import examples
+    from submissions.assignment.examples import locate_examples
 
-    submit_and_wait(examples(_ASSIGNMENT), _ASSIGNMENT, output=output)
+    submit_and_wait(locate_examples(_ASSIGNMENT), _ASSIGNMENT, output=output)

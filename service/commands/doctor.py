@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from service.commands.shown import document, show, table
+from service.commands.output import create_table, print_json, print_renderables
 from sim.errors import HostError
 
 
@@ -10,16 +10,16 @@ def doctor() -> None:
     """Look at everything that grading needs on this machine; exit status 3 if something is wrong."""
     from rich.text import Text
 
-    from service.doctor import examine
+    from service.doctor import examine_machine
     from service.settings import load_settings
 
-    findings = examine(load_settings())
-    looked_at = table("", "", "")
+    findings = examine_machine(load_settings())
+    looked_at = create_table("", "", "")
     for finding in findings:
         mark = Text("ok", style="green") if finding.well else Text("wrong", style="red")
         looked_at.add_row(mark, finding.what, finding.sentence)
-    document(findings=findings)
-    show(looked_at)
+    print_json(findings=findings)
+    print_renderables(looked_at)
     wrong = [finding.what for finding in findings if not finding.well]
     if wrong:
         raise HostError(f"problems: {', '.join(wrong)}")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from service.commands.shown import document, progress, tell
+from service.commands.output import create_progress_console, print_json, print_line
 
 
 def floors(
@@ -17,16 +17,18 @@ def floors(
     """Draw every floor with its scale, the robot's start and its labels."""
     from rich.progress import track
 
-    from service.reports.html import PrintedFloor, gallery
+    from service.reports.html import PrintedFloor, render_floor_gallery
+    from service.reports.output_files import prepare_folder, write_page
     from service.reports.plots.floor import draw_floor
-    from service.reports.plots.style import png
-    from service.reports.written import prepare_folder, write_page
-    from sim.floors import floor, label_names, names
+    from service.reports.plots.style import render_png
+    from sim.floors import build_floor, list_floor_names, list_label_names
 
     prepare_folder(output)
     printed = []
-    for name in track(names(), "drawing", transient=True, console=progress()):
-        printed.append(PrintedFloor(name, png(draw_floor(floor(name, seed=sheet))), label_names(name)))
-    page = write_page(output, "index.html", gallery(printed))
-    document(page=page, floors=names())
-    tell(f"floors: {page}")
+    for name in track(list_floor_names(), "drawing", transient=True, console=create_progress_console()):
+        printed.append(
+            PrintedFloor(name, render_png(draw_floor(build_floor(name, seed=sheet))), list_label_names(name))
+        )
+    page = write_page(output, "index.html", render_floor_gallery(printed))
+    print_json(page=page, floors=list_floor_names())
+    print_line(f"floors: {page}")

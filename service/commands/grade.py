@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from service.commands.options import ChannelFlags, LanguageOption, format_option, with_option_groups
-from service.commands.shown import wants_json
-from service.language import SOURCE
+from service.commands.options import ChannelFlags, LanguageOption, create_format_option, with_option_groups
+from service.commands.output import is_json_output
+from service.language import SOURCE_LANGUAGE
 
 
-def _documents() -> tuple[str, ...]:
+def _list_document_formats() -> tuple[str, ...]:
     """Return the names of the formats that can show one grade."""
     from service.reports.formats import FORMATS
 
@@ -28,8 +28,10 @@ def grade(
         str | None, typer.Option("-a", "--assignment", help="The assignment's id in the catalogue, or its folder.")
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write a report for each submission to this folder.")] = None,
-    form: Annotated[str, format_option("What to print; a wrong one names them all.", _documents)] = "text",
-    language: LanguageOption = SOURCE,
+    form: Annotated[
+        str, create_format_option("What to print; a wrong one names them all.", _list_document_formats)
+    ] = "text",
+    language: LanguageOption = SOURCE_LANGUAGE,
     run: Annotated[
         str | None, typer.Option(metavar="N|TAG", help="For a notebook: the number of the run to mark, or its tag.")
     ] = None,
@@ -45,5 +47,5 @@ def grade(
     """
     from service.commands.grading import grade_all
 
-    chosen = "json" if wants_json() else form
-    grade_all(submissions, assignment, report, chosen, channel.given(), language, run=run, unsafe=unsafe)
+    chosen = "json" if is_json_output() else form
+    grade_all(submissions, assignment, report, chosen, channel.to_table(), language, run=run, unsafe=unsafe)

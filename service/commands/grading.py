@@ -13,25 +13,25 @@ from dataclasses import replace
 from pathlib import Path
 
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.zygote import FULL, NONE
-from service.commands.options import changed
-from service.commands.shown import note, show
-from service.commands.unsafe import warn_of_no_sandbox
+from responders.sandbox.zygote import FULL_ISOLATION, NO_ISOLATION
+from service.commands.options import apply_channel_flags
+from service.commands.output import print_note, print_renderables
+from service.commands.sandbox_warning import warn_about_missing_sandbox
 from service.grading.grade import Grade
 from service.grading.grader import grade as grade_submission
 from service.grading.trial_runner import TrialRunner
-from service.home_secret import secret_here
-from service.language import language_called
+from service.home_secret import load_home_secret
+from service.language import load_language
 from service.reports.formats import FORMATS, Format
-from service.reports.rows import TableRow, missing_words
+from service.reports.rows import TableRow, describe_missing_part
 from service.settings import load_settings
 from sim.errors import HostError, RobomarkError, UsageError
 from submissions.assignment.definition import Assignment
 from submissions.assignment.reader import find_assignment, find_in_catalogue
-from submissions.bundle import fit_parts, named_by, read_submission
-from submissions.names import alike, cannot_be_told, shown_name
-from submissions.raw_files import shown
+from submissions.bundle import derive_student_name, fit_parts, read_submission
+from submissions.raw_files import sanitise_name
 from submissions.student_identity import Student
+from submissions.student_names import describe_look_alikes, find_look_alikes, normalise_name
 from submissions.submission import Submission
 
 
@@ -69,27 +69,27 @@ def grade_all(
     rows: list[TableRow[Grade]] = []
     if report is not None:
         # The plotting library loads slowly.
-        from service.reports.written import prepare_folder, write_report
+        from service.reports.output_files import prepare_folder, write_report
 
         prepare_folder(report)
-    near = _like_others(submissions) if report is not None else {}
-    secret = secret_here(load_settings())
+    near = _find_name_conflicts(submissions) if report is not None else {}
+    secret = load_home_secret(load_settings())
     worst: RobomarkError | None = None
     if unsafe:
-        warn_of_no_sandbox()
-    with TrialRunner(Sandboxes(NONE if unsafe else FULL)) as runner:
+        warn_about_missing_sandbox()
+    with TrialRunner(Sandboxes(NO_ISOLATION if unsafe else FULL_ISOLATION)) as runner:
         for path in submissions:
             try:
                 if path in near:
                     raise UsageError(near[path])
                 submission, asked = read_with_assignment(path, named)
-                submission = _with_run(submission, run)
-                graded = grade_submission(submission, _on_channel(asked, given), secret=secret, runner=runner)
-                graded = replace(graded, notes=(*_tried(given), *graded.notes))
+                submission = _select_run(submission, run)
+                graded = grade_submission(submission, _apply_to_scenarios(asked, given), secret=secret, runner=runner)
+                graded = replace(graded, notes=(*_describe_channel_flags(given), *graded.notes))
             except RobomarkError as error:
                 refused = isinstance(error, UsageError)
-                who = Student(shown_name(named_by(path)))
-                reason = str(error).removeprefix(f"{shown(path.name)}: ")
+                who = Student(normalise_name(derive_student_name(path)))
+                reason = str(error).removeprefix(f"{sanitise_name(path.name)}: ")
                 row: TableRow[Grade] = TableRow(who, str(path), assignment or "", None, reason, refused)
                 if len(submissions) == 1:
                     if refused and chosen.refusal is not None:
@@ -100,12 +100,12 @@ def grade_all(
                 worst = worst if worst is not None and not isinstance(worst, UsageError) else error
                 continue
             if together is None:
-                _print(chosen, graded, submission)
-            missing = missing_words(graded.missing)
+                _print_grade(chosen, graded, submission)
+            missing = describe_missing_part(graded.missing)
             rows.append(TableRow(Student(graded.student), str(path), graded.assignment, graded, missing))
             if report is not None:
-                written = write_report(report, graded, submission, named_by(path), language_called(language))
-                note(f"report: {written}")
+                written = write_report(report, graded, submission, derive_student_name(path), load_language(language))
+                print_note(f"report: {written}")
     if together is not None:
         sys.stdout.write(together(rows))
     if worst is not None:
@@ -113,7 +113,7 @@ def grade_all(
         raise kind("some submissions could not be graded")
 
 
-def _with_run(submission: Submission, run: str | None) -> Submission:
+def _select_run(submission: Submission, run: str | None) -> Submission:
     """Return the submission with ``run`` as the marked run. Raises UsageError if it is not a notebook."""
     if run is None:
         return submission
@@ -122,40 +122,42 @@ def _with_run(submission: Submission, run: str | None) -> Submission:
     return replace(submission, run=run)
 
 
-def _on_channel(asked: Assignment, given: Mapping[str, object]) -> Assignment:
+def _apply_to_scenarios(asked: Assignment, given: Mapping[str, object]) -> Assignment:
     """Return the assignment with the channel flags applied to every scenario.
 
     The result gets a different version, because its grades differ.
     """
     if not given:
         return asked
-    scenarios = tuple(replace(each, channel=changed(each.channel, given)) for each in asked.scenarios)
+    scenarios = tuple(replace(each, channel=apply_channel_flags(each.channel, given)) for each in asked.scenarios)
     version = hashlib.sha256(f"{asked.version}\n{sorted(given.items())}".encode()).hexdigest()
     return replace(asked, scenarios=scenarios, version=version)
 
 
-def _tried(given: Mapping[str, object]) -> tuple[str, ...]:
+def _describe_channel_flags(given: Mapping[str, object]) -> tuple[str, ...]:
     """Return the notes for a grade that was made with channel flags."""
     words = ", ".join(f"{name} {value}" for name, value in given.items())
     return (f"graded with another channel than the assignment's ({words}); these marks do not count",) if given else ()
 
 
-def _print(form: Format, graded: Grade, submission: Submission) -> None:
-    if form.on_terminal is not None and sys.stdout.isatty():
-        show(form.on_terminal(graded, submission))
+def _print_grade(form: Format, graded: Grade, submission: Submission) -> None:
+    if form.terminal is not None and sys.stdout.isatty():
+        print_renderables(form.terminal(graded, submission))
     elif form.document is not None:
         sys.stdout.write(form.document(graded, submission))
 
 
-def _like_others(paths: Sequence[Path]) -> dict[Path, str]:
+def _find_name_conflicts(paths: Sequence[Path]) -> dict[Path, str]:
     """Return the submissions whose reports would overwrite each other, with an error sentence for each."""
-    names = {path: named_by(path) for path in paths}
-    near = alike(names.values())
-    times = Counter(map(named_by, paths))
-    found = {path: f"{path}: its student {cannot_be_told(near[names[path]])}" for path in paths if names[path] in near}
+    names = {path: derive_student_name(path) for path in paths}
+    near = find_look_alikes(names.values())
+    times = Counter(map(derive_student_name, paths))
+    found = {
+        path: f"{path}: its student {describe_look_alikes(near[names[path]])}" for path in paths if names[path] in near
+    }
     for path in paths:
         if times[names[path]] > 1:
-            found.setdefault(path, f"{path}: {shown(names[path])} is named more than once")
+            found.setdefault(path, f"{path}: {sanitise_name(names[path])} is named more than once")
     return {path: f"{sentence}; expected one report for each student." for path, sentence in found.items()}
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from service.language import SOURCE, languages
+from service.language import SOURCE_LANGUAGE, list_languages
 from sim.errors import UsageError
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _INFRARED = ("beacon", "range", "facing", "blocked_by")
 
 
-def format_option(words: str, names: Callable[[], Iterable[str]]) -> Any:
+def create_format_option(words: str, names: Callable[[], Iterable[str]]) -> Any:
     """Return an option that accepts one of ``names``.
 
     ``names`` is called only when the option is used, because the formats load slowly.
@@ -38,10 +38,10 @@ def format_option(words: str, names: Callable[[], Iterable[str]]) -> Any:
     return typer.Option("--format", help=words, metavar="FORMAT", callback=checked, autocompletion=completed)
 
 
-def _known_language(code: str) -> str:
+def _check_language(code: str) -> str:
     # English needs no catalogue, and listing the other languages is slow.
-    if code != SOURCE and code not in languages():
-        raise typer.BadParameter(f"{code!r} is not one of {', '.join(map(repr, languages()))}")
+    if code != SOURCE_LANGUAGE and code not in list_languages():
+        raise typer.BadParameter(f"{code!r} is not one of {', '.join(map(repr, list_languages()))}")
     return code
 
 
@@ -50,21 +50,21 @@ LanguageOption = Annotated[
     typer.Option(
         "--language",
         metavar="CODE",
-        callback=_known_language,
-        autocompletion=lambda: list(languages()),
+        callback=_check_language,
+        autocompletion=lambda: list(list_languages()),
         help="The language of reports and replays, for example de. Printed output stays in English.",
     ),
 ]
 
 
-def _is_gif(path: Path | None) -> Path | None:
+def _check_gif(path: Path | None) -> Path | None:
     if path is not None and path.suffix.lower() != ".gif":
         raise UsageError(f"--film {path}: expected a name that ends in .gif")
     return path
 
 
 FilmOption = Annotated[
-    Path | None, typer.Option("--film", callback=_is_gif, help="Write a film of one trial to this file, as GIF.")
+    Path | None, typer.Option("--film", callback=_check_gif, help="Write a film of one trial to this file, as GIF.")
 ]
 
 
@@ -75,11 +75,14 @@ def with_option_groups(command: Callable[..., None]) -> Callable[..., None]:
     """
     hints = get_type_hints(command, include_extras=True)
     groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
-    parameters = list(_parameters(inspect.signature(command).parameters, hints, groups))
+    parameters = list(_expand_parameters(inspect.signature(command).parameters, hints, groups))
 
     @functools.wraps(command)
     def called(**given: object) -> None:
-        made = {name: group(**{each: given.pop(each) for each in _names(group)}) for name, group in groups.items()}
+        made = {
+            name: group(**{each: given.pop(each) for each in _list_field_names(group)})
+            for name, group in groups.items()
+        }
         command(**given, **made)
 
     called.__signature__ = inspect.Signature(parameters, return_annotation=None)  # type: ignore[attr-defined]
@@ -88,7 +91,7 @@ def with_option_groups(command: Callable[..., None]) -> Callable[..., None]:
     return called
 
 
-def _parameters(
+def _expand_parameters(
     declared: Mapping[str, inspect.Parameter], hints: Mapping[str, Any], groups: Mapping[str, Any]
 ) -> Iterator[inspect.Parameter]:
     for name, parameter in declared.items():
@@ -98,15 +101,15 @@ def _parameters(
         own = get_type_hints(groups[name], include_extras=True)
         for each in fields(groups[name]):
             yield inspect.Parameter(
-                each.name, inspect.Parameter.KEYWORD_ONLY, default=_default(each), annotation=own[each.name]
+                each.name, inspect.Parameter.KEYWORD_ONLY, default=_find_default(each), annotation=own[each.name]
             )
 
 
-def _names(group: Any) -> list[str]:
+def _list_field_names(group: Any) -> list[str]:
     return [each.name for each in fields(group)]
 
 
-def _default(field: Field[Any]) -> object:
+def _find_default(field: Field[Any]) -> object:
     return inspect.Parameter.empty if field.default is MISSING else field.default
 
 
@@ -139,7 +142,7 @@ class ChannelFlags:
         float | None, typer.Option("--corruption", help="Share of messages with changed letters and digits.")
     ] = None
 
-    def given(self) -> dict[str, object]:
+    def to_table(self) -> dict[str, object]:
         """Return the flags that were given, in the form of an assignment's channel table.
 
         Raises:
@@ -154,7 +157,7 @@ class ChannelFlags:
         return given
 
 
-def changed(channel: Channel, given: Mapping[str, object]) -> Channel:
+def apply_channel_flags(channel: Channel, given: Mapping[str, object]) -> Channel:
     """Return the channel with the flags applied. Raises UsageError if the values are invalid."""
     if not given:
         return channel

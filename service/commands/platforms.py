@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from service.commands.operating import operating
-from service.commands.shown import document, note, show, table, tell
+from service.commands.installation import open_installation
+from service.commands.output import create_table, print_json, print_line, print_note, print_renderables
 from service.operations import courses
 from service.operations.courses import DEFAULT_COURSE
 
@@ -36,39 +36,39 @@ def add(
     asked = platforms.Registration(
         name, issuer, client_id, tuple(deployments), authorization_url, token_url, keys_url, origins
     )
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         registered = platforms.register(service, actor, asked)
     found = next(each for each in registered if (each.issuer, each.client_id) == (issuer, client_id))
-    document(platform=found)
-    tell(f"platform {found.name} is registered for {found.issuer}")
+    print_json(platform=found)
+    print_line(f"platform {found.name} is registered for {found.issuer}")
 
 
 def list_platforms() -> None:
     """List the registered learning platforms."""
     from service.operations import platforms
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         found = platforms.list_platforms(service, actor)
-    document(platforms=found)
+    print_json(platforms=found)
     if not found:
-        tell("no learning platforms yet")
+        print_line("no learning platforms yet")
         return
-    listed = table("name", "issuer", "client", "deployments")
+    listed = create_table("name", "issuer", "client", "deployments")
     for each in found:
         listed.add_row(each.name, each.issuer, each.client_id, ", ".join(each.deployments))
-    show(listed)
+    print_renderables(listed)
 
 
 def enrol_members(course: Course = DEFAULT_COURSE) -> None:
     """Enrol all members that the platform has in a course."""
     from service.operations import platforms
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         enrolled = platforms.enrol_members(service, actor, courses.find(service, actor, course))
-    document(members=enrolled.members, refused=enrolled.refused)
-    tell(f"{enrolled.members} of the platform's members are in {course}")
+    print_json(members=enrolled.members, refused=enrolled.refused)
+    print_line(f"{enrolled.members} of the platform's members are in {course}")
     for reason in enrolled.refused:
-        note(f"not enrolled: {reason}")
+        print_note(f"not enrolled: {reason}")
 
 
 def send_marks(
@@ -78,7 +78,7 @@ def send_marks(
     """Send the published marks of an assignment to the platform's gradebook."""
     from service.operations import platforms
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         sent = platforms.pass_back(service, actor, courses.find(service, actor, course), assignment)
-    document(assignment=assignment, sent=sent)
-    tell(f"{assignment}: {sent} published marks sent")
+    print_json(assignment=assignment, sent=sent)
+    print_line(f"{assignment}: {sent} published marks sent")

@@ -11,36 +11,36 @@ from typing import Annotated
 
 import typer
 
-from service.commands.operating import operating
-from service.commands.shown import document, note, tell
+from service.commands.installation import open_installation
+from service.commands.output import print_json, print_line, print_note
 from service.operations import courses, people, privacy
 from service.operations.courses import DEFAULT_COURSE
 from service.operations.privacy import PurgeRequest
 from sim.errors import UsageError
 
-Who = Annotated[str, typer.Argument(help="The student's name, as submitted.")]
+StudentArgument = Annotated[str, typer.Argument(help="The student's name, as submitted.")]
 
 
 def export_student(
-    student: Who, output: Annotated[Path, typer.Option("-o", "--output", help="The .zip file to create.")]
+    student: StudentArgument, output: Annotated[Path, typer.Option("-o", "--output", help="The .zip file to create.")]
 ) -> None:
     """Export all data of a student that the student may see: identity, submissions and results."""
-    from service.home import for_the_user
+    from service.home import user_permissions
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         member = people.find(service, actor, DEFAULT_COURSE, student)
         data = privacy.export_student(service, actor, member.course_id, member.enrolment_id).zip
     try:
-        with for_the_user():
+        with user_permissions():
             output.write_bytes(data)
     except OSError as error:
         raise UsageError(f"{output} cannot be written: {error.strerror}") from None
-    document(student=student, output=output, bytes=len(data))
-    tell(f"{output}: {len(data)} bytes")
+    print_json(student=student, output=output, bytes=len(data))
+    print_line(f"{output}: {len(data)} bytes")
 
 
 def delete_student(
-    student: Who,
+    student: StudentArgument,
     for_good: Annotated[bool, typer.Option("--for-good", help="Confirm the deletion. It cannot be undone.")] = False,
 ) -> None:
     """Delete all data of a student: submissions, grades, recordings and identity.
@@ -49,11 +49,11 @@ def delete_student(
     """
     if not for_good:
         raise UsageError("this cannot be undone; export a copy with export-student if needed, then use --for-good")
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         member = people.find(service, actor, DEFAULT_COURSE, student)
         gone = privacy.erase_student(service, actor, member.course_id, member.enrolment_id)
-    document(submissions=gone.submissions, grades=gone.grades)
-    tell(f"removed: {gone.submissions} submissions, {gone.grades} grades, and the student's identity")
+    print_json(submissions=gone.submissions, grades=gone.grades)
+    print_line(f"removed: {gone.submissions} submissions, {gone.grades} grades, and the student's identity")
 
 
 def purge_course(
@@ -70,13 +70,13 @@ def purge_course(
     if archive is not None and for_good:
         raise UsageError("--archive keeps a copy and --for-good keeps none; use one of them")
     only_count = archive is None and not for_good
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         course_id = courses.find(service, actor, DEFAULT_COURSE)
         if archive is not None:
-            note(f"{archive}: {privacy.archive(service, actor, archive)} bytes")
+            print_note(f"{archive}: {privacy.archive(service, actor, archive)} bytes")
         gone = privacy.purge(service, actor, course_id, PurgeRequest(older_than, only_count))
     counted = f"{gone.submissions} submissions, {gone.grades} grades, {gone.students} students"
-    document(removed=not only_count, archive=archive, **asdict(gone))
-    tell(
+    print_json(removed=not only_count, archive=archive, **asdict(gone))
+    print_line(
         f"{counted} to remove; use --archive FILE or --for-good to remove them" if only_count else f"removed: {counted}"
     )

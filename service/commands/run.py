@@ -13,7 +13,7 @@ from service.commands.options import ChannelFlags, FilmOption, with_option_group
 from sim.errors import UsageError
 
 
-class Tick(StrEnum):
+class TickLength(StrEnum):
     """Tick lengths, by their names in an assignment's world."""
 
     THIRTIETH = "thirtieth"
@@ -84,7 +84,7 @@ class PanelFlags:
 
 
 @dataclass(frozen=True, slots=True)
-class Conditions:
+class RunConditions:
     """Conditions of a run that the magic's flags do not cover."""
 
     responder: Annotated[
@@ -101,13 +101,13 @@ class Conditions:
     sheet: Annotated[
         int | None, typer.Option(min=0, help="Number of the digit sheet. Default: depends on the seed.")
     ] = None
-    tick: Annotated[Tick, typer.Option(help="Length of a tick: 1/30 s, or 33 ms as in RoboLab in the browser.")] = (
-        Tick.THIRTIETH
-    )
+    tick: Annotated[
+        TickLength, typer.Option(help="Length of a tick: 1/30 s, or 33 ms as in RoboLab in the browser.")
+    ] = TickLength.THIRTIETH
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class OutputFiles:
     """The files in which a run is saved."""
 
     replay: Annotated[
@@ -128,7 +128,7 @@ class Kept:
         Path | None, typer.Option(help="Write the diagrams of a notebook's cells to this folder, as PNG.")
     ] = None
 
-    def check(self) -> None:
+    def check_options(self) -> None:
         """Raise UsageError if the options do not fit together."""
         if self.picture is not None and self.picture.suffix.lower() != ".png":
             raise UsageError(f"--picture {self.picture}: expected a name that ends in .png")
@@ -141,15 +141,15 @@ def run(
     program: Annotated[Path, typer.Argument(help="The robot program, a .py file, or a notebook.")],
     magic: MagicFlags,
     panels: PanelFlags,
-    conditions: Conditions,
+    conditions: RunConditions,
     channel: ChannelFlags,
-    kept: Kept,
+    kept: OutputFiles,
     unsafe: Annotated[
         bool, typer.Option("--unsafe-no-sandbox", help="Run programs without a sandbox. For development only.")
     ] = False,
 ) -> None:
     """Run a robot program or a notebook in the simulator, with the flags of %sim_magic, and print its output."""
-    kept.check()
-    from service.commands.running import run_file
+    kept.check_options()
+    from service.commands.program_run import run_file
 
     run_file(program, magic, conditions, channel, kept, unsafe=unsafe)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 
-from service.commands.shown import document, tell
+from service.commands.output import print_json, print_line
 
 
 def check() -> None:
@@ -14,11 +14,11 @@ def check() -> None:
 
     kernel = f"{platform.system()} {platform.release()} on {platform.machine()}"
     with Sandboxes() as sandboxes:
-        robot, responder = sandboxes.check("robot"), sandboxes.check("responder")
-        no_bubblewrap = sandboxes.why_no_bubblewrap()
-        kept = sandboxes.remembers()
-    no_group = control_group.why_not()
-    document(
+        robot, responder = sandboxes.check_isolation("robot"), sandboxes.check_isolation("responder")
+        no_bubblewrap = sandboxes.check_bubblewrap()
+        kept = sandboxes.check_data_leaks()
+    no_group = control_group.check_available()
+    print_json(
         kernel=kernel,
         robot_programs=str(robot),
         responders=str(responder),
@@ -26,18 +26,18 @@ def check() -> None:
         no_control_group_because=no_group,
         trials_remember_because=kept,
     )
-    tell(f"kernel: {kernel}")
-    tell(f"robot programs: {robot}")
-    tell(f"responders: {responder}")
+    print_line(f"kernel: {kernel}")
+    print_line(f"robot programs: {robot}")
+    print_line(f"responders: {responder}")
     if no_bubblewrap is None:
-        tell("extra: bubblewrap gives them separate namespaces")
+        print_line("extra: bubblewrap gives them separate namespaces")
     else:
-        tell(f"extra: bubblewrap, which provides separate namespaces, is not used: {no_bubblewrap}")
+        print_line(f"extra: bubblewrap, which provides separate namespaces, is not used: {no_bubblewrap}")
     if no_group is None:
-        tell("extra: a worker started from here has a control group for each concurrent grading")
+        print_line("extra: a worker started from here has a control group for each concurrent grading")
     else:
-        tell(f"extra: a worker started from here has no control group for each concurrent grading: {no_group}")
+        print_line(f"extra: a worker started from here has no control group for each concurrent grading: {no_group}")
     if kept is None:
-        tell("between trials: no data remains between trials")
+        print_line("between trials: no data remains between trials")
     else:
-        tell(f"between trials: data can remain between trials, so hidden scenarios are not graded: {kept}")
+        print_line(f"between trials: data can remain between trials, so hidden scenarios are not graded: {kept}")

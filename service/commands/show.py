@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from service.commands.batch.batch_summary import remarks
-from service.commands.operating import operating
+from service.commands.batch.batch_summary import list_remarks
+from service.commands.installation import open_installation
 from service.commands.options import FilmOption, LanguageOption
-from service.commands.shown import document, note, tell
-from service.home import for_the_user
-from service.language import SOURCE, language_called
+from service.commands.output import print_json, print_line, print_note
+from service.home import user_permissions
+from service.language import SOURCE_LANGUAGE, load_language
 from service.operations import stored_grades
 from service.operations.context import Actor, Service
 from service.operations.stored_grades import JobLine
@@ -20,7 +20,7 @@ from service.operations.types import JobState
 from sim.errors import UsageError
 
 #: This word cannot be the beginning of an id, because ids contain no ``o``.
-_BEFORE = "before"
+_PREVIOUS = "before"
 
 
 def show(
@@ -37,10 +37,10 @@ def show(
         str | None,
         typer.Option(
             help="Add the trials of this grade to the replay: an earlier grade of the same student "
-            f"('{_BEFORE}': the previous one), or the grade of the reference."
+            f"('{_PREVIOUS}': the previous one), or the grade of the reference."
         ),
     ] = None,
-    language: LanguageOption = SOURCE,
+    language: LanguageOption = SOURCE_LANGUAGE,
     film: FilmOption = None,
     trial: Annotated[
         int | None, typer.Option(help="The trial for the film, as numbered in the replay. Default: the first.")
@@ -51,55 +51,57 @@ def show(
         raise UsageError("--over needs a replay; expected --replay or --output too")
     if trial is not None and film is None:
         raise UsageError("--trial needs a film; expected --film too")
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         line = stored_grades.find(service, actor, grade)
-        others = None if over is None else _over(service, actor, over, line)
+        others = None if over is None else _find_overlay_grade(service, actor, over, line)
         if line.state is not JobState.DONE:
-            document(job=line, grade=None)
-            tell(_not_graded(line))
+            print_json(job=line, grade=None)
+            print_line(_describe_ungraded(line))
             return
         # These modules load slowly, so the grade is looked up first.
-        from service.reports.formats.json_output import json_document
-        from service.reports.formats.text import plain_text
-        from service.reports.view import staff_view
+        from service.reports.formats.json_output import build_json_document
+        from service.reports.formats.text import render_plain_text
+        from service.reports.view import build_staff_view
 
-        words, submission = stored_grades.load_words(service, actor, line.id)
-        told = staff_view(words)
-        document(job=line, grade=json_document(told, submission))
-        tell(plain_text(told, submission).rstrip("\n"))
+        words, submission = stored_grades.load_summary(service, actor, line.id)
+        told = build_staff_view(words)
+        print_json(job=line, grade=build_json_document(told, submission))
+        print_line(render_plain_text(told, submission).rstrip("\n"))
         by = f"graded by {line.worker}" if line.copied_from is None else "not run"
-        tell("; ".join([f"plots: {line.plots.value}", by, f"the student's attempt {line.attempt}", *remarks(line)]))
+        print_line(
+            "; ".join([f"plots: {line.plots.value}", by, f"the student's attempt {line.attempt}", *list_remarks(line)])
+        )
         if replay is None and film is None and output is None:
             return
         # Writing a report draws missing plots, so this import is slow.
         from service.report_files import write_grade_film, write_grade_replay, write_report
-        from service.reports.written import file_stem
+        from service.reports.output_files import build_file_stem
 
         graded = stored_grades.load(service, actor, line.id)
-        spoken = language_called(language)
+        spoken = load_language(language)
         if replay is not None:
             write_grade_replay(service.store, line, graded, replay, others, spoken)
-            note(f"replay: {replay}")
+            print_note(f"replay: {replay}")
         if film is not None:
             write_grade_film(service.store, line, graded, film, trial)
-            note(f"film: {film}")
+            print_note(f"film: {film}")
         if output is None:
             return
-        written = write_report(service.store, line, graded, output, file_stem(line.student), others, spoken)
-        note(f"report: {written.path}")
+        written = write_report(service.store, line, graded, output, build_file_stem(line.student), others, spoken)
+        print_note(f"report: {written.path}")
         for name, data in written.plots.items():
             path = output / f"{line.id}-plot-{name}.png"
-            with for_the_user():
+            with user_permissions():
                 path.write_bytes(data)
-            note(f"plot: {path}")
+            print_note(f"plot: {path}")
 
 
-def _over(service: Service, actor: Actor, over: str, line: JobLine) -> JobLine:
-    if over == _BEFORE:
+def _find_overlay_grade(service: Service, actor: Actor, over: str, line: JobLine) -> JobLine:
+    if over == _PREVIOUS:
         return stored_grades.find_previous(service, actor, line.id)
     return stored_grades.find(service, actor, over)
 
 
-def _not_graded(line: JobLine) -> str:
+def _describe_ungraded(line: JobLine) -> str:
     reason = f": {line.error}" if line.error else ""
     return f"{line.id}: {line.source} of {line.student}, {line.assignment}: {line.state.value}{reason}"

@@ -26,13 +26,13 @@ def up(
     port: Port = 8470,
 ) -> None:
     """Start broker, workers and web server, and keep them running until Ctrl-C. Unfinished jobs return to the queue."""
-    from service.commands.serving import bring_up
+    from service.commands.service_startup import run_service
 
-    bring_up(workers, host, port, serve=serve)
+    run_service(workers, host, port, serve=serve)
 
 
 def serve(host: Host = "127.0.0.1", port: Port = 8470) -> None:
     """Answer on the web: pages, the API, /health/live, /health/ready and /metrics. Grades nothing; workers do."""
-    from service.commands.serving import answer
+    from service.commands.service_startup import run_web_server
 
-    answer(host, port)
+    run_web_server(host, port)

@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
-from service.commands.operating import operating
-from service.commands.shown import document, note, show, table, tell
+from service.commands.installation import open_installation
+from service.commands.output import create_table, print_json, print_line, print_note, print_renderables
 from service.operations import courses, people, people_views, sign_in_links
 from service.operations.courses import DEFAULT_COURSE, MemberRequest
 from service.operations.people import JoinRequest, Member, TokenForRequest
@@ -18,12 +18,12 @@ from service.operations.types import Role
 from service.settings import Settings
 from sim.errors import UsageError
 
-Id = Annotated[str, typer.Argument(help="The person's id in the course.")]
+PersonId = Annotated[str, typer.Argument(help="The person's id in the course.")]
 Course = Annotated[str, typer.Option(help="The course.")]
 
 
 def add(
-    who: Id,
+    who: PersonId,
     name: Annotated[str, typer.Option(help="The displayed name.")] = "",
     email: Annotated[str, typer.Option(help="The e-mail address.")] = "",
     course: Course = DEFAULT_COURSE,
@@ -38,23 +38,24 @@ def add(
     if student and operator:
         raise UsageError("a student cannot be an operator: use --student or --operator")
     role = Role.STUDENT if student else Role.INSTRUCTOR
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         added = courses.add_member(service, actor, MemberRequest(course, who, name, email, role, operator))
     member = added.member
-    _tell_link(service.settings, member.id, added.secret)
+    _print_link(service.settings, member.id, added.secret)
     for other, instructor in added.elsewhere:
-        note(
-            f"{_called(instructor)} is also an instructor of {other}. If this is the same person: robomark user join "
+        print_note(
+            f"{_format_member(instructor)} is also an instructor of {other}. If this is the same person: robomark "
+            "user join "
             f"{member.id} "
             f"--course {course} --same-as {instructor.id} --of {other}"
         )
 
 
-def link(who: Id, course: Course = DEFAULT_COURSE) -> None:
+def link(who: PersonId, course: Course = DEFAULT_COURSE) -> None:
     """Print a new sign-in link, which works once."""
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         member, secret = sign_in_links.make_members_link(service, actor, course, who)
-    _tell_link(service.settings, member.id, secret)
+    _print_link(service.settings, member.id, secret)
 
 
 def links(
@@ -64,7 +65,7 @@ def links(
     ] = sign_in_links.DAYS,
 ) -> None:
     """Print a new sign-in link for each student of a course. Earlier links expire."""
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         made = sign_in_links.make_links(service, actor, courses.find(service, actor, course), days)
     public = service.settings.public_url
     lines = [
@@ -79,21 +80,21 @@ def links(
         }
         for each in made
     ]
-    document(links=lines)
+    print_json(links=lines)
     if not lines:
-        tell("no students yet")
+        print_line("no students yet")
         return
-    listed = table("id", "name", "address", "link")
+    listed = create_table("id", "name", "address", "link")
     for line in lines:
         link = line["url"] or line["path"] or line["reason"]
         listed.add_row(*(str(each) for each in (line["id"], line["name"], line["email"], link)))
-    show(listed)
+    print_renderables(listed)
     if not public:
-        note("add each link to the address that robomark up or serve prints")
+        print_note("add each link to the address that robomark up or serve prints")
 
 
 def token(
-    who: Id,
+    who: PersonId,
     scopes: Annotated[list[str], typer.Option("--scope", help="A scope of the token: read, submit, mark or manage.")],
     name: Annotated[str, typer.Option(help="The name of the token.")] = "",
     course: Course = DEFAULT_COURSE,
@@ -105,40 +106,40 @@ def token(
     for scope in scopes:
         if scope not in SCOPES:
             raise UsageError(f"--scope is {scope!r}, expected one of {', '.join(SCOPES)}")
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         member = people.find(service, actor, course, who)
         asked = TokenForRequest(name or "command line", frozenset(scopes), days)
         secret = people.issue_token(service, actor, member.enrolment_id, asked)
-    document(id=member.id, token=secret, scopes=sorted(scopes), days=days)
-    tell(secret)
+    print_json(id=member.id, token=secret, scopes=sorted(scopes), days=days)
+    print_line(secret)
 
 
 def sign_out(
-    who: Id,
+    who: PersonId,
     course: Course = DEFAULT_COURSE,
     release: Annotated[
         bool, typer.Option("--release", help="A student's next launch with this id may take this place in the course.")
     ] = False,
 ) -> None:
     """End all links, sessions and tokens of a person."""
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         member = people.find(service, actor, course, who)
         ended = people.sign_out(service, actor, member.enrolment_id, release=release)
-    document(id=member.id, ended=ended)
-    tell(f"{_called(member)} is signed out: {ended} links, sessions and tokens revoked")
+    print_json(id=member.id, ended=ended)
+    print_line(f"{_format_member(member)} is signed out: {ended} links, sessions and tokens revoked")
 
 
-def remove(who: Id, course: Course = DEFAULT_COURSE) -> None:
+def remove(who: PersonId, course: Course = DEFAULT_COURSE) -> None:
     """Remove a person without submissions from a course."""
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         member = people.find(service, actor, course, who)
         people.remove(service, actor, member.course_id, member.enrolment_id)
-    document(id=member.id, course=course)
-    tell(f"{_called(member)} is removed from {course}")
+    print_json(id=member.id, course=course)
+    print_line(f"{_format_member(member)} is removed from {course}")
 
 
 def join(
-    who: Id,
+    who: PersonId,
     same_as: Annotated[str, typer.Option("--same-as", help="The id of the same person in the other course.")],
     of: Annotated[str, typer.Option("--of", help="The other course.")],
     course: Course = DEFAULT_COURSE,
@@ -147,36 +148,36 @@ def join(
     ] = False,
 ) -> None:
     """Join the accounts of one person in different courses, and sign both out."""
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         member = people.find(service, actor, course, who)
         other = people.find(service, actor, of, same_as)
         people.join(service, actor, JoinRequest(member.enrolment_id, other.enrolment_id, from_platform))
-    document(id=member.id, course=course, same_as=other.id, of=of)
-    tell(f"{_called(member)} in {course} and {_called(other)} in {of} are now one person")
+    print_json(id=member.id, course=course, same_as=other.id, of=of)
+    print_line(f"{_format_member(member)} in {course} and {_format_member(other)} in {of} are now one person")
 
 
 def list_people(course: Course = DEFAULT_COURSE) -> None:
     """List who is in a course."""
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         members = people_views.list_members(service, actor, courses.find(service, actor, course))
-    document(
+    print_json(
         people=[
             {"id": each.id, "name": each.name, "email": each.email, "role": each.role, "operator": each.operator}
             for each in members
         ]
     )
-    listed = table("id", "name", "address", "role")
+    listed = create_table("id", "name", "address", "role")
     for each in members:
         listed.add_row(each.id, each.name, each.email, f"{each.role}{', operator' if each.operator else ''}")
-    show(listed)
+    print_renderables(listed)
 
 
-def _tell_link(settings: Settings, who: str, secret: str) -> None:
+def _print_link(settings: Settings, who: str, secret: str) -> None:
     path = f"/sign-in/{secret}"
     where = f"{settings.public_url}{path}" if settings.public_url else path
-    document(id=who, path=path, url=f"{settings.public_url}{path}" if settings.public_url else None)
-    tell(where if settings.public_url else f"{path}   (add this to the address that robomark up or serve prints)")
+    print_json(id=who, path=path, url=f"{settings.public_url}{path}" if settings.public_url else None)
+    print_line(where if settings.public_url else f"{path}   (add this to the address that robomark up or serve prints)")
 
 
-def _called(member: Member) -> str:
+def _format_member(member: Member) -> str:
     return f"{member.name} ({member.id})" if member.name else member.id

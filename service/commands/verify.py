@@ -11,6 +11,6 @@ def verify(
     grade: Annotated[str, typer.Argument(help="The grade's id, or its first characters.")],
 ) -> None:
     """Repeat every trial of a stored grading and compare. Exit status 3 if a result differs that must not."""
-    from service.commands.verifying import verify_grade
+    from service.commands.verification import verify_grade
 
     verify_grade(grade)

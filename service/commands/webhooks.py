@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.commands.operating import operating
-from service.commands.shown import document, note, show, table, tell
+from service.commands.installation import open_installation
+from service.commands.output import create_table, print_json, print_line, print_note, print_renderables
 from service.operations import courses
 from service.operations.courses import DEFAULT_COURSE
 from sim.errors import UsageError
@@ -34,29 +34,29 @@ def add(
     """Add a webhook to a course, and print the secret that signs its deliveries."""
     from service.operations import webhooks
 
-    chosen = _events(events)
-    with operating() as (service, actor):
+    chosen = _parse_events(events)
+    with open_installation() as (service, actor):
         line, secret = webhooks.create(service, actor, courses.find(service, actor, course), url, chosen)
-    document(webhook=line, secret=secret)
-    tell(secret)
-    note(f"webhook {line.id} added; its secret is shown only once")
+    print_json(webhook=line, secret=secret)
+    print_line(secret)
+    print_note(f"webhook {line.id} added; its secret is shown only once")
 
 
 def list_webhooks(course: Course = DEFAULT_COURSE) -> None:
     """List the webhooks of a course, the oldest first."""
     from service.operations import webhooks
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         found = webhooks.list_webhooks(service, actor, courses.find(service, actor, course))
-    document(webhooks=found)
+    print_json(webhooks=found)
     if not found:
-        tell("no webhooks yet")
+        print_line("no webhooks yet")
         return
-    listed = table("id", "created", "events", "address")
+    listed = create_table("id", "created", "events", "address")
     for each in found:
         created = each.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
         listed.add_row(each.id, created, ", ".join(each.events), each.url)
-    show(listed)
+    print_renderables(listed)
 
 
 def remove(
@@ -66,10 +66,10 @@ def remove(
     """Remove a webhook and its pending deliveries."""
     from service.operations import webhooks
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         webhooks.revoke(service, actor, courses.find(service, actor, course), webhook)
-    document(webhook=webhook)
-    tell(f"webhook {webhook} removed")
+    print_json(webhook=webhook)
+    print_line(f"webhook {webhook} removed")
 
 
 def list_deliveries(
@@ -79,22 +79,22 @@ def list_deliveries(
     """List the newest deliveries to the webhooks of a course."""
     from service.operations import webhooks
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         found = webhooks.list_deliveries(service, actor, courses.find(service, actor, course), limit)
-    document(deliveries=found)
+    print_json(deliveries=found)
     if not found:
-        tell("no deliveries yet")
+        print_line("no deliveries yet")
         return
-    listed = table("made", "webhook", "event", "attempts", "delivered", "error", right=("attempts",))
+    listed = create_table("made", "webhook", "event", "attempts", "delivered", "error", right=("attempts",))
     for each in found:
         made, delivered = (
             "" if at is None else at.astimezone().strftime("%Y-%m-%d %H:%M") for at in (each.made_at, each.delivered_at)
         )
         listed.add_row(made, each.webhook_id, each.event, str(each.attempts), delivered, each.error or "")
-    show(listed)
+    print_renderables(listed)
 
 
-def _events(names: Sequence[str]) -> list[WebhookEvent]:
+def _parse_events(names: Sequence[str]) -> list[WebhookEvent]:
     from service.operations.webhooks import WebhookEvent
 
     known = [event.value for event in WebhookEvent]

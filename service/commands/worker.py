@@ -16,7 +16,7 @@ def worker(
 ) -> None:
     """Start a worker, which grades queued jobs. Starts the bundled broker if no other is configured or running."""
     from responders.sandbox import control_group
-    from service.commands.unsafe import warn_of_no_sandbox
+    from service.commands.sandbox_warning import warn_about_missing_sandbox
     from service.queue.broker import EmbeddedBroker
     from service.queue.logs import configure_logging
     from service.queue.worker import run_worker
@@ -25,12 +25,12 @@ def worker(
     settings = load_settings()
     configure_logging(settings.log_level)
     if unsafe:
-        warn_of_no_sandbox()
+        warn_about_missing_sandbox()
     if settings.broker_url:
         status = run_worker(settings, unsafe=unsafe)
     else:
         # Divide the control group before the broker starts: this is only possible while no other process is in it.
-        control_group.divide()
+        control_group.divide_group()
         with EmbeddedBroker(settings) as broker:
             status = run_worker(broker.settings, unsafe=unsafe)
     if status:

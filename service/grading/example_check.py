@@ -11,16 +11,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
 
+from service.grading.class_statistics import MarkedSubmission, to_marked_submission
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.guessable import find_guessable_reports
-from service.grading.judging.message_parts import fault_words
-from service.grading.statistics import MarkedSubmission, marked_of
+from service.grading.guessable_reports import find_guessable_reports
+from service.grading.judging.message_parts import describe_fault
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
-from sim.recorded import faults_of
+from sim.recording_values import collect_faults
 from submissions.assignment.definition import Assignment
-from submissions.assignment.examples import EXPECTED, Expectation, OriginalMeasure, examples, expected, read_example
+from submissions.assignment.examples import (
+    EXPECTED,
+    ExpectedResult,
+    OriginalMeasure,
+    locate_examples,
+    read_example,
+    read_expected,
+)
 from submissions.assignment.folder import REFERENCE
 from submissions.assignment.reader import find_assignment
 
@@ -37,7 +44,7 @@ class ExampleResult:
     lost: tuple[str, ...]  # ids of the criteria without full marks
     seconds: float  # real time
     problems: tuple[str, ...]
-    unwritten: Expectation | None = None
+    missing_expectation: ExpectedResult | None = None
     marked: MarkedSubmission | None = None  # for statistics; None if it was rejected
 
 
@@ -50,7 +57,7 @@ class ComparedMeasure:
     unit: str = ""
 
     @property
-    def agrees(self) -> bool:
+    def is_close(self) -> bool:
         """Return whether the reference is close enough to the original. False if it has no such measure."""
         near = self.original.within * max(abs(self.original.value), 1e-9)
         return self.value is not None and abs(self.value - self.original.value) <= near + 1e-9
@@ -68,7 +75,7 @@ class CheckedAssignment:
     def problems(self) -> tuple[str, ...]:
         """One sentence for each problem: first those of the examples, then those of the measures."""
         of_examples = (problem for example in self.examples for problem in example.problems)
-        of_measures = (problem for measure in self.measures for problem in _measure_problems(measure))
+        of_measures = (problem for measure in self.measures for problem in _check_measure(measure))
         return (*of_examples, *of_measures)
 
     @property
@@ -77,17 +84,17 @@ class CheckedAssignment:
         return tuple(find_guessable_reports(self.assignment))
 
     @property
-    def unwritten(self) -> Mapping[str, Expectation]:
+    def missing_expectations(self) -> Mapping[str, ExpectedResult]:
         """Expectations missing from ``expected.toml``, by example. Examples with other problems are left out."""
         return {
-            each.name: each.unwritten
+            each.name: each.missing_expectation
             for each in self.examples
-            if each.unwritten is not None and set(each.problems) <= {_no_table(each.name)}
+            if each.missing_expectation is not None and set(each.problems) <= {_describe_missing_table(each.name)}
         }
 
-    def written(self) -> CheckedAssignment:
+    def as_written(self) -> CheckedAssignment:
         """Return the result as it will be once ``expected.toml`` contains the missing expectations."""
-        told = self.unwritten
+        told = self.missing_expectations
         examples = (replace(each, problems=()) if each.name in told else each for each in self.examples)
         return replace(self, examples=tuple(examples))
 
@@ -99,15 +106,15 @@ def check_examples(name_or_path: str, *, runner: TrialRunner) -> CheckedAssignme
         AssignmentError: The assignment or its ``expected.toml`` is invalid.
     """
     assignment = find_assignment(name_or_path)
-    wanted = expected(name_or_path)
-    names = example_names(name_or_path)
+    wanted = read_expected(name_or_path)
+    names = list_examples(name_or_path)
     results: list[ExampleResult] = []
     measures: tuple[ComparedMeasure, ...] = ()
     for name in names:
         result, graded = _check_example(name_or_path, name, assignment, wanted.examples.get(name), runner)
         results.append(result)
         if name == REFERENCE and graded is not None:
-            measures = tuple(_compared(original, graded) for original in wanted.original)
+            measures = tuple(_compare_measure(original, graded) for original in wanted.original)
     missing = sorted(wanted.examples.keys() - set(names))
     results += [
         ExampleResult(name, None, (), 0.0, (f"{name}: is expected, but is not an example",)) for name in missing
@@ -115,10 +122,10 @@ def check_examples(name_or_path: str, *, runner: TrialRunner) -> CheckedAssignme
     return CheckedAssignment(assignment, tuple(results), measures)
 
 
-def example_names(name_or_path: str) -> tuple[str, ...]:
+def list_examples(name_or_path: str) -> tuple[str, ...]:
     """Return the names of the examples, the reference first, then sorted. Empty if there are no examples."""
     try:
-        folder = examples(name_or_path)
+        folder = locate_examples(name_or_path)
     except UsageError:
         return ()
     names = (path.name for path in folder.iterdir() if not path.name.startswith((".", "_")))
@@ -126,7 +133,7 @@ def example_names(name_or_path: str) -> tuple[str, ...]:
 
 
 def _check_example(
-    name_or_path: str, name: str, assignment: Assignment, wanted: Expectation | None, runner: TrialRunner
+    name_or_path: str, name: str, assignment: Assignment, wanted: ExpectedResult | None, runner: TrialRunner
 ) -> tuple[ExampleResult, Grade | None]:
     begin = time.monotonic()
     try:
@@ -138,31 +145,33 @@ def _check_example(
     lost = tuple(result.id for result in graded.criteria if result.marks < result.max_marks)
     problems = [
         f"{name}: {each}"
-        for each in _differences(graded, lost, wanted if wanted is not None else _usual(name, assignment))
+        for each in _compare_with_expectation(
+            graded, lost, wanted if wanted is not None else _build_default_expectation(name, assignment)
+        )
     ]
     if wanted is None and name != REFERENCE:
-        problems.append(_no_table(name))
-    unwritten = _found(graded, lost) if wanted is None else None
-    marked = replace(marked_of(graded), who=name)
+        problems.append(_describe_missing_table(name))
+    unwritten = _build_expectation(graded, lost) if wanted is None else None
+    marked = replace(to_marked_submission(graded), who=name)
     return ExampleResult(name, graded.marks, lost, seconds, tuple(problems), unwritten, marked), graded
 
 
-def _no_table(name: str) -> str:
+def _describe_missing_table(name: str) -> str:
     return f"{name}: has no table in {EXPECTED} (check --write-expected writes its results)"
 
 
-def _found(graded: Grade, lost: tuple[str, ...]) -> Expectation:
+def _build_expectation(graded: Grade, lost: tuple[str, ...]) -> ExpectedResult:
     """Return the expectation that matches this grade."""
     earns = {result.id: result.marks for result in graded.criteria if result.id in lost}
-    return Expectation(marks=graded.marks, verdict=graded.verdict, loses=lost, earns=earns)
+    return ExpectedResult(marks=graded.marks, verdict=graded.verdict, loses=lost, earns=earns)
 
 
-def _usual(name: str, assignment: Assignment) -> Expectation | None:
+def _build_default_expectation(name: str, assignment: Assignment) -> ExpectedResult | None:
     """Return the default expectation of an example without an entry: full marks for the reference, else None."""
-    return Expectation(marks=assignment.max_marks) if name == REFERENCE else None
+    return ExpectedResult(marks=assignment.max_marks) if name == REFERENCE else None
 
 
-def _differences(graded: Grade, lost: tuple[str, ...], wanted: Expectation | None) -> list[str]:
+def _compare_with_expectation(graded: Grade, lost: tuple[str, ...], wanted: ExpectedResult | None) -> list[str]:
     found = [f"{result.id} could not be judged: {result.unjudged}" for result in graded.criteria if result.unjudged]
     if wanted is None:
         return found
@@ -180,27 +189,27 @@ def _differences(graded: Grade, lost: tuple[str, ...], wanted: Expectation | Non
     ]
     told = "\n".join(result.message for result in graded.criteria)
     if graded.marks != wanted.marks:
-        found.append(f"got {graded.marks} marks, expected {wanted.marks}; {_lost_words(graded)}")
+        found.append(f"got {graded.marks} marks, expected {wanted.marks}; {_describe_lost_marks(graded)}")
     if graded.verdict != wanted.verdict:
-        found.append(f"ended as {graded.verdict}, expected {wanted.verdict}{_fault(graded)}")
+        found.append(f"ended as {graded.verdict}, expected {wanted.verdict}{_describe_fault(graded)}")
     if wanted.loses is not None and set(lost) != set(wanted.loses):
         found.append(f"lost marks in {', '.join(lost) or 'nothing'}, expected {', '.join(wanted.loses) or 'nothing'}")
     found += [f'did not get the feedback "{phrase}", but {told}' for phrase in wanted.feedback if phrase not in told]
     return found
 
 
-def _fault(graded: Grade) -> str:
+def _describe_fault(graded: Grade) -> str:
     """Return the first reported fault as a sentence part; empty if there is none."""
-    faults = [fault for trial in graded.trials for fault in faults_of(trial.recording)]
-    return f"; {fault_words(faults[0])}" if faults else ""
+    faults = [fault for trial in graded.trials for fault in collect_faults(trial.recording)]
+    return f"; {describe_fault(faults[0])}" if faults else ""
 
 
-def _lost_words(graded: Grade) -> str:
+def _describe_lost_marks(graded: Grade) -> str:
     words = [f"{result.id}: {result.message}" for result in graded.criteria if result.marks < result.max_marks]
     return " ".join(words) or "nothing was lost"
 
 
-def _compared(original: OriginalMeasure, graded: Grade) -> ComparedMeasure:
+def _compare_measure(original: OriginalMeasure, graded: Grade) -> ComparedMeasure:
     """Compare the original with the first measure of that name, in the order of criteria and trials."""
     for result in graded.criteria:
         for evidence in result.evidence:
@@ -210,11 +219,11 @@ def _compared(original: OriginalMeasure, graded: Grade) -> ComparedMeasure:
     return ComparedMeasure(original, None)
 
 
-def _measure_problems(measure: ComparedMeasure) -> tuple[str, ...]:
+def _check_measure(measure: ComparedMeasure) -> tuple[str, ...]:
     original = measure.original
     if measure.value is None:
         return (f"{REFERENCE}: measured no {original.measure}, expected about {original.value:g}",)
-    if measure.agrees or original.explained:
+    if measure.is_close or original.explained:
         return ()
     return (
         f"{REFERENCE}: {original.measure} is {measure.value:g} {measure.unit}".rstrip()

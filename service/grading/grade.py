@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 
-from responders.sandbox.meter import JobLimits, Spent
-from sim.recorded import verdict_of
+from responders.sandbox.meter import JobCosts, JobLimits
 from sim.recording import Image, Pose, Recording, Verdict
-from submissions.seeds import PUBLIC
+from sim.recording_values import decide_verdict
+from submissions.seeds import PUBLIC_SECRET
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ class Evidence:
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class VisibleFeedback:
     """The feedback on a criterion that has hidden trials, made from its visible trials only.
 
     Students could otherwise encode in numbers and texts what the robot saw in a hidden trial.
@@ -131,7 +131,7 @@ class Shown:
 
 
 @dataclass(frozen=True, slots=True)
-class SetByHand:
+class StaffAdjustment:
     """A staff adjustment of a criterion's marks, or its exclusion, with the marks that the grader gave."""
 
     graded: Decimal | None  # None if it could not be judged
@@ -162,10 +162,10 @@ class CriterionResult:
     accuracy: Accuracy | None = None
     predictions: tuple[Prediction, ...] = ()
     curves: tuple[AccuracyCurve, ...] = ()
-    shown: Shown | None = None  # None if every trial is visible
+    shown: VisibleFeedback | None = None  # None if every trial is visible
     unjudged: str = ""  # why it could not be judged, for staff; otherwise empty
     for_staff: str = ""  # what staff should check; not shown to students
-    set_by_hand: SetByHand | None = None  # None if the marks are as graded
+    set_by_hand: StaffAdjustment | None = None  # None if the marks are as graded
 
     @property
     def worth(self) -> Decimal:
@@ -195,7 +195,7 @@ class TrialResult:
     @property
     def verdict(self) -> Verdict:
         """The verdict of the run, as recorded."""
-        return verdict_of(self.recording)
+        return decide_verdict(self.recording)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +203,7 @@ class Cost:
     """The shared limits of all trials and, for staff, the resources that they used."""
 
     limits: JobLimits
-    spent: Spent | None = None
+    spent: JobCosts | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,7 +222,7 @@ class Grade:
     notes: tuple[str, ...] = ()
     missing: str = ""  # a required file that was not submitted; criteria that need it get no marks
     hints: tuple[str, ...] = ()  # likely reasons for lost marks, best first; they don't affect marks
-    secret_sha256: str = PUBLIC.sha256  # hash of the secret that the seeds are derived from
+    secret_sha256: str = PUBLIC_SECRET.sha256  # hash of the secret that the seeds are derived from
     cost: Cost | None = field(default=None, compare=False)  # measured, so it may differ between two runs
     comments: tuple[WrittenComment, ...] = ()
 
@@ -258,7 +258,7 @@ class Grade:
         return next((result for result in measured if result.worth), measured[0] if measured else None)
 
 
-def unjudged_notes(criteria: Sequence[CriterionResult]) -> tuple[str, ...]:
+def build_unjudged_notes(criteria: Sequence[CriterionResult]) -> tuple[str, ...]:
     """Return a note on the number of criteria that could not be judged; empty if all were judged."""
     count = sum(bool(result.unjudged) for result in criteria)
     return (f"{count} of {len(criteria)} criteria could not be judged; staff will review them",) if count else ()

@@ -11,26 +11,26 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from responders.repeated_faults import SPARED, Diverged, RepeatedFaults
+from responders.repeated_faults import REPLAY_NOTES, FaultReplay, ReplayDiverged
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.trial_spec import PartnerSpec, TrialSpec
-from service.grading.grade import Cost, Grade, TrialResult, unjudged_notes
-from service.grading.hints import hints_for
-from service.grading.judging.bounded import bounds_for, judge_within
+from service.grading.grade import Cost, Grade, TrialResult, build_unjudged_notes
+from service.grading.hints import collect_hints
+from service.grading.judging.limited_judging import compute_judging_limits, judge_within_limits
+from service.grading.model_training import add_model_answers
 from service.grading.run_plan import RunPlan, plan_run
 from service.grading.static_analysis import analyse
-from service.grading.training import with_models_answers
 from service.grading.trial_runner import TrialRunner
 from service.version import GRADER_VERSION
-from sim.chance import Stream
 from sim.errors import AssignmentError
-from sim.floors import Floor, floor, floor_from_image
+from sim.floors import Floor, build_floor, build_floor_from_image
 from sim.motion import Physics
+from sim.random_streams import RandomStream
 from sim.recording import BROWSER_TICK, TICK, Recording
-from sim.robot import robot
+from sim.robot import get_robot
 from sim.world import Noise
 from submissions.assignment.definition import Assignment, Trial, WorldSpec
-from submissions.seeds import PUBLIC, Secret, child_seed
+from submissions.seeds import PUBLIC_SECRET, Secret, compute_child_seed
 from submissions.submission import PART_FILES, Submission
 
 _MEGABYTE = 1 << 20
@@ -45,14 +45,14 @@ class GradingProgress:
     trials: int
 
 
-class Observe(Protocol):
+class ProgressObserver(Protocol):
     """Callback for progress, called after each trial and about once a second. Raises Cancelled to stop the grading."""
 
     def __call__(self, progress: GradingProgress, /) -> None:
         """Process the progress quickly, because grading waits. Raise Cancelled to stop the grading."""
 
 
-def _nobody(progress: GradingProgress) -> None:
+def _ignore_progress(progress: GradingProgress) -> None:
     """Ignore the progress. The default observer."""
 
 
@@ -60,8 +60,8 @@ def grade(
     submission: Submission,
     assignment: Assignment,
     *,
-    secret: Secret = PUBLIC,
-    observe: Observe | None = None,
+    secret: Secret = PUBLIC_SECRET,
+    observe: ProgressObserver | None = None,
     runner: TrialRunner | None = None,
 ) -> Grade:
     """Grade ``submission`` with seeds derived from ``secret``, the secret of the installation.
@@ -77,15 +77,17 @@ def grade(
         with TrialRunner() as own:
             return grade(submission, assignment, secret=secret, observe=observe, runner=own)
     plan = plan_run(submission, assignment, secret)
-    runner.begin(plan.processes)
+    runner.start_zygotes(plan.processes)
     trials = tuple(assignment.trials(secret)) if plan.program or not plan.missing else ()
-    watch = _Watch(observe or _nobody, len(trials))
-    meter = JobMeter(_limits_of_job(assignment, sum(map(_is_visible, trials))), watch.heartbeat)
+    watch = _ProgressReporter(observe or _ignore_progress, len(trials))
+    meter = JobMeter(_compute_job_limits(assignment, sum(map(_is_visible, trials))), watch.heartbeat)
     results = _run_trials(plan, trials, runner, meter, watch)
     if assignment.training is not None:
-        results = with_models_answers(results, plan, assignment.training, runner, meter)
+        results = add_model_answers(results, plan, assignment.training, runner, meter)
     analysis = analyse(plan, results, runner, meter)
-    criteria = judge_within(bounds_for(results), assignment, tuple(results), analysis, meter.heartbeat)
+    criteria = judge_within_limits(
+        compute_judging_limits(results), assignment, tuple(results), analysis, meter.heartbeat
+    )
     return Grade(
         assignment=assignment.id,
         assignment_title=assignment.title,
@@ -99,30 +101,30 @@ def grade(
         notes=(
             *submission.notes,
             *plan.notes,
-            *plan.trial.notes_on_all(results),
-            *_spared_notes(results),
-            *unjudged_notes(criteria),
+            *plan.trial.collect_shared_notes(results),
+            *_build_spared_notes(results),
+            *build_unjudged_notes(criteria),
         ),
         missing=PART_FILES[plan.missing] if plan.missing else "",
-        hints=hints_for(submission, plan, results, criteria, meter.heartbeat),
+        hints=collect_hints(submission, plan, results, criteria, meter.heartbeat),
         secret_sha256=secret.sha256,
         cost=Cost(meter.limits, meter.spent),
     )
 
 
 def _run_trials(
-    plan: RunPlan, trials: Sequence[Trial], runner: TrialRunner, meter: JobMeter, watch: _Watch
+    plan: RunPlan, trials: Sequence[Trial], runner: TrialRunner, meter: JobMeter, watch: _ProgressReporter
 ) -> list[TrialResult]:
     """Run the trials and return the results in the order of ``trials``, which may differ from the order of the runs."""
     if not all(map(_is_visible, trials)):
-        runner.check_forgetting()
+        runner.check_trial_isolation()
     run: dict[int, TrialResult] = {}
-    repeats = RepeatedFaults()
-    for number in _run_order(trials, plan.child_seed):
+    repeats = FaultReplay()
+    for number in _choose_run_order(trials, plan.child_seed):
         trial = trials[number]
         if not _is_visible(trial):
             # Visible trials run within their own limit, so that it does not reveal the number of hidden trials.
-            meter.extend(_limits_of_job(plan.assignment, len(trials)))
+            meter.extend(_compute_job_limits(plan.assignment, len(trials)))
         run[number] = TrialResult(
             trial.scenario.id,
             trial.index,
@@ -130,33 +132,33 @@ def _run_trials(
             trial.light_noise,
             trial.motor_noise,
             trial.scenario.visibility,
-            _recorded(trial, plan, runner, meter, repeats),
+            _record_trial(trial, plan, runner, meter, repeats),
             trial.sweep,
             trial.place,
         )
-        watch.finished_one()
+        watch.count_finished_trial()
     return [run[number] for number in range(len(trials))]
 
 
-def _recorded(trial: Trial, plan: RunPlan, runner: TrialRunner, meter: JobMeter, repeats: RepeatedFaults) -> Recording:
+def _record_trial(trial: Trial, plan: RunPlan, runner: TrialRunner, meter: JobMeter, repeats: FaultReplay) -> Recording:
     """Run one trial, without any child process that would only repeat an earlier fault."""
-    spec, obstacles, before = _spec(trial, plan), plan.assignment.world.obstacles, meter.spent
-    with runner.sparing(repeats):
+    spec, obstacles, before = _build_trial_spec(trial, plan), plan.assignment.world.obstacles, meter.spent
+    with runner.skipping_repeats(repeats):
         try:
-            return repeats.ran(plan.trial.run(spec, obstacles, runner, meter))
-        except Diverged:
-            meter.give_back(before)
-            repeats.again()
-            return repeats.ran(plan.trial.run(spec, obstacles, runner, meter))
+            return repeats.record_trial(plan.trial.run(spec, obstacles, runner, meter))
+        except ReplayDiverged:
+            meter.refund_since(before)
+            repeats.record_divergence()
+            return repeats.record_trial(plan.trial.run(spec, obstacles, runner, meter))
 
 
-def _run_order(trials: Sequence[Trial], own_seed: int) -> Sequence[int]:
+def _choose_run_order(trials: Sequence[Trial], own_seed: int) -> Sequence[int]:
     """Return the order in which to run the trials: visible ones first, otherwise shuffled for each submission.
 
     This way, code that counts processes or reads a clock cannot recognise a trial. Visible results are complete before
     the first hidden trial runs, and the order of visible trials does not depend on hidden ones.
     """
-    chance = Stream(own_seed, "order of trials")
+    chance = RandomStream(own_seed, "order of trials")
     visible = [number for number, trial in enumerate(trials) if _is_visible(trial)]
     hidden = [number for number, trial in enumerate(trials) if not _is_visible(trial)]
     places = {number: place for place, number in enumerate((*visible, *hidden))}
@@ -167,10 +169,10 @@ def _is_visible(trial: Trial) -> bool:
     return trial.scenario.visibility == "visible"
 
 
-def _spared_notes(results: Sequence[TrialResult]) -> tuple[str, ...]:
+def _build_spared_notes(results: Sequence[TrialResult]) -> tuple[str, ...]:
     """Return notes on visible trials that ran without a child. Hidden trials are not counted."""
     shown = [result.recording.notes for result in results if result.visibility == "visible"]
-    counts = [(note, sum(note in notes for notes in shown)) for note in SPARED.values()]
+    counts = [(note, sum(note in notes for notes in shown)) for note in REPLAY_NOTES.values()]
     return tuple(
         f"{note.replace('this trial', f'{count} of {len(shown)} trials')}: two trials had ended with the same fault, "
         "and the program had the same input and uses no random numbers, so the result would be the same"
@@ -179,12 +181,12 @@ def _spared_notes(results: Sequence[TrialResult]) -> tuple[str, ...]:
     )
 
 
-def _limits_of_job(assignment: Assignment, trials: int) -> JobLimits:
+def _compute_job_limits(assignment: Assignment, trials: int) -> JobLimits:
     limits = assignment.limits
-    return JobLimits(limits.all_output_mb * _MEGABYTE, limits.all_cpu_of(trials), limits.all_sleep)
+    return JobLimits(limits.all_output_mb * _MEGABYTE, limits.compute_total_cpu(trials), limits.all_sleep)
 
 
-class _Watch:
+class _ProgressReporter:
     """Reduces the frequent heartbeats of a trial to one observer call a second."""
 
     def __init__(self, observe: Callable[[GradingProgress], None], trials: int) -> None:
@@ -195,56 +197,56 @@ class _Watch:
 
     def heartbeat(self) -> None:
         if time.monotonic() - self._last >= _OBSERVE_SECONDS:
-            self._tell()
+            self._report_progress()
 
-    def finished_one(self) -> None:
+    def count_finished_trial(self) -> None:
         self._done += 1
-        self._tell()
+        self._report_progress()
 
-    def _tell(self) -> None:
+    def _report_progress(self) -> None:
         self._last = time.monotonic()
         self._observe(GradingProgress(self._done, self._trials))
 
 
-def _floor(world: WorldSpec, seed: int) -> Floor:
+def _build_floor(world: WorldSpec, seed: int) -> Floor:
     if world.image is not None:
-        return _own_floor(world.background, world.image)
-    return floor(world.background, labels=world.labels, seed=seed if world.sheet is None else world.sheet)
+        return _load_floor_image(world.background, world.image)
+    return build_floor(world.background, labels=world.labels, seed=seed if world.sheet is None else world.sheet)
 
 
 @functools.lru_cache(maxsize=2)
-def _own_floor(name: str, image: bytes) -> Floor:
+def _load_floor_image(name: str, image: bytes) -> Floor:
     """Load the floor image once for all trials. Cameras cache images by identity."""
-    return floor_from_image(name, image)
+    return build_floor_from_image(name, image)
 
 
-def _spec(trial: Trial, plan: RunPlan) -> TrialSpec:
+def _build_trial_spec(trial: Trial, plan: RunPlan) -> TrialSpec:
     world = plan.assignment.world
     if trial.scenario.visibility != "visible":
-        plan = plan.unwatched()
+        plan = plan.to_hidden_plan()
     if plan.program is None:
         raise AssignmentError(f"Assignment {plan.assignment.id} has scenarios and no robot program to run in them.")
     return TrialSpec(
         program=plan.program,
-        responder=plan.answers,
+        responder=plan.responder,
         agents=plan.agents,
         collaborative=plan.collaborative,
-        floor=_floor(world, trial.seed),
-        robot=robot(world.robot),
+        floor=_build_floor(world, trial.seed),
+        robot=get_robot(world.robot),
         pose=trial.pose,
         noise=Noise(trial.light_noise, trial.motor_noise, world.noise == "both directions"),
         channel=trial.channel,
         seconds=trial.scenario.seconds,
         seed=trial.seed,
-        child_seed=child_seed(trial.seed, plan.submission),
+        child_seed=compute_child_seed(trial.seed, plan.submission),
         pen_down="p" in plan.flags.switches,
         physics=Physics(world.solid, world.drive),
         tick=BROWSER_TICK if world.tick == "browser" else TICK,
-        partner=_partner(trial, plan),
+        partner=_build_partner_spec(trial, plan),
     )
 
 
-def _partner(trial: Trial, plan: RunPlan) -> PartnerSpec | None:
+def _build_partner_spec(trial: Trial, plan: RunPlan) -> PartnerSpec | None:
     """Return the second robot, if there is one. A program from the assignment may run until the time limit."""
     if plan.second_program is None or trial.second_pose is None:
         return None

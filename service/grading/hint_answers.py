@@ -12,147 +12,154 @@ from collections.abc import Iterator
 
 from responders.message_format import JSON
 from service.grading.grade import CriterionResult
-from service.grading.hint_clues import Clues, finding_of
-from service.grading.hint_code import joined
-from service.grading.hint_relations import advice_on
-from service.grading.hint_rules import RETURNS, where_returned
-from service.grading.judging.message_parts import quoted
+from service.grading.hint_clues import Clues, describe_first_failure
+from service.grading.hint_code import join_tokens
+from service.grading.hint_differences import advise_on_difference
+from service.grading.hint_formats import RETURN_LINE, describe_return_line
+from service.grading.judging.message_parts import quote_text
 from sim.readers.json_text import read_json
-from sim.readers.unreadable import Unreadable
-from submissions.criteria.coping import FreshAnswers, Resends
-from submissions.criteria.logged import ImageLog
+from sim.readers.reader_errors import UnreadableDataError
+from submissions.criteria.logs import ImageLog
 from submissions.criteria.replies import Replies
 from submissions.criteria.reporting import Reports
+from submissions.criteria.unreliable_channel import FreshAnswers, Resends
 
 _KEY = re.compile(r"""["'](\w{2,40})["']\s*:""")
 _NO_KEY = re.compile(r"KeyError: '([^']+)'")
 _AFTER = re.compile(r'"([^"]+)" did not come after "(\w+)"')
-_NOTHING = re.compile(r"\bNone\b|\bnull\b")
+_NONE_VALUE = re.compile(r"\bNone\b|\bnull\b")
 _TEXT_NUMBER = re.compile(r'"(\w+)"\s*:\s*"(-?\d+(?:\.\d+)?)"')
 _IMAGE_LOG = re.compile(r"image_data (?:left|right|both)\Z")
-_NEAR = 0.6
+_MIN_SIMILARITY = 0.6
 _VALUE = re.compile(r'but it (?:answered|has) "([^"]{1,80})"')
 #: The number of answers that show a constant shift.
-_ENOUGH = 2
+_MIN_SHIFTED_ANSWERS = 2
 
 
-def of_other_keys(clues: Clues) -> Iterator[str]:
+def hint_about_other_keys(clues: Clues) -> Iterator[str]:
     """Yield a hint on a key missing from all answers, if they have a similar key or other keys in its place."""
     for criterion in clues.lost:
         path = (criterion.path or "") if isinstance(criterion, Replies) else ""
         wanted = path.rpartition(".")[2]
         for answer in clues.answers if path else ():
-            there = _keys_beside(answer, path)
-            if there and not any(wanted in _keys_beside(each, path) for each in clues.answers):
-                keys = " and ".join(map(quoted, there[:3]))
-                line = _line_of_key(there, clues) or where_returned(answer, clues, RETURNS)
-                yield f"{line}: the answer has {keys}; expected the key {quoted(wanted)}"
+            there = _list_sibling_keys(answer, path)
+            if there and not any(wanted in _list_sibling_keys(each, path) for each in clues.answers):
+                keys = " and ".join(map(quote_text, there[:3]))
+                line = _describe_key_line(there, clues) or describe_return_line(answer, clues, RETURN_LINE)
+                yield f"{line}: the answer has {keys}; expected the key {quote_text(wanted)}"
                 return
-    yield from _near_keys(clues)
+    yield from _hint_about_near_keys(clues)
 
 
-def of_missing_key(clues: Clues) -> Iterator[str]:
+def hint_about_missing_key(clues: Clues) -> Iterator[str]:
     """Yield a hint on a key that the assignment asks for and the robot reads, but no answer has."""
     missing = (_NO_KEY.match(fault.message) for fault in clues.faults if fault.who == "program")
     key = next((found[1] for found in missing if found), "")
     if not key or f'"{key}"' not in clues.task or clues.missing == "responder":
         return
     given = list(dict.fromkeys(each for answer in clues.answers for each in _KEY.findall(answer)))
-    near = difflib.get_close_matches(key.casefold(), [each.casefold() for each in given], 1, _NEAR)
+    near = difflib.get_close_matches(key.casefold(), [each.casefold() for each in given], 1, _MIN_SIMILARITY)
     other = next((each for each in given if each.casefold() in near and f'"{each}"' not in clues.task), "")
-    line = _line_of_key([other], clues) if other and key not in given else ""
+    line = _describe_key_line([other], clues) if other and key not in given else ""
     if line:
-        yield f"{line} answers the key {quoted(other)}; the assignment asks for {quoted(key)}. Write {quoted(key)}"
+        yield (
+            f"{line} answers the key {quote_text(other)}; the assignment asks for {quote_text(key)}. Write "
+            f"{quote_text(key)}"
+        )
 
 
-def of_none_answers(clues: Clues) -> Iterator[str]:
+def hint_about_none_answers(clues: Clues) -> Iterator[str]:
     """Yield a hint on an answer that contains None, if exactly one line returns None."""
-    answer = next((each for each in clues.answers if _NOTHING.search(each)), None)
+    answer = next((each for each in clues.answers if _NONE_VALUE.search(each)), None)
     if answer is None or not any(isinstance(each, Replies) for each in clues.lost):
         return
     found = [
         (listing, each)
-        for listing in clues.answering
+        for listing in clues.responder_process_listings
         for each in listing.code.statements
         if each.tokens in (("return", "None"), ("return",))
     ]
     if len(found) != 1:
         return
     listing, each = found[0]
-    condition = next((one for one in listing.code.around(each) if one.keyword in ("if", "elif")), None)
+    condition = next((one for one in listing.code.list_enclosing(each) if one.keyword in ("if", "elif")), None)
     if condition is not None:
         yield (
-            f"{listing.at(each.line)} returns None, and the answer was {quoted(answer)}. Check the condition in line "
-            f"{condition.line}: {joined(condition.condition)}"
+            f"{listing.locate(each.line)} returns None, and the answer was {quote_text(answer)}. Check the "
+            "condition in line "
+            f"{condition.line}: {join_tokens(condition.condition)}"
         )
 
 
-def of_answer_values(clues: Clues) -> Iterator[str]:
+def hint_about_answer_values(clues: Clues) -> Iterator[str]:
     """Yield the line that makes a wrong value of an answer, with how it differs from the expected one."""
-    for criterion in clues.dearest[:1]:
+    for criterion in clues.costliest_criteria[:1]:
         path = (criterion.path or "") if isinstance(criterion, Replies) else ""
-        found = _VALUE.search(finding_of(clues, criterion)) if path else None
-        where = _line_of_key([path.rpartition(".")[2]], clues) if found else ""
+        found = _VALUE.search(describe_first_failure(clues, criterion)) if path else None
+        where = _describe_key_line([path.rpartition(".")[2]], clues) if found else ""
         if found is None or not where or not isinstance(criterion, Replies):
             continue
         expected = next((each for each in criterion.expect.values() if str(each).endswith(found[1])), "")
-        advice = advice_on(expected, found[1]) if expected and isinstance(expected, str) else ""
+        advice = advise_on_difference(expected, found[1]) if expected and isinstance(expected, str) else ""
         if found[1].startswith("["):
             advice = "It is a list or an array: take its first value with [0]"
         if advice:
-            yield f"{where} answers {quoted(found[1])} at {path}. {advice}"
+            yield f"{where} answers {quote_text(found[1])} at {path}. {advice}"
             return
 
 
-def of_shifted_numbers(clues: Clues) -> Iterator[str]:
+def hint_about_shifted_numbers(clues: Clues) -> Iterator[str]:
     """Yield a hint on a number of the answers that is too large or too small by the same amount in every trial."""
     reports = {each.id for each in clues.lost if isinstance(each, Reports) and each.source == "reply"}
     for result in clues.results:
         failed = [each.message for each in result.evidence if not each.passed] if result.id in reports else []
-        pairs = {found for each in failed if (found := _shift(each)) is not None}
-        if len(failed) < _ENOUGH or len(pairs) != 1:
+        pairs = {found for each in failed if (found := _compute_shift(each)) is not None}
+        if len(failed) < _MIN_SHIFTED_ANSWERS or len(pairs) != 1:
             continue
         key, shift = pairs.pop()
-        where = _line_of_key([key], clues)
+        where = _describe_key_line([key], clues)
         if where and shift:
             fix = f"add {shift}" if shift > 0 else f"subtract {-shift}"
             size = "small" if shift > 0 else "large"
-            yield f"{where}: {quoted(key)} is {abs(shift)} too {size} in every answer. Correct how it is counted: {fix}"
+            yield (
+                f"{where}: {quote_text(key)} is {abs(shift)} too {size} in every answer. Correct how it is counted: "
+                f"{fix}"
+            )
             return
 
 
-def _shift(told: str) -> tuple[str, int] | None:
+def _compute_shift(told: str) -> tuple[str, int] | None:
     """Return the key and expected minus actual value of an answer; None if they are no whole numbers."""
     asked, answer = _AFTER.search(told), told.partition(JSON)[2].rpartition('"')[0]
-    value = _object_of(JSON + answer).get(asked[2]) if asked is not None else None
+    value = _unwrap_object(JSON + answer).get(asked[2]) if asked is not None else None
     if asked is None or not isinstance(value, int) or not asked[1].isdigit():
         return None
     return asked[2], int(asked[1]) - value
 
 
-def of_swapped_values(clues: Clues) -> Iterator[str]:
+def hint_about_swapped_values(clues: Clues) -> Iterator[str]:
     """Yield a hint on a number that belongs to another key of the answer."""
     reports = {each.id for each in clues.lost if isinstance(each, Reports) and each.source == "reply"}
     for result in clues.results:
-        asked = _AFTER.search(_messages(result)) if result.id in reports else None
+        asked = _AFTER.search(_join_messages(result)) if result.id in reports else None
         for answer in clues.answers if asked else ():
-            values = _object_of(answer)
+            values = _unwrap_object(answer)
             number, key = asked.groups() if asked else ("", "")
             other = next((each for each, value in values.items() if each != key and str(value) == number), None)
-            if any(True for _ in of_shifted_numbers(clues)):
+            if any(True for _ in hint_about_shifted_numbers(clues)):
                 return
             if other is None or key not in values or str(values[key]) == number:
                 continue
-            where = _line_of_key([key], clues)
+            where = _describe_key_line([key], clues)
             if where:
                 yield (
-                    f"{where}: {quoted(key)} is {values[key]}; expected {number}, which {quoted(other)} has. "
-                    f"Check the values of {quoted(key)} and {quoted(other)}: they may be swapped"
+                    f"{where}: {quote_text(key)} is {values[key]}; expected {number}, which {quote_text(other)} has. "
+                    f"Check the values of {quote_text(key)} and {quote_text(other)}: they may be swapped"
                 )
                 return
 
 
-def of_text_numbers(clues: Clues) -> Iterator[str]:
+def hint_about_text_numbers(clues: Clues) -> Iterator[str]:
     """Yield a hint on a number sent as a text that the program compares with a number."""
     if not any(isinstance(each, Resends | FreshAnswers | Replies) for each in clues.lost):
         return
@@ -162,73 +169,75 @@ def of_text_numbers(clues: Clues) -> Iterator[str]:
             continue
         key = found[1]
         compared = re.compile(rf"""\[["']{key}["']\]\s*(?:==|!=|<|>)(?!\s*["'])""")
-        place = next((each for each in clues.programs if each.find(compared)), None)
+        place = next((each for each in clues.programs if each.find_line(compared)), None)
         if place is not None:
             yield (
-                f"{_line_of_key([key], clues) or 'responder.py'} sends {quoted(key)} as the text {quoted(found[2])}, "
-                f"and {place.at(place.find(compared))} compares it with a number. Write int(...) around the text"
+                f"{_describe_key_line([key], clues) or 'responder.py'} sends {quote_text(key)} as the text "
+                f"{quote_text(found[2])}, "
+                f"and {place.locate(place.find_line(compared))} compares it with a number. Write int(...) around "
+                "the text"
             )
             return
 
 
-def of_image_command(clues: Clues) -> Iterator[str]:
+def hint_about_image_command(clues: Clues) -> Iterator[str]:
     """Yield a hint on a printed text that is close to ``image_data left``."""
     if not any(isinstance(each, ImageLog) for each in clues.lost):
         return
     for text in clues.printed:
         near = difflib.SequenceMatcher(None, text.casefold(), "image_data left").ratio()
         if near >= 0.75 and not _IMAGE_LOG.match(text) and "logged..." not in text:
-            where = clues.where("program", re.compile(re.escape(text)))
+            where = clues.describe_matching_line("program", re.compile(re.escape(text)))
             side = next((each for each in ("right", "both") if each in text), "left")
-            yield f'{where} prints {quoted(text)}, which logs no image; expected "image_data {side}"'
+            yield f'{where} prints {quote_text(text)}, which logs no image; expected "image_data {side}"'
             return
 
 
-def _near_keys(clues: Clues) -> Iterator[str]:
+def _hint_about_near_keys(clues: Clues) -> Iterator[str]:
     """Yield a hint on a key required within a text, as in ``"'typ': 'PY'"``."""
     for criterion in clues.lost:
         texts = criterion.contains if isinstance(criterion, Replies) else ()
         wanted = {key for text in texts for key in _KEY.findall(text)}
         there = {key for answer in clues.answers for key in _KEY.findall(answer)}
         for key in sorted(wanted - there):
-            near = difflib.get_close_matches(key, sorted(there - wanted), 1, _NEAR)
-            line = _line_of_key(near, clues) if near else ""
+            near = difflib.get_close_matches(key, sorted(there - wanted), 1, _MIN_SIMILARITY)
+            line = _describe_key_line(near, clues) if near else ""
             if line:
-                yield f"{line} writes the key {quoted(near[0])}; expected {quoted(key)}"
+                yield f"{line} writes the key {quote_text(near[0])}; expected {quote_text(key)}"
                 return
 
 
-def _keys_beside(answer: str, path: str) -> list[str]:
+def _list_sibling_keys(answer: str, path: str) -> list[str]:
     """Return the keys of an answer at the level of the path's last key."""
-    value = _parsed(answer)
+    value = _parse_answer(answer)
     for key in path.split(".")[:-1]:
         value = value.get(key) if isinstance(value, dict) else None
     return [str(key) for key in value] if isinstance(value, dict) else []
 
 
-def _object_of(answer: str) -> dict[str, object]:
+def _unwrap_object(answer: str) -> dict[str, object]:
     """Return the innermost object of an answer that is wrapped in objects of one key; {} if it is not an object."""
-    value = _parsed(answer)
+    value = _parse_answer(answer)
     while isinstance(value, dict) and len(value) == 1:
         value = next(iter(value.values()))
     return {str(key): each for key, each in value.items()} if isinstance(value, dict) else {}
 
 
-def _parsed(answer: str) -> object:
-    with contextlib.suppress(ValueError, Unreadable):
+def _parse_answer(answer: str) -> object:
+    with contextlib.suppress(ValueError, UnreadableDataError):
         return read_json(answer.removeprefix(JSON)) if answer.startswith(JSON) else None
     return None
 
 
-def _line_of_key(keys: list[str], clues: Clues) -> str:
+def _describe_key_line(keys: list[str], clues: Clues) -> str:
     """Return the line of a responder that writes one of the keys; empty if none does."""
-    for listing in clues.answering:
+    for listing in clues.responder_process_listings:
         for key in keys:
-            line = listing.find(re.compile(rf"""["']{re.escape(key)}["']\s*:"""))
+            line = listing.find_line(re.compile(rf"""["']{re.escape(key)}["']\s*:"""))
             if line is not None:
-                return listing.at(line)
+                return listing.locate(line)
     return ""
 
 
-def _messages(result: CriterionResult) -> str:
+def _join_messages(result: CriterionResult) -> str:
     return " ".join((result.message, *(each.message for each in result.evidence)))

@@ -15,14 +15,17 @@ _PLAIN_TEXT = re.compile(r"""[bru]?["']""", re.IGNORECASE)
 _LONGEST = 60
 
 
-def of_braces(clues: Clues) -> Iterator[str]:
+def hint_about_braces(clues: Clues) -> Iterator[str]:
     """Yield a hint with the line of the text that was meant as an f-string."""
     if not clues.lost:
         return
     texts = (*clues.printed, *clues.spoken, *clues.sent, *clues.answers)
     found = {each[0]: each[1] for text in texts for each in _BRACES.finditer(text)}
     names = {
-        name for listing in clues.texts for each in listing.code.statements for name in (*each.bound, *each.tokens)
+        name
+        for listing in clues.texts
+        for each in listing.code.statements
+        for name in (*each.bound_names, *each.tokens)
     }
     for listing in clues.texts:
         for statement in listing.code.statements:
@@ -32,7 +35,7 @@ def of_braces(clues: Clues) -> Iterator[str]:
                     continue
                 fixed = f"f{token}" if len(token) <= _LONGEST else "f before the first quote"
                 yield (
-                    f"{listing.at(statement.line)}: the f before the quotes is missing, so {braces} stays as it is "
+                    f"{listing.locate(statement.line)}: the f before the quotes is missing, so {braces} stays as it is "
                     f"and is not replaced by its value. Write {fixed}"
                 )
                 return

@@ -13,12 +13,12 @@ from functools import cached_property
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.hint_code import CodeStatements, read_code
 from service.grading.run_plan import RunPlan
-from sim.recorded import faults_of, stood_still
 from sim.recording import Fault, Message, Recording
+from sim.recording_values import collect_faults, is_stationary
 from submissions.assignment.definition import Assignment
 from submissions.criteria import Criterion
-from submissions.raw_files import shown
-from submissions.source_text import is_program_magic, magic_place
+from submissions.raw_files import sanitise_name
+from submissions.source_text import find_magic_line, is_program_magic
 from submissions.submission import PART_FILES, SECOND_PROGRAM, Part, Submission
 
 _MOST_LINES, _LONGEST_LINE = 5000, 300
@@ -43,18 +43,18 @@ class Listing:
     @cached_property
     def magic_place(self) -> int | None:
         """The index of its magic line, if it has one."""
-        return magic_place("\n".join(self.lines))
+        return find_magic_line("\n".join(self.lines))
 
     @property
-    def runs_robot(self) -> bool:
+    def is_robot_cell(self) -> bool:
         """Return whether this is a cell with a robot program."""
         return self.magic_place is not None and is_program_magic(self.lines[self.magic_place])
 
-    def find(self, pattern: re.Pattern[str], start: int = 0) -> int | None:
+    def find_line(self, pattern: re.Pattern[str], start: int = 0) -> int | None:
         """Return the number, from 1, of the first line after ``start`` that matches; None if no line does."""
         return next((n for n, line in enumerate(self.lines[start:], start + 1) if pattern.search(line)), None)
 
-    def at(self, line: int | None) -> str:
+    def locate(self, line: int | None) -> str:
         """Return ``line 3 of robot.py``, or only the name if the line is unknown."""
         return self.name if line is None else f"line {line} of {self.name}"
 
@@ -91,7 +91,7 @@ class Clues:
     results: tuple[CriterionResult, ...] = ()
     limit: float = 0.0
     task: str = ""
-    beside: tuple[Listing, ...] = ()
+    extra_listings: tuple[Listing, ...] = ()
     marked_cell: int | None = None
     ignored_magic: str = ""
     idle_responder: str = ""
@@ -100,7 +100,7 @@ class Clues:
     definition: Assignment | None = None
     practice: tuple[CriterionResult, ...] = ()
     shown: tuple[TrialResult, ...] = ()
-    by_trial: Mapping[int, Recording] = field(default_factory=dict)
+    recordings_by_trial: Mapping[int, Recording] = field(default_factory=dict)
 
     @property
     def cell_errors(self) -> tuple[Fault, ...]:
@@ -110,44 +110,44 @@ class Clues:
     @property
     def programs(self) -> Iterator[Listing]:
         """The robot programs: files, and cells that begin with a simulator magic."""
-        return (each for each in self.listings if each.part == "program" or (each.part is None and each.runs_robot))
+        return (each for each in self.listings if each.part == "program" or (each.part is None and each.is_robot_cell))
 
     @property
     def responders(self) -> Iterator[Listing]:
         """The responder's texts that are not robot programs."""
         programs = {each.name for each in self.programs}
-        return (each for each in self.of("responder") if each.name not in programs)
+        return (each for each in self.list_texts("responder") if each.name not in programs)
 
     @property
-    def answering(self) -> Iterator[Listing]:
+    def responder_process_listings(self) -> Iterator[Listing]:
         """The texts that run in the responder's process: the responder and its agents."""
         yield from self.responders
-        yield from self.beside
+        yield from self.extra_listings
 
     @property
     def texts(self) -> tuple[Listing, ...]:
         """All texts of the submission."""
-        return (*self.listings, *self.beside)
+        return (*self.listings, *self.extra_listings)
 
     @property
-    def wants_queue(self) -> bool:
+    def should_use_queue(self) -> bool:
         """Return whether a criterion asks for JSON objects or the program reads the queue."""
         asked = any(
             getattr(each, "is_json", False) or getattr(each, "path", None) or getattr(each, "json_queue", False)
             for each in self.lost
         )
-        return asked or any(listing.find(_QUEUE) for listing in self.of("program"))
+        return asked or any(listing.find_line(_QUEUE) for listing in self.list_texts("program"))
 
     @property
-    def dearest(self) -> list[Criterion]:
+    def costliest_criteria(self) -> list[Criterion]:
         """The visible criteria that lost marks, the costliest first."""
         results = {each.id: each for each in self.results}
         return sorted(self.lost, key=lambda each: results[each.id].marks - results[each.id].max_marks)
 
     @property
-    def stood_still(self) -> bool:
+    def is_stationary(self) -> bool:
         """Return whether no robot moved in any visible trial."""
-        return bool(self.recordings) and all(map(stood_still, self.recordings))
+        return bool(self.recordings) and all(map(is_stationary, self.recordings))
 
     @property
     def seconds(self) -> float:
@@ -157,17 +157,17 @@ class Clues:
     @property
     def faults(self) -> Iterator[Fault]:
         """The first three faults of each visible trial, in order of time."""
-        return (fault for recording in self.recordings for fault in faults_of(recording)[:3])
+        return (fault for recording in self.recordings for fault in collect_faults(recording)[:3])
 
     @property
     def printed(self) -> tuple[str, ...]:
         """The distinct texts that programs printed."""
-        return _different(line.text for recording in self.recordings for line in recording.printed)
+        return _collect_distinct_texts(line.text for recording in self.recordings for line in recording.printed)
 
     @property
     def spoken(self) -> tuple[str, ...]:
         """The distinct texts that robots said."""
-        return _different(line.text for recording in self.recordings for line in recording.spoken)
+        return _collect_distinct_texts(line.text for recording in self.recordings for line in recording.spoken)
 
     @property
     def messages(self) -> Iterator[Message]:
@@ -184,25 +184,25 @@ class Clues:
         """The distinct answers of the responder."""
         return self._messages("responder")
 
-    def of(self, part: Part) -> Iterator[Listing]:
+    def list_texts(self, part: Part) -> Iterator[Listing]:
         """Return the texts that may contain the part."""
         return (each for each in self.listings if each.part in (part, None))
 
-    def where(self, part: Part, pattern: re.Pattern[str]) -> str:
+    def describe_matching_line(self, part: Part, pattern: re.Pattern[str]) -> str:
         """Return the first matching line as ``line 3 of robot.py``; the part's file if no line matches."""
-        for listing in self.of(part):
-            line = listing.find(pattern)
+        for listing in self.list_texts(part):
+            line = listing.find_line(pattern)
             if line is not None:
-                return listing.at(line)
+                return listing.locate(line)
         return PART_FILES[part] if any(each.part == part for each in self.listings) else "the notebook"
 
     def _messages(self, sender: str) -> tuple[str, ...]:
-        return _different(
+        return _collect_distinct_texts(
             message.text for recording in self.recordings for message in recording.messages if message.sender == sender
         )
 
 
-def clues_of(
+def collect_clues(
     submission: Submission, plan: RunPlan, trials: Sequence[TrialResult], results: Sequence[CriterionResult]
 ) -> Clues:
     """Collect the clues from what the student may see before publication."""
@@ -211,30 +211,34 @@ def clues_of(
     recordings = [each for first in visible for each in (first, first.partner) if each is not None]
     seen = {index for index, trial in enumerate(trials) if trial.visibility == "visible"}
     return Clues(
-        tuple(_listings(submission, plan.assignment.world.robots)),
+        tuple(_build_listings(submission, plan.assignment.world.robots)),
         tuple(recordings),
         tuple(each for each in plan.assignment.criteria if each.id in lost),
         tuple(submission.files),
         plan.missing,
         plan.flags.preamble,
         plan.collaborative,
-        tuple(_as_shown(each, seen) for each in results if each.id in lost),
+        tuple(_remove_hidden_evidence(each, seen) for each in results if each.id in lost),
         min((each.seconds for each in plan.assignment.scenarios if each.visibility == "visible"), default=0.0),
         plan.assignment.description,
-        tuple(_beside(submission)),
+        tuple(_build_extra_listings(submission)),
         getattr(plan.trial, "cell", None),
         plan.ignored_magic,
         submission.notebook.raw_responders[0] if submission.notebook and submission.notebook.raw_responders else "",
         frozenset(plan.agents),
         plan.assignment.id,
         plan.assignment,
-        tuple(_as_shown(each, seen) for each in results if each.visibility == "visible" and not each.max_marks),
+        tuple(
+            _remove_hidden_evidence(each, seen)
+            for each in results
+            if each.visibility == "visible" and not each.max_marks
+        ),
         tuple(trial for trial in trials if trial.visibility == "visible"),
         {index: trials[index].recording for index in seen},
     )
 
 
-def _as_shown(result: CriterionResult, seen: Set[int]) -> CriterionResult:
+def _remove_hidden_evidence(result: CriterionResult, seen: Set[int]) -> CriterionResult:
     """Return the result without anything that comes from hidden trials."""
     evidence = tuple(each for each in result.evidence if each.trial in seen)
     if len(evidence) == len(result.evidence):
@@ -244,30 +248,30 @@ def _as_shown(result: CriterionResult, seen: Set[int]) -> CriterionResult:
     return replace(result, evidence=evidence, message=told, accuracy=accuracy, predictions=(), curves=(), shown=None)
 
 
-def _listings(submission: Submission, robots: int) -> Iterator[Listing]:
+def _build_listings(submission: Submission, robots: int) -> Iterator[Listing]:
     if submission.program is not None:
-        yield _listing("robot.py", "program", submission.program.text)
+        yield _build_listing("robot.py", "program", submission.program.text)
     if submission.responder is not None:
-        yield _listing("responder.py", "responder", submission.responder.text)
-    second = submission.code(SECOND_PROGRAM) if robots == 2 else None
+        yield _build_listing("responder.py", "responder", submission.responder.text)
+    second = submission.find_code(SECOND_PROGRAM) if robots == 2 else None
     if second is not None:
-        yield _listing(SECOND_PROGRAM, "program", second.text)
+        yield _build_listing(SECOND_PROGRAM, "program", second.text)
     for cell in submission.notebook.cells if submission.notebook is not None else ():
-        yield _listing(f"cell {cell.number}", None, cell.source)
+        yield _build_listing(f"cell {cell.number}", None, cell.source)
 
 
-def _beside(submission: Submission) -> Iterator[Listing]:
+def _build_extra_listings(submission: Submission) -> Iterator[Listing]:
     for name in [each for each in sorted(submission.files) if each.endswith(".py")][:_MOST_BESIDE]:
         if name in submission.python_files:
-            yield _listing(name, None, submission.python_files[name].text)
+            yield _build_listing(name, None, submission.python_files[name].text)
 
 
-def _listing(name: str, part: Part | None, text: str) -> Listing:
+def _build_listing(name: str, part: Part | None, text: str) -> Listing:
     lines = tuple(line[:_LONGEST_LINE].rstrip("\r") for line in text.split("\n", _MOST_LINES)[:_MOST_LINES])
     return Listing(name, part, lines)
 
 
-def _different(texts: Iterator[str]) -> tuple[str, ...]:
+def _collect_distinct_texts(texts: Iterator[str]) -> tuple[str, ...]:
     found: dict[str, None] = {}
     for text in texts:
         found[text[:LONGEST_TEXT]] = None
@@ -276,28 +280,28 @@ def _different(texts: Iterator[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def finding_of(clues: Clues, criterion: Criterion) -> str:
+def describe_first_failure(clues: Clues, criterion: Criterion) -> str:
     """Return the message of the first failure of a criterion that lost marks."""
     result = next(each for each in clues.results if each.id == criterion.id)
     return next((each.message for each in result.evidence if not each.passed and each.message), result.message)
 
 
-def listing_of(fault: Fault, clues: Clues) -> Listing | None:
+def find_listing(fault: Fault, clues: Clues) -> Listing | None:
     """Return the text that contains the fault; None if it is not one of the student's texts."""
-    name = name_of(fault)
+    name = name_faulty_text(fault)
     if name == SECOND_PROGRAM and not any(each.name == name for each in clues.texts):
         name = "robot.py"  # one program runs on both robots
     return next((each for each in clues.texts if each.name == name), None)
 
 
-def place_of(fault: Fault, clues: Clues) -> str:
+def describe_fault_line(fault: Fault, clues: Clues) -> str:
     """Return the position of a fault as ``line 3 of robot.py``; empty if it is not in the student's texts."""
-    name = name_of(fault)
-    listing = listing_of(fault, clues) or Listing(shown(name), None, ())
-    return listing.at(fault.line) if listing.lines or name in clues.files else ""
+    name = name_faulty_text(fault)
+    listing = find_listing(fault, clues) or Listing(sanitise_name(name), None, ())
+    return listing.locate(fault.line) if listing.lines or name in clues.files else ""
 
 
-def name_of(fault: Fault) -> str:
+def name_faulty_text(fault: Fault) -> str:
     """Return the name of the text that contains the fault."""
     if fault.file:
         return fault.file

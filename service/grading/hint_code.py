@@ -12,7 +12,7 @@ import tokenize
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-_SKIPPED = frozenset({tokenize.COMMENT, tokenize.NL, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER})
+_SKIPPED_TOKENS = frozenset({tokenize.COMMENT, tokenize.NL, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER})
 _NAME = re.compile(r"[^\W\d]\w*\Z")
 _MAGIC = re.compile(r"^\s*[%!]")
 _MOST_STATEMENTS, _MOST_TOKENS = 3000, 400
@@ -61,21 +61,21 @@ class Statement:
         return self.tokens[0] if len(self.tokens) > 2 and self.tokens[1] == "=" and is_name(self.tokens[0]) else ""
 
     @property
-    def bound(self) -> frozenset[str]:
+    def bound_names(self) -> frozenset[str]:
         """The names that it binds by assignment, definition, import or loop."""
-        return frozenset(_bound(self.tokens))
+        return frozenset(_collect_bound_names(self.tokens))
 
     @property
     def calls(self) -> tuple[CallInCode, ...]:
         """The calls in the statement, from left to right. Empty for ``def`` and ``class``."""
-        return tuple(_calls(self.tokens)) if self.keyword not in ("def", "class") else ()
+        return tuple(_parse_calls(self.tokens)) if self.keyword not in ("def", "class") else ()
 
-    def has(self, *names: str) -> bool:
+    def has_token(self, *names: str) -> bool:
         """Return whether one of the names is among the tokens."""
         return any(name in self.tokens for name in names)
 
 
-_WITH_BODY = frozenset({"while", "for", "if", "elif", "else", "def", "class", "with", "try", "except", "finally"})
+_BLOCK_KEYWORDS = frozenset({"while", "for", "if", "elif", "else", "def", "class", "with", "try", "except", "finally"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,31 +84,31 @@ class CodeStatements:
 
     statements: tuple[Statement, ...] = ()
 
-    def at(self, line: int | None) -> Statement | None:
+    def find_statement(self, line: int | None) -> Statement | None:
         """Return the statement that contains the line, or None."""
         if line is None:
             return None
         return next((each for each in self.statements if each.line <= line <= each.last_line), None)
 
-    def body(self, head: Statement) -> tuple[Statement, ...]:
+    def list_body(self, head: Statement) -> tuple[Statement, ...]:
         """Return the statements inside a loop, condition or function."""
         found = []
-        for each in self.after(head):
+        for each in self.list_following(head):
             if each.indent <= head.indent:
                 break
             found.append(each)
         return tuple(found)
 
-    def after(self, statement: Statement) -> tuple[Statement, ...]:
+    def list_following(self, statement: Statement) -> tuple[Statement, ...]:
         """Return the statements after this one."""
         return self.statements[statement.number + 1 :]
 
-    def next_outside(self, head: Statement) -> Statement | None:
+    def find_next_outside(self, head: Statement) -> Statement | None:
         """Return the first statement after the body of ``head``, or None."""
-        below = self.after(head)[len(self.body(head)) :]
+        below = self.list_following(head)[len(self.list_body(head)) :]
         return below[0] if below else None
 
-    def around(self, statement: Statement) -> tuple[Statement, ...]:
+    def list_enclosing(self, statement: Statement) -> tuple[Statement, ...]:
         """Return the enclosing statements, the innermost first."""
         found: list[Statement] = []
         parent = statement.parent
@@ -117,17 +117,17 @@ class CodeStatements:
             parent = found[-1].parent
         return tuple(found)
 
-    def loops_around(self, statement: Statement) -> tuple[Statement, ...]:
+    def list_enclosing_loops(self, statement: Statement) -> tuple[Statement, ...]:
         """Return the enclosing loops, including itself, innermost first, then loops that call its function."""
-        around = self.around(statement)
+        around = self.list_enclosing(statement)
         loops = [each for each in (statement, *around) if each.keyword in LOOPS]
         function = next((each.tokens[1] for each in around if each.keyword == "def" and len(each.tokens) > 1), "")
         if function:
             callers = (each for each in self.statements if any(call.name == function for call in each.calls))
-            loops += [outer for each in callers for outer in self.around(each) if outer.keyword in LOOPS]
+            loops += [outer for each in callers for outer in self.list_enclosing(each) if outer.keyword in LOOPS]
         return tuple(loops)
 
-    def functions(self) -> Iterator[Statement]:
+    def list_functions(self) -> Iterator[Statement]:
         """Return the heads of the functions."""
         return (each for each in self.statements if each.keyword == "def" and len(each.tokens) > 1)
 
@@ -144,7 +144,7 @@ class CodeStatements:
             if len(given) != 1 or len(given[0].tokens) != 3 or is_name(given[0].tokens[2]):
                 return None
             tokens = given[0].tokens[2:]
-        return _as_number(tokens[0], sign)
+        return _parse_number(tokens[0], sign)
 
 
 def read_code(lines: Sequence[str]) -> CodeStatements:
@@ -152,7 +152,7 @@ def read_code(lines: Sequence[str]) -> CodeStatements:
     text = "\n".join("#" if _MAGIC.match(line) else line for line in lines) + "\n"
     found: list[Statement] = []
     open_blocks: list[Statement] = []
-    for number, each in enumerate(itertools.islice(_statements(text), _MOST_STATEMENTS)):
+    for number, each in enumerate(itertools.islice(_split_statements(text), _MOST_STATEMENTS)):
         while open_blocks and open_blocks[-1].indent >= each.indent:
             open_blocks.pop()
         found.append(replace(each, number=number, parent=open_blocks[-1].number if open_blocks else -1))
@@ -160,7 +160,7 @@ def read_code(lines: Sequence[str]) -> CodeStatements:
     return CodeStatements(tuple(found))
 
 
-def result_of(body: Sequence[Statement]) -> str:
+def guess_result_name(body: Sequence[Statement]) -> str:
     """Guess the name that a function without return should return: a fitted object, else the last assigned name."""
     fitted = [call.name.removesuffix(".fit") for each in body for call in each.calls if call.name.endswith(".fit")]
     assigned = [each.target for each in body if each.target]
@@ -172,7 +172,7 @@ def is_name(token: str) -> bool:
     return _NAME.match(token) is not None
 
 
-def joined(tokens: Sequence[str]) -> str:
+def join_tokens(tokens: Sequence[str]) -> str:
     """Join the tokens into readable code."""
     text = ""
     for before, token in zip(("", *tokens), tokens, strict=False):
@@ -181,7 +181,7 @@ def joined(tokens: Sequence[str]) -> str:
     return text
 
 
-def depths(tokens: Sequence[str]) -> list[int]:
+def compute_bracket_depths(tokens: Sequence[str]) -> list[int]:
     """Return the bracket depth of each token. A bracket has the depth outside it."""
     found, depth = [], 0
     for token in tokens:
@@ -191,42 +191,42 @@ def depths(tokens: Sequence[str]) -> list[int]:
     return found
 
 
-def _statements(text: str) -> Iterator[Statement]:
+def _split_statements(text: str) -> Iterator[Statement]:
     tokens: list[tokenize.TokenInfo] = []
     try:
         for token in tokenize.generate_tokens(io.StringIO(text).readline):
             if token.type == tokenize.NEWLINE:
                 if tokens:
-                    yield from _statement(tokens)
+                    yield from _split_logical_line(tokens)
                 tokens = []
-            elif token.type not in _SKIPPED:
+            elif token.type not in _SKIPPED_TOKENS:
                 tokens.append(token)
     except (tokenize.TokenError, SyntaxError):
         return
 
 
-def _statement(tokens: list[tokenize.TokenInfo]) -> Iterator[Statement]:
+def _split_logical_line(tokens: list[tokenize.TokenInfo]) -> Iterator[Statement]:
     """Yield the statements of one logical line, split at semicolons and before a body on the same line."""
     tokens = tokens[:_MOST_TOKENS]
     first, words = tokens[0], [token.string for token in tokens]
     indent, depth, begin = first.start[1], 0, 0
     for place, word in enumerate(words):
         depth += (word in _OPENING) - (word in _CLOSING)
-        ends = word == ";" or (word == ":" and words[begin] in _WITH_BODY and place + 1 < len(words))
+        ends = word == ";" or (word == ":" and words[begin] in _BLOCK_KEYWORDS and place + 1 < len(words))
         if depth or not ends or words[begin] == "lambda":
             continue
-        yield _made(tokens[begin : place + (word == ":")], indent)
+        yield _build_statement(tokens[begin : place + (word == ":")], indent)
         indent, begin = indent + (word == ":"), place + 1
     if begin < len(words):
-        yield _made(tokens[begin:], indent)
+        yield _build_statement(tokens[begin:], indent)
 
 
-def _made(tokens: list[tokenize.TokenInfo], indent: int) -> Statement:
+def _build_statement(tokens: list[tokenize.TokenInfo], indent: int) -> Statement:
     words, columns = (token.string for token in tokens), (token.start[1] for token in tokens)
     return Statement(tokens[0].start[0], tokens[-1].end[0], indent, tuple(words), columns=tuple(columns))
 
 
-def _bound(tokens: tuple[str, ...]) -> Iterator[str]:
+def _collect_bound_names(tokens: tuple[str, ...]) -> Iterator[str]:
     match tokens:
         case ("def" | "class" | "global", name, *_):
             yield name
@@ -244,27 +244,27 @@ def _bound(tokens: tuple[str, ...]) -> Iterator[str]:
         if token == ":=" and place:
             yield tokens[place - 1]
         if depth == 0 and token.endswith("=") and token not in ("==", "!=", "<=", ">=", ":="):
-            yield from _targets(tokens[:place])
+            yield from _collect_targets(tokens[:place])
 
 
-def _targets(tokens: Sequence[str]) -> Iterator[str]:
+def _collect_targets(tokens: Sequence[str]) -> Iterator[str]:
     if all(is_name(token) or token in ".,()=[]" or token[0].isdigit() or token[0] in "\"'" for token in tokens):
         yield from (
             token for place, token in enumerate(tokens) if is_name(token) and tokens[place - 1 : place] != (".",)
         )
 
 
-def _calls(tokens: Sequence[str]) -> Iterator[CallInCode]:
+def _parse_calls(tokens: Sequence[str]) -> Iterator[CallInCode]:
     for place, token in enumerate(tokens[:-1]):
         if tokens[place + 1] != "(" or not is_name(token) or token in ("and", "or", "not", "in", "if", "while"):
             continue
         begin = place
         while begin >= 2 and tokens[begin - 1] == "." and is_name(tokens[begin - 2]):
             begin -= 2
-        yield CallInCode("".join(tokens[begin : place + 1]), tuple(_arguments(tokens[place + 2 :])))
+        yield CallInCode("".join(tokens[begin : place + 1]), tuple(_split_arguments(tokens[place + 2 :])))
 
 
-def _arguments(tokens: Sequence[str]) -> Iterator[tuple[str, ...]]:
+def _split_arguments(tokens: Sequence[str]) -> Iterator[tuple[str, ...]]:
     depth, begin = 0, 0
     for place, token in enumerate(tokens):
         if token in _CLOSING and depth == 0:
@@ -277,7 +277,7 @@ def _arguments(tokens: Sequence[str]) -> Iterator[tuple[str, ...]]:
             begin = place + 1
 
 
-def _as_number(token: str, sign: float) -> float | None:
+def _parse_number(token: str, sign: float) -> float | None:
     try:
         return sign * float(token)
     except ValueError:

@@ -12,28 +12,28 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
 
-from service.grading.hint_advice import ADVICE, NOT_AVAILABLE, PROPERTIES, USAGE
-from service.grading.hint_clues import Clues, Listing, listing_of, place_of
-from service.grading.hint_code import Statement, joined
-from service.grading.hint_motion import loops_that_end_at_once
+from service.grading.hint_clues import Clues, Listing, describe_fault_line, find_listing
+from service.grading.hint_code import Statement, join_tokens
+from service.grading.hint_formats import RETURN_LINE, describe_return_line
+from service.grading.hint_motion import describe_skipped_loops
 from service.grading.hint_names import (
-    NO_NAME,
     PRELOADED,
-    of_constant,
-    of_later_cell,
-    of_later_line,
-    of_other_process,
-    of_overwritten,
-    of_owner,
+    UNDEFINED_NAME,
+    advise_on_constant,
+    advise_on_later_cell,
+    advise_on_later_line,
+    advise_on_other_process,
+    advise_on_overwritten_name,
+    advise_on_owner,
 )
-from service.grading.hint_rules import RETURNS, where_returned
-from service.grading.hint_syntax import of_syntax
-from service.grading.judging.message_parts import quoted
-from sim.recorded import faults_of
+from service.grading.hint_syntax import advise_on_syntax
+from service.grading.hint_tables import ADVICE, PROPERTIES, UNAVAILABLE_MODULES, USAGE
+from service.grading.judging.message_parts import quote_text
 from sim.recording import Fault, Verdict
-from submissions.raw_files import shown
+from sim.recording_values import collect_faults
+from submissions.raw_files import sanitise_name
 
-_NO_ERRORS = (Verdict.TIME_LIMIT, Verdict.CPU_LIMIT, Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
+_NON_ERROR_VERDICTS = (Verdict.TIME_LIMIT, Verdict.CPU_LIMIT, Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
 _MOST_ERRORS, _LONGEST_ERROR = 3, 300
 _NO_FILE = re.compile(r"FileNotFoundError: \[Errno 2\] No such file or directory: '([^']+)'")
 _NO_ACCESS = re.compile(r"^PermissionError|Permission denied|may only open files")
@@ -56,65 +56,65 @@ _TEXT = re.compile(r"""(["'])((?:(?!\1).){1,200})\1""")
 _VALUES = re.compile(r"(?:, got 1D array instead)?:?\s*\n.*|array=.*|: line \d+ column \d+ \(char \d+\)", re.DOTALL)
 _KEY = re.compile(r"""["'](\w{2,40})["']\s*:""")
 #: A guess by Python that better advice replaces.
-_GUESS = re.compile(r"\. Perhaps you forgot a comma\?$")
+_COMMA_GUESS = re.compile(r"\. Perhaps you forgot a comma\?$")
 #: The list of available modules in a message about a missing module.
 _MODULES = re.compile(r"(?<='): numpy, .* are there$")
 _NEAR_KEY, _NEAR_MODULE = 0.6, 0.8
 
 
-def of_cell_errors(clues: Clues) -> Iterator[str]:
+def hint_about_cell_errors(clues: Clues) -> Iterator[str]:
     """Yield a hint on the first notebook cell that failed, if there are also later errors."""
-    if any(fault.verdict not in _NO_ERRORS for fault in clues.faults):
-        yield from _of_cells(clues)
+    if any(fault.verdict not in _NON_ERROR_VERDICTS for fault in clues.faults):
+        yield from _hint_about_first_cell(clues)
 
 
-def of_other_cell_errors(clues: Clues) -> Iterator[str]:
+def hint_about_failed_cell(clues: Clues) -> Iterator[str]:
     """Yield a hint on the first notebook cell that failed, if marks were lost."""
     if clues.lost:
-        yield from _of_cells(clues)
+        yield from _hint_about_first_cell(clues)
 
 
-def of_errors(clues: Clues) -> Iterator[str]:
+def hint_about_errors(clues: Clues) -> Iterator[str]:
     """Yield the first error of each trial, with advice."""
-    firsts = (faults[0] for recording in clues.recordings if (faults := faults_of(recording)))
+    firsts = (faults[0] for recording in clues.recordings if (faults := collect_faults(recording)))
     for fault in list(dict.fromkeys(replace(each, t=0.0) for each in firsts))[:_MOST_ERRORS]:
-        if fault.verdict not in _NO_ERRORS:
-            yield from _of_error(fault, clues)
+        if fault.verdict not in _NON_ERROR_VERDICTS:
+            yield from _hint_about_error(fault, clues)
 
 
-def _of_cells(clues: Clues) -> Iterator[str]:
+def _hint_about_first_cell(clues: Clues) -> Iterator[str]:
     for fault in clues.cell_errors[:1]:
-        yield from _of_error(fault, clues)
+        yield from _hint_about_error(fault, clues)
 
 
-def _of_error(fault: Fault, clues: Clues) -> Iterator[str]:
-    where = place_of(fault, clues)
+def _hint_about_error(fault: Fault, clues: Clues) -> Iterator[str]:
+    where = describe_fault_line(fault, clues)
     if not where:
         return
-    name = NO_NAME.match(fault.message)
+    name = UNDEFINED_NAME.match(fault.message)
     if name and fault.who == "program" and clues.preamble != "preloaded" and name[1] in PRELOADED:
         yield (
             f"{where} uses {name[1]}, which %%sim_magic_preloaded brings; expected that magic in the first line, "
             "or the name to be defined"
         )
         return
-    yield f"{where}: {advised(fault, clues)}"
+    yield f"{where}: {describe_error(fault, clues)}"
 
 
-def advised(fault: Fault, clues: Clues) -> str:
+def describe_error(fault: Fault, clues: Clues) -> str:
     """Return the error message followed by advice."""
     sentence = _VALUES.sub("", fault.message)[:_LONGEST_ERROR].rstrip(".")
-    advice = advice_on(fault, clues)
+    advice = advise_on_error(fault, clues)
     if not advice:
         return sentence
-    sentence = _MODULES.sub("", _GUESS.sub("", sentence))
+    sentence = _MODULES.sub("", _COMMA_GUESS.sub("", sentence))
     return f"{sentence}{'' if sentence.endswith('?') else '.'} {advice}"
 
 
-def advice_on(fault: Fault, clues: Clues) -> str:
+def advise_on_error(fault: Fault, clues: Clues) -> str:
     """Return advice on an error; empty if there is none."""
-    listing = listing_of(fault, clues)
-    statement = None if listing is None else listing.code.at(fault.line)
+    listing = find_listing(fault, clues)
+    statement = None if listing is None else listing.code.find_statement(fault.line)
     for adviser in _ADVISERS:
         advice = adviser(fault, clues, listing, statement)
         if advice:
@@ -122,27 +122,27 @@ def advice_on(fault: Fault, clues: Clues) -> str:
     return ""
 
 
-def _of_null(fault: Fault, clues: Clues, *_: object) -> str:
+def _advise_on_null(fault: Fault, clues: Clues, *_: object) -> str:
     """Return advice on an error caused by a null value from the responder."""
     answer = next((text for text in clues.answers if _NULL.search(text)), None)
     if fault.who != "program" or "'NoneType' object" not in fault.message or answer is None:
         return ""
-    where = where_returned(answer, clues, RETURNS)
-    return f"The responder answered {quoted(answer)}: check why {where} is reached, and its condition."
+    where = describe_return_line(answer, clues, RETURN_LINE)
+    return f"The responder answered {quote_text(answer)}: check why {where} is reached, and its condition."
 
 
-def _of_lost_message(fault: Fault, clues: Clues, _: Listing | None, statement: Statement | None) -> str:
+def _advise_on_lost_message(fault: Fault, clues: Clues, _: Listing | None, statement: Statement | None) -> str:
     """Return advice on an answer that never came because the channel lost the message."""
-    empty = "IndexError" in fault.message and statement is not None and statement.has("pyState", "messages")
+    empty = "IndexError" in fault.message and statement is not None and statement.has_token("pyState", "messages")
     lost = next((each for each in clues.messages if each.lost in _OUT_OF_REACH), None)
     if fault.who != "program" or not empty or lost is None or clues.answers:
         return ""
-    why = f"{quoted(lost.text)} was lost, because the robot {_OUT_OF_REACH[lost.lost]}"
-    ended = next((found for found, _ in loops_that_end_at_once(clues)), "") if clues.stood_still else ""
+    why = f"{quote_text(lost.text)} was lost, because the robot {_OUT_OF_REACH[lost.lost]}"
+    ended = next((found for found, _ in describe_skipped_loops(clues)), "") if clues.is_stationary else ""
     return f"No answer came: {why}.{ended and ' It never moved. In '}{ended}"
 
 
-def _of_module(fault: Fault, clues: Clues, *_: object) -> str:
+def _advise_on_module(fault: Fault, clues: Clues, *_: object) -> str:
     """Return advice on an import of an agent, of a robot-only module, or of an unavailable module."""
     found = _NO_MODULE.match(fault.message)
     if found is None:
@@ -152,73 +152,76 @@ def _of_module(fault: Fault, clues: Clues, *_: object) -> str:
         return f"{name}.py is an agent, and agents are not imported: delete this line and call {name}(...)."
     if name.startswith("ev3dev2") and fault.who == "responder":
         return f"Only a robot program can import {name}: delete this line."
-    if name in NOT_AVAILABLE:
+    if name in UNAVAILABLE_MODULES:
         return f"{name} is not available here: delete this line and what uses it."
     near = difflib.get_close_matches(name.lower(), [*_LIBRARIES, *sys.stdlib_module_names], 1, _NEAR_MODULE)
     return f"Did you mean {near[0]}?" if near and not fault.hint else ""
 
 
-def _of_message_text(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
+def _advise_on_message_text(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
     """Return advice on a message that the responder uses as an object without decoding it."""
     if fault.who != "responder" or listing is None or statement is None:
         return ""
     if not fault.message.startswith("TypeError: string indices") or any(
-        each.has("loads", "literal_eval") for each in listing.code.statements
+        each.has_token("loads", "literal_eval") for each in listing.code.statements
     ):
         return ""
     return "The message is still a text: write json.loads(...) around the text after IMG_DATA:: or PY::."
 
 
-def _of_unpacking(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
+def _advise_on_unpacking(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
     """Return advice on a property with three values that is unpacked into fewer names."""
     if statement is None or not _UNPACKED.match(fault.message) or "=" not in statement.tokens:
         return ""
     place = statement.tokens.index("=")
     value = statement.tokens[-1]
     if value == "rgb":
-        return f"rgb has three values: write red, green, blue = {joined(statement.tokens[place + 1 :])}."
+        return f"rgb has three values: write red, green, blue = {join_tokens(statement.tokens[place + 1 :])}."
     names = sum(token == "," for token in statement.tokens[:place]) + 1
     return f"There are {names} names to the left of =: write as many names as there are values."
 
 
-def _of_fit(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
+def _advise_on_fit(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
     """Return advice on ``fit`` called with labels and images in the wrong order."""
     if statement is None or "could not convert string to float" not in fault.message:
         return ""
     for call in statement.calls:
-        plain = [joined(each) for each in call.arguments if "=" not in each]
+        plain = [join_tokens(each) for each in call.arguments if "=" not in each]
         if call.name.endswith(".fit") and len(plain) == 2 and _LABELS.search(plain[0]) and not _LABELS.search(plain[1]):
             return f"fit takes the images first and then the labels: write {call.name}({plain[1]}, {plain[0]})."
     return ""
 
 
-def _of_steering(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
+def _advise_on_steering(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
     """Return advice on a speed given in the position of the steering."""
     calls = () if statement is None or "SpeedPercent" not in fault.message else statement.calls
     usage = next((USAGE[call.name] for call in calls if call.name.startswith("tank_turn.") and call.name in USAGE), "")
     return f"The arguments are in the wrong order: write {usage}." if usage else ""
 
 
-def _of_missing_file(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
+def _advise_on_missing_file(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
     """Return advice on a file that was not submitted, or is named with a folder."""
     found = _NO_FILE.search(fault.message)
     if found:
         file = PurePosixPath(found[1].replace("\\", "/")).name
         if file in clues.files or file != found[1]:
-            return f'Files lie beside your program: submit {shown(file)} with it and write "{shown(file)}", no folder.'
+            return (
+                f"Files lie beside your program: submit {sanitise_name(file)} with it and write "
+                f'"{sanitise_name(file)}", no folder.'
+            )
         if fault.hint:
-            return f"{fault.hint} Submit {shown(file)} with your program if that is the right name."
-        return f"There is no such file. Submit {shown(file)} with your program."
+            return f"{fault.hint} Submit {sanitise_name(file)} with your program if that is the right name."
+        return f"There is no such file. Submit {sanitise_name(file)} with your program."
     if not _NO_ACCESS.search(fault.message) or listing is None or fault.line is None:
         return ""
     for text in _TEXT.finditer("".join(listing.lines[fault.line - 1 : fault.line])):
         if "/" in text[2] or "\\" in text[2]:
             file = PurePosixPath(text[2].replace("\\", "/")).name
-            return f'Only files beside your program can be opened: write "{shown(file)}", without folders.'
+            return f'Only files beside your program can be opened: write "{sanitise_name(file)}", without folders.'
     return ""
 
 
-def _of_key(fault: Fault, clues: Clues, *_: object) -> str:
+def _advise_on_key(fault: Fault, clues: Clues, *_: object) -> str:
     """Return advice on a key that is similar to one in the messages or the submission."""
     found = _NO_KEY.match(fault.message)
     if not found:
@@ -230,11 +233,11 @@ def _of_key(fault: Fault, clues: Clues, *_: object) -> str:
         return f'Did you mean "{near[0]}"?'
     answer = next((text for text in reversed(clues.answers) if text.startswith("JSON::")), "")
     if fault.who == "program" and answer:
-        return f"Nothing is stored under this key. The responder answered {quoted(answer)}: use one of its keys."
+        return f"Nothing is stored under this key. The responder answered {quote_text(answer)}: use one of its keys."
     return "Nothing is stored under this key. Print the object to see its keys."
 
 
-def _of_call(fault: Fault, clues: Clues, listing: Listing | None, statement: Statement | None) -> str:
+def _advise_on_call(fault: Fault, clues: Clues, listing: Listing | None, statement: Statement | None) -> str:
     """Return advice on a call of something that is not callable: a property, or an overwritten name."""
     found = _NOT_CALLABLE.match(fault.message)
     if found is None or statement is None or listing is None:
@@ -246,12 +249,13 @@ def _of_call(fault: Fault, clues: Clues, listing: Listing | None, statement: Sta
         given = next((each for each in listing.code.statements if each.target == call.name), None)
         if given is not None:
             return (
-                f"Line {given.line} gives {call.name} another value: {joined(given.tokens)}. Choose another name there."
+                f"Line {given.line} gives {call.name} another value: {join_tokens(given.tokens)}. Choose another name "
+                "there."
             )
     return "A sign such as * or a comma is missing before the bracket, or the name stands for a value."
 
 
-def _of_usage(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
+def _advise_on_usage(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
     """Return the usage of a call that has too few values."""
     found = _TOO_FEW.match(fault.message)
     if found is None or statement is None:
@@ -261,12 +265,12 @@ def _of_usage(fault: Fault, _: Clues, __: Listing | None, statement: Statement |
     return f"Write {usage}." if usage else ""
 
 
-def _of_hint(fault: Fault, *_: object) -> str:
+def _advise_from_hint(fault: Fault, *_: object) -> str:
     """Return the hint that the child process found: a similar name."""
     return fault.hint
 
 
-def _of_table(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
+def _advise_from_table(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
     code = "" if listing is None else "".join(listing.lines[(fault.line or 0) - 1 : fault.line])
     text = f"{fault.message}\n{code}"
     found = ((error.search(text), advice) for error, advice in ADVICE)
@@ -276,24 +280,24 @@ def _of_table(fault: Fault, _: Clues, listing: Listing | None, statement: Statem
 _Adviser = Callable[[Fault, Clues, Listing | None, Statement | None], str]
 #: The first adviser with a result is used.
 _ADVISERS: Sequence[_Adviser] = (
-    of_syntax,
-    of_constant,
-    of_owner,
-    of_later_cell,
-    of_other_process,
-    of_later_line,
-    of_overwritten,
-    _of_lost_message,
-    _of_null,
-    _of_module,
-    _of_message_text,
-    _of_missing_file,
-    _of_key,
-    _of_call,
-    _of_usage,
-    _of_unpacking,
-    _of_steering,
-    _of_fit,
-    _of_hint,
-    _of_table,
+    advise_on_syntax,
+    advise_on_constant,
+    advise_on_owner,
+    advise_on_later_cell,
+    advise_on_other_process,
+    advise_on_later_line,
+    advise_on_overwritten_name,
+    _advise_on_lost_message,
+    _advise_on_null,
+    _advise_on_module,
+    _advise_on_message_text,
+    _advise_on_missing_file,
+    _advise_on_key,
+    _advise_on_call,
+    _advise_on_usage,
+    _advise_on_unpacking,
+    _advise_on_steering,
+    _advise_on_fit,
+    _advise_from_hint,
+    _advise_from_table,
 )

@@ -10,68 +10,72 @@ import re
 from collections.abc import Iterator
 
 from service.grading.hint_clues import Clues, Listing
-from service.grading.hint_code import LOOPS, Statement, joined, result_of
-from service.grading.hint_errors import advised
-from service.grading.hint_relations import advice_on, read_value
+from service.grading.hint_code import LOOPS, Statement, guess_result_name, join_tokens
+from service.grading.hint_differences import advise_on_difference, parse_value
+from service.grading.hint_errors import describe_error
 from sim.recording import Fault, Verdict
 from submissions.criteria.code import Functions
-from submissions.raw_files import shown
+from submissions.raw_files import sanitise_name
 
 _RETURNED_NOTHING = re.compile(r"returned (?:null|None|NoneType)")
 _GAVE_NOTHING = re.compile(r"TypeError: (\w+) returned NoneType, which has no \w+")
 _NO_FUNCTION = "there is no function called"
-_HIDDEN = "hidden calls"
+_HIDDEN_CALLS = "hidden calls"
 _CALLED = re.compile(r"Expected (\w+)\(")
 #: The expected list and the returned list.
 _LISTS = re.compile(r"to return (\[[^\]]+\]), but it returned (\[[^\]]*\])")
 _FAILED = re.compile(r"(?:but it did not|to be loaded, but): (\w+: .{1,300}?) \(line (\d+)\)")
-_NEAR = 0.75
+_MIN_SIMILARITY = 0.75
 
 
 #: The expected value and the returned value.
 _VALUES = re.compile(r"to return (.+?), but it returned (.+?)(?: \(\d+ of \d+ calls correct\))?\.?\Z", re.DOTALL)
 
 
-def of_returned_values(clues: Clues) -> Iterator[str]:
+def hint_about_returned_values(clues: Clues) -> Iterator[str]:
     """Yield the line that makes a wrong value, and how the value differs from the expected one."""
     messages = {each.id: each.message for each in clues.results}
-    for criterion in clues.dearest:
+    for criterion in clues.costliest_criteria:
         told = messages.get(criterion.id, "") if isinstance(criterion, Functions) else ""
         called, values = _CALLED.search(told), _VALUES.search(told)
         if called is None or values is None:
             continue
-        advice = advice_on(read_value(values[1]), read_value(values[2]))
+        advice = advise_on_difference(parse_value(values[1]), parse_value(values[2]))
         if not advice and values[2].startswith("[["):
-            advice = advice_on([], [[]])
-        making = _making(called[1], clues)
+            advice = advise_on_difference([], [[]])
+        making = _find_value_statement(called[1], clues)
         if making is not None:
             listing, each = making
             fix = advice or "Work this call out by hand, line by line, and compare"
-            yield f"{listing.at(each.line)}, {joined(each.tokens)}: {told[0].lower()}{told[1:].rstrip('.')}. {fix}"
+            yield (
+                f"{listing.locate(each.line)}, {join_tokens(each.tokens)}: {told[0].lower()}{told[1:].rstrip('.')}. "
+                f"{fix}"
+            )
             return
 
 
-def of_narrow_except(clues: Clues) -> Iterator[str]:
+def hint_about_narrow_except(clues: Clues) -> Iterator[str]:
     """Yield a hint on an ``except`` that catches too few errors, if only hidden calls failed."""
-    for criterion in clues.dearest:
+    for criterion in clues.costliest_criteria:
         told = next((each.message for each in clues.results if each.id == criterion.id), "")
-        if not isinstance(criterion, Functions) or _HIDDEN not in told:
+        if not isinstance(criterion, Functions) or _HIDDEN_CALLS not in told:
             continue
         for listing in clues.responders:
             for each in listing.code.statements:
-                if each.keyword == "except" and len(each.tokens) > 2 and not each.has("Exception"):
+                if each.keyword == "except" and len(each.tokens) > 2 and not each.has_token("Exception"):
                     yield (
-                        f"{listing.at(each.line)} catches only {joined(each.tokens[1:]).rstrip(':')}. Another error, "
+                        f"{listing.locate(each.line)} catches only {join_tokens(each.tokens[1:]).rstrip(':')}. "
+                        "Another error, "
                         "such as KeyError or TypeError, ends the function. Write except Exception:"
                     )
                     return
 
 
-def _making(name: str, clues: Clues) -> tuple[Listing, Statement] | None:
+def _find_value_statement(name: str, clues: Clues) -> tuple[Listing, Statement] | None:
     """Return the statement that makes the value of a function: its only append, otherwise its only computed return."""
     for listing in clues.responders:
-        for head in listing.code.functions():
-            body = listing.code.body(head) if head.tokens[1] == name else ()
+        for head in listing.code.list_functions():
+            body = listing.code.list_body(head) if head.tokens[1] == name else ()
             appends = [each for each in body if any(call.name.endswith(".append") for call in each.calls)]
             returns = [each for each in body if each.keyword == "return" and len(each.tokens) > 1]
             # A returned name says nothing about the line that went wrong.
@@ -82,7 +86,7 @@ def _making(name: str, clues: Clues) -> tuple[Listing, Statement] | None:
     return None
 
 
-def of_functions(clues: Clues) -> Iterator[str]:
+def hint_about_functions(clues: Clues) -> Iterator[str]:
     """Yield one hint for each function that lost marks."""
     messages = {each.id: each.message for each in clues.results}
     for criterion in clues.lost:
@@ -91,16 +95,16 @@ def of_functions(clues: Clues) -> Iterator[str]:
         told = messages.get(criterion.id, "")
         names = {criterion.function, *(call.function for call in criterion.calls)} - {""}
         for name in sorted(names):
-            found = _of_error(told, clues) or _of_function(name, told, clues)
+            found = _hint_about_function_error(told, clues) or _hint_about_function(name, told, clues)
             if found:
                 yield found
                 break
 
 
-def of_wrong_values(name: str, told: str) -> str:
+def hint_about_wrong_values(name: str, told: str) -> str:
     """Return a hint with the function, its call and the value. It names no line, since the return may be correct."""
     expected = f"{told[0].lower()}{told[1:].rstrip('.')}"
-    if _HIDDEN not in told:
+    if _HIDDEN_CALLS not in told:
         called = _CALLED.search(told)
         return f"The function {called[1] if called else name}: {expected}"
     return (
@@ -109,46 +113,46 @@ def of_wrong_values(name: str, told: str) -> str:
     )
 
 
-def no_return(listing: Listing, head: Statement) -> str:
+def describe_missing_return(listing: Listing, head: Statement) -> str:
     """Return a hint that the function has no return, with the line to add."""
-    result = result_of(listing.code.body(head))
+    result = guess_result_name(listing.code.list_body(head))
     fix = f"Add return {result} as its last line" if result else "Add return with the result"
-    return f"{listing.at(head.line)}: {head.tokens[1]} has no return, so it gives nothing back. {fix}"
+    return f"{listing.locate(head.line)}: {head.tokens[1]} has no return, so it gives nothing back. {fix}"
 
 
-def of_no_return(clues: Clues) -> Iterator[str]:
+def hint_about_missing_return(clues: Clues) -> Iterator[str]:
     """Yield a hint on a function such as ``train`` that ends without a return."""
     name = next((found[1] for fault in clues.faults if (found := _GAVE_NOTHING.search(fault.message))), "")
     for listing in clues.responders:
-        for head in listing.code.functions():
-            returns = any(each.keyword == "return" for each in listing.code.body(head))
+        for head in listing.code.list_functions():
+            returns = any(each.keyword == "return" for each in listing.code.list_body(head))
             if head.tokens[1] == name and not returns:
-                yield no_return(listing, head)
+                yield describe_missing_return(listing, head)
                 return
 
 
-def early_return(listing: Listing, head: Statement) -> Statement | None:
+def find_early_return(listing: Listing, head: Statement) -> Statement | None:
     """Return a return that ends a loop in its first iteration, or None.
 
     It is directly in the loop, or in the else of an if whose branches all return.
     """
-    for each in listing.code.body(head):
+    for each in listing.code.list_body(head):
         parent = listing.code.statements[each.parent] if each.parent >= 0 else None
         if each.keyword != "return" or parent is None:
             continue
-        if parent.keyword in LOOPS or (parent.keyword == "else" and _returns_in_any_case(listing, parent)):
+        if parent.keyword in LOOPS or (parent.keyword == "else" and _has_exhaustive_returns(listing, parent)):
             return each
     return None
 
 
-def _returns_in_any_case(listing: Listing, last: Statement) -> bool:
+def _has_exhaustive_returns(listing: Listing, last: Statement) -> bool:
     """Return whether an ``else`` is directly in a loop and all branches before it also end with a return."""
     loop = listing.code.statements[last.parent] if last.parent >= 0 else None
     if loop is None or loop.keyword not in LOOPS:
         return False
-    beside = [each for each in listing.code.body(loop) if each.parent == loop.number and each.number < last.number]
+    beside = [each for each in listing.code.list_body(loop) if each.parent == loop.number and each.number < last.number]
     for each in reversed(beside):
-        ending = [one for one in listing.code.body(each) if one.parent == each.number][-1:]
+        ending = [one for one in listing.code.list_body(each) if one.parent == each.number][-1:]
         if each.keyword not in ("if", "elif") or not ending or ending[0].keyword != "return":
             return False
         if each.keyword == "if":
@@ -156,7 +160,7 @@ def _returns_in_any_case(listing: Listing, last: Statement) -> bool:
     return False
 
 
-def _of_error(told: str, clues: Clues) -> str:
+def _hint_about_function_error(told: str, clues: Clues) -> str:
     """Return the line where a called function failed, with advice on its error; empty if unknown."""
     found = _FAILED.search(told)
     listing = next((each for each in clues.responders if each.part == "responder"), None)
@@ -164,39 +168,42 @@ def _of_error(told: str, clues: Clues) -> str:
         return ""
     line, error = int(found[2]), found[1]
     fault = Fault(0.0, Verdict.RESPONDER_ERROR, "responder", error, line)
-    return f"{listing.at(line)}: {advised(fault, clues)}"
+    return f"{listing.locate(line)}: {describe_error(fault, clues)}"
 
 
-def _of_function(name: str, told: str, clues: Clues) -> str:
-    defined = [(listing, head) for listing in clues.responders for head in listing.code.functions() if not head.indent]
+def _hint_about_function(name: str, told: str, clues: Clues) -> str:
+    defined = [
+        (listing, head) for listing in clues.responders for head in listing.code.list_functions() if not head.indent
+    ]
     own = next(((listing, head) for listing, head in defined if head.tokens[1] == name), None)
     if own is None:
         if _NO_FUNCTION not in told:
             return ""
-        near = difflib.get_close_matches(name, [head.tokens[1] for _, head in defined], 1, _NEAR)
+        near = difflib.get_close_matches(name, [head.tokens[1] for _, head in defined], 1, _MIN_SIMILARITY)
         listing, head = next(((one, each) for one, each in defined if each.tokens[1] in near), (None, None))
         if listing is None or head is None:
             return ""
-        return f"{listing.at(head.line)} defines {shown(head.tokens[1])}; expected a function called {name}"
+        return f"{listing.locate(head.line)} defines {sanitise_name(head.tokens[1])}; expected a function called {name}"
     listing, head = own
-    body = listing.code.body(head)
+    body = listing.code.list_body(head)
     returns = [each for each in body if each.keyword == "return" and len(each.tokens) > 1]
     prints = next((each for each in body if each.keyword == "print"), None)
     if not returns and prints is not None:
-        return f"{listing.at(prints.line)} prints the result of {name} and does not return it. Write return there"
+        return f"{listing.locate(prints.line)} prints the result of {name} and does not return it. Write return there"
     if not returns and _RETURNED_NOTHING.search(told):
-        return no_return(listing, head)
-    early = early_return(listing, head)
+        return describe_missing_return(listing, head)
+    early = find_early_return(listing, head)
     if early is not None:
         return (
-            f"{listing.at(early.line)}: return is in the loop, so {name} ends in the first pass of the loop. Move "
+            f"{listing.locate(early.line)}: return is in the loop, so {name} ends in the first pass of the loop. Move "
             "return below the loop: indent it less"
         )
     stop = next((each for each in body if each.tokens == ("break",)), None)
     lists = _LISTS.search(told)
     if stop is not None and lists and len(lists[2].split(",")) < len(lists[1].split(",")) + (lists[2] == "[]"):
         return (
-            f"{listing.at(stop.line)}: break ends the whole loop, so {name} returns too few values. To skip only this "
+            f"{listing.locate(stop.line)}: break ends the whole loop, so {name} returns too few values. To skip "
+            "only this "
             "value, write continue in place of break"
         )
     return ""

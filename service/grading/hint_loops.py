@@ -8,76 +8,79 @@ from __future__ import annotations
 import keyword
 from collections.abc import Iterator, Sequence
 
-from service.grading.hint_advice import AMOUNTS, MOVES_FOR, PROPERTIES, READINGS
-from service.grading.hint_clues import Clues, Listing, listing_of, place_of
-from service.grading.hint_code import CodeStatements, Statement, is_name, joined
-from sim.recorded import faults_of
+from service.grading.hint_clues import Clues, Listing, describe_fault_line, find_listing
+from service.grading.hint_code import CodeStatements, Statement, is_name, join_tokens
+from service.grading.hint_tables import AMOUNTS, LIMITED_MOVES, PROPERTIES, READINGS
 from sim.recording import Fault, Verdict
+from sim.recording_values import collect_faults
 
 _LIMITS = (Verdict.TIME_LIMIT, Verdict.CPU_LIMIT)
-_FREE = frozenset({"position", "speed", "state", "is_running"})
+_FREE_PROPERTIES = frozenset({"position", "speed", "state", "is_running"})
 _WAITS = (
-    frozenset({"sleep", "wait_until_not_moving", "wait_until", "wait", "wait_while"}) | MOVES_FOR | (PROPERTIES - _FREE)
+    frozenset({"sleep", "wait_until_not_moving", "wait_until", "wait", "wait_while"})
+    | LIMITED_MOVES
+    | (PROPERTIES - _FREE_PROPERTIES)
 )
 _KEYWORDS = frozenset({"and", "or", "not", "in", "is", "True", "False", "None", "len"})
-_MOST_TURNS = 100_000
+_MAX_ITERATIONS = 100_000
 
 
-def of_limits(clues: Clues) -> Iterator[str]:
+def hint_about_limits(clues: Clues) -> Iterator[str]:
     """Yield hints with the line where a program was stopped and why the loop around it does not end."""
-    for fault in dict.fromkeys(_stopped(clues)):
-        where, listing = place_of(fault, clues), listing_of(fault, clues)
+    for fault in dict.fromkeys(_collect_limit_faults(clues)):
+        where, listing = describe_fault_line(fault, clues), find_listing(fault, clues)
         if not where or listing is None:
             continue
-        statement = listing.code.at(fault.line)
+        statement = listing.code.find_statement(fault.line)
         if statement is None:
             continue
-        yield _reason(fault, listing, statement, clues)
+        yield _explain_limit(fault, listing, statement, clues)
         return
 
 
-def _stopped(clues: Clues) -> Iterator[Fault]:
+def _collect_limit_faults(clues: Clues) -> Iterator[Fault]:
     """Yield the faults that ended trials at a limit. Time limits count only if a criterion reports them."""
     for recording in clues.recordings:
-        for fault in faults_of(recording)[:1]:
+        for fault in collect_faults(recording)[:1]:
             told = any(fault.message in each.message for each in clues.results)
             if fault.verdict is Verdict.CPU_LIMIT or (fault.verdict is Verdict.TIME_LIMIT and told):
                 yield fault
 
 
-def _reason(fault: Fault, listing: Listing, statement: Statement, clues: Clues) -> str:
+def _explain_limit(fault: Fault, listing: Listing, statement: Statement, clues: Clues) -> str:
     code = listing.code
-    amount = too_large_amount(code, statement, clues.limit)
+    amount = describe_large_amount(code, statement, clues.limit)
     if amount:
-        return f"{listing.at(statement.line)}: {amount}"
-    loops = code.loops_around(statement)
+        return f"{listing.locate(statement.line)}: {amount}"
+    loops = code.list_enclosing_loops(statement)
     for loop in loops:
-        why = _endless(loop, code, listing, fault)
+        why = _explain_endless_loop(loop, code, listing, fault)
         if why:
             return why
     up = "the simulated time was up" if fault.verdict is Verdict.TIME_LIMIT else "it was stopped"
     who = "responder" if fault.who == "responder" else "program"
     if loops:
-        head = joined(loops[0].tokens)
+        head = join_tokens(loops[0].tokens)
         return (
-            f'{listing.at(loops[0].line)}: the {who} was still in the loop "{head}" when {up}. '
-            f"{_wait_for(loops[0], code, fault)}"
+            f'{listing.locate(loops[0].line)}: the {who} was still in the loop "{head}" when {up}. '
+            f"{_suggest_loop_fix(loops[0], code, fault)}"
         )
     return (
-        f'{listing.at(statement.line)}: the {who} was still in the line "{joined(statement.tokens)}" when {up}. '
+        f'{listing.locate(statement.line)}: the {who} was still in the line "{join_tokens(statement.tokens)}" '
+        f"when {up}. "
         "Check what it waits for, and whether that ever happens"
     )
 
 
-def _wait_for(loop: Statement, code: CodeStatements, fault: Fault) -> str:
-    if fault.verdict is Verdict.CPU_LIMIT and fault.who != "responder" and not _waits(loop, code):
+def _suggest_loop_fix(loop: Statement, code: CodeStatements, fault: Fault) -> str:
+    if fault.verdict is Verdict.CPU_LIMIT and fault.who != "responder" and not _is_waiting(loop, code):
         return "Nothing in it waits, so the robot cannot move. Add time.sleep(0.1), or read a sensor, in the loop"
     if fault.who == "responder":
         return "Check when it ends, or make the calculation smaller"
     return "Check when its condition becomes false, or end it with break"
 
 
-def too_large_amount(code: CodeStatements, statement: Statement, least: float) -> str:
+def describe_large_amount(code: CodeStatements, statement: Statement, least: float) -> str:
     """Return a hint that a call has a time or an amount in the wrong unit; otherwise empty."""
     for call in statement.calls:
         known = AMOUNTS.get(call.name.rpartition(".")[2])
@@ -96,43 +99,46 @@ def too_large_amount(code: CodeStatements, statement: Statement, least: float) -
     return ""
 
 
-def _endless(loop: Statement, code: CodeStatements, listing: Listing, fault: Fault) -> str:
+def _explain_endless_loop(loop: Statement, code: CodeStatements, listing: Listing, fault: Fault) -> str:
     """Return why a loop does not end; empty if that is not clear."""
-    body = code.body(loop)
-    where = listing.at(loop.line)
+    body = code.list_body(loop)
+    where = listing.locate(loop.line)
     if loop.keyword == "for":
         turns = next((call for call in loop.calls if call.name == "range"), None)
         numbers = [number for each in (turns.arguments if turns else ()) if (number := code.number(each)) is not None]
-        if numbers and max(map(abs, numbers)) >= _MOST_TURNS:
+        if numbers and max(map(abs, numbers)) >= _MAX_ITERATIONS:
             return f"{where}: this loop has {max(numbers):,.0f} passes, which is too many. Use a smaller number"
         return ""
-    head, condition = joined(loop.tokens), loop.condition
+    head, condition = join_tokens(loop.tokens), loop.condition
     for each in body:
-        effect = without_effect(each, code)
+        effect = describe_discarded_value(each, code)
         if effect and any(token in condition for token in each.tokens if is_name(token)):
             never = f"so the loop in line {loop.line}, {head[:-1]}, never ends"
-            return f"{listing.at(each.line)}: {effect}, {never}. {fix_effect(each)}"
+            return f"{listing.locate(each.line)}: {effect}, {never}. {suggest_correct_statement(each)}"
     if condition in (("True",), ("1",), ("not", "False")):
-        once = _read_before(loop, body, code)
+        once = _describe_stale_reading(loop, body, code)
         if once:
             return f"{where}: {once}"
         if any(each.keyword in ("break", "return") for each in body):
             return ""
-        return f"{where}: {head[:-1]} repeats for ever{_lacks(body, fault)}. {_end_it(body, fault)}"
-    always = always_true(condition, code)
+        return (
+            f"{where}: {head[:-1]} repeats for ever{_describe_missing_actions(body, fault)}. "
+            f"{_suggest_loop_end(body, fault)}"
+        )
+    always = explain_always_true(condition, code)
     if always:
         return f"{where}: {head[:-1]} never ends: {always}"
-    step = _wrong_step(loop, body)
+    step = _find_wrong_step(loop, body)
     if step:
         each, effect, fix = step
         never = f"so the loop in line {loop.line}, {head[:-1]}, never ends"
-        return f"{listing.at(each.line)}: {joined(each.tokens)} {effect}, {never}. {fix}"
+        return f"{listing.locate(each.line)}: {join_tokens(each.tokens)} {effect}, {never}. {fix}"
     names = {token for place, token in enumerate(condition) if is_name(token) and token not in _KEYWORDS}
     reads = any(token in (".", "(") for token in condition)
-    changed = {name for each in body for name in each.bound}
+    changed = {name for each in body for name in each.bound_names}
     calls = {call.name for each in body for call in each.calls}
     if names and not reads and not names & changed and not any(each.keyword == "global" for each in code.statements):
-        return f"{where}: {head[:-1]} never ends: {_unchanged(sorted(names), loop, code, calls)}"
+        return f"{where}: {head[:-1]} never ends: {_describe_unchanged_names(sorted(names), loop, code, calls)}"
     exact = [place for place, token in enumerate(condition) if token in ("!=", "==")]
     if exact and any(token in PROPERTIES for token in condition) and any(each[:1].isdigit() for each in condition):
         past = "the value can jump past the number between two readings"
@@ -140,10 +146,10 @@ def _endless(loop: Statement, code: CodeStatements, listing: Listing, fault: Fau
     return ""
 
 
-def _wrong_step(loop: Statement, body: Sequence[Statement]) -> tuple[Statement, str, str] | None:
+def _find_wrong_step(loop: Statement, body: Sequence[Statement]) -> tuple[Statement, str, str] | None:
     """Return the statement that moves a counter away from its limit, its effect, and the fix; otherwise None."""
     condition = loop.condition
-    if len(condition) < 3 or condition[1] not in _AWAY or not is_name(condition[0]):
+    if len(condition) < 3 or condition[1] not in _DIVERGING_SIGNS or not is_name(condition[0]):
         return None
     name, sign = condition[0], condition[1]
     for each in body:
@@ -152,14 +158,14 @@ def _wrong_step(loop: Statement, body: Sequence[Statement]) -> tuple[Statement, 
         if each.target == name and len(each.tokens) == 3 and not is_name(each.tokens[2]):
             again = f"gives {name} the same value in each pass"
             return each, again, "Move it to the line before the loop, without indentation"
-        direction = _direction(each, name)
-        if direction == _AWAY[sign]:
+        direction = _find_step_sign(each, name)
+        if direction == _DIVERGING_SIGNS[sign]:
             away, towards = ("grow", "-") if direction == "+" else ("shrink", "+")
             return each, f"makes {name} {away}", f"Write {towards} in place of {direction}"
     return None
 
 
-def _direction(statement: Statement, name: str) -> str:
+def _find_step_sign(statement: Statement, name: str) -> str:
     """Return ``+`` or ``-`` if the statement adds to the name or subtracts from it; otherwise empty."""
     tokens = statement.tokens
     if tokens[0] == name and len(tokens) == 3 and tokens[1] in ("+=", "-="):
@@ -170,31 +176,36 @@ def _direction(statement: Statement, name: str) -> str:
 
 
 #: The sign that leads away from the end of a loop with this comparison.
-_AWAY = {">": "+", ">=": "+", "<": "-", "<=": "-"}
+_DIVERGING_SIGNS = {">": "+", ">=": "+", "<": "-", "<=": "-"}
 
 
-def _read_before(loop: Statement, body: Sequence[Statement], code: CodeStatements) -> str:
+def _describe_stale_reading(loop: Statement, body: Sequence[Statement], code: CodeStatements) -> str:
     """Return a hint on a reading that the loop uses but that is read only once, before it."""
-    if any(_reads(each) for each in body):
+    if any(_is_reading(each) for each in body):
         return ""
-    changed = {name for each in body for name in each.bound}
+    changed = {name for each in body for name in each.bound_names}
     for each in code.statements[: loop.number]:
-        if each.target and _reads(each) and each.target not in changed and any(one.has(each.target) for one in body):
-            again = joined(each.tokens)
+        if (
+            each.target
+            and _is_reading(each)
+            and each.target not in changed
+            and any(one.has_token(each.target) for one in body)
+        ):
+            again = join_tokens(each.tokens)
             return f"{each.target} is read once, in line {each.line}, and not again. Repeat {again} in the loop"
     return ""
 
 
-def _lacks(body: Sequence[Statement], fault: Fault) -> str:
+def _describe_missing_actions(body: Sequence[Statement], fault: Fault) -> str:
     missing = []
     if fault.verdict is Verdict.CPU_LIMIT and fault.who != "responder":
         missing.append("nothing in it waits")
-    if not any(_reads(each) for each in body) and fault.who != "responder":
+    if not any(_is_reading(each) for each in body) and fault.who != "responder":
         missing.append("it reads no sensor")
     return f", and {' and '.join(missing)}" if missing else ""
 
 
-def _end_it(body: Sequence[Statement], fault: Fault) -> str:
+def _suggest_loop_end(body: Sequence[Statement], fault: Fault) -> str:
     if fault.who == "responder":
         return "End it with break, or write a condition in place of True"
     if fault.verdict is Verdict.CPU_LIMIT:
@@ -202,47 +213,47 @@ def _end_it(body: Sequence[Statement], fault: Fault) -> str:
     return "End it with break, write a condition that reads a sensor, or remove the loop"
 
 
-def without_effect(statement: Statement, code: CodeStatements) -> str:
+def describe_discarded_value(statement: Statement, code: CodeStatements) -> str:
     """Return a hint that a statement computes a value and discards it; empty if it has an effect."""
     tokens = statement.tokens
-    if _has_turned_operator(statement, code):
+    if _has_reversed_operator(statement, code):
         return f"{tokens[0]} ={tokens[2]} {tokens[3]} sets {tokens[0]} to {tokens[2]}{tokens[3]}"
     operators = [token for token in tokens if token in ("+", "-", "*", "/", "==", "<", ">")]
     if not is_name(tokens[0]) or not operators or any(each.endswith("=") and each != "==" for each in tokens):
         return ""
     plain = all(is_name(each) or each in "+-*/.==<>" or each[0].isdigit() for each in tokens)
-    return f"{joined(tokens)} has no effect" if plain and tokens[0] not in _STATEMENTS else ""
+    return f"{join_tokens(tokens)} has no effect" if plain and tokens[0] not in _STATEMENTS else ""
 
 
-def _has_turned_operator(statement: Statement, code: CodeStatements) -> bool:
+def _has_reversed_operator(statement: Statement, code: CodeStatements) -> bool:
     """Return whether this is ``count =- 1``, spaced so, in a loop, for a variable assigned earlier."""
     tokens, columns, name = statement.tokens, statement.columns, statement.target
     if len(tokens) != 4 or not name or name.isupper() or tokens[2] not in ("+", "-"):
         return False
     is_written_so = columns[2] == columns[1] + 1 and columns[3] > columns[2] + 1
     has_value = any(each.target == name for each in code.statements[: statement.number])
-    return is_written_so and has_value and bool(code.loops_around(statement))
+    return is_written_so and has_value and bool(code.list_enclosing_loops(statement))
 
 
 _STATEMENTS = frozenset(keyword.kwlist)
 
 
-def fix_effect(statement: Statement) -> str:
+def suggest_correct_statement(statement: Statement) -> str:
     """Return the correct form of a statement without effect."""
     tokens = statement.tokens
     if tokens[1] == "=":
         return f"Write {tokens[0]} {tokens[2]}= {tokens[3]}"
     if tokens[1] == "==":
-        return f"Write one = for an assignment: {tokens[0]} = {joined(tokens[2:])}"
-    return f"Write {tokens[0]} = {joined(tokens)}"
+        return f"Write one = for an assignment: {tokens[0]} = {join_tokens(tokens[2:])}"
+    return f"Write {tokens[0]} = {join_tokens(tokens)}"
 
 
-def always_true(condition: Sequence[str], code: CodeStatements) -> str:
+def explain_always_true(condition: Sequence[str], code: CodeStatements) -> str:
     """Return why a comparison of a reading with a number is always true; empty if it is not."""
     place = next((at for at, token in enumerate(condition) if token in ("<", ">", "<=", ">=")), None)
     if place is None or any(token in ("and", "or", "not") for token in condition):
         return ""
-    sign, name = condition[place], reading_in(condition[:place], code)
+    sign, name = condition[place], find_reading(condition[:place], code)
     number = code.number(condition[place + 1 :])
     if not name or number is None:
         return ""
@@ -250,20 +261,20 @@ def always_true(condition: Sequence[str], code: CodeStatements) -> str:
     holds = {">=": number <= least, ">": number < least, "<=": number >= most, "<": number > most}[sign]
     if not holds:
         return ""
-    what = joined(condition)
+    what = join_tokens(condition)
     better = (
         f"Write {sign[0]} {number:g}" if sign in (">=", "<=") and number in (least, most) else "Choose a number within"
     )
     return f"{what} is always true, because {name} {unit}. {better}"
 
 
-def reading_in(tokens: Sequence[str], code: CodeStatements) -> str:
+def find_reading(tokens: Sequence[str], code: CodeStatements) -> str:
     """Return the reading that the token is or that was assigned to the name; otherwise empty."""
-    name = tokens[-1] if tokens and tokens[-1] in READINGS else _source(tokens, code)
+    name = tokens[-1] if tokens and tokens[-1] in READINGS else _find_source_token(tokens, code)
     return name if name in READINGS else ""
 
 
-def _source(tokens: Sequence[str], code: CodeStatements) -> str:
+def _find_source_token(tokens: Sequence[str], code: CodeStatements) -> str:
     """Return the last token of the value assigned to a name; otherwise empty."""
     if len(tokens) != 1:
         return ""
@@ -271,22 +282,25 @@ def _source(tokens: Sequence[str], code: CodeStatements) -> str:
     return given.tokens[-1] if given is not None else ""
 
 
-def _unchanged(names: Sequence[str], loop: Statement, code: CodeStatements, calls: set[str]) -> str:
+def _describe_unchanged_names(names: Sequence[str], loop: Statement, code: CodeStatements, calls: set[str]) -> str:
     listed = " and ".join(names[:2])
     change = "does not change" if len(names) == 1 else "do not change"
     for name in names:
-        given = next((each for each in code.statements[: loop.number] if each.target == name and _reads(each)), None)
+        given = next(
+            (each for each in code.statements[: loop.number] if each.target == name and _is_reading(each)), None
+        )
         if given is not None:
             return (
-                f"{name} is read once, in line {given.line}, and not again. Repeat {joined(given.tokens)} in the loop"
+                f"{name} is read once, in line {given.line}, and not again. Repeat {join_tokens(given.tokens)} in the "
+                "loop"
             )
     return f"{listed} {change} in the loop. Assign {names[0]} in the loop"
 
 
-def _reads(statement: Statement) -> bool:
+def _is_reading(statement: Statement) -> bool:
     return any(token in PROPERTIES or token in ("get_clock", "pyState") for token in statement.tokens)
 
 
-def _waits(loop: Statement, code: CodeStatements) -> bool:
+def _is_waiting(loop: Statement, code: CodeStatements) -> bool:
     """Return whether the loop takes simulated time. Reading the state of a motor takes none."""
-    return any(token in _WAITS for each in (loop, *code.body(loop)) for token in each.tokens)
+    return any(token in _WAITS for each in (loop, *code.list_body(loop)) for token in each.tokens)

@@ -8,100 +8,115 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from service.grading.hint_advice import MOVES_FOR, MOVES_ON, PROPERTIES, READINGS
 from service.grading.hint_clues import Clues, Listing
-from service.grading.hint_code import CallInCode, Statement, joined
-from service.grading.hint_loops import too_large_amount
-from service.grading.hint_structure import DRIVEN, moves, statements_of
+from service.grading.hint_code import CallInCode, Statement, join_tokens
+from service.grading.hint_loops import describe_large_amount
+from service.grading.hint_structure import DRIVING_CRITERIA, collect_statements, has_motor_call
+from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES, READINGS
 from submissions.criteria import Criterion
 from submissions.criteria.drawing import Drawing
 from submissions.criteria.ending import EndPose
-from submissions.criteria.motion import AskedMotion, Displacement, Moves
+from submissions.criteria.motion import Displacement, MotionConditions, Moves
 from submissions.criteria.stopping import StopOn
 
 #: Criteria that fail if the robot does not stop in time.
-STOPPED = (EndPose, StopOn)
-_AT_ONCE = 0.5
+STOPPING_CRITERIA = (EndPose, StopOn)
+_IMMEDIATE_SECONDS = 0.5
 _TURNED = re.compile(r"robot turned (\d+(?:\.\d+)?)°")
 
 
-def of_stillness(clues: Clues) -> Iterator[str]:
+def hint_about_stillness(clues: Clues) -> Iterator[str]:
     """Yield a hint on a robot that should have driven and never did."""
-    if not clues.stood_still or not any(isinstance(each, DRIVEN + STOPPED) for each in clues.lost):
+    if not clues.is_stationary or not any(
+        isinstance(each, DRIVING_CRITERIA + STOPPING_CRITERIA) for each in clues.lost
+    ):
         return
-    moving = [(listing, each) for listing, each in statements_of(clues) if moves(each, MOVES_ON | MOVES_FOR)]
-    slow = [pair for pair in moving if _is_zero(*pair)]
+    moving = [
+        (listing, each)
+        for listing, each in collect_statements(clues)
+        if has_motor_call(each, CONTINUOUS_MOVES | LIMITED_MOVES)
+    ]
+    slow = [pair for pair in moving if _is_zero_move(*pair)]
     unwaited = [pair for pair in moving if _has_no_block(pair[1])]
-    switched = [pair for pair in moving if moves(pair[1], MOVES_ON)]
+    switched = [pair for pair in moving if has_motor_call(pair[1], CONTINUOUS_MOVES)]
     if slow and len(slow) == len(moving):
         listing, each = slow[0]
-        yield f"{listing.at(each.line)} drives with speed or length 0, so the robot never moved. Write a larger number"
+        yield (
+            f"{listing.locate(each.line)} drives with speed or length 0, so the robot never moved. Write a larger "
+            "number"
+        )
     elif unwaited:
         listing, each = unwaited[0]
         yield (
-            f"{listing.at(each.line)}: with block=False the program does not wait, and it ends before the robot moves. "
+            f"{listing.locate(each.line)}: with block=False the program does not wait, and it ends before the "
+            "robot moves. "
             "Remove block=False"
         )
-    elif switched and _conditions_of(*switched[0]):
+    elif switched and _list_enclosing_conditions(*switched[0]):
         listing, each = switched[0]
-        head = _conditions_of(listing, each)[0]
+        head = _list_enclosing_conditions(listing, each)[0]
         yield (
-            f"{listing.at(head.line)}: the robot never moved. Line {each.line} runs only if {joined(head.condition)} "
+            f"{listing.locate(head.line)}: the robot never moved. Line {each.line} runs only if "
+            f"{join_tokens(head.condition)} "
             "is true. Print the values in it, and check the condition"
         )
     elif switched:
         listing, each = switched[0]
-        below = next((other for other in listing.code.after(each) if moves(other, frozenset({"off", "stop"}))), None)
+        below = next(
+            (other for other in listing.code.list_following(each) if has_motor_call(other, frozenset({"off", "stop"}))),
+            None,
+        )
         then = f"line {below.line} switches them off at once" if below else "the program ends at once"
         yield (
-            f"{listing.at(each.line)} switches the motors on, but nothing waits after it: {then}, and the robot never "
+            f"{listing.locate(each.line)} switches the motors on, but nothing waits after it: {then}, and the "
+            "robot never "
             "moved. Add time.sleep(2), with import time above, or use on_for_seconds"
         )
-    elif moving and all(_conditions_of(*pair) for pair in moving):
+    elif moving and all(_list_enclosing_conditions(*pair) for pair in moving):
         listing, each = moving[0]
-        head = _conditions_of(listing, each)[0]
+        head = _list_enclosing_conditions(listing, each)[0]
         yield (
-            f"{listing.at(each.line)} moves the robot, but the program never came to it: the robot never moved. "
-            f"Check the condition in line {head.line}: {joined(head.condition)}"
+            f"{listing.locate(each.line)} moves the robot, but the program never came to it: the robot never moved. "
+            f"Check the condition in line {head.line}: {join_tokens(head.condition)}"
         )
     elif moving or not any(listing.code.statements for listing in clues.programs):
         return
-    elif any(isinstance(each, DRIVEN) for each in clues.lost):
+    elif any(isinstance(each, DRIVING_CRITERIA) for each in clues.lost):
         how = "for example with tank_drive.on_for_seconds(20, 20, 1)"
         yield f"the robot never moved; expected the program to switch its motors on, {how}"
 
 
 def _has_no_block(statement: Statement) -> bool:
-    return any(joined(each) == "block = False" for call in statement.calls for each in call.arguments)
+    return any(join_tokens(each) == "block = False" for call in statement.calls for each in call.arguments)
 
 
-def _conditions_of(listing: Listing, statement: Statement) -> list[Statement]:
+def _list_enclosing_conditions(listing: Listing, statement: Statement) -> list[Statement]:
     """Return the enclosing ``if`` and ``while`` statements that may be false, the innermost first."""
-    around = listing.code.around(statement)
+    around = listing.code.list_enclosing(statement)
     return [each for each in around if each.keyword in ("if", "elif", "while") and each.condition != ("True",)]
 
 
-def of_units(clues: Clues) -> Iterator[str]:
+def hint_about_units(clues: Clues) -> Iterator[str]:
     """Yield a hint on an amount in the wrong unit, or a reading compared with a value outside its range."""
-    for listing, each in statements_of(clues):
-        amount = too_large_amount(listing.code, each, 0)
-        if amount and any(isinstance(lost, DRIVEN + STOPPED) for lost in clues.lost):
-            yield f"{listing.at(each.line)}: {amount}"
+    for listing, each in collect_statements(clues):
+        amount = describe_large_amount(listing.code, each, 0)
+        if amount and any(isinstance(lost, DRIVING_CRITERIA + STOPPING_CRITERIA) for lost in clues.lost):
+            yield f"{listing.locate(each.line)}: {amount}"
             return
-        range_ = _out_of_range(listing, each)
+        range_ = _describe_impossible_threshold(listing, each)
         if range_:
-            yield f"{listing.at(each.line)}: {range_}"
+            yield f"{listing.locate(each.line)}: {range_}"
             return
 
 
-def of_distances(clues: Clues) -> Iterator[str]:
+def hint_about_distances(clues: Clues) -> Iterator[str]:
     """Yield a hint on a robot that a distance threshold in centimetres stopped in the wrong place."""
-    if not any(isinstance(each, STOPPED) for each in clues.lost):
+    if not any(isinstance(each, STOPPING_CRITERIA) for each in clues.lost):
         return
     found = [
         (listing, each, number)
-        for listing, each in statements_of(clues)
-        if (number := _compared(listing, each, "distance_centimeters")) is not None
+        for listing, each in collect_statements(clues)
+        if (number := _find_compared_number(listing, each, "distance_centimeters")) is not None
     ]
     for listing, each, number in found[-1:]:
         if number < 10:
@@ -109,117 +124,121 @@ def of_distances(clues: Clues) -> Iterator[str]:
         what = next((criterion for criterion in clues.results if criterion.evidence and not criterion.marks), None)
         seen = next((one.message for one in what.evidence if not one.passed), "") if what is not None else ""
         yield (
-            f"{listing.at(each.line)} compares distance_centimeters with {number:g}: that is in centimetres, so "
+            f"{listing.locate(each.line)} compares distance_centimeters with {number:g}: that is in centimetres, so "
             f"{10 * number:g} mm. For {number:g} mm write {number / 10:g}{'. ' if seen else ''}{seen.rstrip('.')}"
         )
 
 
-def of_turns(clues: Clues) -> Iterator[str]:
+def hint_about_turns(clues: Clues) -> Iterator[str]:
     """Yield a hint on the only line that turns the robot, if the robot turned too much or too little."""
-    turns = list(_turning(clues))
+    turns = list(_collect_turning_calls(clues))
     if len(turns) != 1:
         return
     listing, each, call = turns[0]
     amount = listing.code.number(call.arguments[-1]) if call.arguments else None
-    for criterion, told in _told(clues):
-        asked, turned = _asked_turn(criterion), _TURNED.search(told)
+    for criterion, told in _collect_failure_messages(clues):
+        asked, turned = _find_required_turn(criterion), _TURNED.search(told)
         if asked is None or turned is None or amount is None or not float(turned[1]):
             continue
-        if listing.code.loops_around(each) and not isinstance(criterion, Drawing):
+        if listing.code.list_enclosing_loops(each) and not isinstance(criterion, Drawing):
             continue
         middle = abs(sum(asked) / 2)
         yield (
-            f"{listing.at(each.line)}: the robot turned {turned[1]}°; expected {asked[0]:g} to {asked[1]:g}°. "
-            f"Change {amount:g} to about {_rounded(amount * middle / float(turned[1]))}"
+            f"{listing.locate(each.line)}: the robot turned {turned[1]}°; expected {asked[0]:g} to {asked[1]:g}°. "
+            f"Change {amount:g} to about {_format_number(amount * middle / float(turned[1]))}"
         )
         return
 
 
-def _rounded(number: float) -> str:
+def _format_number(number: float) -> str:
     return f"{number:.0f}" if abs(number) >= 100 else f"{number:.3g}"
 
 
-def of_curves(clues: Clues) -> Iterator[str]:
+def hint_about_curves(clues: Clues) -> Iterator[str]:
     """Yield a hint on a turn that is a curve instead of on the spot, if corners are required."""
-    corners = any(isinstance(each, Drawing) for each in clues.lost) and not clues.stood_still
-    for listing, each, call in _turning(clues):
+    corners = any(isinstance(each, Drawing) for each in clues.lost) and not clues.is_stationary
+    for listing, each, call in _collect_turning_calls(clues):
         steering = listing.code.number(call.arguments[0]) if call.arguments else None
         if corners and steering is not None and 0 < abs(steering) < 100:
             spot = 100 if steering > 0 else -100
             yield (
-                f"{listing.at(each.line)} steers by {steering:g}, so the robot drives a curve. "
+                f"{listing.locate(each.line)} steers by {steering:g}, so the robot drives a curve. "
                 f"To turn on the spot, write {spot} in place of {steering:g}"
             )
             return
 
 
-def of_speeds(clues: Clues) -> Iterator[str]:
+def hint_about_speeds(clues: Clues) -> Iterator[str]:
     """Yield a hint on unequal or negative wheel speeds, if the robot should drive straight forwards."""
-    if clues.stood_still or not any(_asks_straight(criterion) for criterion in clues.lost):
+    if clues.is_stationary or not any(_is_straight_required(criterion) for criterion in clues.lost):
         return
-    for listing, each in statements_of(clues):
+    for listing, each in collect_statements(clues):
         for call in each.calls:
-            if not call.name.startswith("tank_drive.") or call.name.rpartition(".")[2] not in MOVES_FOR | MOVES_ON:
+            if (
+                not call.name.startswith("tank_drive.")
+                or call.name.rpartition(".")[2] not in LIMITED_MOVES | CONTINUOUS_MOVES
+            ):
                 continue
             left, right = (listing.code.number(one) for one in (*call.arguments[:2], (), ())[:2])
             if left is None or right is None or left * right <= 0:
                 continue
             if left < 0:
-                yield f"{listing.at(each.line)} drives backwards: the speeds are negative. Write positive speeds"
+                yield f"{listing.locate(each.line)} drives backwards: the speeds are negative. Write positive speeds"
                 return
             if left != right:
                 yield (
-                    f"{listing.at(each.line)} gives the wheels the speeds {left:g} and {right:g}, so the robot drives "
+                    f"{listing.locate(each.line)} gives the wheels the speeds {left:g} and {right:g}, so the "
+                    "robot drives "
                     "a curve. To drive straight on, give both the same speed"
                 )
                 return
 
 
-def of_loops_that_end_at_once(clues: Clues) -> Iterator[str]:
+def hint_about_skipped_loop(clues: Clues) -> Iterator[str]:
     """Yield a hint on a sensor loop whose condition is false at the start, so the robot stops immediately."""
-    if clues.seconds <= _AT_ONCE and not any(True for _ in clues.faults):
-        for ended, condition in loops_that_end_at_once(clues):
+    if clues.seconds <= _IMMEDIATE_SECONDS and not any(True for _ in clues.faults):
+        for ended, condition in describe_skipped_loops(clues):
             other = condition.replace("<", ">") if "<" in condition else condition.replace(">", "<")
             yield f"{ended}, or write {other}"
 
 
-def loops_that_end_at_once(clues: Clues) -> Iterator[tuple[str, str]]:
+def describe_skipped_loops(clues: Clues) -> Iterator[tuple[str, str]]:
     """Yield the first sensor loop after the motors are switched on: why it ends immediately, and its condition."""
-    for listing, each in statements_of(clues):
+    for listing, each in collect_statements(clues):
         reading = next((token for token in each.condition if token in PROPERTIES), "")
-        drives = any(moves(other, MOVES_ON) for other in listing.code.statements[: each.number])
+        drives = any(has_motor_call(other, CONTINUOUS_MOVES) for other in listing.code.statements[: each.number])
         if each.keyword == "while" and reading and drives:
             unit = f" {reading} {READINGS[reading][2]}." if reading in READINGS else ""
-            condition = joined(each.condition)
+            condition = join_tokens(each.condition)
             why = f"the loop ends at once, because {condition} is false from the start.{unit}"
-            yield f"{listing.at(each.line)}: {why} Check the number", condition
+            yield f"{listing.locate(each.line)}: {why} Check the number", condition
             return
 
 
-def _asks_straight(criterion: object) -> bool:
+def _is_straight_required(criterion: object) -> bool:
     motions = criterion.moves if isinstance(criterion, Moves) else (criterion,)
     return isinstance(criterion, Moves | Displacement) and all(
         each.forward is not None and each.forward[0] >= 0 and (each.turn is None or each.turn[0] <= 0 <= each.turn[1])
         for each in motions
-        if isinstance(each, AskedMotion)
+        if isinstance(each, MotionConditions)
     )
 
 
-def _turning(clues: Clues) -> Iterator[tuple[Listing, Statement, CallInCode]]:
+def _collect_turning_calls(clues: Clues) -> Iterator[tuple[Listing, Statement, CallInCode]]:
     """Yield the calls that turn the robot by an amount."""
-    for listing, each in statements_of(clues):
+    for listing, each in collect_statements(clues):
         for call in each.calls:
-            if call.name.startswith("tank_turn.") and call.name.rpartition(".")[2] in MOVES_FOR:
+            if call.name.startswith("tank_turn.") and call.name.rpartition(".")[2] in LIMITED_MOVES:
                 yield listing, each, call
 
 
-def _told(clues: Clues) -> Iterator[tuple[Criterion, str]]:
+def _collect_failure_messages(clues: Clues) -> Iterator[tuple[Criterion, str]]:
     """Return each criterion that lost marks, with the message of its first failure."""
     told = {each.id: next((one.message for one in each.evidence if not one.passed), "") for each in clues.results}
     return ((each, told.get(each.id, "")) for each in clues.lost)
 
 
-def _asked_turn(criterion: Criterion) -> tuple[float, float] | None:
+def _find_required_turn(criterion: Criterion) -> tuple[float, float] | None:
     if isinstance(criterion, Drawing):
         angles = set(criterion.angle_of_each)
         if len(angles) > 1:
@@ -231,10 +250,10 @@ def _asked_turn(criterion: Criterion) -> tuple[float, float] | None:
     return next(((each[0], each[1]) for each in ranges if each is not None), None)
 
 
-def _is_zero(listing: Listing, statement: Statement) -> bool:
+def _is_zero_move(listing: Listing, statement: Statement) -> bool:
     """Return whether the statement drives at speed zero or by zero."""
     for call in statement.calls:
-        if call.name.rpartition(".")[2] in MOVES_ON | MOVES_FOR:
+        if call.name.rpartition(".")[2] in CONTINUOUS_MOVES | LIMITED_MOVES:
             speeds = call.arguments[1:2] if "turn" in call.name else call.arguments[:2]
             numbers = [listing.code.number(each) for each in speeds]
             last = listing.code.number(call.arguments[-1]) if call.arguments else None
@@ -242,7 +261,7 @@ def _is_zero(listing: Listing, statement: Statement) -> bool:
     return False
 
 
-def _compared(listing: Listing, statement: Statement, reading: str) -> float | None:
+def _find_compared_number(listing: Listing, statement: Statement, reading: str) -> float | None:
     tokens = statement.tokens
     for place, token in enumerate(tokens[:-2]):
         if token == reading and tokens[place + 1] in ("<", ">", "<=", ">="):
@@ -250,9 +269,9 @@ def _compared(listing: Listing, statement: Statement, reading: str) -> float | N
     return None
 
 
-def _out_of_range(listing: Listing, statement: Statement) -> str:
+def _describe_impossible_threshold(listing: Listing, statement: Statement) -> str:
     for reading, (least, most, unit) in READINGS.items():
-        number = _compared(listing, statement, reading)
+        number = _find_compared_number(listing, statement, reading)
         if number is not None and not least <= number <= most:
             return f"{reading} {unit}, so it is never near {number:g}. Choose a number within that range"
     return ""

@@ -9,10 +9,10 @@ import re
 from collections.abc import Iterator
 
 from service.grading.hint_clues import Clues, Listing
-from service.grading.hint_code import Statement, joined
+from service.grading.hint_code import Statement, join_tokens
 from sim.recording import Fault
 
-NO_NAME = re.compile(r"NameError: name '(\w+)' is not defined")
+UNDEFINED_NAME = re.compile(r"NameError: name '(\w+)' is not defined")
 _NO_ATTRIBUTE = re.compile(r"AttributeError: '(\w+)' object has no attribute '(\w+)'")
 _NOT_CALLABLE = re.compile(r"TypeError: '(\w+)' object is not callable")
 _CALLED = re.compile(r"(?<![.\w])(\w+)\(")
@@ -21,7 +21,20 @@ _CONSTANTS = {"null": "None", "none": "None", "NULL": "None", "true": "True", "f
 
 #: Names that %%sim_magic_preloaded binds and the other magics don't.
 PRELOADED = frozenset(("say", "speaker", "tank_turn", "tank_drive", "ultrasonic", "colorLeft", "colorRight", "gyro"))
-_GIVEN = PRELOADED | {"print", "str", "int", "float", "list", "len", "range", "max", "min", "sum", "round", "input"}
+_PREDEFINED_NAMES = PRELOADED | {
+    "print",
+    "str",
+    "int",
+    "float",
+    "list",
+    "len",
+    "range",
+    "max",
+    "min",
+    "sum",
+    "round",
+    "input",
+}
 #: Objects whose attributes are often written without the object.
 _OWNERS = {
     **dict.fromkeys(("left_motor", "right_motor"), ("tank_drive",)),
@@ -33,97 +46,100 @@ _OWNERS = {
 }
 
 
-def of_owner(fault: Fault, clues: Clues, *_: object) -> str:
+def advise_on_owner(fault: Fault, clues: Clues, *_: object) -> str:
     """Return advice on an attribute of a robot part that is written without its object."""
-    name = NO_NAME.match(fault.message)
+    name = UNDEFINED_NAME.match(fault.message)
     owners = _OWNERS.get(name[1], ()) if name and fault.who == "program" and clues.preamble == "preloaded" else ()
     if name is None or not owners:
         return ""
     return f"{name[1]} belongs to {' and '.join(owners)}: write {' or '.join(f'{each}.{name[1]}' for each in owners)}."
 
 
-def of_constant(fault: Fault, *_: object) -> str:
+def advise_on_constant(fault: Fault, *_: object) -> str:
     """Return advice on ``null`` or ``true``, as written in JSON."""
-    name = NO_NAME.match(fault.message)
+    name = UNDEFINED_NAME.match(fault.message)
     return f"Write {_CONSTANTS[name[1]]} in place of {name[1]}." if name and name[1] in _CONSTANTS else ""
 
 
-def of_other_process(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
+def advise_on_other_process(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
     """Return advice on a name that only the other process (robot or responder) defines."""
-    name = NO_NAME.match(fault.message)
+    name = UNDEFINED_NAME.match(fault.message)
     if name is None or listing is None:
         return ""
     robots = {each.name for each in clues.programs}
     is_robot = listing.name in robots
     others = (each for each in clues.listings if (each.name in robots) != is_robot)
-    other, found = next(_defining(name[1], others), (None, None))
-    if other is None or found is None or next(_defining(name[1], _same_process(listing, clues)), None):
+    other, found = next(_collect_definitions(name[1], others), (None, None))
+    if other is None or found is None or next(_collect_definitions(name[1], _list_same_process(listing, clues)), None):
         return ""
     whose = other.name.capitalize() if other.part is None else other.name
     if found.keyword in ("import", "from"):
         who = "the robot program" if not is_robot else "the responder"
-        return f"The import in {other.name} is only for {who}. Add {joined(found.tokens)} at the top of {listing.name}."
+        return (
+            f"The import in {other.name} is only for {who}. Add {join_tokens(found.tokens)} at the top of "
+            f"{listing.name}."
+        )
     sees = "a robot program does not see it" if is_robot else "the responder does not see it"
     below = ", below its first line" if listing.part is None and is_robot else ""
     return f"{whose} defines {name[1]}, but {sees}. Define {name[1]} in {listing.name} as well{below}."
 
 
-def of_later_cell(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
+def advise_on_later_cell(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
     """Return advice on a name that a later cell, not a robot program, defines."""
-    name = NO_NAME.match(fault.message)
+    name = UNDEFINED_NAME.match(fault.message)
     if name is None or listing is None or fault.cell is None:
         return ""
-    cells = [each for each in _same_process(listing, clues) if each.part is None]
-    later = next((each for each, _ in _defining(name[1], cells[cells.index(listing) + 1 :])), None)
+    cells = [each for each in _list_same_process(listing, clues) if each.part is None]
+    later = next((each for each, _ in _collect_definitions(name[1], cells[cells.index(listing) + 1 :])), None)
     if later is None:
         return ""
     return f"{later.name.capitalize()} defines {name[1]}, but runs later. Move {later.name} above {listing.name}."
 
 
-def of_later_line(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
+def advise_on_later_line(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
     """Return advice on a function that is defined after the line that calls it."""
-    name = NO_NAME.match(fault.message)
-    if name is None or listing is None or statement is None or listing.code.around(statement):
+    name = UNDEFINED_NAME.match(fault.message)
+    if name is None or listing is None or statement is None or listing.code.list_enclosing(statement):
         return ""
-    for each in listing.code.after(statement):
-        if not each.indent and each.keyword == "def" and name[1] in each.bound:
+    for each in listing.code.list_following(statement):
+        if not each.indent and each.keyword == "def" and name[1] in each.bound_names:
             return f"Line {each.line} defines {name[1]}, but is below. Move line {statement.line} below the definition."
     return ""
 
 
-def of_overwritten(fault: Fault, clues: Clues, listing: Listing | None, statement: Statement | None) -> str:
+def advise_on_overwritten_name(fault: Fault, clues: Clues, listing: Listing | None, statement: Statement | None) -> str:
     """Return advice on a module or function whose name was assigned another value."""
     if listing is None or statement is None:
         return ""
     lost = _NO_ATTRIBUTE.match(fault.message)
     if lost:
-        owners = _owners_of(lost[2], statement)
+        owners = _collect_owners(lost[2], statement)
     elif _NOT_CALLABLE.match(fault.message):
         # The tokenizer returns an f-string as one token, so calls in it are searched by pattern.
         owners = _CALLED.findall("".join(listing.lines[statement.line - 1 : statement.last_line]))
     else:
         return ""
     for name in owners:
-        for other in _same_process(listing, clues):
+        for other in _list_same_process(listing, clues):
             for each in other.code.statements:
-                if each.target == name and _is_shared(name, listing, clues):
+                if each.target == name and _is_shared_name(name, listing, clues):
                     at = f"Line {each.line}" if other is listing else f"Line {each.line} of {other.name}"
-                    return f"{at} gives {name} another value: {joined(each.tokens)}. Choose another name there."
+                    return f"{at} gives {name} another value: {join_tokens(each.tokens)}. Choose another name there."
     return ""
 
 
-def _is_shared(name: str, listing: Listing, clues: Clues) -> bool:
+def _is_shared_name(name: str, listing: Listing, clues: Clues) -> bool:
     """Return whether a name is that of a module, a function or a robot object, not only of this variable."""
     binds = (
         each
-        for other in _same_process(listing, clues)
+        for other in _list_same_process(listing, clues)
         for each in other.code.statements
-        if each.keyword in ("import", "from", "def") and name in each.bound
+        if each.keyword in ("import", "from", "def") and name in each.bound_names
     )
-    return name in _GIVEN or any(binds)
+    return name in _PREDEFINED_NAMES or any(binds)
 
 
-def _owners_of(attribute: str, statement: Statement) -> list[str]:
+def _collect_owners(attribute: str, statement: Statement) -> list[str]:
     tokens = statement.tokens
     return [
         owner
@@ -132,15 +148,15 @@ def _owners_of(attribute: str, statement: Statement) -> list[str]:
     ]
 
 
-def _defining(name: str, listings: Iterator[Listing] | list[Listing]) -> Iterator[tuple[Listing, Statement]]:
+def _collect_definitions(name: str, listings: Iterator[Listing] | list[Listing]) -> Iterator[tuple[Listing, Statement]]:
     """Yield the statements that bind a name outside functions."""
     for listing in listings:
         for each in listing.code.statements:
-            if not each.indent and name in each.bound:
+            if not each.indent and name in each.bound_names:
                 yield listing, each
 
 
-def _same_process(listing: Listing, clues: Clues) -> list[Listing]:
+def _list_same_process(listing: Listing, clues: Clues) -> list[Listing]:
     """Return the texts in the same process, in order. Robot cells and files run alone."""
     if listing.part is not None or listing.name in {each.name for each in clues.programs}:
         return [listing]

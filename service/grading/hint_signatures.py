@@ -8,47 +8,52 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from service.grading.hint_clues import Clues, Listing, place_of
+from service.grading.hint_clues import Clues, Listing, describe_fault_line
 from service.grading.hint_code import Statement, is_name
 
 _CALLED = re.compile(r"TypeError: (?:(\w+)\.)?(\w+)\(\) (?:takes|missing) (\w+)(?:.* but (\d+) (?:was|were) given)?")
 
 
-def of_signatures(clues: Clues) -> Iterator[str]:
+def hint_about_signatures(clues: Clues) -> Iterator[str]:
     """Yield a hint on the definition that does not match a call."""
     for fault in clues.faults:
         found = _CALLED.match(fault.message)
-        listing, head = _definition(found[2], clues) if found else (None, None)
+        listing, head = _find_definition(found[2], clues) if found else (None, None)
         if found is None or listing is None or head is None:
             continue
         name = found[2]
-        inside = next((each for each in listing.code.around(head) if each.keyword == "class"), None)
+        inside = next((each for each in listing.code.list_enclosing(head) if each.keyword == "class"), None)
         if inside is not None and "self" not in head.tokens:
-            rest = "".join(f", {each}" for each in _parameters(head))
-            yield f'{listing.at(head.line)}: a method needs self as first parameter. Write "def {name}(self{rest}):"'
+            rest = "".join(f", {each}" for each in _list_parameters(head))
+            yield (
+                f'{listing.locate(head.line)}: a method needs self as first parameter. Write "def {name}(self{rest}):"'
+            )
             return
-        arguments = _arguments(name, clues)
+        arguments = _list_arguments(name, clues)
         if fault.agent and fault.line is None and arguments:
             yield (
-                f"{listing.at(head.line)} defines {name} with {_count(len(_parameters(head)))}, but it is called with "
+                f"{listing.locate(head.line)} defines {name} with "
+                f"{_describe_parameter_count(len(_list_parameters(head)))}, but it is called with "
                 f'{len(arguments)}. Write "def {name}({", ".join(arguments)}):"'
             )
             return
-        where = place_of(fault, clues)
+        where = describe_fault_line(fault, clues)
         if where and fault.line is not None and inside is None:
             yield (
                 f"{where} calls {name} with another number of values than line {head.line} of {listing.name} defines. "
-                f"Its parameters are: {', '.join(_parameters(head)) or 'none'}"
+                f"Its parameters are: {', '.join(_list_parameters(head)) or 'none'}"
             )
             return
 
 
-def _definition(name: str, clues: Clues) -> tuple[Listing | None, Statement | None]:
-    heads = ((listing, head) for listing in clues.texts for head in listing.code.functions() if head.tokens[1] == name)
+def _find_definition(name: str, clues: Clues) -> tuple[Listing | None, Statement | None]:
+    heads = (
+        (listing, head) for listing in clues.texts for head in listing.code.list_functions() if head.tokens[1] == name
+    )
     return next(heads, (None, None))
 
 
-def _parameters(head: Statement) -> list[str]:
+def _list_parameters(head: Statement) -> list[str]:
     end = head.tokens.index(")") if ")" in head.tokens else len(head.tokens)
     return [
         token
@@ -57,9 +62,9 @@ def _parameters(head: Statement) -> list[str]:
     ]
 
 
-def _arguments(name: str, clues: Clues) -> list[str]:
+def _list_arguments(name: str, clues: Clues) -> list[str]:
     """Return the argument names in a call of the function, with a placeholder for each that is not a name."""
-    for listing in clues.answering:
+    for listing in clues.responder_process_listings:
         for each in listing.code.statements:
             for call in each.calls:
                 if call.name == name:
@@ -68,5 +73,5 @@ def _arguments(name: str, clues: Clues) -> list[str]:
     return []
 
 
-def _count(number: int) -> str:
+def _describe_parameter_count(number: int) -> str:
     return {0: "no parameter", 1: "one parameter"}.get(number, f"{number} parameters")

@@ -8,80 +8,87 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 
-from service.grading.hint_advice import READINGS
 from service.grading.hint_clues import Clues, Listing
-from service.grading.hint_code import CodeStatements, Statement, depths, is_name, joined
-from service.grading.hint_loops import reading_in
-from service.grading.hint_variables import early_step, other_case, removal_from_list, same_side, unreachable_if
+from service.grading.hint_code import CodeStatements, Statement, compute_bracket_depths, is_name, join_tokens
+from service.grading.hint_loops import find_reading
+from service.grading.hint_tables import READINGS
+from service.grading.hint_variables import (
+    check_early_step,
+    check_mixed_sides,
+    check_name_case,
+    check_removal_in_loop,
+    check_unreachable_if,
+)
 
 COMPARISONS = frozenset({"<", ">", "<=", ">=", "==", "!="})
-_ORDERS = frozenset({"<", ">", "<=", ">="})
+_ORDER_SIGNS = frozenset({"<", ">", "<=", ">="})
 #: Functions without arguments that students compare without calling them.
-_WITHOUT_ARGUMENTS = frozenset({"robot_number", "pyState", "get_clock"})
+_PARAMETERLESS_FUNCTIONS = frozenset({"robot_number", "pyState", "get_clock"})
 _TEXT = re.compile(r"""[fbru]{0,2}["']""", re.IGNORECASE)
 _NUMBER = re.compile(r"\d+(?:\.\d+)?\Z")
 _BEFORE_OPERAND = frozenset({"if", "while", "elif", "and", "or", "not", "(", "return", "="})
 _AFTER_OPERAND = frozenset({":", ")", "and", "or"})
 _LONGEST_ENTRY = 40
-_Slip = Callable[[Listing, Statement], str]
+_SlipCheck = Callable[[Listing, Statement], str]
 
 
-def of_slips(clues: Clues) -> Iterator[str]:
+def hint_about_slips(clues: Clues) -> Iterator[str]:
     """Yield the first slip in any text, if marks were lost."""
     if not clues.lost:
         return
     for listing in clues.texts:
-        for sentence in slips_in(listing):
+        for sentence in collect_slips(listing):
             yield sentence
             return
 
 
-def of_short_list(clues: Clues) -> Iterator[str]:
+def hint_about_missing_comma(clues: Clues) -> Iterator[str]:
     """Yield a hint on a list with a missing comma, if a list index was out of range."""
     if not any("IndexError: list index out of range" in fault.message for fault in clues.faults):
         return
     for listing in clues.texts:
         for statement in listing.code.statements:
-            found = _missing_comma(listing, statement)
+            found = _check_missing_comma(listing, statement)
             if found:
                 yield found
                 return
 
 
-def slips_in(listing: Listing) -> Iterator[str]:
+def collect_slips(listing: Listing) -> Iterator[str]:
     """Yield all slips in a text."""
     for statement in listing.code.statements:
-        for slip in _SLIPS:
+        for slip in _SLIP_CHECKS:
             found = slip(listing, statement)
             if found:
                 yield found
 
 
-def _caret(listing: Listing, statement: Statement) -> str:
+def _check_caret(listing: Listing, statement: Statement) -> str:
     tokens = statement.tokens
     for before, token, after in zip(tokens, tokens[1:], tokens[2:], strict=False):
         if token == "^" and _NUMBER.match(after) and (is_name(before) or before == ")" or _NUMBER.match(before)):
-            return f"{listing.at(statement.line)}: ^ is not a power in Python. Write ** in place of ^"
+            return f"{listing.locate(statement.line)}: ^ is not a power in Python. Write ** in place of ^"
     return ""
 
 
-def _bitwise(listing: Listing, statement: Statement) -> str:
+def _check_bitwise_operator(listing: Listing, statement: Statement) -> str:
     tokens, words = statement.tokens, {"&": "and", "|": "or"}
-    levels = depths(tokens)
+    levels = compute_bracket_depths(tokens)
     for place, token in enumerate(tokens):
         if token not in words:
             continue
-        left, right = _within(tokens, levels, place)
+        left, right = _split_operands(tokens, levels, place)
         compared = [each for each in (*left, *right) if each in COMPARISONS]
         if len(compared) > 1:
             return (
-                f"{listing.at(statement.line)}: {token} is calculated before {compared[0]}, so this does not ask for "
+                f"{listing.locate(statement.line)}: {token} is calculated before {compared[0]}, so this does not "
+                "ask for "
                 f"both comparisons. Write {words[token]} in place of {token}"
             )
     return ""
 
 
-def _constant_operand(listing: Listing, statement: Statement) -> str:
+def _check_constant_operand(listing: Listing, statement: Statement) -> str:
     """Return a hint on ``day == "Saturday" or "Sunday"``, where the second operand is not a comparison."""
     tokens = statement.tokens
     for place, token in enumerate(tokens[:-1]):
@@ -93,45 +100,46 @@ def _constant_operand(listing: Listing, statement: Statement) -> str:
         left = tokens[begin:place]
         sign = next((at for at, each in enumerate(left) if each in COMPARISONS), None)
         if sign:
-            whole = joined((*left[: sign + 1], value))
+            whole = join_tokens((*left[: sign + 1], value))
             return (
-                f"{listing.at(statement.line)}: {value} after {token} is not compared, and is always true. "
+                f"{listing.locate(statement.line)}: {value} after {token} is not compared, and is always true. "
                 f"Write {token} {whole}"
             )
     return ""
 
 
-def _bare_operand(listing: Listing, statement: Statement) -> str:
+def _check_bare_operand(listing: Listing, statement: Statement) -> str:
     """Return a hint on ``left and right < 25``, where the first operand is not a comparison."""
     tokens = statement.tokens
     for place in range(1, len(tokens) - 4):
         before, name, word, other, sign = tokens[place - 1 : place + 4]
-        if word not in ("and", "or") or before not in _BEFORE_OPERAND or before == "=" or sign not in _ORDERS:
+        if word not in ("and", "or") or before not in _BEFORE_OPERAND or before == "=" or sign not in _ORDER_SIGNS:
             continue
-        if is_name(name) and is_name(other) and name != other and _is_number(listing.code, name):
+        if is_name(name) and is_name(other) and name != other and _is_numeric_name(listing.code, name):
             number = tokens[place + 4]
             return (
-                f"{listing.at(statement.line)}: {name} {word} {other} {sign} {number} only asks whether {name} is not "
+                f"{listing.locate(statement.line)}: {name} {word} {other} {sign} {number} only asks whether "
+                f"{name} is not "
                 f"0. Write {name} {sign} {number} {word} {other} {sign} {number}"
             )
     return ""
 
 
-def _is_number(code: CodeStatements, name: str) -> bool:
+def _is_numeric_name(code: CodeStatements, name: str) -> bool:
     """Return whether a name is a reading, or is compared with ``<`` or ``>`` elsewhere."""
-    if reading_in((name,), code):
+    if find_reading((name,), code):
         return True
     return any(
         name == token
-        and (set(each.tokens[place + 1 : place + 2]) | set(each.tokens[max(place - 1, 0) : place])) & _ORDERS
+        and (set(each.tokens[place + 1 : place + 2]) | set(each.tokens[max(place - 1, 0) : place])) & _ORDER_SIGNS
         for each in code.statements
         for place, token in enumerate(each.tokens)
     )
 
 
-def _missing_comma(listing: Listing, statement: Statement) -> str:
+def _check_missing_comma(listing: Listing, statement: Statement) -> str:
     tokens = statement.tokens
-    levels = depths(tokens)
+    levels = compute_bracket_depths(tokens)
     for place in range(1, len(tokens) - 1):
         one, other = tokens[place : place + 2]
         texts = _TEXT.match(one) and _TEXT.match(other) and max(len(one), len(other)) <= _LONGEST_ENTRY
@@ -140,12 +148,14 @@ def _missing_comma(listing: Listing, statement: Statement) -> str:
         opening = next(at for at in range(place, -1, -1) if levels[at] < levels[place] or at == 0)
         inside = [at for at in range(opening + 1, len(tokens)) if levels[at] == levels[place]]
         if tokens[opening] in "[{" and any(tokens[at] == "," for at in inside):
-            line = _line_of(listing, statement, one, other)
-            return f"{listing.at(line)}: a comma is missing after {one}, so Python joins it to {other}. Add the comma"
+            line = _find_line(listing, statement, one, other)
+            return (
+                f"{listing.locate(line)}: a comma is missing after {one}, so Python joins it to {other}. Add the comma"
+            )
     return ""
 
 
-def _line_of(listing: Listing, statement: Statement, one: str, other: str) -> int:
+def _find_line(listing: Listing, statement: Statement, one: str, other: str) -> int:
     """Return the line of the first of two adjacent texts."""
     for number in range(statement.line, min(statement.last_line, len(listing.lines)) + 1):
         text = listing.lines[number - 1]
@@ -154,35 +164,35 @@ def _line_of(listing: Listing, statement: Statement, one: str, other: str) -> in
     return statement.line
 
 
-def _uncalled(listing: Listing, statement: Statement) -> str:
+def _check_uncalled_function(listing: Listing, statement: Statement) -> str:
     tokens = statement.tokens
     for place, token in enumerate(tokens[:-1]):
         sign = tokens[place + 1]
-        if token in _WITHOUT_ARGUMENTS and sign in COMPARISONS:
+        if token in _PARAMETERLESS_FUNCTIONS and sign in COMPARISONS:
             begin = place - 2 if place > 1 and tokens[place - 1] == "." else place
-            name = joined(tokens[begin : place + 1])
-            compared = joined(tokens[begin : place + 3])
+            name = join_tokens(tokens[begin : place + 1])
+            compared = join_tokens(tokens[begin : place + 3])
             return (
-                f"{listing.at(statement.line)}: {token} is a function. Without brackets it is not called, so "
+                f"{listing.locate(statement.line)}: {token} is a function. Without brackets it is not called, so "
                 f"{compared} does not compare its result. Write {name}()"
             )
     return ""
 
 
-def _reading_as_text(listing: Listing, statement: Statement) -> str:
+def _check_reading_as_text(listing: Listing, statement: Statement) -> str:
     """Return a hint on a sensor's number that is compared with a text."""
     tokens = statement.tokens
     for place in range(1, len(tokens) - 1):
         sign, text = tokens[place : place + 2]
-        reading = reading_in(tokens[place - 1 : place], listing.code)
+        reading = find_reading(tokens[place - 1 : place], listing.code)
         if sign not in ("==", "!=") or not _TEXT.match(text) or reading not in READINGS:
             continue
         fix = "Write color_name in place of color" if reading == "color" else f"Write {text[1:-1]} without quotes"
-        return f"{listing.at(statement.line)}: {reading} is a number, and never equals the text {text}. {fix}"
+        return f"{listing.locate(statement.line)}: {reading} is a number, and never equals the text {text}. {fix}"
     return ""
 
 
-def _empty_range(listing: Listing, statement: Statement) -> str:
+def _check_empty_range(listing: Listing, statement: Statement) -> str:
     call = next((each for each in statement.calls if each.name == "range"), None)
     if statement.keyword != "for" or call is None or len(call.arguments) < 2:
         return ""
@@ -190,46 +200,48 @@ def _empty_range(listing: Listing, statement: Statement) -> str:
     begin, end, step = (*numbers, 1.0)[:3]
     if begin is None or end is None or not step or (end - begin) * step > 0:
         return ""
-    shown = f"range({show_arguments(call.arguments)})"
+    shown = f"range({format_arguments(call.arguments)})"
     if step > 0 and begin > end:
         fix = f"To count down to {end:g}, write range({begin:g}, {end - 1:g}, -1)"
     elif step < 0 and begin < end:
         fix = f"To count up to {end:g}, write range({begin:g}, {end + 1:g})"
     else:
         fix = "The end is never reached: write a larger end" if step > 0 else "Write a smaller end"
-    return f"{listing.at(statement.line)}: {shown} is empty, so the loop never runs. {fix}"
+    return f"{listing.locate(statement.line)}: {shown} is empty, so the loop never runs. {fix}"
 
 
-def show_arguments(arguments: Sequence[Sequence[str]]) -> str:
+def format_arguments(arguments: Sequence[Sequence[str]]) -> str:
     """Return the arguments of a call as code."""
-    return ", ".join(f"{each[0]}={joined(each[2:])}" if each[1:2] == ("=",) else joined(each) for each in arguments)
+    return ", ".join(
+        f"{each[0]}={join_tokens(each[2:])}" if each[1:2] == ("=",) else join_tokens(each) for each in arguments
+    )
 
 
-def _idle_value(listing: Listing, statement: Statement) -> str:
+def _check_unused_value(listing: Listing, statement: Statement) -> str:
     """Return a hint on a name or text alone on a line of a function: a forgotten ``return``."""
-    head = next((each for each in listing.code.around(statement) if each.keyword == "def"), None)
+    head = next((each for each in listing.code.list_enclosing(statement) if each.keyword == "def"), None)
     if head is None or len(statement.tokens) != 1:
         return ""
-    token, body = statement.tokens[0], listing.code.body(head)
-    is_value = is_name(token) and (token in head.tokens or any(token in each.bound for each in body))
+    token, body = statement.tokens[0], listing.code.list_body(head)
+    is_value = is_name(token) and (token in head.tokens or any(token in each.bound_names for each in body))
     is_text = token[:1] in "fF" and _TEXT.match(token) is not None
     if not (is_value or is_text):
         return ""
-    return f"{listing.at(statement.line)}: {token} alone does nothing, and is not returned. Write return {token}"
+    return f"{listing.locate(statement.line)}: {token} alone does nothing, and is not returned. Write return {token}"
 
 
-def _chained_ifs(listing: Listing, statement: Statement) -> str:
+def _check_chained_ifs(listing: Listing, statement: Statement) -> str:
     """Return a hint on ``if``, ``if``, ``else`` on the same reading, where the second should be ``elif``."""
     code = listing.code
-    if statement.keyword != "if" or len(statement.condition) != 3 or statement.condition[1] not in _ORDERS:
+    if statement.keyword != "if" or len(statement.condition) != 3 or statement.condition[1] not in _ORDER_SIGNS:
         return ""
-    following = code.next_outside(statement)
+    following = code.find_next_outside(statement)
     if following is None or following.keyword != "if" or following.indent != statement.indent:
         return ""
     last: Statement | None = following
     while last is not None and last.keyword in ("if", "elif") and last.condition[:2] == statement.condition[:2]:
-        last = code.next_outside(last)
-    ends = any(each.keyword in ("return", "break", "continue") for each in code.body(statement))
+        last = code.find_next_outside(last)
+    ends = any(each.keyword in ("return", "break", "continue") for each in code.list_body(statement))
     first, second = (code.number(each.condition[2:]) for each in (statement, following))
     if last is None or last.keyword != "else" or last.indent != statement.indent or ends:
         return ""
@@ -238,12 +250,13 @@ def _chained_ifs(listing: Listing, statement: Statement) -> str:
     if (first > second) != (statement.condition[1] in (">", ">=")):
         return ""
     return (
-        f"{listing.at(following.line)}: this if is also checked when the if in line {statement.line} was true, so both "
+        f"{listing.locate(following.line)}: this if is also checked when the if in line {statement.line} was "
+        "true, so both "
         "run. Write elif in place of if"
     )
 
 
-def _within(tokens: Sequence[str], levels: Sequence[int], place: int) -> tuple[list[str], list[str]]:
+def _split_operands(tokens: Sequence[str], levels: Sequence[int], place: int) -> tuple[list[str], list[str]]:
     """Return the tokens to the left and right of one, within the same bracket and operand."""
     stops = ("and", "or", ",", ":", "=", "return", "if", "while")
 
@@ -261,20 +274,20 @@ def _within(tokens: Sequence[str], levels: Sequence[int], place: int) -> tuple[l
     return side(-1), side(1)
 
 
-_SLIPS: Sequence[_Slip] = (
-    other_case,
-    same_side,
-    early_step,
-    removal_from_list,
-    unreachable_if,
-    _caret,
-    _bitwise,
-    _constant_operand,
-    _bare_operand,
-    _missing_comma,
-    _uncalled,
-    _reading_as_text,
-    _empty_range,
-    _idle_value,
-    _chained_ifs,
+_SLIP_CHECKS: Sequence[_SlipCheck] = (
+    check_name_case,
+    check_mixed_sides,
+    check_early_step,
+    check_removal_in_loop,
+    check_unreachable_if,
+    _check_caret,
+    _check_bitwise_operator,
+    _check_constant_operand,
+    _check_bare_operand,
+    _check_missing_comma,
+    _check_uncalled_function,
+    _check_reading_as_text,
+    _check_empty_range,
+    _check_unused_value,
+    _check_chained_ifs,
 )

@@ -17,23 +17,23 @@ _UNCLOSED_TEXT = re.compile(r"SyntaxError: unterminated (triple-quoted )?(?:f-)?
 _WORDS = re.compile(r"\b(say|print|speak)\(\s*([^\W\d]\w*(?:[ ]+[\w!?.]+)+)\s*(?=[,)])")
 _NO_TEXT = re.compile(r"\b(?:and|or|not|if|else|for|in|is|lambda|f)\b")
 _KEYWORD_ARGUMENT = re.compile(r",\s*\w+\s*=\s*\w+\s*\)*\s*$")
-_STEP = 4
+_INDENT_WIDTH = 4
 
 
-def of_syntax(fault: Fault, _: Clues, listing: Listing | None, __: Statement | None) -> str:
+def advise_on_syntax(fault: Fault, _: Clues, listing: Listing | None, __: Statement | None) -> str:
     """Return the fix of a line that Python cannot parse; empty if it is unclear."""
     if listing is None or fault.line is None or not fault.message.startswith(("SyntaxError", "IndentationError")):
         return ""
     line = "".join(listing.lines[fault.line - 1 : fault.line])
     return (
-        _of_else_if(line)
-        or _of_block(fault, listing, line)
-        or _of_unclosed_text(fault, line)
-        or _of_words(line, listing)
+        _advise_on_else_if(line)
+        or _advise_on_indentation(fault, listing, line)
+        or _advise_on_unclosed_text(fault, line)
+        or _advise_on_unquoted_words(line, listing)
     )
 
 
-def _of_else_if(line: str) -> str:
+def _advise_on_else_if(line: str) -> str:
     found = _ELSE_IF.match(line)
     if found is None:
         return ""
@@ -41,26 +41,26 @@ def _of_else_if(line: str) -> str:
     return f"Python has no {words}. Write elif in place of {words}."
 
 
-def _of_block(fault: Fault, listing: Listing, line: str) -> str:
+def _advise_on_indentation(fault: Fault, listing: Listing, line: str) -> str:
     """Return the fix of a line that is not indented deeper than the block's head above it."""
     found = _NO_BLOCK.match(fault.message)
     if found is None:
         return ""
     head = int(found[2])
-    deep = _indent_of("".join(listing.lines[head - 1 : head])) + _STEP
+    deep = _count_indent("".join(listing.lines[head - 1 : head])) + _INDENT_WIDTH
     if not line.strip() or fault.line == head:
         return f"Write the lines that belong to line {head} below it. Begin each with {deep} blanks."
     return f"If line {fault.line} belongs to line {head}, indent it: begin line {fault.line} with {deep} blanks."
 
 
-def _of_unclosed_text(fault: Fault, line: str) -> str:
+def _advise_on_unclosed_text(fault: Fault, line: str) -> str:
     """Return the line with its missing closing quote."""
     found = _UNCLOSED_TEXT.match(fault.message)
     if found is None:
         return ""
     if found[1]:
         return "A text that begins with three quotes must end with three quotes."
-    opening = _open_quote(line)
+    opening = _find_open_quote(line)
     if opening is None:
         return ""
     quote, text = line[opening], line[opening + 1 :]
@@ -83,7 +83,7 @@ def _split_end(text: str, brackets: int) -> tuple[str, str]:
     return text, end
 
 
-def _open_quote(line: str) -> int | None:
+def _find_open_quote(line: str) -> int | None:
     """Return the position of an opening quote that is never closed; None if there is none."""
     opening: int | None = None
     skip = False
@@ -101,16 +101,16 @@ def _open_quote(line: str) -> int | None:
     return opening
 
 
-def _of_words(line: str, listing: Listing) -> str:
+def _advise_on_unquoted_words(line: str, listing: Listing) -> str:
     """Return advice on unquoted words in the brackets of a call."""
     found = _WORDS.search(line)
     if found is None or _NO_TEXT.search(found[2]):
         return ""
-    known = {name for each in listing.code.statements for name in each.bound}
+    known = {name for each in listing.code.statements for name in each.bound_names}
     if set(found[2].split()) <= known:
         return ""
     return f'A text needs quotes: write {found[1]}("{found[2]}"{line[found.end() :].strip()}'
 
 
-def _indent_of(line: str) -> int:
+def _count_indent(line: str) -> int:
     return len(line) - len(line.lstrip(" "))

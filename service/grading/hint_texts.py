@@ -10,19 +10,19 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from responders.message_format import kind
+from responders.message_format import classify_text
 from service.grading.hint_clues import Clues
-from service.grading.judging.message_parts import quoted
+from service.grading.judging.message_parts import quote_text
 from sim.recording import Verdict
 from submissions.criteria import Criterion
-from submissions.criteria.logged import Datalog
+from submissions.criteria.logs import Datalog
 from submissions.criteria.replies import Replies
 from submissions.criteria.reporting import Events, Reports
 from submissions.criteria.sequence import WordSequence
 from submissions.criteria.texts import Messages, Prints, Says, TextSequence
 from submissions.submission import PART_FILES, Part
 
-_NEAR = 0.72
+_MIN_SIMILARITY = 0.72
 _MOST_TEXTS, _LONGEST = 20, 80
 _DIGITS = re.compile(r"[\d.,]+")
 #: The end of the text that the simulator prints when an image is logged.
@@ -31,13 +31,13 @@ _QUOTE = re.compile("[\"']")
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class ExpectedText:
     """An expected text, and whether it must be all, the beginning or a part of the actual text."""
 
     text: str
     how: str
 
-    def compared_parts(self, text: str) -> Iterator[str]:
+    def split_parts(self, text: str) -> Iterator[str]:
         """Yield the parts of a text to compare: all of it, its first words, or every run of as many words."""
         words, count = text.split(), len(self.text.split())
         if self.how == "equals":
@@ -60,20 +60,20 @@ class Wanted:
                 return plain in given
 
 
-def of_sent_texts(clues: Clues) -> Iterator[str]:
+def hint_about_sent_texts(clues: Clues) -> Iterator[str]:
     """Yield hints on messages that are almost right. Later errors follow from them."""
-    yield from _of_criteria((each for each in clues.lost if isinstance(each, Messages)), clues)
+    yield from _hint_about_criteria((each for each in clues.lost if isinstance(each, Messages)), clues)
 
 
-def of_texts(clues: Clues) -> Iterator[str]:
+def hint_about_texts(clues: Clues) -> Iterator[str]:
     """Yield one hint for each criterion that lost marks because a text is almost right."""
-    yield from _of_criteria(clues.lost, clues)
+    yield from _hint_about_criteria(clues.lost, clues)
 
 
-def _of_criteria(criteria: Iterable[Criterion], clues: Clues) -> Iterator[str]:
+def _hint_about_criteria(criteria: Iterable[Criterion], clues: Clues) -> Iterator[str]:
     for criterion in criteria:
-        part, texts, verb = _looked_at(criterion, clues)
-        wanted = list(_wanted(criterion))
+        part, texts, verb = _find_checked_texts(criterion, clues)
+        wanted = list(_collect_expected_texts(criterion))
         folds = getattr(criterion, "ignore_case", False)
         strange = [text for text in texts if not any(each.is_met_by(text, ignore_case=folds) for each in wanted)]
         for each in wanted:
@@ -82,30 +82,33 @@ def _of_criteria(criteria: Iterable[Criterion], clues: Clues) -> Iterator[str]:
             near = next((text for text in strange[:_MOST_TEXTS] if is_near(each, text)), None)
             if near is not None:
                 at = {"equals": "", "starts_with": " at its start"}.get(each.how, " in it")
-                yield f"{where_written(clues, part, near)} {verb} {quoted(near)}; expected {quoted(each.text)}{at}"
+                yield (
+                    f"{describe_quoting_line(clues, part, near)} {verb} {quote_text(near)}; expected "
+                    f"{quote_text(each.text)}{at}"
+                )
                 break
 
 
-def of_unspoken(clues: Clues) -> Iterator[str]:
+def hint_about_unspoken_text(clues: Clues) -> Iterator[str]:
     """Yield a hint on a text that is printed instead of said, if nothing is said."""
-    wanted = [list(_wanted(each)) for each in clues.lost if isinstance(each, Says) or _is_spoken(each)]
+    wanted = [list(_collect_expected_texts(each)) for each in clues.lost if isinstance(each, Says) or _is_spoken(each)]
     # After an error, the missing speech may have no other cause.
     if clues.spoken or not wanted or any(fault.verdict is Verdict.PROGRAM_ERROR for fault in clues.faults):
         return
     asked = [one for each in wanted for one in each]
-    printed = [text for text in clues.printed if kind(text) == "text" and not text.endswith(_LOGGED)]
+    printed = [text for text in clues.printed if classify_text(text) == "text" and not text.endswith(_LOGGED)]
     meant = (text for text in printed if not asked or any(is_near(each, text) for each in asked))
     for text in list(meant)[-1:]:
-        where = where_written(clues, "program", text)
-        yield f"{where} prints {quoted(text)}, and nothing is said; expected say(...), which prints as well"
+        where = describe_quoting_line(clues, "program", text)
+        yield f"{where} prints {quote_text(text)}, and nothing is said; expected say(...), which prints as well"
 
 
-def of_unlogged(clues: Clues) -> Iterator[str]:
+def hint_about_missing_series(clues: Clues) -> Iterator[str]:
     """Yield a hint on a datalog series of which nothing is printed."""
     for criterion in clues.lost:
         if not isinstance(criterion, Datalog) or clues.missing is not None:
             continue
-        begin = Wanted(f"{criterion.series}:", "starts_with")
+        begin = ExpectedText(f"{criterion.series}:", "starts_with")
         near = any(is_near(begin, text) or begin.is_met_by(text, ignore_case=True) for text in clues.printed)
         if near or any(True for _ in clues.faults):
             continue
@@ -122,7 +125,7 @@ def _is_spoken(criterion: Criterion) -> bool:
     return isinstance(criterion, WordSequence | Reports | Events) and criterion.source == "speech"
 
 
-def _looked_at(criterion: Criterion, clues: Clues) -> tuple[Part, Sequence[str], str]:
+def _find_checked_texts(criterion: Criterion, clues: Clues) -> tuple[Part, Sequence[str], str]:
     """Return the part and the texts that a criterion checks, and a verb for them; no texts for other criteria."""
     match criterion:
         case Datalog():
@@ -138,40 +141,40 @@ def _looked_at(criterion: Criterion, clues: Clues) -> tuple[Part, Sequence[str],
     return "program", (), ""
 
 
-def _wanted(criterion: Criterion) -> Iterator[Wanted]:
+def _collect_expected_texts(criterion: Criterion) -> Iterator[ExpectedText]:
     if isinstance(criterion, Datalog):
-        yield Wanted(f"{criterion.series}:", "starts_with")
+        yield ExpectedText(f"{criterion.series}:", "starts_with")
     if isinstance(criterion, TextSequence | Replies):
         for how in ("equals", "starts_with", "contains"):
-            yield from (Wanted(text, how) for text in getattr(criterion, how))
+            yield from (ExpectedText(text, how) for text in getattr(criterion, how))
     if isinstance(criterion, TextSequence) and criterion.compare != "matches":
-        yield from (Wanted(text, criterion.compare) for text in criterion.in_order)
+        yield from (ExpectedText(text, criterion.compare) for text in criterion.in_order)
     if isinstance(criterion, Replies):
-        yield from (Wanted(text, "equals") for text in criterion.expect.values() if isinstance(text, str))
+        yield from (ExpectedText(text, "equals") for text in criterion.expect.values() if isinstance(text, str))
 
 
-def is_near(wanted: Wanted, text: str) -> bool:
+def is_near(wanted: ExpectedText, text: str) -> bool:
     """Return whether a part of the text is close to the expected text."""
     if len(wanted.text) > _LONGEST or len(text) > _LONGEST:
         return False
-    return any(_alike(part, wanted.text) for part in wanted.compared_parts(text))
+    return any(_is_similar(part, wanted.text) for part in wanted.split_parts(text))
 
 
-def _alike(one: str, other: str) -> bool:
+def _is_similar(one: str, other: str) -> bool:
     """Return whether the texts differ by a few characters, and not only by numbers."""
     plain, expected = (_DIGITS.sub("0", each) for each in (one, other))
     if plain == expected or not any(letter.isalpha() for letter in expected):
         return False
-    return difflib.SequenceMatcher(None, plain.casefold(), expected.casefold()).ratio() >= _NEAR
+    return difflib.SequenceMatcher(None, plain.casefold(), expected.casefold()).ratio() >= _MIN_SIMILARITY
 
 
-def where_written(clues: Clues, part: Part, text: str) -> str:
+def describe_quoting_line(clues: Clues, part: Part, text: str) -> str:
     """Return the line that quotes the longest beginning of the text."""
     words = text.split()
     for count in range(min(len(words), 12), 0, -1):
         begin = " ".join(words[:count])
-        for listing in clues.of(part):
+        for listing in clues.list_texts(part):
             for number, line in enumerate(listing.lines, 1):
                 if len(begin) > 2 and begin in line and _QUOTE.search(line):
-                    return listing.at(number)
+                    return listing.locate(number)
     return PART_FILES[part] if any(each.part == part for each in clues.listings) else "the notebook"

@@ -9,13 +9,13 @@ import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from service.grading.hint_clues import Clues, Listing
-from service.grading.hint_code import CodeStatements, Statement, is_name, joined
-from service.grading.hint_structure import statements_of
-from service.grading.judging.geometry import Side, positions
+from service.grading.hint_code import CodeStatements, Statement, is_name, join_tokens
+from service.grading.hint_structure import collect_statements
+from service.grading.judging.geometry import Side, compute_positions
 from sim.recording import Floats, Recording
 from submissions.criteria.stopping import StopOn
 
-_COMPARE: Mapping[str, Callable[[float, float], bool]] = {
+_COMPARISON_FUNCTIONS: Mapping[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
     ">": operator.gt,
     "<=": operator.le,
@@ -27,54 +27,54 @@ _PERCENT = "reflected_light_intensity_pc"
 _SENSORS: Mapping[Side, str] = {"left": "colorLeft", "right": "colorRight"}
 _CHANNELS = ("red", "green", "blue")
 #: The smallest difference of two readings, in percent, that a threshold can separate.
-_APART = 0.5
+_MIN_DIFFERENCE = 0.5
 _Colour = Sequence[float]
 
 
-def of_thresholds(clues: Clues) -> Iterator[str]:
+def hint_about_thresholds(clues: Clues) -> Iterator[str]:
     """Yield a hint on a loop that continues although the sensor is where the robot should stop."""
     for criterion in clues.lost:
         if not isinstance(criterion, StopOn) or criterion.zone is None or criterion.sensor == "either":
             continue
-        for listing, loop in _loops(clues):
-            found = _threshold(listing, loop, _SENSORS[criterion.sensor])
+        for listing, loop in _collect_last_loops(clues):
+            found = _find_threshold(listing, loop, _SENSORS[criterion.sensor])
             for recording in clues.recordings if found else ():
-                passed = _passed_over(recording, criterion.sensor, criterion.zone)
+                passed = _find_zone_readings(recording, criterion.sensor, criterion.zone)
                 if passed is None or found is None:
                     continue
                 sign, number = found
-                why = _of_passed(sign, number, *passed)
+                why = _explain_missed_zone(sign, number, *passed)
                 if why:
-                    yield f"{listing.at(loop.line)}: {why}"
+                    yield f"{listing.locate(loop.line)}: {why}"
                     return
 
 
-def of_joined_colours(clues: Clues) -> Iterator[str]:
+def hint_about_joined_colours(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``or`` between colour comparisons where ``and`` is right, or the reverse."""
     for criterion in clues.lost:
         if not isinstance(criterion, StopOn) or criterion.rgb is None:
             continue
         sides = list(_SENSORS) if criterion.sensor == "either" else [criterion.sensor]
-        for listing, statement in statements_of(clues):
+        for listing, statement in collect_statements(clues):
             for recording in clues.recordings:
-                ends = [_colour_at_end(recording, side) for side in sides if len(recording.ticks)]
+                ends = [_read_end_colour(recording, side) for side in sides if len(recording.ticks)]
                 for end in ends:
-                    why = _wrong_word(listing.code, statement, end, criterion.rgb)
+                    why = _hint_about_wrong_word(listing.code, statement, end, criterion.rgb)
                     if why:
-                        yield f"{listing.at(statement.line)}: {why}"
+                        yield f"{listing.locate(statement.line)}: {why}"
                         return
 
 
-def _loops(clues: Clues) -> Iterator[tuple[Listing, Statement]]:
+def _collect_last_loops(clues: Clues) -> Iterator[tuple[Listing, Statement]]:
     """Yield the last ``while`` loop of each program, which stops the robot."""
     for listing in clues.programs:
         loops = [each for each in listing.code.statements if each.keyword == "while"]
         yield from ((listing, each) for each in loops[-1:])
 
 
-def _threshold(listing: Listing, loop: Statement, sensor: str) -> tuple[str, float] | None:
+def _find_threshold(listing: Listing, loop: Statement, sensor: str) -> tuple[str, float] | None:
     """Return the sign and number that the sensor's reading is compared with; None for other conditions."""
-    place = next((at for at, token in enumerate(loop.condition) if token in _COMPARE), None)
+    place = next((at for at, token in enumerate(loop.condition) if token in _COMPARISON_FUNCTIONS), None)
     if place is None or any(token in ("and", "or", "not") for token in loop.condition):
         return None
     reading = loop.condition[:place]
@@ -86,11 +86,11 @@ def _threshold(listing: Listing, loop: Statement, sensor: str) -> tuple[str, flo
     return (loop.condition[place], number) if is_this and number is not None else None
 
 
-def _passed_over(
+def _find_zone_readings(
     recording: Recording, side: Side, zone: tuple[float, float, float, float]
 ) -> tuple[Floats, Floats] | None:
     """Return the readings before and in the zone, in percent; None if the robot did not drive through the zone."""
-    places = positions(recording, "left_light" if side == "left" else "right_light")[1:]
+    places = compute_positions(recording, "left_light" if side == "left" else "right_light")[1:]
     left, bottom, right, top = zone
     x, y = places[:, 0], places[:, 1]
     inside = (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
@@ -102,14 +102,14 @@ def _passed_over(
     return reads[:first], reads[inside]
 
 
-def _of_passed(sign: str, number: float, before: Floats, within: Floats) -> str:
+def _explain_missed_zone(sign: str, number: float, before: Floats, within: Floats) -> str:
     """Return why a loop did not end in the zone, if another threshold would have ended it there; otherwise empty."""
-    holds = _COMPARE[sign]
+    holds = _COMPARISON_FUNCTIONS[sign]
     if not all(holds(float(each), number) for each in within):
         return ""
     falls = sign in (">", ">=")
     there, earlier = (within.min(), before.min()) if falls else (within.max(), before.max())
-    if (earlier - there if falls else there - earlier) < _APART:
+    if (earlier - there if falls else there - earlier) < _MIN_DIFFERENCE:
         return ""
     least, most = sorted((float(there), float(earlier)))
     return (
@@ -118,19 +118,19 @@ def _of_passed(sign: str, number: float, before: Floats, within: Floats) -> str:
     )
 
 
-def _colour_at_end(recording: Recording, side: Side) -> _Colour:
+def _read_end_colour(recording: Recording, side: Side) -> _Colour:
     rgb = recording.ticks.left_rgb if side == "left" else recording.ticks.right_rgb
     return [float(part) for part in rgb[-1]]
 
 
-def _wrong_word(code: CodeStatements, statement: Statement, end: _Colour, wanted: _Colour) -> str:
+def _hint_about_wrong_word(code: CodeStatements, statement: Statement, end: _Colour, wanted: _Colour) -> str:
     """Return a hint that ``and`` or ``or`` is wrong; empty if the colours don't prove it."""
-    pair = _compared_pair(code, statement)
+    pair = _parse_comparison_pair(code, statement)
     if pair is None:
         return ""
     word, comparisons, stops = pair
-    ended = [_holds(each, end) for each in comparisons]
-    meant = [_holds(each, wanted) for each in comparisons]
+    ended = [_is_comparison_true(each, end) for each in comparisons]
+    meant = [_is_comparison_true(each, wanted) for each in comparisons]
     # With the other word, the loop would have continued here and ended over the required colour.
     if ended[0] == ended[1] or meant != [stops, stops] or (word == "or") != stops:
         return ""
@@ -145,36 +145,36 @@ def _wrong_word(code: CodeStatements, statement: Statement, end: _Colour, wanted
 _Comparison = tuple[str, str, float, int]
 
 
-def _compared_pair(code: CodeStatements, statement: Statement) -> tuple[str, list[_Comparison], bool] | None:
+def _parse_comparison_pair(code: CodeStatements, statement: Statement) -> tuple[str, list[_Comparison], bool] | None:
     """Return the word between two colour comparisons, the comparisons, and whether the loop ends if they are true."""
     tokens = statement.condition
     if statement.keyword == "while" and tokens[:2] == ("not", "(") and tokens[-1:] == (")",):
         tokens, stops = tokens[2:-1], True
     elif statement.keyword == "while":
         stops = False
-    elif statement.keyword == "if" and any(each.keyword == "break" for each in code.body(statement)):
+    elif statement.keyword == "if" and any(each.keyword == "break" for each in code.list_body(statement)):
         stops = True
     else:
         return None
     words = [at for at, token in enumerate(tokens) if token in ("and", "or", "not")]
     if len(words) != 1 or tokens[words[0]] == "not":
         return None
-    found = [_comparison(code, side) for side in (tokens[: words[0]], tokens[words[0] + 1 :])]
+    found = [_parse_comparison(code, side) for side in (tokens[: words[0]], tokens[words[0] + 1 :])]
     comparisons = [each for each in found if each is not None]
     return (tokens[words[0]], comparisons, stops) if len(comparisons) == 2 else None
 
 
-def _comparison(code: CodeStatements, tokens: Sequence[str]) -> _Comparison | None:
+def _parse_comparison(code: CodeStatements, tokens: Sequence[str]) -> _Comparison | None:
     """Return the operand, the sign, the number and the colour channel of a comparison; otherwise None."""
-    place = next((at for at, token in enumerate(tokens) if token in _COMPARE), None)
+    place = next((at for at, token in enumerate(tokens) if token in _COMPARISON_FUNCTIONS), None)
     if place is None:
         return None
     number = code.number(tokens[place + 1 :])
-    channel = _channel(code, tokens[:place])
-    return None if number is None or channel is None else (joined(tokens[:place]), tokens[place], number, channel)
+    channel = _find_channel(code, tokens[:place])
+    return None if number is None or channel is None else (join_tokens(tokens[:place]), tokens[place], number, channel)
 
 
-def _channel(code: CodeStatements, tokens: Sequence[str]) -> int | None:
+def _find_channel(code: CodeStatements, tokens: Sequence[str]) -> int | None:
     """Return 0 to 2 for red, green and blue, read from the sensor or unpacked from ``rgb``; otherwise None."""
     if not tokens:
         return None
@@ -191,6 +191,6 @@ def _channel(code: CodeStatements, tokens: Sequence[str]) -> int | None:
     return None
 
 
-def _holds(comparison: _Comparison, colour: _Colour) -> bool:
+def _is_comparison_true(comparison: _Comparison, colour: _Colour) -> bool:
     _, sign, number, channel = comparison
-    return _COMPARE[sign](int(colour[channel]), number)
+    return _COMPARISON_FUNCTIONS[sign](int(colour[channel]), number)

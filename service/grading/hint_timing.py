@@ -8,81 +8,81 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from service.grading.hint_advice import PROPERTIES
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import Statement
-from service.grading.hint_motion import STOPPED
-from service.grading.hint_slips import show_arguments
-from service.grading.hint_structure import statements_of
-from submissions.criteria.coping import Resends
+from service.grading.hint_motion import STOPPING_CRITERIA
+from service.grading.hint_slips import format_arguments
+from service.grading.hint_structure import collect_statements
+from service.grading.hint_tables import PROPERTIES
 from submissions.criteria.sequence import WordSequence
+from submissions.criteria.unreliable_channel import Resends
 
 _SPEAKING = "still speaking"
 _TOO_EARLY = "after its answer had come"
-_SELDOM = 0.5
+_RARE_READING_SECONDS = 0.5
 
 
-def of_overlapping_speech(clues: Clues) -> Iterator[str]:
+def hint_about_overlapping_speech(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``say`` without ``wait=True``, if the text must be spoken to its end."""
-    if not any(_SPEAKING in each.message for each in clues.results) or not _lost(clues, WordSequence):
+    if not any(_SPEAKING in each.message for each in clues.results) or not _has_lost_criterion(clues, WordSequence):
         return
-    for listing, each in statements_of(clues):
+    for listing, each in collect_statements(clues):
         for call in each.calls:
             if call.name == "say" and call.arguments and not any("wait" in one for one in call.arguments):
-                said = show_arguments(call.arguments)
+                said = format_arguments(call.arguments)
                 yield (
-                    f"{listing.at(each.line)}: the program goes on before the words are spoken. "
+                    f"{listing.locate(each.line)}: the program goes on before the words are spoken. "
                     f"Write say({said}, wait=True)"
                 )
                 return
 
 
-def of_short_waits(clues: Clues) -> Iterator[str]:
+def hint_about_short_waits(clues: Clues) -> Iterator[str]:
     """Yield a hint on a wait for an answer that is shorter than the answer takes."""
-    if not _lost(clues, Resends) or not any(_TOO_EARLY in each.message for each in clues.results):
+    if not _has_lost_criterion(clues, Resends) or not any(_TOO_EARLY in each.message for each in clues.results):
         return
-    takes = _fastest_answer(clues)
-    for listing, each in statements_of(clues):
-        number = _sleep(listing, each)
-        if number is not None and number < takes and listing.code.loops_around(each):
+    takes = _measure_fastest_answer(clues)
+    for listing, each in collect_statements(clues):
+        number = _find_sleep_seconds(listing, each)
+        if number is not None and number < takes and listing.code.list_enclosing_loops(each):
             yield (
-                f"{listing.at(each.line)} waits {number:g} s, but an answer takes {takes:.2g} s. "
+                f"{listing.locate(each.line)} waits {number:g} s, but an answer takes {takes:.2g} s. "
                 f"Wait longer, for example {max(0.5, math.ceil(20 * takes) / 10):g} s"
             )
             return
 
 
-def of_seldom_looks(clues: Clues) -> Iterator[str]:
+def hint_about_rare_readings(clues: Clues) -> Iterator[str]:
     """Yield a hint on a loop that reads a sensor so rarely that the robot drives past its target."""
-    if not _lost(clues, *STOPPED) or clues.stood_still:
+    if not _has_lost_criterion(clues, *STOPPING_CRITERIA) or clues.is_stationary:
         return
-    for listing, each in statements_of(clues):
-        number = _sleep(listing, each)
-        loop = next((one for one in listing.code.loops_around(each) if one.keyword == "while"), None)
-        if number is None or number < _SELDOM or loop is None:
+    for listing, each in collect_statements(clues):
+        number = _find_sleep_seconds(listing, each)
+        loop = next((one for one in listing.code.list_enclosing_loops(each) if one.keyword == "while"), None)
+        if number is None or number < _RARE_READING_SECONDS or loop is None:
             continue
-        body = listing.code.body(loop)
+        body = listing.code.list_body(loop)
         reads = any(token in PROPERTIES for one in (loop, *body) for token in one.tokens)
         if reads and each.parent == loop.number:
-            way = _speed(clues) * number
+            way = _measure_top_speed(clues) * number
             yield (
-                f"{listing.at(each.line)}: the loop reads the sensor only every {number:g} s, and the robot drives "
+                f"{listing.locate(each.line)}: the loop reads the sensor only every {number:g} s, and the robot drives "
                 f"about {way:.0f} mm in that time. Wait less, for example time.sleep(0.05)"
             )
             return
 
 
-def _lost(clues: Clues, *kinds: type) -> bool:
+def _has_lost_criterion(clues: Clues, *kinds: type) -> bool:
     return any(isinstance(each, kinds) for each in clues.lost)
 
 
-def _sleep(listing: Listing, statement: Statement) -> float | None:
+def _find_sleep_seconds(listing: Listing, statement: Statement) -> float | None:
     """Return how many seconds a statement sleeps; None if it does not sleep or the number is unclear."""
     call = next((each for each in statement.calls if each.name in ("time.sleep", "sleep")), None)
     return listing.code.number(call.arguments[0]) if call is not None and call.arguments else None
 
 
-def _fastest_answer(clues: Clues) -> float:
+def _measure_fastest_answer(clues: Clues) -> float:
     """Return the shortest time from a message to its answer, in seconds; 0 if there are no answers."""
     took = (
         message.delivered - recording.messages[message.reply_to].t
@@ -93,7 +93,7 @@ def _fastest_answer(clues: Clues) -> float:
     return min(took, default=0.0)
 
 
-def _speed(clues: Clues) -> float:
+def _measure_top_speed(clues: Clues) -> float:
     """Return the highest mean speed of a trial, in mm/s."""
     found = [0.0]
     for recording in clues.recordings:

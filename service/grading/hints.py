@@ -13,212 +13,242 @@ from collections.abc import Callable, Iterator, Sequence
 from responders.message_format import JSON
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.hint_answers import (
-    of_answer_values,
-    of_image_command,
-    of_missing_key,
-    of_none_answers,
-    of_other_keys,
-    of_shifted_numbers,
-    of_swapped_values,
-    of_text_numbers,
+    hint_about_answer_values,
+    hint_about_image_command,
+    hint_about_missing_key,
+    hint_about_none_answers,
+    hint_about_other_keys,
+    hint_about_shifted_numbers,
+    hint_about_swapped_values,
+    hint_about_text_numbers,
 )
-from service.grading.hint_braces import of_braces
-from service.grading.hint_clues import LONGEST_TEXT, Clues, clues_of
-from service.grading.hint_errors import of_cell_errors, of_errors, of_other_cell_errors
-from service.grading.hint_files import of_ignored_magic, of_redefined, of_several_programs, of_starter, of_swapped_parts
-from service.grading.hint_formulas import of_division, of_gain, of_gyro_direction, of_radius, of_reversed_distance
-from service.grading.hint_functions import of_functions, of_narrow_except, of_no_return, of_returned_values
-from service.grading.hint_loops import of_limits
-from service.grading.hint_moments import of_loops_that_never_run, of_moments
+from service.grading.hint_braces import hint_about_braces
+from service.grading.hint_cause_lines import hint_about_cause_line
+from service.grading.hint_clues import LONGEST_TEXT, Clues, collect_clues
+from service.grading.hint_counterfactuals import hint_about_wrong_number
+from service.grading.hint_errors import hint_about_cell_errors, hint_about_errors, hint_about_failed_cell
+from service.grading.hint_failure_lines import hint_about_failure_line, hint_about_unentered_loop
+from service.grading.hint_files import (
+    hint_about_ignored_magic,
+    hint_about_redefined_functions,
+    hint_about_several_programs,
+    hint_about_starter_files,
+    hint_about_swapped_parts,
+)
+from service.grading.hint_formats import (
+    RETURN_LINE,
+    describe_return_line,
+    hint_about_answers,
+    hint_about_empty_parts,
+    hint_about_image_log,
+    hint_about_images,
+    hint_about_magics,
+    hint_about_messages,
+    hint_about_missing_files,
+    hint_about_quoted_names,
+)
+from service.grading.hint_formulas import (
+    hint_about_division,
+    hint_about_gain,
+    hint_about_gyro_direction,
+    hint_about_radius,
+    hint_about_reversed_distance,
+)
+from service.grading.hint_functions import (
+    hint_about_functions,
+    hint_about_missing_return,
+    hint_about_narrow_except,
+    hint_about_returned_values,
+)
+from service.grading.hint_logic import (
+    hint_about_first_message,
+    hint_about_first_value,
+    hint_about_mirrored_end,
+    hint_about_missing_reverse,
+    hint_about_range_start,
+    hint_about_range_step,
+    hint_about_spoken_name,
+    hint_about_unused_parameter,
+)
+from service.grading.hint_loops import hint_about_limits
 from service.grading.hint_motion import (
-    of_curves,
-    of_distances,
-    of_loops_that_end_at_once,
-    of_speeds,
-    of_stillness,
-    of_turns,
-    of_units,
+    hint_about_curves,
+    hint_about_distances,
+    hint_about_skipped_loop,
+    hint_about_speeds,
+    hint_about_stillness,
+    hint_about_turns,
+    hint_about_units,
 )
-from service.grading.hint_places import of_places
-from service.grading.hint_recognition import of_recognition
-from service.grading.hint_repeats import (
-    of_exact_reading,
-    of_inner_loop,
-    of_last_number,
-    of_single_round,
-    of_words_in_loop,
+from service.grading.hint_recognition import hint_about_recognition
+from service.grading.hint_repetition import (
+    hint_about_exact_reading,
+    hint_about_inner_loop,
+    hint_about_last_number,
+    hint_about_repeated_words,
+    hint_about_single_reaction,
 )
 from service.grading.hint_responder import (
-    of_double_json,
-    of_misnamed_function,
-    of_missing_responder,
-    of_printed_answers,
-    of_replaced_prefix,
-    of_single_colon,
-    of_uncallable_responder,
-    of_unqueued_answers,
-    of_unreadable_answers,
+    hint_about_double_json,
+    hint_about_misnamed_function,
+    hint_about_missing_responder,
+    hint_about_single_colon,
+    hint_about_uncallable_responder,
+    hint_about_unqueued_answers,
+    hint_about_unreadable_answers,
+    hint_about_unreturned_answers,
+    hint_about_wrong_prefix,
 )
-from service.grading.hint_rules import (
-    RETURNS,
-    of_answers,
-    of_empty_parts,
-    of_image_log,
-    of_images,
-    of_magics,
-    of_messages,
-    of_missing_files,
-    of_quoted_names,
-    where_returned,
-)
-from service.grading.hint_signatures import of_signatures
-from service.grading.hint_slips import of_short_list, of_slips
-from service.grading.hint_steps import (
-    of_count_from_one,
-    of_first_message,
-    of_first_value,
-    of_mirrored_end,
-    of_no_way_back,
-    of_other_step,
-    of_spoken_name,
-    of_unused_parameter,
-)
+from service.grading.hint_signatures import hint_about_signatures
+from service.grading.hint_slips import hint_about_missing_comma, hint_about_slips
 from service.grading.hint_structure import (
-    of_no_effect,
-    of_replaced,
-    of_single_look,
-    of_stop_in_loop,
-    of_unbracketed,
-    of_uncalled,
-    of_unindented,
+    hint_about_discarded_value,
+    hint_about_missing_brackets,
+    hint_about_replaced_function,
+    hint_about_single_reading,
+    hint_about_stop_in_loop,
+    hint_about_uncalled_function,
+    hint_about_unindented_statement,
 )
-from service.grading.hint_texts import Wanted, is_near, of_sent_texts, of_texts, of_unlogged, of_unspoken, where_written
-from service.grading.hint_thresholds import of_joined_colours, of_thresholds
-from service.grading.hint_timing import of_overlapping_speech, of_seldom_looks, of_short_waits
-from service.grading.hint_unused import (
-    of_few_images,
-    of_few_samples,
-    of_partial_reading,
-    of_swallowed_flags,
-    of_swapped_atan2,
-    of_swapped_ports,
-    of_unread,
+from service.grading.hint_texts import (
+    ExpectedText,
+    describe_quoting_line,
+    hint_about_missing_series,
+    hint_about_sent_texts,
+    hint_about_texts,
+    hint_about_unspoken_text,
+    is_near,
 )
-from service.grading.hint_what_if import of_what_if
-from service.grading.judging.bounded import sentences_within
-from service.grading.judging.message_parts import quoted
+from service.grading.hint_thresholds import hint_about_joined_colours, hint_about_thresholds
+from service.grading.hint_timing import hint_about_overlapping_speech, hint_about_rare_readings, hint_about_short_waits
+from service.grading.hint_values import (
+    hint_about_few_images,
+    hint_about_few_samples,
+    hint_about_partial_reading,
+    hint_about_swallowed_flags,
+    hint_about_swapped_atan2,
+    hint_about_swapped_ports,
+    hint_about_unused_value,
+)
+from service.grading.judging.limited_judging import collect_within_limits
+from service.grading.judging.message_parts import quote_text
 from service.grading.run_plan import RunPlan
 from submissions.submission import Part, Submission
 
-_MOST = 5
+_MAX_HINTS = 5
 Rule = Callable[[Clues], Iterator[str]]
 #: Problems that prevent everything else.
-_OF_FILES: Sequence[Rule] = (of_missing_files, of_empty_parts, of_starter, of_swapped_parts)
+_FILE_RULES: Sequence[Rule] = (
+    hint_about_missing_files,
+    hint_about_empty_parts,
+    hint_about_starter_files,
+    hint_about_swapped_parts,
+)
 #: Rules that explain an error better than its message. The message is used if none of them applies.
-_OF_ERRORS: Sequence[Rule] = (
-    of_magics,
-    of_cell_errors,
-    of_misnamed_function,
-    of_missing_responder,
-    of_uncallable_responder,
-    of_printed_answers,
-    of_unreadable_answers,
-    of_no_return,
-    of_missing_key,
-    of_unqueued_answers,
-    of_signatures,
-    of_short_list,
+_ERROR_RULES: Sequence[Rule] = (
+    hint_about_magics,
+    hint_about_cell_errors,
+    hint_about_misnamed_function,
+    hint_about_missing_responder,
+    hint_about_uncallable_responder,
+    hint_about_unreturned_answers,
+    hint_about_unreadable_answers,
+    hint_about_missing_return,
+    hint_about_missing_key,
+    hint_about_unqueued_answers,
+    hint_about_signatures,
+    hint_about_missing_comma,
 )
 #: Rules for the causes of errors.
-_OF_MESSAGES: Sequence[Rule] = (
-    of_messages,
-    of_quoted_names,
-    of_braces,
-    of_images,
-    of_image_log,
-    of_double_json,
-    of_single_colon,
-    of_replaced_prefix,
-    of_answers,
-    of_sent_texts,
-    of_other_keys,
-    of_text_numbers,
+_MESSAGE_RULES: Sequence[Rule] = (
+    hint_about_messages,
+    hint_about_quoted_names,
+    hint_about_braces,
+    hint_about_images,
+    hint_about_image_log,
+    hint_about_double_json,
+    hint_about_single_colon,
+    hint_about_wrong_prefix,
+    hint_about_answers,
+    hint_about_sent_texts,
+    hint_about_other_keys,
+    hint_about_text_numbers,
 )
 #: Rules for programs that finished but did too little, the most certain first.
-_OF_STRUCTURE: Sequence[Rule] = (
-    of_ignored_magic,
-    of_unbracketed,
-    of_replaced,
-    of_redefined,
-    of_uncalled,
-    of_single_look,
-    of_loops_that_end_at_once,
-    of_no_effect,
-    of_unindented,
+_STRUCTURE_RULES: Sequence[Rule] = (
+    hint_about_ignored_magic,
+    hint_about_missing_brackets,
+    hint_about_replaced_function,
+    hint_about_redefined_functions,
+    hint_about_uncalled_function,
+    hint_about_single_reading,
+    hint_about_skipped_loop,
+    hint_about_discarded_value,
+    hint_about_unindented_statement,
 )
-_OF_RESULTS: Sequence[Rule] = (
-    of_spoken_name,
-    of_first_message,
-    of_overlapping_speech,
-    of_short_waits,
-    of_functions,
-    of_division,
-    of_image_command,
-    of_none_answers,
-    of_shifted_numbers,
-    of_swapped_values,
-    of_texts,
-    of_unspoken,
-    of_unlogged,
-    of_recognition,
-    of_units,
-    of_turns,
-    of_curves,
-    of_speeds,
-    of_distances,
-    of_count_from_one,
-    of_other_step,
-    of_unused_parameter,
-    of_no_way_back,
-    of_mirrored_end,
-    of_gain,
-    of_reversed_distance,
-    of_first_value,
-    of_radius,
-    of_joined_colours,
-    of_partial_reading,
-    of_thresholds,
-    of_seldom_looks,
-    of_swallowed_flags,
-    of_swapped_ports,
-    of_swapped_atan2,
-    of_words_in_loop,
-    of_inner_loop,
-    of_last_number,
-    of_exact_reading,
-    of_few_samples,
-    of_few_images,
-    of_single_round,
-    of_unread,
+_RESULT_RULES: Sequence[Rule] = (
+    hint_about_spoken_name,
+    hint_about_first_message,
+    hint_about_overlapping_speech,
+    hint_about_short_waits,
+    hint_about_functions,
+    hint_about_division,
+    hint_about_image_command,
+    hint_about_none_answers,
+    hint_about_shifted_numbers,
+    hint_about_swapped_values,
+    hint_about_texts,
+    hint_about_unspoken_text,
+    hint_about_missing_series,
+    hint_about_recognition,
+    hint_about_units,
+    hint_about_turns,
+    hint_about_curves,
+    hint_about_speeds,
+    hint_about_distances,
+    hint_about_range_start,
+    hint_about_range_step,
+    hint_about_unused_parameter,
+    hint_about_missing_reverse,
+    hint_about_mirrored_end,
+    hint_about_gain,
+    hint_about_reversed_distance,
+    hint_about_first_value,
+    hint_about_radius,
+    hint_about_joined_colours,
+    hint_about_partial_reading,
+    hint_about_thresholds,
+    hint_about_rare_readings,
+    hint_about_swallowed_flags,
+    hint_about_swapped_ports,
+    hint_about_swapped_atan2,
+    hint_about_repeated_words,
+    hint_about_inner_loop,
+    hint_about_last_number,
+    hint_about_exact_reading,
+    hint_about_few_samples,
+    hint_about_few_images,
+    hint_about_single_reaction,
+    hint_about_unused_value,
 )
 #: Rules for failures without a known mistake. The first that applies is used.
-_IF_NOTHING_ELSE: Sequence[Rule] = (
-    of_other_cell_errors,
-    of_several_programs,
-    of_loops_that_never_run,
-    of_answer_values,
-    of_returned_values,
-    of_narrow_except,
-    of_what_if,
-    of_moments,
-    of_places,
+_FALLBACK_RULES: Sequence[Rule] = (
+    hint_about_failed_cell,
+    hint_about_several_programs,
+    hint_about_unentered_loop,
+    hint_about_answer_values,
+    hint_about_returned_values,
+    hint_about_narrow_except,
+    hint_about_wrong_number,
+    hint_about_failure_line,
+    hint_about_cause_line,
 )
 _QUOTED = re.compile(r'"([^"]{6,60})"')
 _KEY = re.compile(r'"(\w+)"\s*:')
-_VARIES = re.compile(r"\d|[{}<>:]")
+_VARIABLE_TEXT = re.compile(r"\d|[{}<>:]")
 
 
-def hints_for(
+def collect_hints(
     submission: Submission,
     plan: RunPlan,
     trials: Sequence[TrialResult],
@@ -230,43 +260,59 @@ def hints_for(
     Returns None if it takes too long.
 
     Raises:
-        Exception: Whatever ``sentences_within`` raises.
+        Exception: Whatever ``collect_within_limits`` raises.
     """
     shown = [result for result in results if result.visibility == "visible"]
-    rules = accepted_differences if all(result.marks >= result.max_marks for result in shown) else _near_and_accepted
-    return sentences_within(trials, lambda: rules(clues_of(submission, plan, trials, results)), heartbeat)
+    rules = (
+        collect_accepted_differences
+        if all(result.marks >= result.max_marks for result in shown)
+        else _collect_all_hints
+    )
+    return collect_within_limits(trials, lambda: rules(collect_clues(submission, plan, trials, results)), heartbeat)
 
 
-def _near_and_accepted(clues: Clues) -> tuple[str, ...]:
-    return (*near_misses(clues), *accepted_differences(clues))[:_MOST]
+def _collect_all_hints(clues: Clues) -> tuple[str, ...]:
+    return (*collect_near_misses(clues), *collect_accepted_differences(clues))[:_MAX_HINTS]
 
 
-def near_misses(clues: Clues) -> tuple[str, ...]:
+def collect_near_misses(clues: Clues) -> tuple[str, ...]:
     """Return everything that the rules find, regardless of marks. Problems that prevent everything else come first."""
-    explained = _found(_OF_ERRORS, clues)
-    errors = explained or tuple(of_errors(clues))
-    sent = _found(_OF_MESSAGES, clues)
-    slips = () if errors else tuple(of_slips(clues))
-    limits = () if errors or slips else (*of_stop_in_loop(clues), *of_gyro_direction(clues), *of_limits(clues))
-    structure = () if errors else _found(_OF_STRUCTURE, clues)
-    still = () if errors or slips or limits or structure else tuple(of_stillness(clues))
+    explained = _apply_rules(_ERROR_RULES, clues)
+    errors = explained or tuple(hint_about_errors(clues))
+    sent = _apply_rules(_MESSAGE_RULES, clues)
+    slips = () if errors else tuple(hint_about_slips(clues))
+    limits = (
+        ()
+        if errors or slips
+        else (*hint_about_stop_in_loop(clues), *hint_about_gyro_direction(clues), *hint_about_limits(clues))
+    )
+    structure = () if errors else _apply_rules(_STRUCTURE_RULES, clues)
+    still = () if errors or slips or limits or structure else tuple(hint_about_stillness(clues))
     first = (*explained, *sent) if explained else (*sent, *errors)
-    found = (*_found(_OF_FILES, clues), *first, *slips, *limits, *structure, *still, *_found(_OF_RESULTS, clues))
-    found = found or next(filter(None, (tuple(rule(clues)) for rule in _IF_NOTHING_ELSE)), ())
-    return tuple(dict.fromkeys(found))[:_MOST]
+    found = (
+        *_apply_rules(_FILE_RULES, clues),
+        *first,
+        *slips,
+        *limits,
+        *structure,
+        *still,
+        *_apply_rules(_RESULT_RULES, clues),
+    )
+    found = found or next(filter(None, (tuple(rule(clues)) for rule in _FALLBACK_RULES)), ())
+    return tuple(dict.fromkeys(found))[:_MAX_HINTS]
 
 
-def _found(rules: Sequence[Rule], clues: Clues) -> tuple[str, ...]:
+def _apply_rules(rules: Sequence[Rule], clues: Clues) -> tuple[str, ...]:
     return tuple(sentence for rule in rules for sentence in rule(clues))
 
 
-def accepted_differences(clues: Clues) -> tuple[str, ...]:
+def collect_accepted_differences(clues: Clues) -> tuple[str, ...]:
     """Return one sentence each on words and on keys that differ from the description. Empty if none do."""
     task = " ".join(clues.task.split())
-    return (*_other_words(task, clues), *_missing_keys(task, clues))
+    return (*_hint_about_other_words(task, clues), *_hint_about_missing_keys(task, clues))
 
 
-def _other_words(task: str, clues: Clues) -> Iterator[str]:
+def _hint_about_other_words(task: str, clues: Clues) -> Iterator[str]:
     texts: Sequence[tuple[Part, str, Sequence[str]]] = (
         ("program", "says", clues.spoken),
         ("program", "prints", clues.printed),
@@ -274,31 +320,31 @@ def _other_words(task: str, clues: Clues) -> Iterator[str]:
     )
     for asked in _QUOTED.findall(task):
         begin = asked.partition("...")[0].strip()
-        if len(begin.split()) < 2 or _VARIES.search(begin):
+        if len(begin.split()) < 2 or _VARIABLE_TEXT.search(begin):
             continue
-        wanted = Wanted(begin, "contains")
+        wanted = ExpectedText(begin, "contains")
         if any(wanted.is_met_by(text, ignore_case=True) for _, _, found in texts for text in found):
             continue
         for part, verb, found in texts:
             near = next((text for text in found if is_near(wanted, text)), None)
             if near is not None:
-                where = where_written(clues, part, near)
-                yield f"{where} {verb} {quoted(near)}; the assignment asks for {quoted(begin)}"
+                where = describe_quoting_line(clues, part, near)
+                yield f"{where} {verb} {quote_text(near)}; the assignment asks for {quote_text(begin)}"
                 return
 
 
-def _missing_keys(task: str, clues: Clues) -> Iterator[str]:
-    asked = list(dict.fromkeys(key for form in _forms(task) for key in _KEY.findall(form)))
+def _hint_about_missing_keys(task: str, clues: Clues) -> Iterator[str]:
+    asked = list(dict.fromkeys(key for form in _extract_json_objects(task) for key in _KEY.findall(form)))
     answers = [text for text in clues.answers if text.startswith(JSON) and len(text) < LONGEST_TEXT]
     given = {key for text in answers for key in _KEY.findall(text)}
     missing = [key for key in asked if key not in given]
     if missing and given:
-        where = where_returned(answers[0], clues, RETURNS)
-        keys = " and ".join(map(quoted, missing[:3]))
-        yield f"{where}: the answer is {quoted(answers[0])}, without {keys}, which the assignment asks for"
+        where = describe_return_line(answers[0], clues, RETURN_LINE)
+        keys = " and ".join(map(quote_text, missing[:3]))
+        yield f"{where}: the answer is {quote_text(answers[0])}, without {keys}, which the assignment asks for"
 
 
-def _forms(task: str) -> Iterator[str]:
+def _extract_json_objects(task: str) -> Iterator[str]:
     """Yield each object after ``JSON::``, up to its closing bracket."""
     for piece in task.split(JSON)[1:]:
         depth = 0

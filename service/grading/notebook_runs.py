@@ -9,26 +9,26 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from responders.channel import Channel
-from responders.code import Code
 from responders.notebook_executor import MagicCall, PlannedRun
 from responders.sandbox.running_child import ChildLimits
+from responders.source_file import SourceFile
 from responders.trial_spec import ProgramSpec, TrialSpec
-from sim.chance import Stream
 from sim.errors import UsageError
-from sim.floors import floor
+from sim.floors import build_floor
+from sim.random_streams import RandomStream
 from sim.recording import TICK, Recording
-from sim.robot import robot
+from sim.robot import get_robot
 from sim.world import Noise
-from submissions.magics import Flags, Setup, Simulator, parse_flags
-from submissions.marked_run import Site
-from submissions.source_text import modules_of
+from submissions.magics import Flags, SimulatorPage, SimulatorSettings, parse_flags
+from submissions.marked_run import RunSite
+from submissions.source_text import find_modules
 
 #: The program that ``%sim_magic --refresh`` loads.
-_REFRESHED = "print('Refreshing simulator...')"
+_REFRESH_PROGRAM = "print('Refreshing simulator...')"
 
 
 @dataclass(frozen=True, slots=True)
-class Program:
+class LoadedProgram:
     """The loaded robot program: its cell, its text with that cell's line numbers, and its flags."""
 
     cell: int
@@ -36,9 +36,9 @@ class Program:
     flags: Flags
 
 
-_NO_PROGRAM = Program(0, "", Flags())
+_IDLE_PROGRAM = LoadedProgram(0, "", Flags())
 #: Creates the marked run from the program, the flags of the magic that starts it, and the simulator settings.
-MarkedRun = Callable[[Program, Flags, Setup], PlannedRun]
+MarkedRunPlanner = Callable[[LoadedProgram, Flags, SimulatorSettings], PlannedRun]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,65 +57,73 @@ class UnmarkedRuns:
 class NotebookRuns:
     """Follows the magics of one notebook execution, in call order."""
 
-    def __init__(self, marked: Site | None, marked_run: MarkedRun, unmarked: UnmarkedRuns, last: PlannedRun) -> None:
+    def __init__(
+        self, marked: RunSite | None, marked_run: MarkedRunPlanner, unmarked: UnmarkedRuns, last: PlannedRun
+    ) -> None:
         """Create the planner. ``marked`` is where the marked run starts, ``last`` the run after all cells, if any."""
         self._marked = marked
         self._marked_run = marked_run
         self._unmarked = unmarked
         self._last = last
-        self.simulator = Simulator()
-        self._program: Program | None = None
+        self.simulator = SimulatorPage()
+        self._program: LoadedProgram | None = None
         self._count = 0
         self.marked_ran = False
         #: Sites of the runs, in order.
-        self.started: list[Site] = []
+        self.started: list[RunSite] = []
 
-    def standing(self) -> PlannedRun:
+    def plan_standstill(self) -> PlannedRun:
         """The run of a robot that does not move, at its current pose."""
         setup = self.simulator.apply(Flags())
-        return PlannedRun(self._own(_NO_PROGRAM, setup), setup.obstacles)
+        return PlannedRun(self._build_unmarked_spec(_IDLE_PROGRAM, setup), setup.obstacles)
 
-    def call(self, call: MagicCall) -> PlannedRun:
+    def plan_call(self, call: MagicCall) -> PlannedRun:
         """Return the run that one magic starts."""
-        here = Site(call.cell, call.line or 0)
+        here = RunSite(call.cell, call.line or 0)
         marked = here == self._marked and not self.marked_ran
         try:
             flags = parse_flags(call.name, call.arguments)
         except UsageError as error:
             if not (marked and call.body is not None):
                 return PlannedRun(notes=(f"{error}; nothing was run",))
-            return self._start(here, marked, *self._load(call, Flags()), (f"the magic line is ignored: {error}",))
+            return self._plan_run(
+                here, marked, *self._load_program(call, Flags()), (f"the magic line is ignored: {error}",)
+            )
         if call.body is None and call.name != "sim_magic":
             return PlannedRun(notes=(f"%{call.name} in a single line does nothing, as in the simulator",))
         if "F" in flags.switches:
-            self._program = Program(call.cell, _REFRESHED, Flags())
+            self._program = LoadedProgram(call.cell, _REFRESH_PROGRAM, Flags())
             return PlannedRun()
         if call.body is not None:
-            self._load(call, flags)
+            self._load_program(call, flags)
         try:
             setup = self.simulator.apply(flags)
         except UsageError as error:
             if not marked:
                 return PlannedRun(notes=(f"{error}; nothing was run",))
-            return self._start(here, marked, Flags(), self.simulator.apply(Flags()), (f"a flag is ignored: {error}",))
+            return self._plan_run(
+                here, marked, Flags(), self.simulator.apply(Flags()), (f"a flag is ignored: {error}",)
+            )
         if not marked and "R" not in flags.switches:
             return PlannedRun(notes=setup.notes)
-        return self._start(here, marked, flags, setup, ())
+        return self._plan_run(here, marked, flags, setup, ())
 
-    def ran(self, recording: Recording) -> None:
+    def record_run(self, recording: Recording) -> None:
         """Keep the robot at the end pose of the run."""
-        self.simulator.leave_at(recording.end)
+        self.simulator.set_pose(recording.end)
 
-    def last(self) -> PlannedRun:
+    def plan_last_run(self) -> PlannedRun:
         """Return the run after all cells, if any."""
         return self._last
 
-    def _load(self, call: MagicCall, flags: Flags) -> tuple[Flags, Setup]:
+    def _load_program(self, call: MagicCall, flags: Flags) -> tuple[Flags, SimulatorSettings]:
         text = "#\n" * (call.line or 0) + (call.body or "")
-        self._program = Program(call.cell, text, flags)
+        self._program = LoadedProgram(call.cell, text, flags)
         return flags, self.simulator.apply(Flags())
 
-    def _start(self, here: Site, marked: bool, flags: Flags, setup: Setup, notes: tuple[str, ...]) -> PlannedRun:
+    def _plan_run(
+        self, here: RunSite, marked: bool, flags: Flags, setup: SimulatorSettings, notes: tuple[str, ...]
+    ) -> PlannedRun:
         if self._program is None:
             return PlannedRun(notes=("no robot program has been loaded; nothing was run",))
         self.started.append(here)
@@ -132,19 +140,22 @@ class NotebookRuns:
             )
         self._count += 1
         return PlannedRun(
-            self._own(self._program, setup), setup.obstacles, self._program.cell, notes=notes + setup.notes
+            self._build_unmarked_spec(self._program, setup),
+            setup.obstacles,
+            self._program.cell,
+            notes=notes + setup.notes,
         )
 
-    def _own(self, program: Program, setup: Setup) -> TrialSpec:
+    def _build_unmarked_spec(self, program: LoadedProgram, setup: SimulatorSettings) -> TrialSpec:
         """Return the spec of an unmarked run, by its own flags."""
         own = self._unmarked
-        seed = Stream(own.seed, "notebook run").integer(self._count) >> 1
+        seed = RandomStream(own.seed, "notebook run").integer(self._count) >> 1
         return TrialSpec(
-            program=program_spec(program, own.limits, own.output_bytes, own.files),
+            program=build_program_spec(program, own.limits, own.output_bytes, own.files),
             responder=None,
             collaborative=setup.collaborative,
-            floor=floor(setup.background, seed=own.sheet),
-            robot=robot(setup.robot),
+            floor=build_floor(setup.background, seed=own.sheet),
+            robot=get_robot(setup.robot),
             pose=setup.pose,
             noise=Noise(setup.light_noise, setup.motor_noise),
             channel=Channel(),
@@ -156,7 +167,9 @@ class NotebookRuns:
         )
 
 
-def program_spec(program: Program, limits: ChildLimits, output_bytes: int, files: Mapping[str, bytes]) -> ProgramSpec:
+def build_program_spec(
+    program: LoadedProgram, limits: ChildLimits, output_bytes: int, files: Mapping[str, bytes]
+) -> ProgramSpec:
     """Return the bridge's spec of a cell's program, with the modules among ``files`` that it can import."""
-    code = Code(f"cell {program.cell}", program.text)
-    return ProgramSpec(code, program.flags.preamble, limits, output_bytes, modules_of(code.text, files.get))
+    code = SourceFile(f"cell {program.cell}", program.text)
+    return ProgramSpec(code, program.flags.preamble, limits, output_bytes, find_modules(code.text, files.get))

@@ -13,26 +13,26 @@ from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobMeter
 from responders.trial_spec import TrialSpec
 from service.grading.grade import TrialResult
-from service.grading.notebook_runs import NotebookRuns, Program, UnmarkedRuns, program_spec
+from service.grading.notebook_runs import LoadedProgram, NotebookRuns, UnmarkedRuns, build_program_spec
 from service.grading.trial_runner import TrialRunner
 from sim.motion import Rectangle
 from sim.recording import Fault, Recording, Verdict
-from submissions.magics import Flags, Setup
-from submissions.marked_run import RunChoice, Site
+from submissions.magics import Flags, SimulatorSettings
+from submissions.marked_run import RunChoice, RunSite
 
 
 @dataclass(frozen=True, slots=True)
 class NotebookTrial:
     """The execution of the notebook in each trial, and the choice of the marked run.
 
-    ``choice`` is None if the program comes from the assignment. With ``as_read``, the program text of the trial spec is
-    run: the source rules were checked against it, and a notebook could supply another text. The seed and the agents in
-    ``notebook`` are set for each trial.
+    ``choice`` is None if the program comes from the assignment. With ``runs_spec_text``, the program text of the trial
+    spec is run: the source rules were checked against it, and a notebook could supply another text. The seed and the
+    agents in ``notebook`` are set for each trial.
     """
 
     notebook: NotebookSpec
     choice: RunChoice | None
-    as_read: bool = False
+    runs_spec_text: bool = False
 
     def run(self, spec: TrialSpec, obstacles: tuple[Rectangle, ...], runner: TrialRunner, meter: JobMeter) -> Recording:
         """Run the notebook and return the recording of the marked run, with the output of the whole notebook.
@@ -44,54 +44,60 @@ class NotebookTrial:
             Exception: Whatever the meter's heartbeat raises.
         """
         site = self.choice.site if self.choice is not None else None
-        executed, started = self._execute(spec, obstacles, site, runner, meter)
-        instead = self._instead(started) if executed.marked is None else None
+        executed, started = self._execute_notebook(spec, obstacles, site, runner, meter)
+        instead = self._choose_replacement(started) if executed.marked_run is None else None
         if instead is not None:
             assert site is not None
             never = f"the run of cell {site.cell} never started, so the run of cell {instead.cell} is marked"
-            executed, _ = self._execute(spec, obstacles, instead, runner, meter)
+            executed, _ = self._execute_notebook(spec, obstacles, instead, runner, meter)
             executed = replace(executed, notes=(never, *executed.notes))
             site = instead
-        if executed.marked is None:
-            return executed.told(runner.never_ran(spec, obstacles, _why_not(executed, site), executed.sandbox))
-        recording = executed.marked.recording
+        if executed.marked_run is None:
+            return executed.add_notebook_output(
+                runner.build_unstarted_recording(
+                    spec, obstacles, _explain_unstarted_run(executed, site), executed.sandbox
+                )
+            )
+        recording = executed.marked_run.recording
         faults = recording.faults
         if executed.stopped is not None and not any(fault.who == "responder" for fault in faults):
             # The notebook was stopped in a cell, before or after this run.
             faults = (*faults, replace(executed.stopped, t=recording.end_t))
         verdict = faults[0].verdict if faults else Verdict.FINISHED
-        return executed.told(replace(recording, faults=faults, verdict=verdict))
+        return executed.add_notebook_output(replace(recording, faults=faults, verdict=verdict))
 
-    def _instead(self, started: Sequence[Site]) -> Site | None:
+    def _choose_replacement(self, started: Sequence[RunSite]) -> RunSite | None:
         """Return the run to mark if the marked run never started; None if there is no replacement."""
         if self.choice is None or self.choice.only or not started:
             return None
         return next((site for site in self.choice.others if site in started), started[-1])
 
-    def notes_on_all(self, results: Sequence[TrialResult]) -> tuple[str, ...]:
+    def collect_shared_notes(self, results: Sequence[TrialResult]) -> tuple[str, ...]:
         """Return the notes on the cells once for all trials, since they are almost equal.
 
         Notes come from a visible trial: cells can put the robot's position into error messages.
         """
         return next((result.recording.notes for result in results if result.visibility == "visible"), ())
 
-    def _execute(
+    def _execute_notebook(
         self,
         spec: TrialSpec,
         obstacles: tuple[Rectangle, ...],
-        site: Site | None,
+        site: RunSite | None,
         runner: TrialRunner,
         meter: JobMeter,
-    ) -> tuple[ExecutedNotebook, list[Site]]:
+    ) -> tuple[ExecutedNotebook, list[RunSite]]:
         """Execute the notebook with the run at ``site`` marked. Return the result and the sites of the runs."""
         planned = PlannedRun(spec, obstacles, None, True, True)
 
-        def marked_run(program: Program, flags: Flags, setup: Setup) -> PlannedRun:
-            if self.as_read:
+        def marked_run(program: LoadedProgram, flags: Flags, setup: SimulatorSettings) -> PlannedRun:
+            if self.runs_spec_text:
                 program = replace(program, text=spec.program.code.text)
             run = replace(
                 spec,
-                program=program_spec(program, spec.program.limits, spec.program.output_bytes, self.notebook.files),
+                program=build_program_spec(
+                    program, spec.program.limits, spec.program.output_bytes, self.notebook.files
+                ),
                 pen_down="p" in flags.switches or "p" in program.flags.switches,
             )
             return replace(planned, spec=run)
@@ -104,14 +110,14 @@ class NotebookTrial:
         unmarked = UnmarkedRuns(limits, output, spec.seconds, spec.child_seed, files, spec.tick, sheet)
         notebook = replace(self.notebook, seed=spec.child_seed, agents=spec.agents)
 
-        def execute() -> tuple[ExecutedNotebook, list[Site]]:
+        def execute() -> tuple[ExecutedNotebook, list[RunSite]]:
             planner = NotebookRuns(site, marked_run, unmarked, planned if self.choice is None else PlannedRun())
             return runner.execute_notebook(notebook, planner, meter), planner.started
 
-        return runner.undisturbed(execute, meter)
+        return runner.run_with_retries(execute, meter)
 
 
-def _why_not(executed: ExecutedNotebook, site: Site | None) -> Fault:
+def _explain_unstarted_run(executed: ExecutedNotebook, site: RunSite | None) -> Fault:
     """Return why the marked run never started: the notebook was stopped, its cell failed, or was never reached.
 
     It counts as a fault of the program, which did not run.

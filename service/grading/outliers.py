@@ -12,11 +12,11 @@ from statistics import fmean, median, pstdev
 from typing import Literal
 
 #: The smallest class with outliers.
-_FEWEST = 8
+_MIN_SUBMISSIONS = 8
 _SPREADS_BELOW = 2.0
 _TIMES_SLOWER, _SECONDS_SLOWER = 3.0, 5.0
 #: The distance from the pass mark that counts as close, as a fraction of all marks.
-_CLOSE = Decimal("0.05")
+_CLOSE_SHARE = Decimal("0.05")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,14 +36,14 @@ class Outlier:
     why: Literal["low", "slow", "close"]
 
 
-def outliers(found: Sequence[MarksAndTime], pass_share: Decimal) -> tuple[Outlier, ...]:
+def find_outliers(found: Sequence[MarksAndTime], pass_share: Decimal) -> tuple[Outlier, ...]:
     """Return the lowest, then the slowest, then those on either side of the pass mark."""
-    return (*_low(found), *_slow(found), *_close(found, pass_share))
+    return (*_find_lowest(found), *_find_slowest(found), *_find_borderline(found, pass_share))
 
 
-def _low(found: Sequence[MarksAndTime]) -> Iterator[Outlier]:
+def _find_lowest(found: Sequence[MarksAndTime]) -> Iterator[Outlier]:
     shares = [float(each.share) for each in found]
-    if len(found) < _FEWEST or not (spread := pstdev(shares)):
+    if len(found) < _MIN_SUBMISSIONS or not (spread := pstdev(shares)):
         return
     below = fmean(shares) - _SPREADS_BELOW * spread
     for each in sorted(found, key=lambda each: each.share):
@@ -51,9 +51,9 @@ def _low(found: Sequence[MarksAndTime]) -> Iterator[Outlier]:
             yield Outlier(each.id, "low")
 
 
-def _slow(found: Sequence[MarksAndTime]) -> Iterator[Outlier]:
+def _find_slowest(found: Sequence[MarksAndTime]) -> Iterator[Outlier]:
     times = {each.id: each.seconds for each in found if each.seconds is not None}
-    if len(times) < _FEWEST:
+    if len(times) < _MIN_SUBMISSIONS:
         return
     usual = median(times.values())
     longest = max(_TIMES_SLOWER * usual, usual + _SECONDS_SLOWER)
@@ -62,7 +62,7 @@ def _slow(found: Sequence[MarksAndTime]) -> Iterator[Outlier]:
             yield Outlier(own, "slow")
 
 
-def _close(found: Sequence[MarksAndTime], pass_share: Decimal) -> Iterator[Outlier]:
+def _find_borderline(found: Sequence[MarksAndTime], pass_share: Decimal) -> Iterator[Outlier]:
     for each in sorted(found, key=lambda each: each.share):
-        if abs(each.share - pass_share) <= _CLOSE:
+        if abs(each.share - pass_share) <= _CLOSE_SHARE:
             yield Outlier(each.id, "close")

@@ -56,21 +56,23 @@ class RankTable:
     @property
     def texts(self) -> list[tuple[str, ...]]:
         """Place, student, value, interval and trials of each row, as tables show them."""
-        return [_texts(row) for row in self.rows]
+        return [_format_row(row) for row in self.rows]
 
 
-def ranked(measures: Sequence[StudentMeasures], *, highest: bool) -> tuple[RankRow, ...]:
+def rank_students(measures: Sequence[StudentMeasures], *, highest: bool) -> tuple[RankRow, ...]:
     """Return the rows in order of place. Equal values share a place: 1, 2, 2, 4."""
     means = {each: round(fmean(each.values), 2) for each in measures if each.values}
     placed = [
-        _row(each, 1 + sum((other > mean) if highest else (other < mean) for other in means.values()), mean, means)
+        _build_row(
+            each, 1 + sum((other > mean) if highest else (other < mean) for other in means.values()), mean, means
+        )
         for each, mean in means.items()
     ]
     without = [RankRow(None, False, each) for each in measures if not each.values]
     return (*sorted(placed, key=lambda row: (row.place, row.measures.student)), *without)
 
 
-def _row(measures: StudentMeasures, place: int, mean: float, means: dict[StudentMeasures, float]) -> RankRow:
+def _build_row(measures: StudentMeasures, place: int, mean: float, means: dict[StudentMeasures, float]) -> RankRow:
     shared = list(means.values()).count(mean) > 1
     count = len(measures.values)
     if count < 2:
@@ -79,7 +81,7 @@ def _row(measures: StudentMeasures, place: int, mean: float, means: dict[Student
     return RankRow(place, shared, measures, mean, mean - half, mean + half)
 
 
-def _texts(row: RankRow) -> tuple[str, ...]:
+def _format_row(row: RankRow) -> tuple[str, ...]:
     place = "" if row.place is None else f"{row.place}{'=' if row.shared else ''}"
     value = "none" if row.value is None else f"{row.value:.2f}"
     interval = "" if row.low is None or row.high is None else f"{row.low:.2f} to {row.high:.2f}"

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
-from responders.code import Code
 from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.trial_spec import AgentSpec, ProgramSpec, RanStatements, ResponderSpec, TrialSpec
+from responders.source_file import SourceFile
+from responders.trial_spec import AgentSpec, ExecutedStatements, ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.grade import TrialResult
 from service.grading.notebook_trial import NotebookTrial
 from service.grading.trial_runner import TrialRunner
@@ -23,14 +23,14 @@ from sim.motion import Rectangle
 from sim.recording import Recording
 from submissions.assignment.definition import Assignment
 from submissions.assignment.other_parts import SAME
-from submissions.bundle import missing_part
+from submissions.bundle import find_missing_part
 from submissions.criteria.code import Functions, SourceRules
-from submissions.diagram_cells import diagrams_in
-from submissions.magics import Flags, setup, split_program, without_magic
+from submissions.diagram_cells import read_diagrams
+from submissions.magics import Flags, apply_flags, comment_out_magic, split_program
 from submissions.marked_run import RunChoice, choose_run
-from submissions.plain_cells import python_of
-from submissions.seeds import PUBLIC, Secret, child_seed, world_seed
-from submissions.source_text import modules_of
+from submissions.notebook_python import extract_python
+from submissions.seeds import PUBLIC_SECRET, Secret, compute_child_seed, compute_world_seed
+from submissions.source_text import find_modules
 from submissions.submission import SECOND_PROGRAM, Notebook, Part, Submission
 
 _MEGABYTE = 1 << 20
@@ -53,7 +53,7 @@ class ProgramTrial:
         )
         return replace(recording, faults=tuple(faults))
 
-    def notes_on_all(self, results: Sequence[TrialResult]) -> tuple[str, ...]:
+    def collect_shared_notes(self, results: Sequence[TrialResult]) -> tuple[str, ...]:
         """Return notes on all trials together: none, because each recording has its own."""
         return ()
 
@@ -70,7 +70,7 @@ class RunPlan:
     assignment: Assignment
     trial: ProgramTrial | NotebookTrial
     program: ProgramSpec | None = None
-    answers: ResponderSpec | None = None
+    responder: ResponderSpec | None = None
     functions: ResponderSpec | None = None
     collaborative: bool = False
     flags: Flags = field(default_factory=Flags)
@@ -83,28 +83,30 @@ class RunPlan:
     agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # agents of ``answers``
     second_program: ProgramSpec | None = None  # if there are two robots
     second_flags: Flags = field(default_factory=Flags)
-    ran: Mapping[Part, RanStatements] = field(default_factory=lambda: MappingProxyType({}))  # of the watched parts
+    executed_statements: Mapping[Part, ExecutedStatements] = field(
+        default_factory=lambda: MappingProxyType({})
+    )  # of the watched parts
     ignored_magic: str = ""  # why a program's magic line is ignored
 
     @property
     def processes(self) -> tuple[ProgramSpec | ResponderSpec, ...]:
         """The processes that take part in every trial, the slowest to start first."""
-        answers = self.trial.notebook.as_responder if isinstance(self.trial, NotebookTrial) else self.answers
+        answers = self.trial.notebook.responder_spec if isinstance(self.trial, NotebookTrial) else self.responder
         found = (answers, *self.agents.values(), self.program, self.second_program)
         return tuple(each for each in found if each is not None)
 
-    def unwatched(self) -> RunPlan:
+    def to_hidden_plan(self) -> RunPlan:
         """Return the plan for hidden trials. Recorded statements could reveal sensor values, so none are recorded."""
-        program, second, answers = self.program, self.second_program, self.answers
+        program, second, answers = self.program, self.second_program, self.responder
         return replace(
             self,
-            program=program and replace(program, ran=None),
-            second_program=second and replace(second, ran=None),
-            answers=answers and replace(answers, ran=None),
+            program=program and replace(program, executed_statements=None),
+            second_program=second and replace(second, executed_statements=None),
+            responder=answers and replace(answers, executed_statements=None),
         )
 
 
-def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PUBLIC) -> RunPlan:
+def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PUBLIC_SECRET) -> RunPlan:
     """Return the plan for grading ``submission``, with seeds derived from ``secret``.
 
     Raises:
@@ -115,23 +117,23 @@ def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PU
         function = assignment.training.function
         raise UsageError(f"{notebook.name}: is a notebook, expected responder.py with a function {function}")
     if notebook is not None and "student" in (assignment.parts.program, assignment.parts.responder):
-        plan = _of_notebook(submission, notebook, assignment)
+        plan = _plan_notebook(submission, notebook, assignment)
     else:
-        plan = _of_files(submission, assignment)
-    plan = replace(plan, agents=MappingProxyType(_agents(submission, assignment)))
-    plan = _watched(plan)
+        plan = _plan_files(submission, assignment)
+    plan = replace(plan, agents=MappingProxyType(_plan_agents(submission, assignment)))
+    plan = _record_statements(plan)
     if assignment.world.robots == 2:
-        plan = _with_second_program(plan, submission)
+        plan = _add_second_program(plan, submission)
     return replace(
         plan,
         own_files=submission.files,
-        notes=(*plan.notes, *diagrams_in(notebook).problems),
+        notes=(*plan.notes, *read_diagrams(notebook).problems),
         submission=submission.sha256,
-        child_seed=child_seed(world_seed(secret, assignment.id), submission.sha256),
+        child_seed=compute_child_seed(compute_world_seed(secret, assignment.id), submission.sha256),
     )
 
 
-def _watched(plan: RunPlan) -> RunPlan:
+def _record_statements(plan: RunPlan) -> RunPlan:
     """Return the plan with recording of executed statements for the parts that rules on used code check.
 
     Notebooks and trained models are not watched, and no responder with a function that has only hidden calls. For
@@ -144,20 +146,20 @@ def _watched(plan: RunPlan) -> RunPlan:
     }
     if isinstance(plan.trial, NotebookTrial) or plan.assignment.training is not None:
         return plan
-    if _has_function_with_hidden_calls_only(plan.assignment):
+    if _has_hidden_only_function(plan.assignment):
         asked.discard("responder")
-    ran: dict[Part, RanStatements] = {part: RanStatements() for part in sorted(asked) if part in plan.read_as}
-    program, answers, functions = plan.program, plan.answers, plan.functions
+    ran: dict[Part, ExecutedStatements] = {part: ExecutedStatements() for part in sorted(asked) if part in plan.read_as}
+    program, answers, functions = plan.program, plan.responder, plan.functions
     return replace(
         plan,
-        program=program and replace(program, ran=ran.get("program")),
-        answers=answers and replace(answers, ran=ran.get("responder")),
-        functions=functions and replace(functions, ran=ran.get("responder")),
-        ran=MappingProxyType(ran),
+        program=program and replace(program, executed_statements=ran.get("program")),
+        responder=answers and replace(answers, executed_statements=ran.get("responder")),
+        functions=functions and replace(functions, executed_statements=ran.get("responder")),
+        executed_statements=MappingProxyType(ran),
     )
 
 
-def _has_function_with_hidden_calls_only(assignment: Assignment) -> bool:
+def _has_hidden_only_function(assignment: Assignment) -> bool:
     called: dict[bool, set[str]] = {True: set(), False: set()}  # names of functions in hidden and in visible calls
     for criterion in (each for each in assignment.criteria if isinstance(each, Functions)):
         for call in criterion.calls:
@@ -165,23 +167,27 @@ def _has_function_with_hidden_calls_only(assignment: Assignment) -> bool:
     return not called[True] <= called[False]
 
 
-def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
-    asked, missing = assignment.parts, missing_part(submission, assignment.parts)
+def _plan_files(submission: Submission, assignment: Assignment) -> RunPlan:
+    asked, missing = assignment.parts, find_missing_part(submission, assignment.parts)
     if missing == "program":
         asked = replace(asked, program="none")
     elif missing == "responder":
         asked = replace(asked, responder="none")
-    code = _part("robot program", "robot.py", asked.program, submission.program, assignment)
-    responder = _part("responder", "responder.py", asked.responder, submission.responder, assignment)
-    head = _read_head(code.text, assignment) if code is not None else _Head(Flags(), "", ())
+    code = _choose_code("robot program", "robot.py", asked.program, submission.program, assignment)
+    responder = _choose_code("responder", "responder.py", asked.responder, submission.responder, assignment)
+    head = _read_head(code.text, assignment) if code is not None else _ProgramHead(Flags(), "", ())
     notes = head.notes
     if submission.responder is not None and responder is not submission.responder:
         notes += ("your responder is not used: this assignment uses another one, or none",)
-    files = _files(submission, assignment, asked.program)
-    program = _program(Code(code.name, head.text), head.flags, files, assignment) if code is not None else None
-    beside = _responder(responder, _files(submission, assignment, asked.responder), assignment)
-    plan = _beside_each_other(ProgramTrial(), program, head.flags, beside, assignment, notes)
-    if missing == "program" and (asking := _stand_in(assignment)) is not None:
+    files = _collect_files(submission, assignment, asked.program)
+    program = (
+        _build_program_spec(SourceFile(code.name, head.text), head.flags, files, assignment)
+        if code is not None
+        else None
+    )
+    beside = _build_responder_spec(responder, _collect_files(submission, assignment, asked.responder), assignment)
+    plan = _plan_separate_parts(ProgramTrial(), program, head.flags, beside, assignment, notes)
+    if missing == "program" and (asking := _build_question_program(assignment)) is not None:
         asked_by = "your responder was called by a Robomark program that only sends the texts"
         plan = replace(plan, program=asking, notes=(*plan.notes, asked_by))
     # Text sent to a missing responder is still a message.
@@ -189,23 +195,25 @@ def _of_files(submission: Submission, assignment: Assignment) -> RunPlan:
     return replace(plan, missing=missing, collaborative=collaborative, ignored_magic=head.ignored)
 
 
-def _stand_in(assignment: Assignment) -> ProgramSpec | None:
+def _build_question_program(assignment: Assignment) -> ProgramSpec | None:
     """Return a program that sends all questions of the criteria to the responder; None if there are none."""
     texts = list(dict.fromkeys(text for criterion in assignment.criteria for text in criterion.questions))
     if not texts:
         return None
     text = f"import time\nfor text in {texts!r}:\n    print(text)\n    time.sleep(0.5)\n"
-    return _program(Code("questions.py", text), Flags(), {}, assignment)
+    return _build_program_spec(SourceFile("questions.py", text), Flags(), {}, assignment)
 
 
-def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignment) -> RunPlan:
+def _plan_notebook(submission: Submission, notebook: Notebook, assignment: Assignment) -> RunPlan:
     """Plan a notebook: executed if it must answer the robot, otherwise only its marked robot program is used."""
     asked = assignment.parts
     if asked.program == "none":
-        return _executed(submission, notebook, assignment, None, Flags(), ())
+        return _plan_executed_notebook(submission, notebook, assignment, None, Flags(), ())
     if asked.program != "student":
         head = _read_head(assignment.given_parts[asked.program], assignment)
-        plan = _executed(submission, notebook, assignment, Code(asked.program, head.text), head.flags, head.notes)
+        plan = _plan_executed_notebook(
+            submission, notebook, assignment, SourceFile(asked.program, head.text), head.flags, head.notes
+        )
         return replace(plan, ignored_magic=head.ignored)
     choice = choose_run(notebook, assignment, submission.run)
     site, cell = choice.site, choice.run.program
@@ -217,19 +225,21 @@ def _of_notebook(submission: Submission, notebook: Notebook, assignment: Assignm
             again = "" if site.cell == cell.number else f", because it is run again by cell {site.cell}"
             marked = f"the robot program in cell {cell.number} of {notebook.name} is marked{again}"
             notes = (marked, *choice.notes, *notes)
-        return _executed(submission, notebook, assignment, Code(notebook.name, head.text), head.flags, notes, choice)
+        return _plan_executed_notebook(
+            submission, notebook, assignment, SourceFile(notebook.name, head.text), head.flags, notes, choice
+        )
     if cell is None:
         raise UsageError(f"{notebook.name}: has no cell that begins with %%sim_magic_preloaded, expected one.")
-    responder = _part("responder", "responder.py", asked.responder, None, assignment)
-    files = _files(submission, assignment, asked.program)
-    program = _program(Code(f"cell {cell.number}", head.text), head.flags, files, assignment)
-    beside = _responder(responder, _files(submission, assignment, asked.responder), assignment)
+    responder = _choose_code("responder", "responder.py", asked.responder, None, assignment)
+    files = _collect_files(submission, assignment, asked.program)
+    program = _build_program_spec(SourceFile(f"cell {cell.number}", head.text), head.flags, files, assignment)
+    beside = _build_responder_spec(responder, _collect_files(submission, assignment, asked.responder), assignment)
     notes = (*head.notes, f"of {notebook.name} only the robot program in cell {cell.number} is run", *choice.notes)
-    plan = _beside_each_other(ProgramTrial(cell.number), program, head.flags, beside, assignment, notes)
+    plan = _plan_separate_parts(ProgramTrial(cell.number), program, head.flags, beside, assignment, notes)
     return replace(plan, ignored_magic=head.ignored)
 
 
-def _beside_each_other(
+def _plan_separate_parts(
     trial: ProgramTrial,
     program: ProgramSpec | None,
     flags: Flags,
@@ -253,18 +263,18 @@ def _beside_each_other(
     )
 
 
-def _executed(
+def _plan_executed_notebook(
     submission: Submission,
     notebook: Notebook,
     assignment: Assignment,
-    program: Code | None,
+    program: SourceFile | None,
     flags: Flags,
     notes: tuple[str, ...],
     choice: RunChoice | None = None,
 ) -> RunPlan:
     """Plan a notebook that runs from top to bottom. Its cells without robot programs are the responder."""
-    files = _files(submission, assignment, "student")
-    functions = _responder(Code(notebook.name, python_of(notebook)), files, assignment)
+    files = _collect_files(submission, assignment, "student")
+    functions = _build_responder_spec(SourceFile(notebook.name, extract_python(notebook)), files, assignment)
     assert functions is not None
     sources = tuple(cell.source for cell in notebook.cells)
     spec = NotebookSpec(notebook.name, sources, files, functions.limits, functions.output_bytes, 0)
@@ -279,7 +289,9 @@ def _executed(
     return RunPlan(
         assignment,
         NotebookTrial(spec, choice, as_read),
-        _program(program, flags, _files(submission, assignment, assignment.parts.program), assignment)
+        _build_program_spec(
+            program, flags, _collect_files(submission, assignment, assignment.parts.program), assignment
+        )
         if program
         else None,
         None,
@@ -291,7 +303,7 @@ def _executed(
     )
 
 
-def _with_second_program(plan: RunPlan, submission: Submission) -> RunPlan:
+def _add_second_program(plan: RunPlan, submission: Submission) -> RunPlan:
     """Return the plan with a second robot. Robots without a responder talk to each other."""
     assignment = plan.assignment
     who = assignment.parts.second_program
@@ -299,10 +311,12 @@ def _with_second_program(plan: RunPlan, submission: Submission) -> RunPlan:
         raise UsageError(f"{assignment.id} has two robots, which no notebook can answer, expected robot.py")
     if who == SAME:
         return replace(plan, second_program=plan.program, second_flags=plan.flags, collaborative=True)
-    code = _part("second robot program", SECOND_PROGRAM, who, submission.code(SECOND_PROGRAM), assignment)
+    code = _choose_code("second robot program", SECOND_PROGRAM, who, submission.find_code(SECOND_PROGRAM), assignment)
     assert code is not None
     head = _read_head(code.text, assignment)
-    program = _program(Code(code.name, head.text), head.flags, _files(submission, assignment, who), assignment)
+    program = _build_program_spec(
+        SourceFile(code.name, head.text), head.flags, _collect_files(submission, assignment, who), assignment
+    )
     return replace(
         plan,
         second_program=program,
@@ -313,18 +327,20 @@ def _with_second_program(plan: RunPlan, submission: Submission) -> RunPlan:
     )
 
 
-def _part(what: str, usual: str, who: str, submitted: Code | None, assignment: Assignment) -> Code | None:
+def _choose_code(
+    what: str, usual: str, who: str, submitted: SourceFile | None, assignment: Assignment
+) -> SourceFile | None:
     if who == "none":
         return None
     if who != "student":
-        return Code(who, assignment.given_parts[who])
+        return SourceFile(who, assignment.given_parts[who])
     if submitted is None:
         raise UsageError(f"the submission has no {what}; {assignment.id} asks for {usual}")
     return submitted
 
 
 @dataclass(frozen=True, slots=True)
-class _Head:
+class _ProgramHead:
     """A program's flags, its text after the magic line, notes on both, and why that line is ignored, if it is."""
 
     flags: Flags
@@ -333,14 +349,14 @@ class _Head:
     ignored: str = ""
 
 
-def _read_head(text: str, assignment: Assignment) -> _Head:
+def _read_head(text: str, assignment: Assignment) -> _ProgramHead:
     """Parse a program's magic line. Notes say where the assignment overrides it."""
     try:
         flags, text = split_program(text)
-        wanted = setup(flags)
+        wanted = apply_flags(flags)
     except UsageError as error:
         note = f"the program's magic line is ignored: {error}"
-        return _Head(Flags(), without_magic(text), (note,), str(error))
+        return _ProgramHead(Flags(), comment_out_magic(text), (note,), str(error))
     world = assignment.world
     notes = []
     if "b" in flags.values and wanted.background != world.background:
@@ -350,10 +366,10 @@ def _read_head(text: str, assignment: Assignment) -> _Head:
         notes.append(f"the program asks for the robot {wanted.robot}; the assignment's is {world.robot}")
     if flags.values.keys() & {"N", "M"}:
         notes.append("the assignment's noise is used, not the program's -N or -M")
-    return _Head(flags, text, tuple(notes))
+    return _ProgramHead(flags, text, tuple(notes))
 
 
-def _files(submission: Submission, assignment: Assignment, who: str) -> Mapping[str, bytes]:
+def _collect_files(submission: Submission, assignment: Assignment, who: str) -> Mapping[str, bytes]:
     """Return the files in the folder of a part of ``who``. Submitted files override given ones.
 
     Parts from the assignment cannot import the submission's code.
@@ -363,35 +379,43 @@ def _files(submission: Submission, assignment: Assignment, who: str) -> Mapping[
     return {**assignment.given, **dict(own)}
 
 
-def _agents(submission: Submission, assignment: Assignment) -> dict[str, AgentSpec]:
+def _plan_agents(submission: Submission, assignment: Assignment) -> dict[str, AgentSpec]:
     """Plan the agents. Each has a folder and limits like the responder's; given agents see only given files."""
     agents = {}
     for name, who in assignment.parts.agents.items():
         given = who != "student"
-        code = Code(who, assignment.given_parts[who]) if given else submission.agent(name)
-        spec = _responder(code, assignment.given if given else _files(submission, assignment, who), assignment)
+        code = SourceFile(who, assignment.given_parts[who]) if given else submission.find_agent_code(name)
+        spec = _build_responder_spec(
+            code, assignment.given if given else _collect_files(submission, assignment, who), assignment
+        )
         if spec is None:
             raise UsageError(f"the submission has no agent {name}; {assignment.id} asks for {name}.py")
         agents[name] = AgentSpec(spec.code, spec.files, spec.limits, spec.output_bytes, given=given)
     return agents
 
 
-def _program(code: Code, flags: Flags, files: Mapping[str, bytes], assignment: Assignment) -> ProgramSpec:
+def _build_program_spec(
+    code: SourceFile, flags: Flags, files: Mapping[str, bytes], assignment: Assignment
+) -> ProgramSpec:
     limits = assignment.limits
-    allowed = ChildLimits(limits.program_cpu, limits.program_memory_mb * _MEGABYTE, _avoided(assignment, "program"))
-    return ProgramSpec(code, flags.preamble, allowed, limits.output_bytes, modules_of(code.text, files.get))
+    allowed = ChildLimits(
+        limits.program_cpu, limits.program_memory_mb * _MEGABYTE, _collect_avoided_modules(assignment, "program")
+    )
+    return ProgramSpec(code, flags.preamble, allowed, limits.output_bytes, find_modules(code.text, files.get))
 
 
-def _responder(code: Code | None, files: Mapping[str, bytes], assignment: Assignment) -> ResponderSpec | None:
+def _build_responder_spec(
+    code: SourceFile | None, files: Mapping[str, bytes], assignment: Assignment
+) -> ResponderSpec | None:
     if code is None:
         return None
     limits = assignment.limits
-    avoided = _avoided(assignment, "responder")
+    avoided = _collect_avoided_modules(assignment, "responder")
     allowed = ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE, avoided)
     return ResponderSpec(code, files, allowed, limits.output_bytes)
 
 
-def _avoided(assignment: Assignment, part: Part) -> tuple[str, ...]:
+def _collect_avoided_modules(assignment: Assignment, part: Part) -> tuple[str, ...]:
     """Return the modules that a student's part may not import. Marked import rules are also enforced at run time."""
     if getattr(assignment.parts, part) != "student":
         return ()

@@ -10,20 +10,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
-from responders.code import Code
-from responders.function_calls import Called, FunctionCall, Returned
+from responders.function_calls import CallResult, CallResults, FunctionCall
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.source_file import SourceFile
 from responders.trial_spec import ResponderSpec
 from service.grading.grade import TrialResult
-from service.grading.judging.code import calls_of
-from service.grading.judging.judges import StaticAnalysis, as_had_by
-from service.grading.judging.message_parts import fault_words
+from service.grading.judging.code import list_calls
+from service.grading.judging.judge_declaration import StaticAnalysis, use_robot_recording
+from service.grading.judging.message_parts import describe_fault
 from service.grading.judging.source_answers import SPEECH, SourceAnswers
 from service.grading.run_plan import RunPlan
-from sim.chance import Stream
-from sim.recorded import seconds_at
+from sim.random_streams import RandomStream
 from sim.recording import Pose
+from sim.recording_values import tick_to_seconds
 from submissions.assignment.definition import Assignment
 from submissions.criteria.code import Functions, PythonCheck, SourceRules
 from submissions.submission import Part
@@ -31,7 +31,10 @@ from submissions.submission import Part
 _MEGABYTE = 1 << 20
 #: The limits are far above the needs of the longest text, so the speed of the machine makes no difference.
 _READER = ResponderSpec(
-    Code("reader.py", "from inside.static_analysis.reader import read"), {}, ChildLimits(30.0, 512 * _MEGABYTE), 100_000
+    SourceFile("reader.py", "from inside.static_analysis.reader import read"),
+    {},
+    ChildLimits(30.0, 512 * _MEGABYTE),
+    100_000,
 )
 #: Size limits for all files together and for one file. They exceed the reader's limits slightly, so that it reports
 #: them.
@@ -43,7 +46,9 @@ _RESPONDERS = ("responder", "*_responder")
 class FunctionCaller(Protocol):
     """Calls functions inside the sandbox. Implemented by the trial runner."""
 
-    def call(self, module: ResponderSpec, calls: Sequence[FunctionCall], seed: int, meter: JobMeter) -> Called:
+    def call_functions(
+        self, module: ResponderSpec, calls: Sequence[FunctionCall], seed: int, meter: JobMeter
+    ) -> CallResults:
         """Call a module's functions in sequence in a fresh child, and return their results."""
 
 
@@ -55,26 +60,26 @@ def analyse(plan: RunPlan, trials: Sequence[TrialResult], caller: FunctionCaller
     """
     assignment = plan.assignment
     answers: dict[str, SourceAnswers] = {}
-    called: dict[str, Called] = {}
-    checks: dict[tuple[str, int], Returned] = {}
+    called: dict[str, CallResults] = {}
+    checks: dict[tuple[str, int], CallResult] = {}
     # The instructor's checks have their own budget, separate from the submission's.
     own = JobMeter(meter.limits, meter.heartbeat)
     # Source rules come last, because they consider which code was executed.
     for criterion in sorted(assignment.criteria, key=lambda each: isinstance(each, SourceRules)):
         if isinstance(criterion, SourceRules) and criterion.part in plan.read_as:
-            answers[criterion.id] = _answers(criterion, plan, caller, meter)
+            answers[criterion.id] = _read_source_answers(criterion, plan, caller, meter)
         elif isinstance(criterion, Functions) and plan.functions is not None:
-            called[criterion.id] = _called(criterion, plan.functions, plan.child_seed, caller, meter)
+            called[criterion.id] = _call_functions(criterion, plan.functions, plan.child_seed, caller, meter)
         elif isinstance(criterion, PythonCheck):
             for place, trial in enumerate(trials):
                 if not criterion.scenarios or trial.scenario in criterion.scenarios:
-                    had = as_had_by(criterion.robot, trial)
-                    checks[criterion.id, place] = _check(criterion, had, assignment, caller, own)
+                    had = use_robot_recording(criterion.robot, trial)
+                    checks[criterion.id, place] = _run_check(criterion, had, assignment, caller, own)
     sandbox = next((each.sandbox for each in called.values()), "")
     return StaticAnalysis(answers, plan.flags, called, checks, sandbox, plan.missing)
 
 
-def plain_trial(trial: TrialResult) -> dict[str, Any]:
+def to_json_trial(trial: TrialResult) -> dict[str, Any]:
     """Return a trial's recording as JSON values, the input of an instructor's check."""
     recording = trial.recording
     return {
@@ -83,11 +88,11 @@ def plain_trial(trial: TrialResult) -> dict[str, Any]:
         "light_noise": trial.light_noise,
         "motor_noise": trial.motor_noise,
         "background": recording.background,
-        "start": _pose(recording.start),
-        "end": _pose(recording.end),
+        "start": _to_json_pose(recording.start),
+        "end": _to_json_pose(recording.end),
         "end_t": recording.end_t,
         "verdict": str(recording.verdict),
-        "ticks": {name: column.tolist() for name, column in recording.ticks.told().items()},
+        "ticks": {name: column.tolist() for name, column in recording.ticks.to_displayed_columns().items()},
         "printed": [[line.t, line.text] for line in recording.printed],
         "spoken": [[line.t, line.text] for line in recording.spoken],
         "messages": [
@@ -101,15 +106,17 @@ def plain_trial(trial: TrialResult) -> dict[str, Any]:
         "datalog": [
             [each.t, each.name, each.value, each.simtime] for each in recording.datalog if math.isfinite(each.value)
         ],
-        "images": [{"t": each.t, "pose": _pose(each.pose), "truth": each.truth} for each in recording.images],
-        "image_log": [[side, seconds_at(recording, tick)] for side, _, tick in recording.image_log],
+        "images": [{"t": each.t, "pose": _to_json_pose(each.pose), "truth": each.truth} for each in recording.images],
+        "image_log": [[side, tick_to_seconds(recording, tick)] for side, _, tick in recording.image_log],
         "touches": [[each.t, each.what] for each in recording.touches],
-        **({"partner": plain_trial(replace(trial, recording=recording.partner))} if recording.partner else {}),
+        **({"partner": to_json_trial(replace(trial, recording=recording.partner))} if recording.partner else {}),
     }
 
 
-def _answers(criterion: SourceRules, plan: RunPlan, caller: FunctionCaller, meter: JobMeter) -> SourceAnswers:
-    entries = _entries(plan.assignment) if criterion.part == "responder" else ()
+def _read_source_answers(
+    criterion: SourceRules, plan: RunPlan, caller: FunctionCaller, meter: JobMeter
+) -> SourceAnswers:
+    entries = _list_entry_points(plan.assignment) if criterion.part == "responder" else ()
     asked = {
         "uses": criterion.uses,
         "avoids": criterion.avoids,
@@ -118,13 +125,13 @@ def _answers(criterion: SourceRules, plan: RunPlan, caller: FunctionCaller, mete
         "shown": SPEECH,
         "entries": (*criterion.defines, *entries),
     }
-    ran = plan.ran.get(criterion.part)
+    ran = plan.executed_statements.get(criterion.part)
     was_run = sorted(ran.places) if ran is not None and ran.places else None
     calls = [FunctionCall("read", [list(_read_files(criterion.part, plan)), asked, was_run])]
-    called = caller.call(_READER, calls, 0, meter)
+    called = caller.call_functions(_READER, calls, 0, meter)
     fault = called.fault or called.returned[0].fault
     if fault is not None:
-        return SourceAnswers(error=f"it cannot be analysed ({fault_words(fault)})")
+        return SourceAnswers(error=f"it cannot be analysed ({describe_fault(fault)})")
     return SourceAnswers.read(called.returned[0].value, criterion)
 
 
@@ -136,13 +143,13 @@ def _read_files(part: Part, plan: RunPlan) -> Iterator[Mapping[str, Any]]:
     yield {"name": "", **{kind: content[:_MOST_OF_ONE] for kind, content in plan.read_as[part].items()}}
     spec = plan.program if part == "program" else plan.functions
     left = _MOST_READ - (len(spec.code.text) if spec is not None else 0)
-    for name, kind, content in _beside(part, plan):
+    for name, kind, content in _list_neighbour_files(part, plan):
         if left > 0:
             yield {"name": name, kind: content[:_MOST_OF_ONE]}
         left -= len(content)
 
 
-def _beside(part: Part, plan: RunPlan) -> Iterator[tuple[str, str, str]]:
+def _list_neighbour_files(part: Part, plan: RunPlan) -> Iterator[tuple[str, str, str]]:
     if part == "responder":
         for name, data in plan.own_files.items():
             if name.lower().endswith(".py"):
@@ -153,7 +160,7 @@ def _beside(part: Part, plan: RunPlan) -> Iterator[tuple[str, str, str]]:
                 yield f"{module}.py", "text", text
 
 
-def _entries(assignment: Assignment) -> Iterator[str]:
+def _list_entry_points(assignment: Assignment) -> Iterator[str]:
     """Yield the names of a responder's functions that are called from outside."""
     yield from _RESPONDERS
     if assignment.training is not None:
@@ -163,26 +170,26 @@ def _entries(assignment: Assignment) -> Iterator[str]:
             yield from {criterion.function, *(call.function for call in criterion.calls)} - {""}
 
 
-def _called(
+def _call_functions(
     criterion: Functions, functions: ResponderSpec, seed: int, caller: FunctionCaller, meter: JobMeter
-) -> Called:
-    own = Stream(seed, f"calls {criterion.id}").integer(0) >> 1
-    return caller.call(functions, calls_of(criterion), own, meter)
+) -> CallResults:
+    own = RandomStream(seed, f"calls {criterion.id}").integer(0) >> 1
+    return caller.call_functions(functions, list_calls(criterion), own, meter)
 
 
-def _check(
+def _run_check(
     criterion: PythonCheck, trial: TrialResult, assignment: Assignment, caller: FunctionCaller, meter: JobMeter
-) -> Returned:
+) -> CallResult:
     limits = assignment.limits
     check = ResponderSpec(
-        Code(criterion.file, assignment.given_parts[criterion.file]),
+        SourceFile(criterion.file, assignment.given_parts[criterion.file]),
         assignment.given,
         ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE),
         limits.output_bytes,
     )
-    called = caller.call(check, [FunctionCall("check", [plain_trial(trial)])], trial.seed, meter)
-    return called.returned[0] if called.returned else Returned(fault=called.fault)
+    called = caller.call_functions(check, [FunctionCall("check", [to_json_trial(trial)])], trial.seed, meter)
+    return called.returned[0] if called.returned else CallResult(fault=called.fault)
 
 
-def _pose(pose: Pose) -> dict[str, float]:
+def _to_json_pose(pose: Pose) -> dict[str, float]:
     return {"x": pose.x, "y": pose.y, "heading": pose.heading}

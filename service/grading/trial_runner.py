@@ -12,21 +12,21 @@ from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
 from typing import TypeVar
 
-from responders.function_calls import Called, FunctionCall, call_functions
-from responders.notebook_executor import ExecutedNotebook, RunPlanner, execute_notebook, never_ran
+from responders.function_calls import CallResults, FunctionCall, call_functions
+from responders.notebook_executor import ExecutedNotebook, RunPlanner, build_unstarted_recording, execute_notebook
 from responders.notebook_process import NotebookSpec
 from responders.pair import run_pair
-from responders.repeated_faults import RepeatedFaults
-from responders.sandbox.child_ends import KilledFromOutside
+from responders.repeated_faults import FaultReplay
+from responders.sandbox.child_exit import KilledFromOutside
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import remove_left_overs
 from responders.sandbox.processor import one_processor
 from responders.sandbox.running_child import LibrariesNeeded
-from responders.training import Named, TrainingSpec, train_and_name
+from responders.training import Predictions, TrainingSpec, train_and_predict
 from responders.trial import run_trial
 from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
-from service.grading.slots import Slots
+from service.grading.grader_locks import GraderLocks
 from sim.arena import Arena
 from sim.camera import CachedCamera, Cameras
 from sim.errors import HostError
@@ -53,7 +53,7 @@ class TrialRunner:
     def __init__(
         self,
         sandboxes: Sandboxes | None = None,
-        slots: Slots | None = None,
+        slots: GraderLocks | None = None,
         spares: bool = True,
     ) -> None:
         remove_left_overs()
@@ -79,11 +79,14 @@ class TrialRunner:
         meter = meter or JobMeter()
         partner = spec.partner
         if partner is not None:
-            camera = self._cameras.camera(spec.floor.pixels)
-            arenas = self._shared_arena(obstacles, spec.robot, 1), self._shared_arena(obstacles, spec.robot, 2)
-            return self.undisturbed(lambda: run_pair(spec, partner, arenas, camera, self._sandboxes, meter), meter)
-        ground = self._ground(spec, obstacles)
-        return self.undisturbed(lambda: run_trial(spec, *ground, self._sandboxes, meter), meter)
+            camera = self._cameras.open_camera(spec.floor.pixels)
+            arenas = (
+                self._reuse_shared_arena(obstacles, spec.robot, 1),
+                self._reuse_shared_arena(obstacles, spec.robot, 2),
+            )
+            return self.run_with_retries(lambda: run_pair(spec, partner, arenas, camera, self._sandboxes, meter), meter)
+        ground = self._prepare_arena_and_camera(spec, obstacles)
+        return self.run_with_retries(lambda: run_trial(spec, *ground, self._sandboxes, meter), meter)
 
     def execute_notebook(
         self, spec: NotebookSpec, planner: RunPlanner, meter: JobMeter | None = None
@@ -92,26 +95,30 @@ class TrialRunner:
 
         ``planner`` serves one execution, so callers use ``undisturbed`` themselves. Raises the same errors as ``run``.
         """
-        return execute_notebook(spec, planner, self._ground, self._sandboxes, meter or JobMeter())
+        return execute_notebook(spec, planner, self._prepare_arena_and_camera, self._sandboxes, meter or JobMeter())
 
-    def never_ran(self, spec: TrialSpec, obstacles: tuple[Rectangle, ...], fault: Fault, sandbox: str) -> Recording:
+    def build_unstarted_recording(
+        self, spec: TrialSpec, obstacles: tuple[Rectangle, ...], fault: Fault, sandbox: str
+    ) -> Recording:
         """Return the recording of a run that did not start because of ``fault``."""
-        return never_ran(spec, *self._ground(spec, obstacles), fault, sandbox)
+        return build_unstarted_recording(spec, *self._prepare_arena_and_camera(spec, obstacles), fault, sandbox)
 
-    def _ground(self, spec: TrialSpec, obstacles: tuple[Rectangle, ...]) -> tuple[Arena, CachedCamera]:
-        return self._arena(obstacles), self._cameras.camera(spec.floor.pixels)
+    def _prepare_arena_and_camera(
+        self, spec: TrialSpec, obstacles: tuple[Rectangle, ...]
+    ) -> tuple[Arena, CachedCamera]:
+        return self._reuse_arena(obstacles), self._cameras.open_camera(spec.floor.pixels)
 
-    def train(self, spec: TrainingSpec, meter: JobMeter | None = None) -> tuple[Named, ...]:
+    def train(self, spec: TrainingSpec, meter: JobMeter | None = None) -> tuple[Predictions, ...]:
         """Train a submission's model and let it classify images. Raises the same errors as ``run``."""
         meter = meter or JobMeter()
-        return self.undisturbed(lambda: train_and_name(spec, self._sandboxes, meter), meter)
+        return self.run_with_retries(lambda: train_and_predict(spec, self._sandboxes, meter), meter)
 
-    def call(
+    def call_functions(
         self, module: ResponderSpec, calls: Sequence[FunctionCall], seed: int, meter: JobMeter | None = None
-    ) -> Called:
+    ) -> CallResults:
         """Call functions of a module in a fresh child, without a robot. Raises the same errors as ``run``."""
         meter = meter or JobMeter()
-        return self.undisturbed(
+        return self.run_with_retries(
             lambda: call_functions(
                 module.code,
                 module.files,
@@ -121,18 +128,18 @@ class TrialRunner:
                 self._sandboxes,
                 seed,
                 meter,
-                module.ran,
+                module.executed_statements,
             ),
             meter,
         )
 
-    def sparing(self, repeats: RepeatedFaults) -> AbstractContextManager[None]:
+    def skipping_repeats(self, repeats: FaultReplay) -> AbstractContextManager[None]:
         """Return a context in which children whose outcome ``repeats`` knows are not run."""
-        return self._sandboxes.standing_in(repeats.child) if self._spares else nullcontext()
+        return self._sandboxes.replacing_children(repeats.provide_child) if self._spares else nullcontext()
 
-    def begin(self, processes: Iterable[ProgramSpec | ResponderSpec]) -> None:
+    def start_zygotes(self, processes: Iterable[ProgramSpec | ResponderSpec]) -> None:
         """Start the zygotes for these processes in parallel, without waiting."""
-        for role, without in dict.fromkeys((each.role, each.limits.without) for each in processes):
+        for role, without in dict.fromkeys((each.role, each.limits.excluded_modules) for each in processes):
             self._sandboxes.begin(role, without)
 
     def check_sandbox(self) -> str:
@@ -141,15 +148,15 @@ class TrialRunner:
         Raises:
             SandboxMissing: A required layer cannot be set up.
         """
-        return self._sandboxes.check()
+        return self._sandboxes.check_isolation()
 
-    def check_forgetting(self) -> None:
+    def check_trial_isolation(self) -> None:
         """Check that trials leave nothing behind for later ones, as hidden trials require. Repeated occasionally.
 
         Raises:
             HostError: A trial could leave something behind.
         """
-        reason = self._sandboxes.remembers() if self._sandboxes.isolation.seccomp else None
+        reason = self._sandboxes.check_data_leaks() if self._sandboxes.isolation.seccomp else None
         if reason is not None:
             raise HostError(f"a trial could leave data for the next, so hidden scenarios are not graded here: {reason}")
 
@@ -175,20 +182,20 @@ class TrialRunner:
     ) -> None:
         self.close()
 
-    def undisturbed(self, work: Callable[[], Result], meter: JobMeter) -> Result:
+    def run_with_retries(self, work: Callable[[], Result], meter: JobMeter) -> Result:
         """Do ``work``, and repeat it if it ends for a reason that is not the submission's fault.
 
         If a child imported an unexpected library, the repeated run provides the library from the start.
         """
         before = meter.spent
         try:
-            return self._unless_killed(work, meter)
+            return self._run_unless_killed(work, meter)
         except LibrariesNeeded:
-            meter.give_back(before)
-            self._sandboxes.give_libraries(meter)
-        return self._unless_killed(work, meter)
+            meter.refund_since(before)
+            self._sandboxes.enable_libraries(meter)
+        return self._run_unless_killed(work, meter)
 
-    def _unless_killed(self, work: Callable[[], Result], meter: JobMeter) -> Result:
+    def _run_unless_killed(self, work: Callable[[], Result], meter: JobMeter) -> Result:
         """Do ``work``. If a child is killed from outside, repeat it exclusively, with no other grader running.
 
         Children of other graders may have used the memory. A child killed twice, the second time alone, is at fault
@@ -196,38 +203,38 @@ class TrialRunner:
         """
         before = meter.spent
         try:
-            with self._slots.beside_others(meter.heartbeat) if self._slots is not None else nullcontext():
-                return _on_one_processor(work)
+            with self._slots.shared_lock(meter.heartbeat) if self._slots is not None else nullcontext():
+                return _run_on_one_processor(work)
         except KilledFromOutside as killed:
             _log.warning("the trial is run again, alone: %s", killed)
-        meter.give_back(before)
+        meter.refund_since(before)
         try:
-            with self._alone(meter):
-                return _on_one_processor(work)
+            with self._exclusive_lock(meter):
+                return _run_on_one_processor(work)
         except KilledFromOutside as killed:
             _log.warning("the trial is run a last time, alone: %s", killed)
-        meter.give_back(before)
-        with self._alone(meter), self._sandboxes.blaming():
-            return _on_one_processor(work)
+        meter.refund_since(before)
+        with self._exclusive_lock(meter), self._sandboxes.blaming():
+            return _run_on_one_processor(work)
 
-    def _alone(self, meter: JobMeter) -> AbstractContextManager[None]:
-        return self._slots.alone(meter.heartbeat) if self._slots is not None else nullcontext()
+    def _exclusive_lock(self, meter: JobMeter) -> AbstractContextManager[None]:
+        return self._slots.exclusive_lock(meter.heartbeat) if self._slots is not None else nullcontext()
 
-    def _arena(self, obstacles: tuple[Rectangle, ...]) -> Arena:
-        return _kept(self._arenas, obstacles, lambda: Arena(obstacles))
+    def _reuse_arena(self, obstacles: tuple[Rectangle, ...]) -> Arena:
+        return _reuse_or_create(self._arenas, obstacles, lambda: Arena(obstacles))
 
-    def _shared_arena(self, obstacles: tuple[Rectangle, ...], robot: Robot, number: int) -> SharedArena:
+    def _reuse_shared_arena(self, obstacles: tuple[Rectangle, ...], robot: Robot, number: int) -> SharedArena:
         """Return the arena of robot ``number`` of a pair."""
         key, partner = (obstacles, robot.name, number), f"robot {3 - number}"
-        return _kept(self._shared_arenas, key, lambda: SharedArena(obstacles, robot, partner))
+        return _reuse_or_create(self._shared_arenas, key, lambda: SharedArena(obstacles, robot, partner))
 
 
-def _on_one_processor(work: Callable[[], Result]) -> Result:
+def _run_on_one_processor(work: Callable[[], Result]) -> Result:
     with one_processor():
         return work()
 
 
-def _kept(arenas: OrderedDict[Key, AnArena], key: Key, make: Callable[[], AnArena]) -> AnArena:
+def _reuse_or_create(arenas: OrderedDict[Key, AnArena], key: Key, make: Callable[[], AnArena]) -> AnArena:
     """Return the arena of this key, created if needed. Closes the least recently used arena beyond the limit."""
     arena = arenas.pop(key, None) or make()
     arenas[key] = arena

@@ -9,7 +9,7 @@ from service.language import translatable
 from sim.recording import Verdict
 
 #: Every verdict has a label.
-ENDED: Mapping[Verdict, str] = MappingProxyType(
+VERDICT_LABELS: Mapping[Verdict, str] = MappingProxyType(
     {
         Verdict.FINISHED: translatable("completed"),
         Verdict.PROGRAM_ERROR: translatable("error in the robot program"),

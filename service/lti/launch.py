@@ -14,7 +14,7 @@ import jwt
 from jwt import PyJWKSet
 from jwt.exceptions import PyJWTError
 
-from service.lti.fetching import fetch
+from service.lti.platform_requests import fetch_json
 from service.store.people.lti import PendingLaunch, Platform
 from service.store.states import Role
 from sim.errors import UsageError
@@ -23,9 +23,9 @@ from submissions.student_identity import Student
 CLAIM = "https://purl.imsglobal.org/spec/lti/claim/"
 MEMBERS_CLAIM = "https://purl.imsglobal.org/spec/lti-nrps/claim/namesroleservice"
 GRADES_CLAIM = "https://purl.imsglobal.org/spec/lti-ags/claim/endpoint"
-_MEMBERSHIP = "http://purl.imsglobal.org/vocab/lis/v2/membership"
-_CLOCKS_DIFFER_SECONDS = 60
-_LONGEST = 250
+_MEMBERSHIP_ROLES = "http://purl.imsglobal.org/vocab/lis/v2/membership"
+_CLOCK_LEEWAY_SECONDS = 60
+_LONGEST_TEXT = 250
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Launch:
     lineitems_url: str | None
 
 
-def authorization_address(
+def build_authorization_url(
     platform: Platform, redirect_uri: str, login_hint: str, message_hint: str | None, state: str, nonce: str
 ) -> str:
     """Return the platform's address that authenticates the user."""
@@ -68,7 +68,7 @@ def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
 
     Raises UsageError if the token is not trusted, PlatformError if the platform's keys cannot be fetched.
     """
-    claims = _claims(pending, id_token)
+    claims = _verify_token(pending, id_token)
     if claims.get(f"{CLAIM}version") != "1.3.0":
         raise UsageError("this launch does not use LTI 1.3")
     if claims.get(f"{CLAIM}message_type") != "LtiResourceLinkRequest":
@@ -76,7 +76,7 @@ def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
     deployment = claims.get(f"{CLAIM}deployment_id")
     if not isinstance(deployment, str) or deployment not in pending.platform.deployments:
         raise UsageError(f"the deployment of this launch is not registered: {str(deployment)[:80]!r}")
-    context = _table(claims, f"{CLAIM}context")
+    context = _read_object(claims, f"{CLAIM}context")
     context_id = context.get("id")
     subject = claims.get("sub")
     if not isinstance(context_id, str) or not isinstance(subject, str) or not context_id or not subject:
@@ -84,33 +84,33 @@ def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
     title = context.get("title") or context.get("label") or context_id
     return Launch(
         subject=subject,
-        student=_student(claims, pending.platform, subject),
-        role=role_of(claims.get(f"{CLAIM}roles")),
+        student=_parse_student(claims, pending.platform, subject),
+        role=parse_role(claims.get(f"{CLAIM}roles")),
         deployment=deployment,
         context=context_id,
-        course_title=str(title)[:_LONGEST],
-        members_url=text_of(_table(claims, MEMBERS_CLAIM), "context_memberships_url"),
-        lineitems_url=text_of(_table(claims, GRADES_CLAIM), "lineitems"),
+        course_title=str(title)[:_LONGEST_TEXT],
+        members_url=read_string(_read_object(claims, MEMBERS_CLAIM), "context_memberships_url"),
+        lineitems_url=read_string(_read_object(claims, GRADES_CLAIM), "lineitems"),
     )
 
 
-def role_of(roles: object) -> Role:
+def parse_role(roles: object) -> Role:
     """Return instructor for an instructor of the course, otherwise student. Roles in the institution do not count."""
     named = {role for role in roles if isinstance(role, str)} if isinstance(roles, list) else set()
-    return Role.INSTRUCTOR if named & {f"{_MEMBERSHIP}#Instructor", "Instructor"} else Role.STUDENT
+    return Role.INSTRUCTOR if named & {f"{_MEMBERSHIP_ROLES}#Instructor", "Instructor"} else Role.STUDENT
 
 
-def student_of(platform: Platform, subject: str, id: str | None, name: str | None, email: str | None) -> Student:
+def build_student(platform: Platform, subject: str, id: str | None, name: str | None, email: str | None) -> Student:
     """Convert a person of a platform to a student, with the institution's id if the platform sends one.
 
     Only names and e-mail addresses are truncated, because truncated ids could collide.
     """
-    return Student(id or f"{platform.name} {subject}", (name or "")[:_LONGEST], (email or "")[:_LONGEST])
+    return Student(id or f"{platform.name} {subject}", (name or "")[:_LONGEST_TEXT], (email or "")[:_LONGEST_TEXT])
 
 
-def _claims(pending: PendingLaunch, id_token: str) -> dict[str, Any]:
+def _verify_token(pending: PendingLaunch, id_token: str) -> dict[str, Any]:
     platform = pending.platform
-    keys = fetch(platform.keys_url).value
+    keys = fetch_json(platform.keys_url).value
     try:
         known = PyJWKSet.from_dict(keys)
         key = known[jwt.get_unverified_header(id_token).get("kid", "")]
@@ -120,7 +120,7 @@ def _claims(pending: PendingLaunch, id_token: str) -> dict[str, Any]:
             algorithms=["RS256"],
             audience=platform.client_id,
             issuer=platform.issuer,
-            leeway=_CLOCKS_DIFFER_SECONDS,
+            leeway=_CLOCK_LEEWAY_SECONDS,
             options={"require": ["exp", "iat", "aud", "iss", "sub", "nonce"]},
         )
     except (PyJWTError, KeyError, TypeError, AttributeError) as error:
@@ -133,22 +133,22 @@ def _claims(pending: PendingLaunch, id_token: str) -> dict[str, Any]:
     return claims
 
 
-def _student(claims: Mapping[str, Any], platform: Platform, subject: str) -> Student:
-    known = text_of(_table(claims, f"{CLAIM}lis"), "person_sourcedid")
-    return student_of(platform, subject, known, text_of(claims, "name"), text_of(claims, "email"))
+def _parse_student(claims: Mapping[str, Any], platform: Platform, subject: str) -> Student:
+    known = read_string(_read_object(claims, f"{CLAIM}lis"), "person_sourcedid")
+    return build_student(platform, subject, known, read_string(claims, "name"), read_string(claims, "email"))
 
 
-def _table(claims: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+def _read_object(claims: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     found = claims.get(name)
     return found if isinstance(found, dict) else {}
 
 
-def text_of(table: Mapping[str, Any], name: str) -> str | None:
+def read_string(table: Mapping[str, Any], name: str) -> str | None:
     """Return a string value sent by a platform; None if it is missing or not a string."""
     value = table.get(name)
     return value if isinstance(value, str) and value else None
 
 
-def tables_in(value: object) -> list[Mapping[str, Any]]:
+def read_objects(value: object) -> list[Mapping[str, Any]]:
     """Return the objects in a list sent by a platform, skipping other values."""
     return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []

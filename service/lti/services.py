@@ -18,11 +18,11 @@ from urllib.parse import urlencode
 
 import jwt
 
-from service.lti.fetching import Fetched, PlatformError, fetch
-from service.lti.keys import signing_key
-from service.lti.launch import role_of, student_of, tables_in, text_of
+from service.lti.keys import ensure_signing_key
+from service.lti.launch import build_student, parse_role, read_objects, read_string
+from service.lti.platform_requests import PlatformError, PlatformReply, fetch_json
 from service.store.engine import Store
-from service.store.people.lti import CourseLink, Platform, origin_of
+from service.store.people.lti import CourseLink, Platform, parse_origin
 from service.store.states import Role
 from submissions.student_identity import Student
 
@@ -34,7 +34,7 @@ _MEMBERS = "application/vnd.ims.lti-nrps.v2.membershipcontainer+json"
 _LINEITEM = "application/vnd.ims.lis.v2.lineitem+json"
 _LINEITEMS = "application/vnd.ims.lis.v2.lineitemcontainer+json"
 _SCORE = "application/vnd.ims.lis.v1.score+json"
-_NEXT = re.compile(r'<([^>]+)>\s*;\s*rel="?next"?')
+_NEXT_LINK = re.compile(r'<([^>]+)>\s*;\s*rel="?next"?')
 _MOST_PAGES = 200
 _ASSERTION_SECONDS = 60
 
@@ -59,23 +59,23 @@ class Score:
     comment: str = ""
 
 
-def members(store: Store, link: CourseLink) -> list[PlatformMember]:
+def fetch_members(store: Store, link: CourseLink) -> list[PlatformMember]:
     """Return the active members of the course. Raises PlatformError if the platform returns no list."""
     if link.members_url is None:
         raise PlatformError("The platform did not send the address of its member list")
     _check_origin(link.platform, link.members_url)
-    headers = {"accept": _MEMBERS, "authorization": f"Bearer {_token(store, link.platform, _MEMBERS_SCOPE)}"}
+    headers = {"accept": _MEMBERS, "authorization": f"Bearer {_request_token(store, link.platform, _MEMBERS_SCOPE)}"}
     found = []
-    for page in _pages(link.platform, link.members_url, headers):
-        for each in tables_in(page.get("members") if isinstance(page, dict) else None):
-            subject = text_of(each, "user_id")
+    for page in _fetch_pages(link.platform, link.members_url, headers):
+        for each in read_objects(page.get("members") if isinstance(page, dict) else None):
+            subject = read_string(each, "user_id")
             if subject is None or each.get("status", "Active") != "Active":
                 continue
-            parts = (text_of(each, "given_name"), text_of(each, "family_name"))
-            name = text_of(each, "name") or " ".join(filter(None, parts))
-            known, email = text_of(each, "lis_person_sourcedid"), text_of(each, "email")
-            student = student_of(link.platform, subject, known, name, email)
-            found.append(PlatformMember(subject, student, role_of(_full(each.get("roles")))))
+            parts = (read_string(each, "given_name"), read_string(each, "family_name"))
+            name = read_string(each, "name") or " ".join(filter(None, parts))
+            known, email = read_string(each, "lis_person_sourcedid"), read_string(each, "email")
+            student = build_student(link.platform, subject, known, name, email)
+            found.append(PlatformMember(subject, student, parse_role(_expand_roles(each.get("roles")))))
     return found
 
 
@@ -89,8 +89,8 @@ def send_scores(store: Store, link: CourseLink, assignment: str, title: str, sco
     _check_origin(link.platform, link.lineitems_url)
     if not scores:
         return 0
-    token = _token(store, link.platform, _GRADES_SCOPES)
-    column = _column(
+    token = _request_token(store, link.platform, _GRADES_SCOPES)
+    column = _ensure_column(
         link.platform, link.lineitems_url, token, assignment, title, max(each.max_marks for each in scores)
     )
     path, _, query = column.partition("?")
@@ -106,19 +106,21 @@ def send_scores(store: Store, link: CourseLink, assignment: str, title: str, sco
             "comment": score.comment,
         }
         headers = {"content-type": _SCORE, "authorization": f"Bearer {token}"}
-        _ask(link.platform, where, method="POST", body=json.dumps(body).encode(), headers=headers)
+        _send_request(link.platform, where, method="POST", body=json.dumps(body).encode(), headers=headers)
     return len(scores)
 
 
-def _column(platform: Platform, lineitems_url: str, token: str, assignment: str, title: str, max_marks: Decimal) -> str:
+def _ensure_column(
+    platform: Platform, lineitems_url: str, token: str, assignment: str, title: str, max_marks: Decimal
+) -> str:
     headers = {"accept": _LINEITEMS, "authorization": f"Bearer {token}"}
     separator = "&" if "?" in lineitems_url else "?"
-    for page in _pages(platform, f"{lineitems_url}{separator}{urlencode({'resource_id': assignment})}", headers):
-        for item in tables_in(page):
+    for page in _fetch_pages(platform, f"{lineitems_url}{separator}{urlencode({'resource_id': assignment})}", headers):
+        for item in read_objects(page):
             if item.get("resourceId") == assignment and isinstance(item.get("id"), str):
                 return str(item["id"])
     wanted = {"label": title, "scoreMaximum": float(max_marks), "resourceId": assignment, "tag": "robomark"}
-    made = _ask(
+    made = _send_request(
         platform,
         lineitems_url,
         method="POST",
@@ -130,10 +132,10 @@ def _column(platform: Platform, lineitems_url: str, token: str, assignment: str,
     return str(made["id"])
 
 
-def _token(store: Store, platform: Platform, scopes: str) -> str:
+def _request_token(store: Store, platform: Platform, scopes: str) -> str:
     """Request an access token with a signed assertion (RFC 7523)."""
     with store.transaction() as session:
-        key_id, pem = signing_key(session)
+        key_id, pem = ensure_signing_key(session)
     at = int(time.time())
     claims = {
         "iss": platform.client_id,
@@ -150,38 +152,38 @@ def _token(store: Store, platform: Platform, scopes: str) -> str:
         "scope": scopes,
     }
     headers = {"content-type": "application/x-www-form-urlencoded"}
-    answer = fetch(platform.token_url, method="POST", body=urlencode(asked).encode(), headers=headers).value
+    answer = fetch_json(platform.token_url, method="POST", body=urlencode(asked).encode(), headers=headers).value
     token = answer.get("access_token") if isinstance(answer, dict) else None
     if not isinstance(token, str):
         raise PlatformError("The platform did not return an access token")
     return token
 
 
-def _ask(platform: Platform, url: str, **request: Any) -> Fetched:
+def _send_request(platform: Platform, url: str, **request: Any) -> PlatformReply:
     """Call an address from a launch or the platform if its origin is registered. Raises PlatformError."""
     _check_origin(platform, url)
-    return fetch(url, **request)
+    return fetch_json(url, **request)
 
 
 def _check_origin(platform: Platform, url: str) -> None:
-    if not platform.may_be_asked(url):
+    if not platform.has_registered_origin(url):
         raise PlatformError(
-            f"The platform uses {origin_of(url) or 'an invalid address'} for a service, which is not "
+            f"The platform uses {parse_origin(url) or 'an invalid address'} for a service, which is not "
             "registered for it; ask an operator of Robomark to add this address to the platform's services"
         )
 
 
-def _pages(platform: Platform, url: str, headers: Mapping[str, str]) -> Iterator[Any]:
+def _fetch_pages(platform: Platform, url: str, headers: Mapping[str, str]) -> Iterator[Any]:
     for _ in range(_MOST_PAGES):
-        fetched = _ask(platform, url, headers=headers)
+        fetched = _send_request(platform, url, headers=headers)
         yield fetched.value
-        further = _NEXT.search(fetched.link)
+        further = _NEXT_LINK.search(fetched.link)
         if further is None:
             return
         url = further[1]
 
 
-def _full(roles: object) -> list[str]:
+def _expand_roles(roles: object) -> list[str]:
     """Return roles with their full names: short names are allowed in member lists."""
     named = roles if isinstance(roles, list) else []
     prefix = "http://purl.imsglobal.org/vocab/lis/v2/membership#"

@@ -8,7 +8,7 @@ from datetime import datetime
 from sqlalchemy.orm import Session
 
 from service.operations.context import Actor, Service
-from service.operations.lookup import course_for, names_for, own_submission
+from service.operations.lookup import load_names_for_actor, require_course, require_own_submission
 from service.store.courses import open_assignments
 from service.store.engine import retry_conflicts
 from service.store.grades import appeals
@@ -38,10 +38,10 @@ def list_open(
 
     ``after`` is the id of the last appeal on the previous page.
     """
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        return appeals.open_in_course(session, course_id, hidden, limit=limit, after=after)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        return appeals.list_open_appeals(session, course_id, hidden, limit=limit, after=after)
 
 
 def list_answered(
@@ -56,10 +56,10 @@ def list_answered(
 
     ``after`` is the answer time and id of the last appeal on the previous page.
     """
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        return appeals.answered_in_course(session, course_id, hidden, limit=limit, after=after)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        return appeals.list_answered_appeals(session, course_id, hidden, limit=limit, after=after)
 
 
 @retry_conflicts
@@ -70,32 +70,32 @@ def answer(service: Service, actor: Actor, course_id: int, appeal_id: int, text:
     answered, or the text is empty or too long.
     """
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        appeals.answer(session, course_id, appeal_id, text, actor.name)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        appeals.answer_appeal(session, course_id, appeal_id, text, actor.name)
 
 
 def show_own(service: Service, actor: Actor, course_id: int, submission_id: int) -> OwnAppeals:
     """Return the appeals of a submission of the actor, with their permission to appeal now. Raises NotFound."""
     with service.store.reading() as session:
-        row = _own(session, actor, course_id, submission_id)
-        earlier = appeals.of_submission(session, submission_id)
-        may = appeals.may_appeal(session, submission_id) and all(each.answered_at is not None for each in earlier)
-        titles = {each.assignment: each.title for each in open_assignments.of_course(session, course_id)}
+        row = _require_student_submission(session, actor, course_id, submission_id)
+        earlier = appeals.load_appeals(session, submission_id)
+        may = appeals.can_appeal(session, submission_id) and all(each.answered_at is not None for each in earlier)
+        titles = {each.assignment: each.title for each in open_assignments.list_assignments(session, course_id)}
     return OwnAppeals(row.id, row.assignment, titles.get(row.assignment, row.assignment), row.attempt, earlier, may)
 
 
 @retry_conflicts
-def ask(service: Service, actor: Actor, course_id: int, submission_id: int, text: str) -> None:
+def submit(service: Service, actor: Actor, course_id: int, submission_id: int, text: str) -> None:
     """Appeal against the grade of a submission of the actor.
 
     Raises NotFound. Raises UsageError if the actor may not see a grade, an appeal is open, or the text is empty or too
     long.
     """
     with service.store.transaction() as session:
-        _own(session, actor, course_id, submission_id)
-        appeals.ask(session, submission_id, text)
+        _require_student_submission(session, actor, course_id, submission_id)
+        appeals.open_appeal(session, submission_id, text)
 
 
-def _own(session: Session, actor: Actor, course_id: int, submission_id: int) -> SubmissionRow:
-    course_for(session, actor, course_id, Role.STUDENT)
-    return own_submission(session, actor, course_id, submission_id)
+def _require_student_submission(session: Session, actor: Actor, course_id: int, submission_id: int) -> SubmissionRow:
+    require_course(session, actor, course_id, Role.STUDENT)
+    return require_own_submission(session, actor, course_id, submission_id)

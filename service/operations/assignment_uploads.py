@@ -11,25 +11,25 @@ from pathlib import Path
 from service.operations.assignments import CourseAssignment, prepare
 from service.operations.context import Actor, Service
 from service.operations.errors import Conflict
-from service.operations.lookup import course_for, own_enrolment
+from service.operations.lookup import require_course, require_own_enrolment
 from service.store.batches import intake
 from service.store.courses import open_assignments
 from service.store.models import Course
-from service.store.states import Lane, Role
+from service.store.states import JobQueue, Role
 from sim.errors import UsageError
+from submissions.archive_extraction import unzip
 from submissions.assignment.definition import Assignment
 from submissions.assignment.examples import EXAMPLES
-from submissions.assignment.folder import FILE_NAME, REFERENCE, assignment_folder, catalogue
+from submissions.assignment.folder import FILE_NAME, REFERENCE, list_catalogue_ids, locate_assignment_folder
 from submissions.assignment.reader import find_in_catalogue, read_assignment
 from submissions.bundle import read_submission
 from submissions.grading_request import GradingRequest
 from submissions.student_identity import Student
-from submissions.unzipping import unzip
 
 _MOST_ENTRIES, _MOST_BYTES = 2000, 200_000_000
 
 
-class StudentsKnowAnother(Conflict):
+class AssignmentAlreadySeen(Conflict):
     """Students have seen a different assignment with this id, and the request does not permit replacing it."""
 
 
@@ -61,15 +61,15 @@ def upload(service: Service, actor: Actor, course_id: int, request: UploadReques
         UsageError: The zip contains no valid assignment; each mistake is a line.
     """
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-    folder = _unpacked(request.path)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+    folder = _unpack_assignment(request.path)
     found = read_assignment(folder)
     if not request.replace:
-        _refuse_replacement(service, course_id, found)
+        _check_replacement(service, course_id, found)
     made = prepare(service, actor, course_id, found)
     reference = folder / EXAMPLES / REFERENCE
     if reference.is_dir():
-        _grade(service, actor, course_id, found, reference)
+        _grade_reference(service, actor, course_id, found, reference)
     return made
 
 
@@ -80,30 +80,30 @@ def preview(service: Service, actor: Actor, course_id: int, assignment: str) -> 
     course's version.
     """
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        found = open_assignments.load(session, course_id, assignment)
-    reference = reference_of(found)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        found = open_assignments.load_assignment(session, course_id, assignment)
+    reference = find_reference_solution(found)
     if reference is None:
         raise UsageError(
             "this version of %(assignment)s has no reference solution; upload its folder again",
             assignment=assignment,
         )
-    return _grade(service, actor, course_id, found, reference)
+    return _grade_reference(service, actor, course_id, found, reference)
 
 
-def reference_of(found: Assignment) -> Path | None:
+def find_reference_solution(found: Assignment) -> Path | None:
     """Return the catalogue's reference solution; None if the course uses a different version."""
-    if found.id not in catalogue() or find_in_catalogue(found.id).version != found.version:
+    if found.id not in list_catalogue_ids() or find_in_catalogue(found.id).version != found.version:
         return None
-    folder = assignment_folder(found.id) / EXAMPLES / REFERENCE
+    folder = locate_assignment_folder(found.id) / EXAMPLES / REFERENCE
     return folder if folder.is_dir() else None
 
 
-def _refuse_replacement(service: Service, course_id: int, found: Assignment) -> None:
+def _check_replacement(service: Service, course_id: int, found: Assignment) -> None:
     with service.store.reading() as session:
-        there = [each for each in open_assignments.of_course(session, course_id) if each.assignment == found.id]
+        there = [each for each in open_assignments.list_assignments(session, course_id) if each.assignment == found.id]
     if any(each.opened_at is not None and each.version != found.version for each in there):
-        raise StudentsKnowAnother(
+        raise AssignmentAlreadySeen(
             "%(id)s: students have already seen another assignment with this ID, %(title)s; "
             "use another ID, or confirm that yours replaces it",
             id=found.id,
@@ -111,23 +111,23 @@ def _refuse_replacement(service: Service, course_id: int, found: Assignment) -> 
         )
 
 
-def _grade(service: Service, actor: Actor, course_id: int, found: Assignment, reference: Path) -> str:
+def _grade_reference(service: Service, actor: Actor, course_id: int, found: Assignment, reference: Path) -> str:
     with service.store.reading() as session:
-        student = Student(own_enrolment(session, actor, course_id, Role.INSTRUCTOR).written)
+        student = Student(require_own_enrolment(session, actor, course_id, Role.INSTRUCTOR).written)
         course = session.get_one(Course, course_id).name
     submission = read_submission(reference, student=student.id, asked=found.parts)
-    accepted = intake.accept(
+    accepted = intake.accept_submission(
         service.store,
-        GradingRequest(submission, found, REFERENCE, whose=student),
+        GradingRequest(submission, found, REFERENCE, listed_student=student),
         course=course,
         max_attempts=service.settings.max_attempts,
     )
     if accepted.copied_from is None:
-        service.notifier.grade(Lane.INTERACTIVE)
+        service.notifier.grade(JobQueue.INTERACTIVE)
     return accepted.job_id
 
 
-def _unpacked(path: Path) -> Path:
+def _unpack_assignment(path: Path) -> Path:
     """Unzip an assignment and return its folder: the top level, or the only folder in it."""
     # Error messages name this folder if the zip has no top folder.
     inside = path.parent / "unpacked" / path.stem

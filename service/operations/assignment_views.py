@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from service.operations.assignment_uploads import reference_of
+from service.operations.assignment_uploads import find_reference_solution
 from service.operations.assignments import CourseAssignment
 from service.operations.context import Actor, Service
-from service.operations.lookup import course_for, own_enrolment
+from service.operations.lookup import require_course, require_own_enrolment
 from service.store.courses import open_assignments, policies
 from service.store.courses.policies import PolicyLimits
 from service.store.grades import own_gradings
 from service.store.grades.own_gradings import OwnGrading
 from service.store.states import Role
 from submissions.assignment.definition import Assignment
-from submissions.assignment.folder import catalogue
+from submissions.assignment.folder import list_catalogue_ids
 from submissions.assignment.reader import find_in_catalogue
 
 
@@ -33,7 +33,7 @@ class AssignmentView:
     """One assignment of a course, its policy, and the actor's own previews of it."""
 
     line: CourseAssignment
-    found: Assignment
+    assignment: Assignment
     own_policy: PolicyLimits | None
     policy: PolicyLimits  # the one that applies
     previews: list[OwnGrading]
@@ -44,42 +44,42 @@ class AssignmentView:
 def list_prepared(service: Service, actor: Actor, course_id: int) -> list[CourseAssignment]:
     """Return the assignments of a course, ordered by id. Raises NotFound."""
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        return open_assignments.of_course(session, course_id)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        return open_assignments.list_assignments(session, course_id)
 
 
 def show_all(service: Service, actor: Actor, course_id: int) -> CourseAssignments:
     """Return the assignments of a course with its policies. Raises NotFound."""
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        allowed = policies.policies(session, course_id)
-        prepared = open_assignments.of_course(session, course_id)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        allowed = policies.load_policies(session, course_id)
+        prepared = open_assignments.list_assignments(session, course_id)
     return CourseAssignments(prepared, allowed, allowed.get("") or PolicyLimits())
 
 
 def load(service: Service, actor: Actor, course_id: int, assignment: str) -> tuple[CourseAssignment, Assignment]:
     """Return one assignment of a course. Raises NotFound, and UsageError if the course does not have it."""
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        line = open_assignments.find(session, course_id, assignment)
-        return line, open_assignments.load(session, course_id, assignment)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        line = open_assignments.load_course_assignment(session, course_id, assignment)
+        return line, open_assignments.load_assignment(session, course_id, assignment)
 
 
 def show(service: Service, actor: Actor, course_id: int, assignment: str) -> AssignmentView:
     """Return one assignment of a course with the data of its page. Raises like ``load``."""
     line, found = load(service, actor, course_id, assignment)
     with service.store.reading() as session:
-        allowed = policies.policies(session, course_id)
-        own = own_enrolment(session, actor, course_id, Role.INSTRUCTOR)
-        previews = own_gradings.newest(session, own.id, assignment)
+        allowed = policies.load_policies(session, course_id)
+        own = require_own_enrolment(session, actor, course_id, Role.INSTRUCTOR)
+        previews = own_gradings.list_newest_gradings(session, own.id, assignment)
     own_policy = allowed.get(assignment)
-    newest = find_in_catalogue(assignment).version if assignment in catalogue() else line.version
+    newest = find_in_catalogue(assignment).version if assignment in list_catalogue_ids() else line.version
     return AssignmentView(
         line,
         found,
         own_policy,
         own_policy or allowed.get("") or PolicyLimits(),
         previews,
-        has_reference=reference_of(found) is not None,
+        has_reference=find_reference_solution(found) is not None,
         changed=newest != line.version,
     )

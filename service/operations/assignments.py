@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 from sqlalchemy.orm import Session
 
 from service.operations.context import Actor, Service
-from service.operations.lookup import course_for
+from service.operations.lookup import require_course
 from service.store import audit
 from service.store.courses import open_assignments
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.open_assignments import CourseAssignment as CourseAssignment
-from service.store.courses.versions import freeze
 from service.store.states import Role
 
 if TYPE_CHECKING:
@@ -24,23 +24,23 @@ def prepare(service: Service, actor: Actor, course_id: int, assignment: Assignme
 
     Raises NotFound if the course does not exist, or the actor does not instruct it.
     """
-    frozen = freeze(assignment)
+    frozen = freeze_assignment(assignment)
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        made = open_assignments.prepare(session, course_id, frozen)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        made = open_assignments.prepare_assignment(session, course_id, frozen)
         detail = {"assignment": made.assignment, "version": made.version}
-        audit.note(session, actor.name, "prepare", "course", str(course_id), **detail)
+        audit.record_action(session, actor.name, "prepare", "course", str(course_id), **detail)
     return made
 
 
 def open_for_students(service: Service, actor: Actor, course_id: int, assignment: str) -> CourseAssignment:
     """Open an assignment to students. Raises NotFound, and UsageError if the course does not have it."""
-    return _change(service, actor, course_id, assignment, "open", open_assignments.open_for_students)
+    return _apply_change(service, actor, course_id, assignment, "open", open_assignments.open_for_students)
 
 
 def close(service: Service, actor: Actor, course_id: int, assignment: str) -> CourseAssignment:
     """Close an assignment to new submissions; existing ones are kept. Raises like ``open_for_students``."""
-    return _change(service, actor, course_id, assignment, "close", open_assignments.close)
+    return _apply_change(service, actor, course_id, assignment, "close", open_assignments.close_assignment)
 
 
 def remove(service: Service, actor: Actor, course_id: int, assignment: str) -> None:
@@ -49,21 +49,23 @@ def remove(service: Service, actor: Actor, course_id: int, assignment: str) -> N
     Raises NotFound, and UsageError if the course does not have it or must keep it.
     """
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        open_assignments.remove(session, course_id, assignment)
-        audit.note(session, actor.name, "remove", "course", str(course_id), assignment=assignment)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        open_assignments.remove_assignment(session, course_id, assignment)
+        audit.record_action(session, actor.name, "remove", "course", str(course_id), assignment=assignment)
 
 
 def hide_names(service: Service, actor: Actor, course_id: int, assignment: str, *, hidden: bool) -> CourseAssignment:
     """Hide or show students' names to all instructors of the course. Raises like ``open_for_students``."""
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
         open_assignments.hide_names(session, course_id, assignment, hidden)
-        audit.note(session, actor.name, "names", "course", str(course_id), assignment=assignment, hidden=hidden)
-        return open_assignments.find(session, course_id, assignment)
+        audit.record_action(
+            session, actor.name, "names", "course", str(course_id), assignment=assignment, hidden=hidden
+        )
+        return open_assignments.load_course_assignment(session, course_id, assignment)
 
 
-def _change(
+def _apply_change(
     service: Service,
     actor: Actor,
     course_id: int,
@@ -72,7 +74,7 @@ def _change(
     change: Callable[[Session, int, str], None],
 ) -> CourseAssignment:
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
         change(session, course_id, assignment)
-        audit.note(session, actor.name, action, "course", str(course_id), assignment=assignment)
-        return open_assignments.find(session, course_id, assignment)
+        audit.record_action(session, actor.name, action, "course", str(course_id), assignment=assignment)
+        return open_assignments.load_course_assignment(session, course_id, assignment)

@@ -10,32 +10,39 @@ from typing import TYPE_CHECKING
 
 from sqlalchemy.orm import Session
 
+from service.grading.class_statistics import PASS_SHARE, AssignmentStatistics, compute_statistics
 from service.grading.ranks import RankTable
-from service.grading.statistics import PASS_SHARE, AssignmentStatistics, statistics_of
 from service.operations.context import Actor, Service
-from service.operations.lookup import batch_in, check_operator, course_for, course_named, existing_batch, names_for
+from service.operations.lookup import (
+    check_operator,
+    load_names_for_actor,
+    require_any_batch,
+    require_batch,
+    require_course,
+    require_named_course,
+)
 from service.store import audit
 from service.store.audit import AuditEntry as AuditEntry
 from service.store.batches import batch_table, batches, publishing, rankings, regrades
 from service.store.batches.batch_table import REFUSED as REFUSED
 from service.store.batches.batch_table import SORTS as SORTS
 from service.store.batches.batch_table import STATES as STATES
-from service.store.batches.batch_table import Remarked as Remarked
-from service.store.batches.batch_table import TableAsked as TableAsked
+from service.store.batches.batch_table import ReviewCounts as ReviewCounts
 from service.store.batches.batch_table import TableLine as TableLine
 from service.store.batches.batch_table import TablePage as TablePage
+from service.store.batches.batch_table import TableRequest as TableRequest
 from service.store.batches.batches import BatchLine as BatchLine
 from service.store.batches.batches import BatchProgress as BatchProgress
 from service.store.batches.batches import JobLine as JobLine
 from service.store.batches.class_overview import ClassOverview as ClassOverview
-from service.store.batches.class_overview import missing, overview
+from service.store.batches.class_overview import compute_overviews, load_missing_students
 from service.store.batches.regrades import Change, ChangesPage
 from service.store.courses import open_assignments
 from service.store.courses.hidden_names import HiddenNames
 from service.store.courses.open_assignments import CourseAssignment
-from service.store.courses.policies import in_days as in_days
-from service.store.grades import current
-from service.store.grades.marked import marked
+from service.store.courses.policies import format_days as format_days
+from service.store.grades import current_grades
+from service.store.grades.statistics_marks import load_marked_submissions
 from service.store.models import Batch
 from service.store.queue import metrics, workers
 from service.store.queue.metrics import Pace
@@ -46,7 +53,7 @@ if TYPE_CHECKING:
     from service.operations.batches import SubmittedBatch
     from submissions.student_identity import Student
 
-_BATCHES_A_PAGE = 30
+_PAGE_SIZE = 30
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +83,7 @@ class TableView:
 
     view: BatchView
     lines: tuple[TableLine, ...]
-    nameless: bool  # names of some students are hidden
+    has_hidden_names: bool  # names of some students are hidden
     waiting_regrades: int
     history: tuple[AuditEntry, ...]
 
@@ -117,12 +124,12 @@ class OverviewView:
 def list_batches_page(service: Service, actor: Actor, course_id: int, after: str = "") -> BatchesPage:
     """Return the newest batches of a course, or those older than the batch ``after``. Raises NotFound."""
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
         last = session.get(Batch, after) if after else None
         place = None if last is None or last.course_id != course_id else (last.created_at, last.id)
-        found = batches.batches_of(session, course_id, _BATCHES_A_PAGE + 1, place)
-        prepared = open_assignments.of_course(session, course_id)
-    shown = tuple(found[:_BATCHES_A_PAGE])
+        found = batches.list_course_batches(session, course_id, _PAGE_SIZE + 1, place)
+        prepared = open_assignments.list_assignments(session, course_id)
+    shown = tuple(found[:_PAGE_SIZE])
     return BatchesPage(shown, shown[-1].id if len(found) > len(shown) else "", tuple(prepared))
 
 
@@ -131,75 +138,77 @@ def list_batches(
 ) -> list[BatchLine]:
     """Return the newest batches of a course, after the batch with this time and id. Raises NotFound."""
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        return batches.batches_of(session, course_id, limit, after)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        return batches.list_course_batches(session, course_id, limit, after)
 
 
 def list_newest(service: Service, actor: Actor, course: str | None) -> list[BatchLine]:
     """Return the newest batches of the course with this name, or of all courses; for operators. Raises NotFound."""
     with service.store.reading() as session:
         check_operator(actor)
-        return batches.list_batches(session, None if course is None else course_named(session, actor, course).id)
+        return batches.list_batches(
+            session, None if course is None else require_named_course(session, actor, course).id
+        )
 
 
-def look(service: Service, actor: Actor, batch_id: str) -> tuple[BatchProgress, BatchState]:
+def poll_progress(service: Service, actor: Actor, batch_id: str) -> tuple[BatchProgress, BatchState]:
     """Return the progress and state of a batch of any course, in few queries, for operators. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
-        return batches.progress(session, batch_id), existing_batch(session, batch_id).state
+        return batches.load_progress(session, batch_id), require_any_batch(session, batch_id).state
 
 
 def list_workers(service: Service, actor: Actor) -> list[WorkerDescription]:
     """Return the active workers, for operators. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
-        return [seen.worker for seen in workers.known_workers(session) if seen.lately]
+        return [seen.worker for seen in workers.load_workers(session) if seen.lately]
 
 
 def show_progress(service: Service, actor: Actor, course_id: int, batch_id: str) -> BatchView:
     """Return the progress of a batch. Raises NotFound."""
     with service.store.reading() as session:
-        return _view(session, actor, course_id, batch_id)
+        return _load_view(session, actor, course_id, batch_id)
 
 
 def show_table(service: Service, actor: Actor, course_id: int, batch_id: str) -> TableView:
     """Return a batch with a row for each submission and rejection. Raises NotFound."""
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        view = _view(session, actor, course_id, batch_id)
-        lines = batch_table.table_lines(session, batch_id, view.batch.refusals, hidden)
-        history = audit.entries(session, "batch", batch_id)
-        waiting = _waiting_regrades(session, view.batch)
+        view = _load_view(session, actor, course_id, batch_id)
+        lines = batch_table.load_table_lines(session, batch_id, view.batch.refusals, hidden)
+        history = audit.load_entries(session, "batch", batch_id)
+        waiting = _count_waiting_regrades(session, view.batch)
     nameless = bool(hidden.assignments & {each.assignment for each in lines})
     return TableView(view, tuple(lines), nameless, waiting, tuple(reversed(history)))
 
 
-def table_page(
-    service: Service, actor: Actor, course_id: int, lines: Sequence[TableLine], asked: TableAsked
-) -> tuple[TablePage, dict[str, Remarked]]:
+def show_table_page(
+    service: Service, actor: Actor, course_id: int, lines: Sequence[TableLine], asked: TableRequest
+) -> tuple[TablePage, dict[str, ReviewCounts]]:
     """Return a page of the rows, and their review counts by job. Raises NotFound."""
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        table = batch_table.table_page(lines, asked)
-        return table, batch_table.remarked(session, table.lines)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        table = batch_table.build_table_page(lines, asked)
+        return table, batch_table.load_review_counts(session, table.lines)
 
 
 def show_graded(service: Service, actor: Actor, course_id: int, batch_id: str) -> GradedView:
     """Return a batch with its grades and their statistics. Raises NotFound."""
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        return _graded(session, actor, course_id, batch_id, hidden)
+        return _load_graded_view(session, actor, course_id, batch_id, hidden)
 
 
 def show_status(service: Service, actor: Actor, course_id: int, batch_id: str) -> StatusView:
     """Return the complete status of a batch. Raises NotFound."""
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        graded = _graded(session, actor, course_id, batch_id, hidden)
+        graded = _load_graded_view(session, actor, course_id, batch_id, hidden)
         is_regrade = graded.view.batch.regrade_of is not None
-        changes = regrades.changes(session, batch_id, hidden) if is_regrade else []
-        ranks = rankings.rank_tables(session, graded.lines)
-        history = audit.entries(session, "batch", batch_id)
+        changes = regrades.load_changes(session, batch_id, hidden) if is_regrade else []
+        ranks = rankings.build_rank_tables(session, graded.lines)
+        history = audit.load_entries(session, "batch", batch_id)
     return StatusView(graded, tuple(ranks), tuple(changes), tuple(history))
 
 
@@ -207,20 +216,20 @@ def list_grades(
     service: Service, actor: Actor, course_id: int, batch_id: str, limit: int, after: str | None = None
 ) -> list[JobLine]:
     """Return at most ``limit`` grades of a batch, after the one with the id ``after``. Raises NotFound."""
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        batch_in(session, course_id, batch_id)
-        return batches.some_job_lines(session, batch_id, hidden, limit, after)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        require_batch(session, course_id, batch_id)
+        return batches.load_job_lines_page(session, batch_id, hidden, limit, after)
 
 
 def list_submitted(service: Service, actor: Actor, done: SubmittedBatch) -> list[JobLine]:
     """Return the grades of new submissions and of those known before, for operators. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
-        lines = [batches.job_line(session, known.job_id) for known in done.known]
+        lines = [batches.load_job_line(session, known.job_id) for known in done.known]
         if done.batch is not None:
-            lines += batches.attempt_lines(session, done.batch.id)
+            lines += batches.load_attempt_lines(session, done.batch.id)
     return sorted(lines, key=lambda line: (line.student, line.id))
 
 
@@ -228,7 +237,7 @@ def show_statistics(service: Service, actor: Actor, lines: Iterable[JobLine]) ->
     """Return the statistics of these grades by assignment, for operators. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
-        return _statistics(session, tuple(lines))
+        return _compute_statistics(session, tuple(lines))
 
 
 def show_overview(
@@ -238,40 +247,40 @@ def show_overview(
 
     Raises NotFound.
     """
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        row = batch_in(session, course_id, batch_id)
-        line = batches.batch(session, row.id)
-        lines = tuple(batch_table.table_lines(session, row.id, line.refusals, hidden))
-        return _overview(session, course_id, line, lines, pass_share, hidden)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        row = require_batch(session, course_id, batch_id)
+        line = batches.load_batch(session, row.id)
+        lines = tuple(batch_table.load_table_lines(session, row.id, line.refusals, hidden))
+        return _build_overview(session, course_id, line, lines, pass_share, hidden)
 
 
-def show_overview_of(
+def show_overview_of_table(
     service: Service, actor: Actor, course_id: int, table: TableView, pass_share: Decimal = PASS_SHARE
 ) -> OverviewView:
     """Return the overview of a table that the actor has already loaded. Raises NotFound."""
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        return _overview(session, course_id, table.view.batch, table.lines, pass_share, hidden)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        return _build_overview(session, course_id, table.view.batch, table.lines, pass_share, hidden)
 
 
-def changes_page(service: Service, actor: Actor, course_id: int, batch_id: str, number: int) -> ChangesPage:
+def show_changes_page(service: Service, actor: Actor, course_id: int, batch_id: str, number: int) -> ChangesPage:
     """Return a page of the changes of a batch of regrades, different marks first. Raises NotFound."""
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        batch_in(session, course_id, batch_id)
-        return regrades.changes_page(session, batch_id, number, hidden)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        require_batch(session, course_id, batch_id)
+        return regrades.load_changes_page(session, batch_id, number, hidden)
 
 
 def is_graded(line: TableLine) -> bool:
     """Return whether the row has a grade that counts."""
-    return current.is_for_students(line)
+    return current_grades.is_for_students(line)
 
 
-def _overview(
+def _build_overview(
     session: Session,
     course_id: int,
     line: BatchLine,
@@ -279,27 +288,27 @@ def _overview(
     pass_share: Decimal,
     hidden: HiddenNames,
 ) -> OverviewView:
-    classes = overview(session, course_id, lines, pass_share, hidden)
+    classes = compute_overviews(session, course_id, lines, pass_share, hidden)
     asked = line.web_assignment if not classes else None
-    return OverviewView(line, lines, classes, missing(session, course_id, asked, hidden) if asked else ())
+    return OverviewView(line, lines, classes, load_missing_students(session, course_id, asked, hidden) if asked else ())
 
 
-def _view(session: Session, actor: Actor, course_id: int, batch_id: str) -> BatchView:
-    course_for(session, actor, course_id, Role.INSTRUCTOR)
-    row = batch_in(session, course_id, batch_id)
-    line = batches.batch(session, row.id)
-    return BatchView(line, batches.progress(session, batch_id), metrics.pace(session, batch_id))
+def _load_view(session: Session, actor: Actor, course_id: int, batch_id: str) -> BatchView:
+    require_course(session, actor, course_id, Role.INSTRUCTOR)
+    row = require_batch(session, course_id, batch_id)
+    line = batches.load_batch(session, row.id)
+    return BatchView(line, batches.load_progress(session, batch_id), metrics.estimate_pace(session, batch_id))
 
 
-def _graded(session: Session, actor: Actor, course_id: int, batch_id: str, hidden: HiddenNames) -> GradedView:
-    view = _view(session, actor, course_id, batch_id)
-    lines = tuple(batches.job_lines(session, batch_id, hidden))
-    return GradedView(view, lines, _statistics(session, lines), _waiting_regrades(session, view.batch))
+def _load_graded_view(session: Session, actor: Actor, course_id: int, batch_id: str, hidden: HiddenNames) -> GradedView:
+    view = _load_view(session, actor, course_id, batch_id)
+    lines = tuple(batches.load_job_lines(session, batch_id, hidden))
+    return GradedView(view, lines, _compute_statistics(session, lines), _count_waiting_regrades(session, view.batch))
 
 
-def _statistics(session: Session, lines: Sequence[JobLine]) -> tuple[AssignmentStatistics, ...]:
-    return statistics_of(marked(session, lines))
+def _compute_statistics(session: Session, lines: Sequence[JobLine]) -> tuple[AssignmentStatistics, ...]:
+    return compute_statistics(load_marked_submissions(session, lines))
 
 
-def _waiting_regrades(session: Session, line: BatchLine) -> int:
-    return 0 if line.regrade_of is not None else publishing.unpublished_regrades(session, line.id)
+def _count_waiting_regrades(session: Session, line: BatchLine) -> int:
+    return 0 if line.regrade_of is not None else publishing.count_unpublished_regrades(session, line.id)

@@ -12,32 +12,32 @@ from sqlalchemy.orm import Session
 
 from service.operations.context import Actor, Service
 from service.operations.lookup import (
-    batch_in,
     check_operator,
-    course_for,
-    course_named,
-    existing_batch,
-    names_for,
+    load_names_for_actor,
+    require_any_batch,
+    require_batch,
+    require_course,
+    require_named_course,
 )
 from service.store import audit
 from service.store.batches import batches, intake, preflight
-from service.store.batches.intake import Accepted as Accepted
-from service.store.batches.intake import AcceptedBatch, AcceptedNew
-from service.store.batches.intake import AlreadySubmitted as AlreadySubmitted
-from service.store.batches.preflight import Foreseen
+from service.store.batches.intake import AcceptedBatch, BatchIntake
+from service.store.batches.intake import AcceptedSubmission as AcceptedSubmission
+from service.store.batches.intake import KnownSubmission as KnownSubmission
+from service.store.batches.preflight import IntakePreview
 from service.store.courses import open_assignments
 from service.store.courses.hidden_names import HiddenNames
 from service.store.engine import now, retry_conflicts
-from service.store.installation import secret_of
+from service.store.installation import load_secret
 from service.store.models import Course, Enrolment, Job
 from service.store.people import membership
-from service.store.people.students import DEFAULT_COURSE, course_of
+from service.store.people.students import DEFAULT_COURSE, ensure_course
 from service.store.queue import batch_control
-from service.store.queue.batch_control import Controlled as Controlled
-from service.store.queue.batch_control import Retried as Retried
-from service.store.states import Lane, Role
+from service.store.queue.batch_control import BatchControlResult as BatchControlResult
+from service.store.queue.batch_control import RetryCounts as RetryCounts
+from service.store.states import JobQueue, Role
 from sim.errors import UsageError
-from submissions.student_identity import Refusal
+from submissions.student_identity import RejectedSubmission
 
 if TYPE_CHECKING:
     from submissions.assignment.definition import Assignment
@@ -46,14 +46,14 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class FoundInCourse:
+class CourseItem:
     """The id of a batch or grade, and the id of its course."""
 
     course_id: int
     id: str
 
 
-def find(service: Service, actor: Actor, start: str) -> FoundInCourse:
+def find(service: Service, actor: Actor, start: str) -> CourseItem:
     """Return the batch of any course whose id begins with ``start``, for operators.
 
     Raises:
@@ -61,11 +61,11 @@ def find(service: Service, actor: Actor, start: str) -> FoundInCourse:
     """
     check_operator(actor)
     with service.store.reading() as session:
-        row = existing_batch(session, batches.find_batch(session, start))
-        return FoundInCourse(row.course_id, row.id)
+        row = require_any_batch(session, batches.find_batch(session, start))
+        return CourseItem(row.course_id, row.id)
 
 
-def find_grade(service: Service, actor: Actor, start: str) -> FoundInCourse:
+def find_grade(service: Service, actor: Actor, start: str) -> CourseItem:
     """Return the grade of any course whose id begins with ``start``, for operators.
 
     Raises:
@@ -74,16 +74,16 @@ def find_grade(service: Service, actor: Actor, start: str) -> FoundInCourse:
     check_operator(actor)
     with service.store.reading() as session:
         row = session.get_one(Job, batches.find_job(session, start))
-        return FoundInCourse(session.get_one(Enrolment, row.enrolment_id).course_id, row.id)
+        return CourseItem(session.get_one(Enrolment, row.enrolment_id).course_id, row.id)
 
 
 @dataclass(frozen=True, slots=True)
-class ForeseenSubmission:
+class SubmissionPreview:
     """Preview of a submission, with its student's name if known."""
 
-    asked: GradingRequest
+    request: GradingRequest
     name: str
-    ahead: Foreseen
+    intake_preview: IntakePreview
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,12 +100,12 @@ class SubmittedBatch:
     """The new batch (None if nothing was new), submissions known before, and all rejections."""
 
     batch: AcceptedBatch | None
-    known: tuple[AlreadySubmitted, ...]
-    refusals: tuple[Refusal, ...]
-    refused_now: tuple[Refusal, ...]  # those rejected by the course rather than while reading
+    known: tuple[KnownSubmission, ...]
+    refusals: tuple[RejectedSubmission, ...]
+    rejected_by_course: tuple[RejectedSubmission, ...]  # those rejected by the course rather than while reading
 
     @property
-    def jobs(self) -> tuple[Accepted, ...]:
+    def jobs(self) -> tuple[AcceptedSubmission, ...]:
         """Return the submissions of the new batch."""
         return () if self.batch is None else self.batch.jobs
 
@@ -128,27 +128,27 @@ def submit(service: Service, actor: Actor, course_id: int, request: SubmitReques
         UsageError: None of the submissions can be accepted.
     """
     with service.store.reading() as session:
-        course = course_for(session, actor, course_id, Role.INSTRUCTOR).name
+        course = require_course(session, actor, course_id, Role.INSTRUCTOR).name
     checked = request.contents
     if not checked.grading_requests:
-        raise _none_taken_in(checked.refusals)
+        raise _build_rejection_error(checked.refusals)
     record = partial(_record_submission, actor.name, len(checked.refusals))
     batch = (request.name, checked.grading_requests, checked.refusals)
     most = service.settings.max_attempts
     if request.again:
         made = intake.accept_batch(service.store, *batch, course=course, max_attempts=most, record=record)
-        accepted = AcceptedNew(made, (), made.refused)
+        accepted = BatchIntake(made, (), made.refused)
     else:
-        accepted = intake.accept_new(service.store, *batch, course=course, max_attempts=most, record=record)
+        accepted = intake.accept_new_submissions(service.store, *batch, course=course, max_attempts=most, record=record)
     refusals = (*checked.refusals, *accepted.refused)
     if accepted.batch is None and not accepted.known:
-        raise _none_taken_in(refusals)
-    done = _under_shown_names(accepted, refusals, names_for(service, actor, course_id))
-    service.notifier.grade(Lane.BATCH, done.queued)
+        raise _build_rejection_error(refusals)
+    done = _hide_names(accepted, refusals, load_names_for_actor(service, actor, course_id))
+    service.notifier.grade(JobQueue.BATCH, done.queued)
     return done
 
 
-def course_of_batches(service: Service, actor: Actor, name: str | None) -> int:
+def resolve_course(service: Service, actor: Actor, name: str | None) -> int:
     """Return the id of a course by name, for operators; without a name, the default course, created if necessary.
 
     Raises:
@@ -158,14 +158,14 @@ def course_of_batches(service: Service, actor: Actor, name: str | None) -> int:
     with service.store.reading() as session:
         named = session.scalars(select(Course.id).where(Course.name == (name or DEFAULT_COURSE))).one_or_none()
         if name is not None and named is None:
-            return course_named(session, actor, name).id
+            return require_named_course(session, actor, name).id
     if named is not None:
         return named
     with service.store.transaction() as session:
-        return course_of(session, DEFAULT_COURSE, now(session))
+        return ensure_course(session, DEFAULT_COURSE, now(session))
 
 
-def assignment_for(service: Service, actor: Actor, course_id: int, name: str) -> Assignment | None:
+def find_batch_assignment(service: Service, actor: Actor, course_id: int, name: str) -> Assignment | None:
     """Return the assignment of a batch from the course or the catalogue; None for an empty name.
 
     Raises:
@@ -173,37 +173,39 @@ def assignment_for(service: Service, actor: Actor, course_id: int, name: str) ->
         UsageError: Neither the course nor the catalogue has it.
     """
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        return assignment_named(session, course_id, name) if name else None
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        return load_course_assignment(session, course_id, name) if name else None
 
 
-def foresee(service: Service, actor: Actor, course_id: int, contents: BatchContents) -> list[ForeseenSubmission]:
+def preview_submissions(
+    service: Service, actor: Actor, course_id: int, contents: BatchContents
+) -> list[SubmissionPreview]:
     """Return a preview of each submission of an upload. Raises NotFound."""
-    secret, hidden = secret_of(service.store).sha256, names_for(service, actor, course_id)
+    secret, hidden = load_secret(service.store).sha256, load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        foreseen = preflight.foresee(session, course_id, contents.grading_requests, secret, hidden.assignments)
-        names = {each.id: each.name for each in membership.members(session, course_id)}
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        foreseen = preflight.preview_intake(session, course_id, contents.grading_requests, secret, hidden.assignments)
+        names = {each.id: each.name for each in membership.list_members(session, course_id)}
     return [
-        ForeseenSubmission(asked, _known_name(asked, names), ahead)
+        SubmissionPreview(asked, _find_student_name(asked, names), ahead)
         for asked, ahead in zip(contents.grading_requests, foreseen, strict=True)
     ]
 
 
-def assignment_named(session: Session, course_id: int, name: str) -> Assignment:
+def load_course_assignment(session: Session, course_id: int, name: str) -> Assignment:
     """Return an assignment from the course, otherwise from the catalogue; never from a folder.
 
     Raises UsageError if neither has it.
     """
-    if name in {each.assignment for each in open_assignments.of_course(session, course_id)}:
-        return open_assignments.load(session, course_id, name)
+    if name in {each.assignment for each in open_assignments.list_assignments(session, course_id)}:
+        return open_assignments.load_assignment(session, course_id, name)
     from submissions.assignment.reader import find_in_catalogue
 
     return find_in_catalogue(name)
 
 
 @retry_conflicts
-def pause(service: Service, actor: Actor, course_id: int, batch_id: str) -> Controlled:
+def pause(service: Service, actor: Actor, course_id: int, batch_id: str) -> BatchControlResult:
     """Start no further jobs of a batch; running jobs continue.
 
     Raises:
@@ -211,15 +213,15 @@ def pause(service: Service, actor: Actor, course_id: int, batch_id: str) -> Cont
         UsageError: The batch was cancelled, or consists of web submissions.
     """
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        batch_in(session, course_id, batch_id)
-        done = batch_control.pause(session, batch_id)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        require_batch(session, course_id, batch_id)
+        done = batch_control.pause_batch(session, batch_id)
         if done.changed:
-            audit.note(session, actor.name, "pause", "batch", batch_id)
+            audit.record_action(session, actor.name, "pause", "batch", batch_id)
         return done
 
 
-def resume(service: Service, actor: Actor, course_id: int, batch_id: str) -> Controlled:
+def resume(service: Service, actor: Actor, course_id: int, batch_id: str) -> BatchControlResult:
     """Resume a paused batch and notify the workers.
 
     Raises:
@@ -227,12 +229,12 @@ def resume(service: Service, actor: Actor, course_id: int, batch_id: str) -> Con
         UsageError: The batch was cancelled, or consists of web submissions.
     """
     done = _resume(service, actor, course_id, batch_id)
-    service.notifier.grade(Lane.BATCH, done.waiting)
+    service.notifier.grade(JobQueue.BATCH, done.waiting)
     return done
 
 
 @retry_conflicts
-def cancel(service: Service, actor: Actor, course_id: int, batch_id: str) -> Controlled:
+def cancel(service: Service, actor: Actor, course_id: int, batch_id: str) -> BatchControlResult:
     """Cancel all unfinished jobs of a batch; existing marks are kept.
 
     Raises:
@@ -240,90 +242,92 @@ def cancel(service: Service, actor: Actor, course_id: int, batch_id: str) -> Con
         UsageError: The batch consists of web submissions.
     """
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        batch_in(session, course_id, batch_id)
-        done = batch_control.cancel(session, batch_id)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        require_batch(session, course_id, batch_id)
+        done = batch_control.cancel_batch(session, batch_id)
         if done.changed:
-            audit.note(session, actor.name, "cancel", "batch", batch_id, not_begun=done.waiting, stopped=done.running)
+            audit.record_action(
+                session, actor.name, "cancel", "batch", batch_id, not_begun=done.waiting, stopped=done.running
+            )
         return done
 
 
-def retry(service: Service, actor: Actor, course_id: int, batch_id: str) -> Retried:
+def retry(service: Service, actor: Actor, course_id: int, batch_id: str) -> RetryCounts:
     """Queue the dead jobs of a batch again and notify the workers.
 
     Raises:
         NotFound: The course does not have the batch, or the actor does not instruct it.
         UsageError: The batch was cancelled.
     """
-    return _notified(service, _retry(service, actor, course_id, batch_id))
+    return _notify_workers(service, _retry(service, actor, course_id, batch_id))
 
 
-def retry_dead(service: Service, actor: Actor, batch_id: str | None) -> Retried:
+def retry_dead(service: Service, actor: Actor, batch_id: str | None) -> RetryCounts:
     """Queue the dead jobs of a batch of any course again, or all dead jobs for None; for operators.
 
     Raises:
         NotFound: The batch does not exist, or the actor is not an operator.
         UsageError: The batch was cancelled.
     """
-    return _notified(service, _retry(service, actor, None, batch_id))
+    return _notify_workers(service, _retry(service, actor, None, batch_id))
 
 
-def _none_taken_in(refusals: Sequence[Refusal]) -> UsageError:
+def _build_rejection_error(refusals: Sequence[RejectedSubmission]) -> UsageError:
     first = refusals[0].sentence if refusals else "there are none"
     return UsageError(f"none of {len(refusals)} submissions can be accepted; {first}")
 
 
-def _record_submission(actor: str, refused: int, session: Session, accepted: AcceptedNew) -> None:
+def _record_submission(actor: str, refused: int, session: Session, accepted: BatchIntake) -> None:
     if accepted.batch is not None:
         counts = {"submissions": len(accepted.batch.jobs), "refused": refused + len(accepted.refused)}
-        audit.note(session, actor, "submit", "batch", accepted.batch.id, **counts, known=len(accepted.known))
+        audit.record_action(session, actor, "submit", "batch", accepted.batch.id, **counts, known=len(accepted.known))
 
 
-def _under_shown_names(accepted: AcceptedNew, refusals: tuple[Refusal, ...], hidden: HiddenNames) -> SubmittedBatch:
+def _hide_names(accepted: BatchIntake, refusals: tuple[RejectedSubmission, ...], hidden: HiddenNames) -> SubmittedBatch:
     batch = accepted.batch
     if batch is not None:
-        jobs = (replace(job, student=hidden.called(job.assignment, job.student)) for job in batch.jobs)
+        jobs = (replace(job, student=hidden.label_student(job.assignment, job.student)) for job in batch.jobs)
         batch = replace(batch, jobs=tuple(jobs))
-    known = (replace(each, student=hidden.called(each.assignment, each.student)) for each in accepted.known)
+    known = (replace(each, student=hidden.label_student(each.assignment, each.student)) for each in accepted.known)
     return SubmittedBatch(batch, tuple(known), refusals, accepted.refused)
 
 
-def _known_name(asked: GradingRequest, names: Mapping[str, str]) -> str:
+def _find_student_name(asked: GradingRequest, names: Mapping[str, str]) -> str:
     """Return the student's name if it differs from the id: from the batch, otherwise from the course."""
     name = asked.student.name if asked.student.name != asked.student.id else ""
     return name or names.get(asked.submission.student, "")
 
 
 @retry_conflicts
-def _resume(service: Service, actor: Actor, course_id: int, batch_id: str) -> Controlled:
+def _resume(service: Service, actor: Actor, course_id: int, batch_id: str) -> BatchControlResult:
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        batch_in(session, course_id, batch_id)
-        done = batch_control.resume(session, batch_id)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        require_batch(session, course_id, batch_id)
+        done = batch_control.resume_batch(session, batch_id)
         if done.changed:
-            audit.note(session, actor.name, "resume", "batch", batch_id)
+            audit.record_action(session, actor.name, "resume", "batch", batch_id)
         return done
 
 
 @retry_conflicts
-def _retry(service: Service, actor: Actor, course_id: int | None, batch_id: str | None) -> Retried:
+def _retry(service: Service, actor: Actor, course_id: int | None, batch_id: str | None) -> RetryCounts:
     """Retry dead jobs. Without a course, the actor must be an operator."""
     with service.store.transaction() as session:
         if course_id is None:
             check_operator(actor)
             if batch_id is not None:
-                existing_batch(session, batch_id)
+                require_any_batch(session, batch_id)
         else:
-            course_for(session, actor, course_id, Role.INSTRUCTOR)
-            batch_in(session, course_id, batch_id or "")
-        done = batch_control.retry(session, batch_id)
+            require_course(session, actor, course_id, Role.INSTRUCTOR)
+            require_batch(session, course_id, batch_id or "")
+        done = batch_control.retry_dead_jobs(session, batch_id)
         if done.queued:
-            audit.note(session, actor.name, "retry", "batch", batch_id or "all", queued=done.queued)
+            audit.record_action(session, actor.name, "retry", "batch", batch_id or "all", queued=done.queued)
         return done
 
 
-def _notified(service: Service, done: Retried) -> Retried:
+def _notify_workers(service: Service, done: RetryCounts) -> RetryCounts:
     # Each job returns to its own queue; extra notifications are harmless.
-    for lane in Lane:
+    for lane in JobQueue:
         service.notifier.grade(lane, done.queued)
     return done

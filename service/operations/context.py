@@ -10,17 +10,17 @@ from service.settings import Settings
 from service.store import audit
 from service.store.engine import Store as Store
 from service.store.engine import open_store as open_store
-from service.store.people.credentials import EVERYWHERE, Reach
-from service.store.states import Lane, Role
+from service.store.people.credentials import UNLIMITED_REACH, Reach
+from service.store.states import JobQueue, Role
 
 
-class WorkerNotices(Protocol):
+class WorkerNotifier(Protocol):
     """Interface for notifying workers, implemented by ``service.queue.notifier``."""
 
-    def grade(self, lane: Lane, count: int = 1) -> None:
+    def grade(self, lane: JobQueue, count: int = 1) -> None:
         """Notify for ``count`` jobs of a queue."""
 
-    def try_out(self, count: int = 1) -> None:
+    def notify_test_runs(self, count: int = 1) -> None:
         """Notify for ``count`` test runs."""
 
     def plot(self, count: int = 1) -> None:
@@ -33,7 +33,7 @@ class Service:
 
     settings: Settings
     store: Store
-    notifier: WorkerNotices
+    notifier: WorkerNotifier
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class Actor:
     person_id: int | None = None
     operator: bool = False
     roles: Mapping[int, Role] = field(default_factory=dict)  # by course
-    reach: Reach = EVERYWHERE
+    reach: Reach = UNLIMITED_REACH
     credential_id: str = ""
 
     @property
@@ -57,6 +57,6 @@ class Actor:
         return self.operator and self.person_id is None
 
 
-def machine_operator() -> Actor:
+def create_machine_actor() -> Actor:
     """Return the actor of a command on the machine, named after the account that runs it."""
-    return Actor(audit.this_user(), operator=True)
+    return Actor(audit.describe_current_user(), operator=True)

@@ -8,7 +8,7 @@ from sqlalchemy import select
 
 from service.operations.context import Actor, Service
 from service.operations.errors import Forbidden, Invalid
-from service.operations.lookup import check_operator, course_for, course_named
+from service.operations.lookup import check_operator, require_course, require_named_course
 from service.operations.people import check_lengths
 from service.operations.sign_in_links import make_link
 from service.store import audit
@@ -19,7 +19,7 @@ from service.store.people import membership
 from service.store.people.membership import CourseLine as CourseLine
 from service.store.people.membership import Member
 from service.store.people.students import DEFAULT_COURSE as DEFAULT_COURSE
-from service.store.people.students import course_of
+from service.store.people.students import ensure_course
 from service.store.states import Role
 from submissions.student_identity import Student
 
@@ -74,23 +74,23 @@ def find(service: Service, actor: Actor, name: str) -> int:
     """
     check_operator(actor)
     with service.store.reading() as session:
-        if name != DEFAULT_COURSE or name in {each.name for each in membership.courses(session)}:
-            return course_named(session, actor, name).id
+        if name != DEFAULT_COURSE or name in {each.name for each in membership.list_courses(session)}:
+            return require_named_course(session, actor, name).id
     with service.store.transaction() as session:
-        return course_of(session, name, now(session))
+        return ensure_course(session, name, now(session))
 
 
 def show_own(service: Service, actor: Actor, course_id: int, role: Role) -> OwnCourse:
     """Return a course in which the actor has this role. Raises NotFound."""
     with service.store.reading() as session:
-        return OwnCourse(course_id, course_for(session, actor, course_id, role).name, role)
+        return OwnCourse(course_id, require_course(session, actor, course_id, role).name, role)
 
 
 def show_taught(service: Service, actor: Actor, course_id: int) -> TaughtCourse:
     """Return a course that the actor instructs. Raises NotFound."""
     with service.store.reading() as session:
-        row = course_for(session, actor, course_id, Role.INSTRUCTOR)
-        return TaughtCourse(row.id, row.name, appeals.waiting(session, row.id))
+        row = require_course(session, actor, course_id, Role.INSTRUCTOR)
+        return TaughtCourse(row.id, row.name, appeals.count_open_appeals(session, row.id))
 
 
 def list_own(service: Service, actor: Actor) -> list[OwnCourse]:
@@ -104,7 +104,7 @@ def list_courses(service: Service, actor: Actor) -> list[CourseLine]:
     """Return all courses by name, with their numbers of members, for operators. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
-        return membership.courses(session)
+        return membership.list_courses(session)
 
 
 def add_member(service: Service, actor: Actor, request: MemberRequest) -> AddedMember:
@@ -135,7 +135,7 @@ def add_member(service: Service, actor: Actor, request: MemberRequest) -> AddedM
         if request.operator:
             membership.make_operator(session, member.person_id)
         detail = {"role": member.role.value, "operator": request.operator}
-        audit.note(session, actor.name, "add", "person", str(member.person_id), **detail)
+        audit.record_action(session, actor.name, "add", "person", str(member.person_id), **detail)
         secret = make_link(session, actor, member.person_id, word=request.word)
-        elsewhere = () if is_student else tuple(membership.elsewhere(session, member.enrolment_id))
+        elsewhere = () if is_student else tuple(membership.find_same_id_instructors(session, member.enrolment_id))
     return AddedMember(member, secret, elsewhere)

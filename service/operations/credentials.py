@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from service.operations.context import Actor, Service
 from service.operations.errors import Conflict, Forbidden, Invalid, NotFound
-from service.operations.scopes import offered_scopes
+from service.operations.scopes import list_offered_scopes
 from service.store import audit
 from service.store.people import credentials
 from service.store.people.credentials import MOST_TOKENS, CredentialLine, Reach
@@ -31,14 +31,14 @@ def make_token(service: Service, actor: Actor, request: TokenRequest) -> None:
 
     Raises Invalid for scopes that the actor cannot use, Conflict if they have too many tokens.
     """
-    person_id = _person(actor)
+    person_id = _require_person_id(actor)
     check_scopes(request.scopes, list(actor.roles.values()), operator=actor.operator, limit=actor.reach.scopes)
     reach = replace(actor.reach, scopes=request.scopes)
     with service.store.transaction() as session:
-        if not credentials.unused_token(session, person_id, request.word):
-            check_number(session, person_id)
+        if not credentials.find_unused_token(session, person_id, request.word):
+            check_token_count(session, person_id)
         lifetime = timedelta(days=request.days)
-        credentials.make_token(
+        credentials.create_token(
             session,
             person_id,
             lifetime,
@@ -47,36 +47,36 @@ def make_token(service: Service, actor: Actor, request: TokenRequest) -> None:
             reach=reach,
             made_with=actor.credential_id,
         )
-        audit.note(session, actor.name, "token", "person", str(person_id), scopes=sorted(request.scopes))
+        audit.record_action(session, actor.name, "token", "person", str(person_id), scopes=sorted(request.scopes))
 
 
 def show_unused_token(service: Service, actor: Actor, word: str) -> str:
     """Return the secret of the actor's token created from this word; empty after its first use."""
     with service.store.reading() as session:
-        return credentials.unused_token(session, _person(actor), word)
+        return credentials.find_unused_token(session, _require_person_id(actor), word)
 
 
 def list_credentials(service: Service, actor: Actor) -> list[CredentialLine]:
     """Return the actor's sessions and tokens, newest first."""
     with service.store.reading() as session:
-        return credentials.of_person(session, _person(actor), actor.reach)
+        return credentials.list_credentials(session, _require_person_id(actor), actor.reach)
 
 
 def end_credential(service: Service, actor: Actor, credential_id: str) -> None:
     """End one of the actor's sessions or tokens. Raises NotFound if they do not have it."""
-    person_id = _person(actor)
+    person_id = _require_person_id(actor)
     with service.store.transaction() as session:
-        if not credentials.revoke(session, credential_id, person_id, actor.reach):
+        if not credentials.revoke_credential(session, credential_id, person_id, actor.reach):
             raise NotFound("you have no session or token with this id")
-        audit.note(session, actor.name, "sign out", "person", str(person_id), ended=1)
+        audit.record_action(session, actor.name, "sign out", "person", str(person_id), ended=1)
 
 
 def end_other_credentials(service: Service, actor: Actor) -> int:
     """End all credentials of the actor except the one in use. Returns the number ended."""
-    person_id = _person(actor)
+    person_id = _require_person_id(actor)
     with service.store.transaction() as session:
         ended = credentials.revoke_all(session, person_id, but=actor.credential_id, reach=actor.reach)
-        audit.note(session, actor.name, "sign out", "person", str(person_id), ended=ended)
+        audit.record_action(session, actor.name, "sign out", "person", str(person_id), ended=ended)
     return ended
 
 
@@ -84,18 +84,18 @@ def check_scopes(
     scopes: frozenset[str], roles: list[Role], *, operator: bool, limit: frozenset[str] = Reach().scopes
 ) -> None:
     """Raise Invalid unless a person with these roles can use the scopes. An empty ``limit`` means no limit."""
-    offered = offered_scopes(roles, operator=operator, limit=limit or None)
+    offered = list_offered_scopes(roles, operator=operator, limit=limit or None)
     if not scopes or not scopes <= offered.keys():
         raise Invalid("Select at least one of these scopes: %(scopes)s.", scopes=", ".join(offered))
 
 
-def check_number(session: Session, person_id: int) -> None:
+def check_token_count(session: Session, person_id: int) -> None:
     """Raise Conflict if a person has the maximum number of tokens."""
     if credentials.count_tokens(session, person_id) >= MOST_TOKENS:
         raise Conflict("The limit of %(count)s tokens is reached. Revoke a token first.", count=MOST_TOKENS)
 
 
-def _person(actor: Actor) -> int:
+def _require_person_id(actor: Actor) -> int:
     if actor.person_id is None:
         raise Forbidden("sign in to see your sessions and tokens")
     return actor.person_id

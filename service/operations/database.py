@@ -10,15 +10,15 @@ from service.operations.lookup import check_machine
 from service.settings import Settings
 from service.store import backup, purge
 from service.store.engine import open_engine, open_store
-from service.store.purge import Purged
-from service.store.revision import newest_revision
+from service.store.purge import PurgeCounts
+from service.store.revision import find_newest_revision
 from sim.errors import UsageError
 
 
 def upgrade(settings: Settings) -> str:
     """Upgrade the tables to this release and return their revision. Raises like ``open_store``."""
     open_store(settings).close()
-    return newest_revision()
+    return find_newest_revision()
 
 
 def back_up(settings: Settings, file: Path) -> int:
@@ -49,16 +49,16 @@ def restore(service: Service, actor: Actor, file: Path) -> str:
     return service.store.engine.url.render_as_string(hide_password=True)
 
 
-def count_old(service: Service, actor: Actor, before: datetime) -> Purged:
-    """Return the counts that ``remove_old`` would remove. Raises Forbidden unless called by a command."""
+def count_old_submissions(service: Service, actor: Actor, before: datetime) -> PurgeCounts:
+    """Return the counts that ``remove_old_submissions`` would remove. Raises Forbidden unless called by a command."""
     check_machine(actor)
-    return purge.purge(service.store, before, actor.name, only_count=True)
+    return purge.purge_submissions(service.store, before, actor.name, only_count=True)
 
 
-def remove_old(service: Service, actor: Actor, before: datetime) -> Purged:
+def remove_old_submissions(service: Service, actor: Actor, before: datetime) -> PurgeCounts:
     """Remove submissions from before a moment, with grades, recordings, and students without remaining submissions.
 
     Raises Forbidden unless called by a command.
     """
     check_machine(actor)
-    return purge.purge(service.store, before, actor.name)
+    return purge.purge_submissions(service.store, before, actor.name)

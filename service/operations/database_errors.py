@@ -12,7 +12,7 @@ from service.store.engine import is_conflict, is_overtaken
 
 __all__ = ["DatabaseError", "DatabaseFailure", "classify"]
 #: Raised if the database is unreachable, busy for too long, or shutting down.
-_AWAY = (OperationalError, InterfaceError, DisconnectionError, PoolTimeoutError)
+_UNREACHABLE_ERRORS = (OperationalError, InterfaceError, DisconnectionError, PoolTimeoutError)
 #: SQLSTATE class of values that PostgreSQL cannot store; its driver raises the same error for a lost connection.
 _PROGRAM_LIMIT = "54"
 
@@ -30,4 +30,8 @@ def classify(error: Exception) -> DatabaseFailure:
     if is_conflict(error) or is_overtaken(error):
         return DatabaseFailure.CONFLICT
     exceeds_limit = str(getattr(getattr(error, "orig", None), "sqlstate", None)).startswith(_PROGRAM_LIMIT)
-    return DatabaseFailure.AWAY if isinstance(error, _AWAY) and not exceeds_limit else DatabaseFailure.UNEXPECTED
+    return (
+        DatabaseFailure.AWAY
+        if isinstance(error, _UNREACHABLE_ERRORS) and not exceeds_limit
+        else DatabaseFailure.UNEXPECTED
+    )

@@ -9,20 +9,20 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import BinaryIO
 
-from service.batch_rows import rows_of, why_not_shown
+from service.batch_rows import build_rows, describe_missing_grade
 from service.grading.grade import Grade
 from service.operations.context import Actor, Service
 from service.operations.errors import Invalid
-from service.operations.lookup import batch_in, course_for, names_for
-from service.report_files import report_pages
+from service.operations.lookup import load_names_for_actor, require_batch, require_course
+from service.report_files import render_report_pages
 from service.reports.formats import FORMATS, Format
+from service.reports.output_files import build_file_stems, build_refused_stems
 from service.reports.rows import TableRow
-from service.reports.written import file_stems, refused_stems
 from service.store.batches import batches, publishing
 from service.store.batches.batches import JobLine as JobLine
-from service.store.grades import current
+from service.store.grades import current_grades
 from service.store.states import Role
-from submissions.raw_files import shown
+from submissions.raw_files import sanitise_name
 
 _TYPES: Mapping[str, str] = MappingProxyType(
     {
@@ -88,33 +88,33 @@ def export(
         NotFound: The course does not have the batch, or the actor does not instruct it.
         Invalid: The format is unknown, does not match the worksheet, or requires hidden names.
     """
-    chosen = _format(request)
-    hidden = names_for(service, actor, course_id)
+    chosen = _require_format(request)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        batch_in(session, course_id, batch_id)
-        lines = batches.job_lines(session, batch_id, hidden)
-        refusals = batches.batch(session, batch_id).refusals
-        waiting = publishing.unpublished_regrades(session, batch_id)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        require_batch(session, course_id, batch_id)
+        lines = batches.load_job_lines(session, batch_id, hidden)
+        refusals = batches.load_batch(session, batch_id).refusals
+        waiting = publishing.count_unpublished_regrades(session, batch_id)
     nameless = sorted({line.assignment for line in lines} & hidden.assignments)
-    if nameless and (chosen.packed is not None or chosen.filled_in is not None):
+    if nameless and (chosen.archive is not None or chosen.worksheet is not None):
         raise Invalid(
             "%(form)s needs student names, but names are hidden for %(assignment)s; show the names first",
             form=request.form,
             assignment=nameless[0],
         )
-    released = [line for line in lines if not why_not_shown(line, published=request.published)]
+    released = [line for line in lines if not describe_missing_grade(line, published=request.published)]
     text, files = "", list[tuple[str, str]]()
     left_over: Sequence[str] = ()
-    if chosen.packed is not None:
-        left_over = chosen.packed(report_pages(service.store, released, refusals), sink or io.BytesIO())
+    if chosen.archive is not None:
+        left_over = chosen.archive(render_report_pages(service.store, released, refusals), sink or io.BytesIO())
     else:
-        rows = rows_of(service.store, lines, refusals, published=request.published)
-        if chosen.filled_in is not None:
-            filled = chosen.filled_in(rows, request.worksheet or "")
+        rows = build_rows(service.store, lines, refusals, published=request.published)
+        if chosen.worksheet is not None:
+            filled = chosen.worksheet(rows, request.worksheet or "")
             text, left_over = filled.text, filled.left_over
         elif chosen.table is None or (request.one_each and chosen.document is not None):
-            files = _files(chosen, rows)
+            files = _render_files(chosen, rows)
         else:
             text = chosen.table(rows)
     return Export(
@@ -129,44 +129,44 @@ def export(
 
 def download(service: Service, actor: Actor, course_id: int, batch_id: str, request: ExportRequest) -> Download:
     """Export as a single file; several files are zipped. Raises like ``export``."""
-    chosen, sink = _format(request), io.BytesIO()
+    chosen, sink = _require_format(request), io.BytesIO()
     found = export(service, actor, course_id, batch_id, request, sink)
-    suffix, data = chosen.suffix, sink.getvalue() if chosen.packed is not None else found.text.encode()
-    if chosen.packed is None and chosen.filled_in is None and chosen.table is None:
-        suffix, data = ".zip", _zipped(found.files)
+    suffix, data = chosen.suffix, sink.getvalue() if chosen.archive is not None else found.text.encode()
+    if chosen.archive is None and chosen.worksheet is None and chosen.table is None:
+        suffix, data = ".zip", _zip_files(found.files)
     with service.store.reading() as session:
-        name = batches.batch(session, batch_id).name
-    return Download(f"{shown(name) or batch_id}-{request.form}{suffix}", _TYPES[suffix], data)
+        name = batches.load_batch(session, batch_id).name
+    return Download(f"{sanitise_name(name) or batch_id}-{request.form}{suffix}", _TYPES[suffix], data)
 
 
-def _format(request: ExportRequest) -> Format:
+def _require_format(request: ExportRequest) -> Format:
     chosen = FORMATS.get(request.form)
-    if chosen is None or (chosen.filled_in is not None) != (request.worksheet is not None):
-        others = sorted(name for name, each in FORMATS.items() if each.filled_in is None)
+    if chosen is None or (chosen.worksheet is not None) != (request.worksheet is not None):
+        others = sorted(name for name, each in FORMATS.items() if each.worksheet is None)
         raise Invalid("expected one of the formats %(formats)s, or a worksheet to fill in", formats=", ".join(others))
     return chosen
 
 
 def _is_for_staff(line: JobLine) -> bool:
-    return current.is_trusted(line) and not current.is_for_students(line)
+    return current_grades.is_trusted(line) and not current_grades.is_for_students(line)
 
 
-def _files(chosen: Format, rows: Sequence[TableRow[Grade]]) -> list[tuple[str, str]]:
+def _render_files(chosen: Format, rows: Sequence[TableRow[Grade]]) -> list[tuple[str, str]]:
     """Return a file for each grade, and for each rejection if the format supports them.
 
     Files are named after the student, and after the assignment if a student has several.
     """
     graded = [(row, row.grade) for row in rows if row.grade is not None]
-    stems = file_stems([(row.student.id, row.assignment) for row, _ in graded])
+    stems = build_file_stems([(row.student.id, row.assignment) for row, _ in graded])
     texts = [] if chosen.document is None else [chosen.document(grade) for _, grade in graded]
     if chosen.refusal is not None:
         refused = [row for row in rows if row.refused]
         texts += map(chosen.refusal, refused)
-        stems += refused_stems([(row.source, row.student.id) for row in refused])
+        stems += build_refused_stems([(row.source, row.student.id) for row in refused])
     return [(f"{stem}{chosen.suffix}", text) for stem, text in zip(stems, texts, strict=True)]
 
 
-def _zipped(files: Sequence[tuple[str, str]]) -> bytes:
+def _zip_files(files: Sequence[tuple[str, str]]) -> bytes:
     sink = io.BytesIO()
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in files:

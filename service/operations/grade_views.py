@@ -10,17 +10,17 @@ from sqlalchemy.orm import Session
 from service.language import ENGLISH, Language
 from service.operations.context import Actor, Service
 from service.operations.errors import NotFound
-from service.operations.lookup import course_for, job_in, names_for, submission_in
-from service.plotting import own_floors
-from service.report_files import report_alone, report_body
+from service.operations.lookup import load_names_for_actor, require_course, require_job, require_submission
+from service.plotting import load_own_floors
+from service.report_files import render_report_body, render_standalone_report
 from service.reports.html import ReportParts
-from service.reports.replay.document import replay_of_grade
-from service.reports.view import View, staff_view
+from service.reports.replay.document import build_grade_replay
+from service.reports.view import View, build_staff_view
 from service.store import audit
 from service.store.audit import AuditEntry
 from service.store.batches import batch_table, batches, intake, regrades
 from service.store.batches.batches import JobLine
-from service.store.batches.regrades import Change, Grading
+from service.store.batches.regrades import Change, GradingLine
 from service.store.courses.hidden_names import HiddenNames
 from service.store.grades import own_gradings, results
 from service.store.grades.own_gradings import OwnGrading
@@ -44,11 +44,11 @@ class GradeView:
     batch_id: str | None  # the batch that it was graded in
     report: ReportParts | None
     change: Change | None  # of a regrade
-    gradings: list[Grading]
+    gradings: list[GradingLine]
     attempts: list[OwnGrading]
     history: list[AuditEntry]
-    put_aside: bool  # over a limit, and not graded until staff ask for it
-    beside: Neighbours
+    awaits_approval: bool  # over a limit, and not graded until staff ask for it
+    neighbours: Neighbours
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,96 +61,98 @@ class SubmittedFiles:
 
 def show_state(service: Service, actor: Actor, course_id: int, job_id: str) -> JobLine:
     """Return the state of one grading. Raises NotFound."""
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        _grade(session, actor, course_id, job_id)
-        return batches.job_line(session, job_id).hidden_by(hidden)
+        _require_course_job(session, actor, course_id, job_id)
+        return batches.load_job_line(session, job_id).hide_name(hidden)
 
 
 def show_grade(service: Service, actor: Actor, course_id: int, job_id: str, language: Language = ENGLISH) -> GradeView:
     """Return one grade with the data of its page. Raises NotFound."""
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        row = _grade(session, actor, course_id, job_id)
-        whole = batches.job_line(session, job_id)
-        line = whole.hidden_by(hidden)
-        change = regrades.change(session, job_id)
-        gradings = regrades.gradings(session, row.submission_id)
-        attempts = own_gradings.newest(session, row.enrolment_id, line.assignment)
-        view = _view(session, line, language) if line.state is JobState.DONE else None
-        history = audit.entries(session, "job", job_id)
-        beside = _neighbours(session, row, hidden)
-    report = None if view is None else report_body(service.store, whole.id, whole.plots, view)
+        row = _require_course_job(session, actor, course_id, job_id)
+        whole = batches.load_job_line(session, job_id)
+        line = whole.hide_name(hidden)
+        change = regrades.load_change(session, job_id)
+        gradings = regrades.load_gradings(session, row.submission_id)
+        attempts = own_gradings.list_newest_gradings(session, row.enrolment_id, line.assignment)
+        view = _load_staff_view(session, line, language) if line.state is JobState.DONE else None
+        history = audit.load_entries(session, "job", job_id)
+        beside = _find_neighbours(session, row, hidden)
+    report = None if view is None else render_report_body(service.store, whole.id, whole.plots, view)
     put_aside = line.state is JobState.CANCELLED and line.cancelled_for is CancelReason.OVER_LIMIT
     return GradeView(line, row.batch_id, report, change, gradings, attempts, history, put_aside, beside)
 
 
 def show_neighbours(service: Service, actor: Actor, course_id: int, job_id: str) -> Neighbours:
     """Return the previous and next grade in the order of the table that the actor sees. Raises NotFound."""
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        return _neighbours(session, _grade(session, actor, course_id, job_id), hidden)
+        return _find_neighbours(session, _require_course_job(session, actor, course_id, job_id), hidden)
 
 
 def show_result(service: Service, actor: Actor, course_id: int, job_id: str) -> View:
     """Return a grade including hidden criteria and trials. Raises NotFound, also before it is graded."""
-    return _result(service, actor, course_id, job_id, ENGLISH)[1]
+    return _load_result(service, actor, course_id, job_id, ENGLISH)[1]
 
 
 def show_report(service: Service, actor: Actor, course_id: int, job_id: str, language: Language = ENGLISH) -> str:
     """Return the report of a grade as a standalone page. Raises NotFound, also before it is graded."""
-    line, view = _result(service, actor, course_id, job_id, language)
-    return report_alone(service.store, line.id, line.plots, view)
+    line, view = _load_result(service, actor, course_id, job_id, language)
+    return render_standalone_report(service.store, line.id, line.plots, view)
 
 
 def show_replay(service: Service, actor: Actor, course_id: int, job_id: str) -> dict[str, Any]:
     """Return the replay data of the grade's trials. Raises NotFound, also before it is graded."""
-    _, view = _result(service, actor, course_id, job_id, ENGLISH)
+    _, view = _load_result(service, actor, course_id, job_id, ENGLISH)
     with service.store.reading() as session:
-        return replay_document(session, job_id, view)
+        return build_replay_document(session, job_id, view)
 
 
 def show_files(service: Service, actor: Actor, course_id: int, submission_id: int) -> SubmittedFiles:
     """Return the submitted files, which can name the student. Raises NotFound, also if names are hidden."""
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        row = submission_in(session, course_id, submission_id)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        row = require_submission(session, course_id, submission_id)
         if row.assignment in hidden.assignments:
             raise NotFound("There is no such page or item, or you have no access to it.")
         return SubmittedFiles(row.packed, f"submission-{row.id}.zip")
 
 
-def replay_document(session: Session, job_id: str, view: View) -> dict[str, Any]:
+def build_replay_document(session: Session, job_id: str, view: View) -> dict[str, Any]:
     """Return the replay data of the trials in a view of a job's grade."""
     submission = intake.load_submission(session, job_id)
-    return replay_of_grade(view, submission, own_floors(intake.load_assignment(session, job_id)))
+    return build_grade_replay(view, submission, load_own_floors(intake.load_assignment(session, job_id)))
 
 
-def _grade(session: Session, actor: Actor, course_id: int, job_id: str) -> Job:
-    course_for(session, actor, course_id, Role.INSTRUCTOR)
-    return job_in(session, course_id, job_id)
+def _require_course_job(session: Session, actor: Actor, course_id: int, job_id: str) -> Job:
+    require_course(session, actor, course_id, Role.INSTRUCTOR)
+    return require_job(session, course_id, job_id)
 
 
-def _neighbours(session: Session, row: Job, hidden: HiddenNames) -> Neighbours:
+def _find_neighbours(session: Session, row: Job, hidden: HiddenNames) -> Neighbours:
     if row.batch_id is None:
         return Neighbours()
-    ids = [line.id for line in batch_table.table_lines(session, row.batch_id, (), hidden) if line.id]
+    ids = [line.id for line in batch_table.load_table_lines(session, row.batch_id, (), hidden) if line.id]
     if row.id not in ids:
         return Neighbours()
     place = ids.index(row.id)
     return Neighbours(ids[place - 1] if place else "", ids[place + 1] if place + 1 < len(ids) else "")
 
 
-def _result(service: Service, actor: Actor, course_id: int, job_id: str, language: Language) -> tuple[JobLine, View]:
-    hidden: HiddenNames = names_for(service, actor, course_id)
+def _load_result(
+    service: Service, actor: Actor, course_id: int, job_id: str, language: Language
+) -> tuple[JobLine, View]:
+    hidden: HiddenNames = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        _grade(session, actor, course_id, job_id)
-        line = batches.job_line(session, job_id).hidden_by(hidden)
+        _require_course_job(session, actor, course_id, job_id)
+        line = batches.load_job_line(session, job_id).hide_name(hidden)
         if line.state is not JobState.DONE:
             raise NotFound("There is no such page or item, or you have no access to it.")
-        return line, _view(session, line, language)
+        return line, _load_staff_view(session, line, language)
 
 
-def _view(session: Session, line: JobLine, language: Language) -> View:
-    return staff_view(replace(results.load(session, line.id), student=line.student), language)
+def _load_staff_view(session: Session, line: JobLine, language: Language) -> View:
+    return build_staff_view(replace(results.load_grade(session, line.id), student=line.student), language)

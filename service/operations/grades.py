@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 
 from service.operations.context import Actor, Service
 from service.operations.errors import Conflict
-from service.operations.lookup import course_for, job_in, names_for
+from service.operations.lookup import load_names_for_actor, require_course, require_job
 from service.store.batches import batches
 from service.store.batches.batches import JobLine
 from service.store.courses.hidden_names import HiddenNames
@@ -59,10 +59,10 @@ class Marking:
 
 def show_marking(service: Service, actor: Actor, course_id: int, job_id: str) -> Marking:
     """Return the overrides and comments of a grade, with the grader's own marks. Raises NotFound."""
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        _grade(session, actor, course_id, job_id)
-        return _marking(session, job_id, hidden)
+        _require_course_job(session, actor, course_id, job_id)
+        return _load_marking(session, job_id, hidden)
 
 
 def set_marks(service: Service, actor: Actor, course_id: int, job_id: str, request: MarksRequest) -> Marking:
@@ -73,19 +73,19 @@ def set_marks(service: Service, actor: Actor, course_id: int, job_id: str, reque
         Conflict: The submission is not graded, or the marks changed after the actor read them.
         UsageError: The criterion is unknown, the marks are out of range, or the reason is missing.
     """
-    wanted = overrides.read_marks(request.marks) if isinstance(request.marks, str) else request.marks
+    wanted = overrides.parse_marks(request.marks) if isinstance(request.marks, str) else request.marks
 
     def change(session: Session) -> None:
         asked = (session, job_id, request.criterion)
         if wanted is None:
-            overrides.excuse(*asked, request.reason, actor.name, seen=request.seen)
+            overrides.excuse_criterion(*asked, request.reason, actor.name, seen=request.seen)
         else:
             overrides.set_marks(*asked, wanted, request.reason, actor.name, seen=request.seen)
 
     return _change_marks(service, actor, course_id, job_id, change)
 
 
-def withdraw(
+def withdraw_override(
     service: Service, actor: Actor, course_id: int, job_id: str, criterion: str, seen: int | None = None
 ) -> Marking:
     """Restore the grader's marks of a criterion; ``seen`` as in ``MarksRequest``.
@@ -97,33 +97,37 @@ def withdraw(
     """
 
     def change(session: Session) -> None:
-        overrides.withdraw(session, job_id, criterion, actor.name, seen=seen)
+        overrides.withdraw_override(session, job_id, criterion, actor.name, seen=seen)
 
     return _change_marks(service, actor, course_id, job_id, change)
 
 
-def comment(service: Service, actor: Actor, course_id: int, job_id: str, request: CommentRequest) -> Marking:
+def add_comment(service: Service, actor: Actor, course_id: int, job_id: str, request: CommentRequest) -> Marking:
     """Add a comment for the student.
 
     Raises NotFound, and UsageError for an unknown criterion, or a text that is empty or too long.
     """
 
     def change(session: Session) -> None:
-        comments.comment(session, job_id, request.criterion, request.text, actor.name)
+        comments.add_comment(session, job_id, request.criterion, request.text, actor.name)
 
-    return _change(service, actor, course_id, job_id, change)
+    return _apply_change(service, actor, course_id, job_id, change)
 
 
 def withdraw_comment(service: Service, actor: Actor, course_id: int, job_id: str, comment_id: int) -> Marking:
     """Withdraw a comment. Raises NotFound, and UsageError if the submission does not have it."""
-    return _change(
-        service, actor, course_id, job_id, lambda session: comments.withdraw(session, job_id, comment_id, actor.name)
+    return _apply_change(
+        service,
+        actor,
+        course_id,
+        job_id,
+        lambda session: comments.withdraw_comment(session, job_id, comment_id, actor.name),
     )
 
 
-def _grade(session: Session, actor: Actor, course_id: int, job_id: str) -> Job:
-    course_for(session, actor, course_id, Role.INSTRUCTOR)
-    return job_in(session, course_id, job_id)
+def _require_course_job(session: Session, actor: Actor, course_id: int, job_id: str) -> Job:
+    require_course(session, actor, course_id, Role.INSTRUCTOR)
+    return require_job(session, course_id, job_id)
 
 
 def _change_marks(
@@ -135,26 +139,28 @@ def _change_marks(
         try:
             change(session)
         except overrides.MarksChanged as error:
-            raise Conflict(error.said) from None
+            raise Conflict(error.message) from None
 
-    return _change(service, actor, course_id, job_id, change_grade)
+    return _apply_change(service, actor, course_id, job_id, change_grade)
 
 
 @retry_conflicts
-def _change(service: Service, actor: Actor, course_id: int, job_id: str, change: Callable[[Session], None]) -> Marking:
-    hidden = names_for(service, actor, course_id)
+def _apply_change(
+    service: Service, actor: Actor, course_id: int, job_id: str, change: Callable[[Session], None]
+) -> Marking:
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.transaction() as session:
-        _grade(session, actor, course_id, job_id)
+        _require_course_job(session, actor, course_id, job_id)
         change(session)
-        return _marking(session, job_id, hidden)
+        return _load_marking(session, job_id, hidden)
 
 
-def _marking(session: Session, job_id: str, hidden: HiddenNames) -> Marking:
+def _load_marking(session: Session, job_id: str, hidden: HiddenNames) -> Marking:
     row = session.get_one(Job, job_id)
     return Marking(
-        batches.job_line(session, job_id).hidden_by(hidden),
+        batches.load_job_line(session, job_id).hide_name(hidden),
         session.get_one(AssignmentVersion, row.assignment_version_id).title,
-        overrides.criterion_marks(session, job_id),
-        comments.of_job(session, job_id),
-        marking_history.history(session, row.submission_id),
+        overrides.load_criterion_marks(session, job_id),
+        comments.load_comments(session, job_id),
+        marking_history.load_history(session, row.submission_id),
     )

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from service.lti import launch
-from service.lti.keys import public_keys, signing_key
+from service.lti.keys import build_public_key_set, ensure_signing_key
 from service.operations.context import Service
 from service.operations.errors import Invalid
 from service.store import audit
 from service.store.people import credentials, lti
 from service.store.people.credentials import SESSION_LIFETIME, NewSession, Reach
-from service.store.people.lti import Launched
+from service.store.people.lti import LaunchResult
 from service.store.states import CredentialKind
 
 
@@ -29,7 +29,7 @@ class LaunchRequest:
 
 
 @dataclass(frozen=True, slots=True)
-class BegunLaunch:
+class StartedLaunch:
     """The state of a started launch, and the platform's address to redirect the browser to."""
 
     state: str
@@ -41,7 +41,7 @@ class CompletedLaunch:
     """A session for the launched person, with the course, role and path to open."""
 
     session: NewSession
-    launched: Launched
+    launched: LaunchResult
     target: str
 
 
@@ -52,11 +52,11 @@ class UnknownPlatform(Invalid):
 def list_keys(service: Service) -> dict[str, Any]:
     """Return the JSON Web Key Set of this installation, creating a key if there is none."""
     with service.store.transaction() as session:
-        signing_key(session)
-        return public_keys(session)
+        ensure_signing_key(session)
+        return build_public_key_set(session)
 
 
-def begin(service: Service, request: LaunchRequest) -> BegunLaunch:
+def begin(service: Service, request: LaunchRequest) -> StartedLaunch:
     """Start a launch. Raises UnknownPlatform."""
     with service.store.reading() as session:
         platform = lti.find_platform(session, request.issuer, request.client_id or None)
@@ -67,8 +67,8 @@ def begin(service: Service, request: LaunchRequest) -> BegunLaunch:
     with service.store.transaction() as session:
         state, nonce = lti.begin_launch(session, platform, request.target)
     back = f"{request.address}/lti/launch"
-    where = launch.authorization_address(platform, back, request.login_hint, request.message_hint, state, nonce)
-    return BegunLaunch(state, where)
+    where = launch.build_authorization_url(platform, back, request.login_hint, request.message_hint, state, nonce)
+    return StartedLaunch(state, where)
 
 
 def complete(service: Service, state: str, id_token: str) -> CompletedLaunch:
@@ -85,7 +85,7 @@ def complete(service: Service, state: str, id_token: str) -> CompletedLaunch:
         raise Invalid("this launch has expired or was already used; open the link in the course again")
     told = launch.read_launch(pending, id_token)
     with service.store.transaction() as session:
-        launched = lti.meet(
+        launched = lti.resolve_launch(
             session,
             pending.platform,
             told.deployment,
@@ -103,6 +103,6 @@ def complete(service: Service, state: str, id_token: str) -> CompletedLaunch:
             )
         # A platform identifies people in its own courses only.
         kind, reach = CredentialKind.SESSION, Reach(platform_id=pending.platform.id)
-        secret = credentials.issue(session, launched.person_id, kind, SESSION_LIFETIME, reach=reach)
-        audit.note(session, f"platform {pending.platform.name}", "launch", "person", str(launched.person_id))
+        secret = credentials.issue_credential(session, launched.person_id, kind, SESSION_LIFETIME, reach=reach)
+        audit.record_action(session, f"platform {pending.platform.name}", "launch", "person", str(launched.person_id))
     return CompletedLaunch(NewSession(secret), launched, pending.target)

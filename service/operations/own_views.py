@@ -8,26 +8,26 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from service.language import ENGLISH, Language
-from service.operations import own_work
+from service.operations import own_submissions
 from service.operations.context import Actor, Service
 from service.operations.errors import NotFound
-from service.operations.grade_views import SubmittedFiles, replay_document
-from service.operations.lookup import own_enrolment, own_submission
-from service.operations.own_work import Allowance, OwnAssignment, OwnSubmission
-from service.report_files import report_alone, report_body
+from service.operations.grade_views import SubmittedFiles, build_replay_document
+from service.operations.lookup import require_own_enrolment, require_own_submission
+from service.operations.own_submissions import Allowance, OwnAssignment, OwnSubmission
+from service.report_files import render_report_body, render_standalone_report
 from service.reports.html import ReportParts
-from service.reports.view import View, student_view
+from service.reports.view import View, build_student_view
 from service.store.batches import intake
 from service.store.courses import open_assignments
 from service.store.courses.open_assignments import CourseAssignment
 from service.store.grades import appeals, results
 from service.store.grades.appeals import AppealLine
-from service.store.queue import tryouts
-from service.store.queue.queue_places import QueuePlace, queue_place, queue_places
+from service.store.queue import test_runs
+from service.store.queue.queue_places import QueuePlace, estimate_place, estimate_places
 from service.store.states import Role
-from service.trying import tryout_assignment
+from service.test_runs import build_single_trial_assignment
 from submissions.assignment.definition import Assignment
-from submissions.assignment.task_sheet import TaskSheet, task_sheet
+from submissions.assignment.task_sheet import TaskSheet, build_task_sheet
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +39,8 @@ class TaskView:
     counting: OwnSubmission | None
     allowance: Allowance
     is_open: bool
-    can_try: bool
-    has_tried: bool
+    can_test_run: bool
+    has_test_run: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,9 @@ def list_assignments(service: Service, actor: Actor, course_id: int) -> list[Own
     Raises NotFound.
     """
     with service.store.reading() as session:
-        return own_work.own_assignments(session, course_id, _enrolment_id(session, actor, course_id))
+        return own_submissions.load_own_assignments(
+            session, course_id, _require_enrolment_id(session, actor, course_id)
+        )
 
 
 def list_opened(
@@ -79,43 +81,43 @@ def list_opened(
 ) -> list[tuple[CourseAssignment, Allowance]]:
     """Return at most ``limit`` opened assignments of a course, ordered by id, after this one. Raises NotFound."""
     with service.store.reading() as session:
-        enrolment_id = _enrolment_id(session, actor, course_id)
-        opened = [each for each in open_assignments.of_course(session, course_id) if each.opened_at is not None]
+        enrolment_id = _require_enrolment_id(session, actor, course_id)
+        opened = [each for each in open_assignments.list_assignments(session, course_id) if each.opened_at is not None]
         some = [each for each in opened if each.assignment > after][:limit]
-        allowed = own_work.allowances(session, enrolment_id, [each.assignment for each in some])
+        allowed = own_submissions.compute_allowances(session, enrolment_id, [each.assignment for each in some])
         return [(each, allowed[each.assignment]) for each in some]
 
 
 def show_sheet(service: Service, actor: Actor, course_id: int, assignment: str) -> TaskSheet:
     """Return the task of an assignment. Raises NotFound if it is not open, unless the actor submitted to it."""
     with service.store.reading() as session:
-        enrolment_id = _enrolment_id(session, actor, course_id)
-        return task_sheet(seen_assignment(session, course_id, enrolment_id, assignment))
+        enrolment_id = _require_enrolment_id(session, actor, course_id)
+        return build_task_sheet(load_visible_assignment(session, course_id, enrolment_id, assignment))
 
 
 def show_given_file(service: Service, actor: Actor, course_id: int, assignment: str, file: str) -> bytes:
     """Return a file that an assignment provides to students. Raises NotFound."""
     given = show_sheet(service, actor, course_id, assignment).given
     if file not in given:
-        raise _nothing()
+        raise _build_not_found()
     return given[file]
 
 
 def show_task(service: Service, actor: Actor, course_id: int, assignment: str) -> TaskView:
     """Return an assignment with the actor's attempts. Raises NotFound like ``show_sheet``."""
     with service.store.reading() as session:
-        enrolment_id = _enrolment_id(session, actor, course_id)
-        seen = seen_assignment(session, course_id, enrolment_id, assignment)
-        is_open = _is_open(session, course_id, assignment)
-        attempts = own_work.own_attempts(session, enrolment_id, assignment)
+        enrolment_id = _require_enrolment_id(session, actor, course_id)
+        seen = load_visible_assignment(session, course_id, enrolment_id, assignment)
+        is_open = _is_assignment_open(session, course_id, assignment)
+        attempts = own_submissions.load_own_attempts(session, enrolment_id, assignment)
         return TaskView(
-            task_sheet(seen),
+            build_task_sheet(seen),
             attempts.newest,
             attempts.counting,
-            own_work.allowance(session, enrolment_id, assignment),
+            own_submissions.compute_allowance(session, enrolment_id, assignment),
             is_open,
-            can_try=is_open and tryout_assignment(seen) is not None,
-            has_tried=tryouts.newest(session, enrolment_id, assignment) is not None,
+            can_test_run=is_open and build_single_trial_assignment(seen) is not None,
+            has_test_run=test_runs.find_newest_run(session, enrolment_id, assignment) is not None,
         )
 
 
@@ -127,17 +129,19 @@ def list_submissions(
     Raises NotFound.
     """
     with service.store.reading() as session:
-        enrolment_id = _enrolment_id(session, actor, course_id)
-        found = own_work.own_submissions_before(session, enrolment_id, before, limit)
+        enrolment_id = _require_enrolment_id(session, actor, course_id)
+        found = own_submissions.load_submissions_before(session, enrolment_id, before, limit)
         waiting = [each.job_id for each in found if each.waits]
-        places = queue_places(session, waiting) if waiting else {}
+        places = estimate_places(session, waiting) if waiting else {}
         return [SubmissionView(each, places.get(each.job_id)) for each in found]
 
 
 def show_submission(service: Service, actor: Actor, course_id: int, submission_id: int) -> SubmissionView:
     """Return a submission of the actor and its progress. Raises NotFound."""
     with service.store.reading() as session:
-        return _with_place(session, _own(session, _enrolment_id(session, actor, course_id), submission_id))
+        return _add_queue_place(
+            session, _require_submission(session, _require_enrolment_id(session, actor, course_id), submission_id)
+        )
 
 
 def show_submission_report(
@@ -145,23 +149,23 @@ def show_submission_report(
 ) -> ReportView:
     """Return a submission of the actor with the data of its page. Raises NotFound."""
     with service.store.reading() as session:
-        enrolment_id = _enrolment_id(session, actor, course_id)
-        found = own_work.own_attempts_beside(session, enrolment_id, submission_id)
+        enrolment_id = _require_enrolment_id(session, actor, course_id)
+        found = own_submissions.find_submission_with_attempts(session, enrolment_id, submission_id)
         if found is None:
-            raise _nothing()
+            raise _build_not_found()
         own, attempts = found
-        assignment, place = own.assignment, _with_place(session, own).place
-        allowance = own_work.allowance(session, enrolment_id, assignment)
-        is_open = _is_open(session, course_id, assignment)
-        asked = appeals.of_submission(session, submission_id)
-        shown = _view(session, own, language) if own.shown else None
-    report = None if shown is None else report_body(service.store, own.job_id, own.plots, shown)
+        assignment, place = own.assignment, _add_queue_place(session, own).place
+        allowance = own_submissions.compute_allowance(session, enrolment_id, assignment)
+        is_open = _is_assignment_open(session, course_id, assignment)
+        asked = appeals.load_appeals(session, submission_id)
+        shown = _load_student_view(session, own, language) if own.shown else None
+    report = None if shown is None else render_report_body(service.store, own.job_id, own.plots, shown)
     return ReportView(own, place, attempts.newest, attempts.counting, allowance, is_open, asked, report)
 
 
 def show_result(service: Service, actor: Actor, course_id: int, submission_id: int) -> tuple[str, View]:
     """Return the id of a grade and the part of it that the actor may see. Raises NotFound if nothing is visible."""
-    found, view = _result(service, actor, course_id, submission_id, ENGLISH)
+    found, view = _load_result(service, actor, course_id, submission_id, ENGLISH)
     return found.job_id, view
 
 
@@ -169,68 +173,68 @@ def show_report(
     service: Service, actor: Actor, course_id: int, submission_id: int, language: Language = ENGLISH
 ) -> str:
     """Return the visible part of the report as a standalone page. Raises NotFound like ``show_result``."""
-    found, view = _result(service, actor, course_id, submission_id, language)
-    return report_alone(service.store, found.job_id, found.plots, view)
+    found, view = _load_result(service, actor, course_id, submission_id, language)
+    return render_standalone_report(service.store, found.job_id, found.plots, view)
 
 
 def show_replay(service: Service, actor: Actor, course_id: int, submission_id: int) -> dict[str, Any]:
     """Return the replay data of the visible trials. Raises NotFound like ``show_result``."""
-    found, view = _result(service, actor, course_id, submission_id, ENGLISH)
+    found, view = _load_result(service, actor, course_id, submission_id, ENGLISH)
     with service.store.reading() as session:
-        return replay_document(session, found.job_id, view)
+        return build_replay_document(session, found.job_id, view)
 
 
 def show_files(service: Service, actor: Actor, course_id: int, submission_id: int) -> SubmittedFiles:
     """Return the files of a submission of the actor. Raises NotFound."""
     with service.store.reading() as session:
-        own_enrolment(session, actor, course_id, Role.STUDENT)
-        row = own_submission(session, actor, course_id, submission_id)
+        require_own_enrolment(session, actor, course_id, Role.STUDENT)
+        row = require_own_submission(session, actor, course_id, submission_id)
         return SubmittedFiles(row.packed, f"{row.assignment}-{row.attempt}.zip")
 
 
-def seen_assignment(session: Session, course_id: int, enrolment_id: int, assignment: str) -> Assignment:
+def load_visible_assignment(session: Session, course_id: int, enrolment_id: int, assignment: str) -> Assignment:
     """Return an assignment that is open or that the student has submitted to. Raises NotFound."""
-    if _is_open(session, course_id, assignment):
-        return open_assignments.load(session, course_id, assignment)
-    submitted = own_work.own_attempts(session, enrolment_id, assignment).newest
+    if _is_assignment_open(session, course_id, assignment):
+        return open_assignments.load_assignment(session, course_id, assignment)
+    submitted = own_submissions.load_own_attempts(session, enrolment_id, assignment).newest
     if not submitted:
-        raise _nothing()
+        raise _build_not_found()
     return intake.load_assignment(session, submitted[0].job_id)
 
 
-def _enrolment_id(session: Session, actor: Actor, course_id: int) -> int:
-    return own_enrolment(session, actor, course_id, Role.STUDENT).id
+def _require_enrolment_id(session: Session, actor: Actor, course_id: int) -> int:
+    return require_own_enrolment(session, actor, course_id, Role.STUDENT).id
 
 
-def _is_open(session: Session, course_id: int, assignment: str) -> bool:
-    prepared = open_assignments.of_course(session, course_id)
+def _is_assignment_open(session: Session, course_id: int, assignment: str) -> bool:
+    prepared = open_assignments.list_assignments(session, course_id)
     return any(each.assignment == assignment and each.open for each in prepared)
 
 
-def _own(session: Session, enrolment_id: int, submission_id: int) -> OwnSubmission:
-    found = own_work.own_submission(session, enrolment_id, submission_id)
+def _require_submission(session: Session, enrolment_id: int, submission_id: int) -> OwnSubmission:
+    found = own_submissions.find_own_submission(session, enrolment_id, submission_id)
     if found is None:
-        raise _nothing()
+        raise _build_not_found()
     return found
 
 
-def _with_place(session: Session, found: OwnSubmission) -> SubmissionView:
-    return SubmissionView(found, queue_place(session, found.job_id) if found.waits else None)
+def _add_queue_place(session: Session, found: OwnSubmission) -> SubmissionView:
+    return SubmissionView(found, estimate_place(session, found.job_id) if found.waits else None)
 
 
-def _result(
+def _load_result(
     service: Service, actor: Actor, course_id: int, submission_id: int, language: Language
 ) -> tuple[OwnSubmission, View]:
     with service.store.reading() as session:
-        found = _own(session, _enrolment_id(session, actor, course_id), submission_id)
+        found = _require_submission(session, _require_enrolment_id(session, actor, course_id), submission_id)
         if not found.shown:
-            raise _nothing()
-        return found, _view(session, found, language)
+            raise _build_not_found()
+        return found, _load_student_view(session, found, language)
 
 
-def _view(session: Session, found: OwnSubmission, language: Language) -> View:
-    return student_view(results.load(session, found.job_id), found.released, language)
+def _load_student_view(session: Session, found: OwnSubmission, language: Language) -> View:
+    return build_student_view(results.load_grade(session, found.job_id), found.released, language)
 
 
-def _nothing() -> NotFound:
+def _build_not_found() -> NotFound:
     return NotFound("There is no such page or item, or you have no access to it.")

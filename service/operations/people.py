@@ -9,9 +9,9 @@ from datetime import timedelta
 from sqlalchemy.orm import Session
 
 from service.operations.context import Actor, Service
-from service.operations.credentials import check_number, check_scopes
+from service.operations.credentials import check_scopes, check_token_count
 from service.operations.errors import Conflict, Invalid, NotFound
-from service.operations.lookup import check_operator, course_for
+from service.operations.lookup import check_operator, require_course
 from service.store import audit
 from service.store.engine import now, retry_conflicts
 from service.store.locks import lock_course, lock_persons
@@ -25,7 +25,7 @@ from service.store.states import CredentialKind, Role
 from sim.sentences import Sentence
 from submissions.student_identity import Student
 
-_LONGEST = 200
+_LONGEST_TEXT = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,20 +61,20 @@ def find(service: Service, actor: Actor, course: str, student: str) -> Member:
     """Return the member of a course by course name and id. Raises NotFound, and UsageError if there is none."""
     check_operator(actor)
     with service.store.reading() as session:
-        return membership.member(session, course, student)
+        return membership.load_member(session, course, student)
 
 
 def show(service: Service, actor: Actor, enrolment_id: int) -> PersonView:
     """Return the person of an enrolment. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
-        row = _enrolment(session, enrolment_id)
+        row = _require_enrolment(session, enrolment_id)
         return PersonView(
-            membership.member_of(session, row),
-            tuple(membership.enrolments(session, row.person_id)),
-            tuple(credentials.of_person(session, row.person_id)),
+            membership.load_enrolled_member(session, row),
+            tuple(membership.load_enrolments(session, row.person_id)),
+            tuple(credentials.list_credentials(session, row.person_id)),
             membership.is_from_platform(session, row.person_id),
-            tuple(membership.elsewhere(session, row.id)),
+            tuple(membership.find_same_id_instructors(session, row.id)),
         )
 
 
@@ -86,11 +86,13 @@ def sign_out(service: Service, actor: Actor, enrolment_id: int, *, release: bool
     """
     check_operator(actor)
     with service.store.transaction() as session:
-        row = _enrolment(session, enrolment_id)
+        row = _require_enrolment(session, enrolment_id)
         ended = credentials.revoke_all(session, row.person_id)
         if release:
             session.get_one(Person, row.person_id).signed_in_at = None
-        audit.note(session, actor.name, "sign out", "person", str(row.person_id), ended=ended, released=release)
+        audit.record_action(
+            session, actor.name, "sign out", "person", str(row.person_id), ended=ended, released=release
+        )
     return ended
 
 
@@ -102,13 +104,13 @@ def join(service: Service, actor: Actor, request: JoinRequest) -> Member:
     """
     check_operator(actor)
     with service.store.transaction() as session:
-        row, other = _enrolment(session, request.enrolment_id), _enrolment(session, request.other_id)
+        row, other = _require_enrolment(session, request.enrolment_id), _require_enrolment(session, request.other_id)
         person_id, other_person = row.person_id, other.person_id
         if person_id == other_person:
             raise Conflict("these two accounts already belong to one person")
         lock_persons(session, person_id, other_person)
         ours, theirs = (
-            {each.enrolment_id: name for name, each in membership.enrolments(session, which)}
+            {each.enrolment_id: name for name, each in membership.load_enrolments(session, which)}
             for which in (person_id, other_person)
         )
         if shared := sorted(set(ours.values()) & set(theirs.values())):
@@ -121,10 +123,10 @@ def join(service: Service, actor: Actor, request: JoinRequest) -> Member:
                 "one of the accounts signs in through a learning platform; "
                 "confirm that the platform may sign in the joined person"
             )
-        membership.join(session, person_id, other_person)
+        membership.merge_persons(session, person_id, other_person)
         detail = {"joined": other_person, "enrolments": sorted(theirs)}
-        audit.note(session, actor.name, "join", "person", str(person_id), **detail)
-        return membership.member_of(session, row)
+        audit.record_action(session, actor.name, "join", "person", str(person_id), **detail)
+        return membership.load_enrolled_member(session, row)
 
 
 def enrol(service: Service, actor: Actor, course_id: int, students: Sequence[Student]) -> list[int]:
@@ -137,29 +139,29 @@ def enrol(service: Service, actor: Actor, course_id: int, students: Sequence[Stu
     """
     check_lengths(students)
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        return _enrol(session, actor, course_id, students)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        return _enrol_students(session, actor, course_id, students)
 
 
 def enrol_new(service: Service, actor: Actor, course_id: int, student: Student) -> int:
     """Enrol a student who is not in the course yet. Returns the enrolment. Raises like ``enrol``, and Conflict."""
     check_lengths([student])
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        known = membership.known(session, course_id, student)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        known = membership.find_member(session, course_id, student)
         if known is not None:
-            raise _already_there(known)
-        return _enrol(session, actor, course_id, [student])[0]
+            raise _build_enrolled_error(known)
+        return _enrol_students(session, actor, course_id, [student])[0]
 
 
 def check_lengths(students: Sequence[Student]) -> None:
     """Raise Invalid if an id, a name or an e-mail address is too long."""
     for each in students:
-        if max(map(len, (each.id, each.name, each.email))) > _LONGEST:
+        if max(map(len, (each.id, each.name, each.email))) > _LONGEST_TEXT:
             raise Invalid(
                 "%(id)s: the ID, name or address is too long, expected at most %(most)s characters",
-                id=each.id[:_LONGEST],
-                most=_LONGEST,
+                id=each.id[:_LONGEST_TEXT],
+                most=_LONGEST_TEXT,
             )
 
 
@@ -172,7 +174,7 @@ def remove(service: Service, actor: Actor, course_id: int, enrolment_id: int) ->
     """
     with service.store.transaction() as session:
         lock_course(session, course_id)
-        row = _enrolment(session, enrolment_id)
+        row = _require_enrolment(session, enrolment_id)
         is_ours = row.course_id == course_id
         may = actor.roles.get(course_id) is Role.INSTRUCTOR and row.role is Role.STUDENT
         if not is_ours or not (actor.operator or may):
@@ -187,10 +189,10 @@ def issue_token(service: Service, actor: Actor, enrolment_id: int, request: Toke
     """Return the secret of a new token for a member, limited to their course. Raises NotFound, Invalid and Conflict."""
     check_operator(actor)
     with service.store.transaction() as session:
-        row = _enrolment(session, enrolment_id)
+        row = _require_enrolment(session, enrolment_id)
         check_scopes(request.scopes, [row.role], operator=False)
-        check_number(session, row.person_id)
-        secret = credentials.issue(
+        check_token_count(session, row.person_id)
+        secret = credentials.issue_credential(
             session,
             row.person_id,
             CredentialKind.TOKEN,
@@ -198,19 +200,19 @@ def issue_token(service: Service, actor: Actor, enrolment_id: int, request: Toke
             name=request.name,
             reach=Reach(course_id=row.course_id, scopes=request.scopes),
         )
-        audit.note(session, actor.name, "token", "person", str(row.person_id), scopes=sorted(request.scopes))
+        audit.record_action(session, actor.name, "token", "person", str(row.person_id), scopes=sorted(request.scopes))
         return secret
 
 
-def _enrol(session: Session, actor: Actor, course_id: int, listed: Sequence[Student]) -> list[int]:
+def _enrol_students(session: Session, actor: Actor, course_id: int, listed: Sequence[Student]) -> list[int]:
     lock_course(session, course_id)
     at, students = now(session), Students(session, course_id)
     enrolled = [students.enrol(each, at) for each in listed]
-    audit.note(session, actor.name, "enrol", "course", str(course_id), students=len(listed))
+    audit.record_action(session, actor.name, "enrol", "course", str(course_id), students=len(listed))
     return enrolled
 
 
-def _already_there(known: Member) -> Conflict:
+def _build_enrolled_error(known: Member) -> Conflict:
     has_name = known.name and known.name != known.id
     called = Sentence(", as %(name)s", {"name": known.name}) if has_name else ""
     if known.role is Role.INSTRUCTOR:
@@ -226,7 +228,7 @@ def _already_there(known: Member) -> Conflict:
     )
 
 
-def _enrolment(session: Session, enrolment_id: int) -> Enrolment:
+def _require_enrolment(session: Session, enrolment_id: int) -> Enrolment:
     row = session.get(Enrolment, enrolment_id)
     if row is None:
         raise NotFound("this person is not a member of any course")

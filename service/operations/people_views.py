@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from service.operations.context import Actor, Service
-from service.operations.lookup import course_for, student_in
+from service.operations.lookup import require_course, require_student
 from service.store.courses import open_assignments, policies
 from service.store.courses.open_assignments import CourseAssignment
 from service.store.courses.policies import ExtensionLine
@@ -17,7 +17,7 @@ from service.store.people.membership import Member
 from service.store.purge import has_submitted
 from service.store.states import Role
 
-_A_PAGE = 100
+_PAGE_SIZE = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,30 +48,30 @@ class StudentView:
 def list_members(service: Service, actor: Actor, course_id: int) -> list[Member]:
     """Return all members of a course, ordered by id. Raises NotFound."""
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        return membership.members(session, course_id)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        return membership.list_members(session, course_id)
 
 
 def list_members_after(service: Service, actor: Actor, course_id: int, enrolment_id: int, limit: int) -> list[Member]:
     """Return at most ``limit`` members of a course in order of enrolment, after this one. Raises NotFound."""
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        return membership.members_after(session, course_id, enrolment_id, limit)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        return membership.list_members_after(session, course_id, enrolment_id, limit)
 
 
 def search_members(service: Service, actor: Actor, course_id: int, text: str = "", number: int = 1) -> MemberPage:
     """Return a page of the members whose id, name or e-mail address contains a text. Raises NotFound."""
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        members = membership.members(session, course_id)
-        extended = frozenset(each.enrolment_id for each in policies.extensions(session, course_id))
-        platform = lti.course_link(session, course_id)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        members = membership.list_members(session, course_id)
+        extended = frozenset(each.enrolment_id for each in policies.list_extensions(session, course_id))
+        platform = lti.find_course_link(session, course_id)
     wanted = text.strip().casefold()
     found = [each for each in members if wanted in f"{each.id} {each.name} {each.email}".casefold()]
-    pages = max(1, -(-len(found) // _A_PAGE))
+    pages = max(1, -(-len(found) // _PAGE_SIZE))
     number = min(number, pages)
     return MemberPage(
-        tuple(found[(number - 1) * _A_PAGE : number * _A_PAGE]),
+        tuple(found[(number - 1) * _PAGE_SIZE : number * _PAGE_SIZE]),
         len(found),
         number,
         pages,
@@ -84,15 +84,15 @@ def search_members(service: Service, actor: Actor, course_id: int, text: str = "
 def show_student(service: Service, actor: Actor, course_id: int, enrolment_id: int) -> StudentView:
     """Return one student of a course. Raises NotFound."""
     with service.store.reading() as session:
-        row = student_in(session, actor, course_id, enrolment_id)
-        hidden = open_assignments.with_names_hidden(session, course_id)
-        gradings = own_gradings.newest(session, enrolment_id)
-        extensions = policies.extensions(session, course_id)
+        row = require_student(session, actor, course_id, enrolment_id)
+        hidden = open_assignments.load_anonymous_assignments(session, course_id)
+        gradings = own_gradings.list_newest_gradings(session, enrolment_id)
+        extensions = policies.list_extensions(session, course_id)
         return StudentView(
-            membership.member_of(session, row),
+            membership.load_enrolled_member(session, row),
             tuple(each for each in gradings if each.assignment not in hidden),
             bool(hidden),
             tuple(each for each in extensions if each.enrolment_id == row.id),
             has_submitted(session, row.id, hidden),
-            tuple(open_assignments.of_course(session, course_id)),
+            tuple(open_assignments.list_assignments(session, course_id)),
         )

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from service.operations.context import Actor, Service
 from service.operations.errors import Invalid
-from service.operations.lookup import check_operator, course_for
+from service.operations.lookup import check_operator, require_course
 from service.store import audit
 from service.store.courses import open_assignments
 from service.store.courses.open_assignments import CourseAssignment
@@ -40,7 +40,7 @@ def list_platforms(service: Service, actor: Actor) -> list[Platform]:
     """Return all registered platforms, ordered by name. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
-        return lti.platforms(session)
+        return lti.list_platforms(session)
 
 
 def register(service: Service, actor: Actor, request: Registration) -> list[Platform]:
@@ -57,17 +57,17 @@ def register(service: Service, actor: Actor, request: Registration) -> list[Plat
     if not request.deployments:
         raise Invalid("enter at least one deployment ID of the platform")
     with service.store.transaction() as session:
-        platform_id = lti.register(session, request)
-        audit.note(session, actor.name, "register", "lti_platform", str(platform_id), issuer=request.issuer)
-        return lti.platforms(session)
+        platform_id = lti.register_platform(session, request)
+        audit.record_action(session, actor.name, "register", "lti_platform", str(platform_id), issuer=request.issuer)
+        return lti.list_platforms(session)
 
 
 def show_course_platform(service: Service, actor: Actor, course_id: int) -> CoursePlatform:
     """Return the platform of a course. Raises NotFound."""
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        assignments = open_assignments.of_course(session, course_id)
-        return CoursePlatform(lti.course_link(session, course_id), tuple(assignments))
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        assignments = open_assignments.list_assignments(session, course_id)
+        return CoursePlatform(lti.find_course_link(session, course_id), tuple(assignments))
 
 
 def enrol_members(service: Service, actor: Actor, course_id: int) -> EnrolledMembers:
@@ -78,18 +78,18 @@ def enrol_members(service: Service, actor: Actor, course_id: int) -> EnrolledMem
     from service.lti import services
 
     with service.store.reading() as session:
-        link = _link(session, actor, course_id)
-    found = services.members(service.store, link)
+        link = _require_platform_link(session, actor, course_id)
+    found = services.fetch_members(service.store, link)
     refused = []
     with service.store.transaction() as session:
         for each in found:
             try:
                 with session.begin_nested():
-                    lti.enrol(session, link.platform, course_id, each.subject, each.student, each.role)
+                    lti.enrol_subject(session, link.platform, course_id, each.subject, each.student, each.role)
             except UsageError as error:
                 refused.append(str(error))
         enrolled = EnrolledMembers(len(found) - len(refused), tuple(refused))
-        audit.note(session, actor.name, "enrol", "course", str(course_id), members=enrolled.members)
+        audit.record_action(session, actor.name, "enrol", "course", str(course_id), members=enrolled.members)
     return enrolled
 
 
@@ -98,19 +98,21 @@ def pass_back(service: Service, actor: Actor, course_id: int, assignment: str) -
 
     Raises NotFound, UsageError without a platform, PlatformError if it does not accept them.
     """
-    from service.lti.passing_back import send_marks
+    from service.lti.passback import send_marks
 
     with service.store.reading() as session:
-        link = _link(session, actor, course_id)
+        link = _require_platform_link(session, actor, course_id)
     sent = send_marks(service.store, link, course_id, assignment)
     with service.store.transaction() as session:
-        audit.note(session, actor.name, "pass_back", "course", str(course_id), assignment=assignment, sent=sent)
+        audit.record_action(
+            session, actor.name, "pass_back", "course", str(course_id), assignment=assignment, sent=sent
+        )
     return sent
 
 
-def _link(session: Session, actor: Actor, course_id: int) -> CourseLink:
-    course_for(session, actor, course_id, Role.INSTRUCTOR)
-    link = lti.course_link(session, course_id)
+def _require_platform_link(session: Session, actor: Actor, course_id: int) -> CourseLink:
+    require_course(session, actor, course_id, Role.INSTRUCTOR)
+    link = lti.find_course_link(session, course_id)
     if link is None:
         raise Invalid("this course is not linked to a learning platform")
     return link

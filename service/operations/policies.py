@@ -7,11 +7,11 @@ from datetime import datetime
 
 from service.operations.context import Actor, Service
 from service.operations.errors import Invalid
-from service.operations.lookup import course_for, student_in
+from service.operations.lookup import require_course, require_student
 from service.store import audit
 from service.store.courses import policies
+from service.store.courses.assignment_versions import check_assignment
 from service.store.courses.policies import PolicyLimits as PolicyLimits
-from service.store.courses.versions import check_assignment
 from service.store.states import Role
 
 _MOST_LATE_DAYS, _MOST_ATTEMPTS, _MOST_COOL_DOWN_SECONDS = 365, 1000, 600_000
@@ -29,8 +29,8 @@ class ExtensionRequest:
 def list_policies(service: Service, actor: Actor, course_id: int) -> dict[str, PolicyLimits]:
     """Return the policies of a course, by assignment; an empty assignment is the default. Raises NotFound."""
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        return policies.policies(session, course_id)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        return policies.load_policies(session, course_id)
 
 
 def set_policy(service: Service, actor: Actor, course_id: int, assignment: str, limits: PolicyLimits) -> None:
@@ -41,7 +41,7 @@ def set_policy(service: Service, actor: Actor, course_id: int, assignment: str, 
         Invalid: A limit is out of range.
         UsageError: The assignment does not exist.
     """
-    _check_due(limits.due_at)
+    _check_due_date(limits.due_at)
     if not 0 <= limits.late_days <= _MOST_LATE_DAYS:
         raise Invalid("the days for late submissions must be from 0 to %(most)s", most=_MOST_LATE_DAYS)
     if limits.attempts is not None and not 1 <= limits.attempts <= _MOST_ATTEMPTS:
@@ -52,17 +52,17 @@ def set_policy(service: Service, actor: Actor, course_id: int, assignment: str, 
             most=_MOST_COOL_DOWN_SECONDS // 60,
         )
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
         check_assignment(session, assignment)
         policies.set_policy(session, course_id, assignment, limits)
-        audit.note(
+        audit.record_action(
             session,
             actor.name,
             "policy",
             "course",
             str(course_id),
             assignment=assignment,
-            due_at=_written(limits.due_at),
+            due_at=_format_due_date(limits.due_at),
             late_days=limits.late_days,
             attempts=limits.attempts,
             cool_down_seconds=limits.cool_down_seconds,
@@ -72,9 +72,11 @@ def set_policy(service: Service, actor: Actor, course_id: int, assignment: str, 
 def drop_policy(service: Service, actor: Actor, course_id: int, assignment: str) -> None:
     """Remove the policy of an assignment, so that the default of the course applies. Raises NotFound."""
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
         policies.drop_policy(session, course_id, assignment)
-        audit.note(session, actor.name, "policy", "course", str(course_id), assignment=assignment, dropped=True)
+        audit.record_action(
+            session, actor.name, "policy", "course", str(course_id), assignment=assignment, dropped=True
+        )
 
 
 def extend(
@@ -89,14 +91,14 @@ def extend(
     """
     if request.due_at is None and not request.more_attempts:
         raise Invalid("an extension needs a later deadline, additional attempts, or both")
-    _check_due(request.due_at)
+    _check_due_date(request.due_at)
     if not 0 <= request.more_attempts <= _MOST_ATTEMPTS:
         raise Invalid("additional attempts must be from 0 to %(most)s", most=_MOST_ATTEMPTS)
     with service.store.transaction() as session:
-        row = student_in(session, actor, course_id, enrolment_id)
+        row = require_student(session, actor, course_id, enrolment_id)
         check_assignment(session, request.assignment)
-        policies.extend(session, enrolment_id, request.assignment, request.due_at, request.more_attempts)
-        audit.note(
+        policies.extend_policy(session, enrolment_id, request.assignment, request.due_at, request.more_attempts)
+        audit.record_action(
             session,
             actor.name,
             "extend",
@@ -104,25 +106,25 @@ def extend(
             str(course_id),
             student=row.student,
             assignment=request.assignment,
-            due_at=_written(request.due_at),
+            due_at=_format_due_date(request.due_at),
             more_attempts=request.more_attempts,
         )
-        return policies.limits(session, enrolment_id, request.assignment)
+        return policies.load_limits(session, enrolment_id, request.assignment)
 
 
 def show_limits(service: Service, actor: Actor, course_id: int, enrolment_id: int, assignment: str) -> PolicyLimits:
     """Return the limits of one student for an assignment, including extensions. Raises NotFound."""
     with service.store.reading() as session:
-        student_in(session, actor, course_id, enrolment_id)
-        return policies.limits(session, enrolment_id, assignment)
+        require_student(session, actor, course_id, enrolment_id)
+        return policies.load_limits(session, enrolment_id, assignment)
 
 
-def _check_due(due_at: datetime | None) -> None:
+def _check_due_date(due_at: datetime | None) -> None:
     if due_at is not None and not 2000 <= due_at.year < 2200:
         raise Invalid(
             "%(date)s is not a valid deadline, expected a year from 2000 to 2199", date=due_at.date().isoformat()
         )
 
 
-def _written(due_at: datetime | None) -> str | None:
+def _format_due_date(due_at: datetime | None) -> str | None:
     return None if due_at is None else due_at.isoformat()

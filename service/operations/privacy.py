@@ -8,13 +8,13 @@ from pathlib import Path
 
 from service.operations.context import Actor, Service
 from service.operations.errors import Invalid
-from service.operations.lookup import check_machine, course_for, own_enrolment, student_in
+from service.operations.lookup import check_machine, require_course, require_own_enrolment, require_student
 from service.store import purge as purging
 from service.store.backup import back_up
 from service.store.courses import open_assignments
 from service.store.engine import now, retry_conflicts
 from service.store.locks import lock_course
-from service.store.purge import Purged
+from service.store.purge import PurgeCounts
 from service.store.states import Role
 
 _MOST_DAYS = 36_500
@@ -42,7 +42,7 @@ def export_own(service: Service, actor: Actor, course_id: int) -> StudentData:
     from service.student_export import export_student as exported
 
     with service.store.reading() as session:
-        enrolment_id = own_enrolment(session, actor, course_id, Role.STUDENT).id
+        enrolment_id = require_own_enrolment(session, actor, course_id, Role.STUDENT).id
     return StudentData(enrolment_id, exported(service.store, enrolment_id))
 
 
@@ -54,20 +54,20 @@ def export_student(service: Service, actor: Actor, course_id: int, enrolment_id:
     from service.student_export import export_student as exported
 
     with service.store.reading() as session:
-        student_in(session, actor, course_id, enrolment_id)
-        hidden = frozenset() if actor.is_machine else open_assignments.with_names_hidden(session, course_id)
+        require_student(session, actor, course_id, enrolment_id)
+        hidden = frozenset() if actor.is_machine else open_assignments.load_anonymous_assignments(session, course_id)
     return StudentData(enrolment_id, exported(service.store, enrolment_id, hidden))
 
 
 @retry_conflicts
-def erase_student(service: Service, actor: Actor, course_id: int, enrolment_id: int) -> Purged:
+def erase_student(service: Service, actor: Actor, course_id: int, enrolment_id: int) -> PurgeCounts:
     """Permanently remove all submissions of a student, their results, and personal data.
 
     Raises NotFound, and UsageError while a submission of the student is being graded.
     """
     with service.store.transaction() as session:
         lock_course(session, course_id)
-        student_in(session, actor, course_id, enrolment_id)
+        require_student(session, actor, course_id, enrolment_id)
         return purging.erase_student(session, enrolment_id, actor.name)
 
 
@@ -84,7 +84,7 @@ def archive(service: Service, actor: Actor, file: Path) -> int:
     return file.stat().st_size
 
 
-def purge(service: Service, actor: Actor, course_id: int, request: PurgeRequest) -> Purged:
+def purge(service: Service, actor: Actor, course_id: int, request: PurgeRequest) -> PurgeCounts:
     """Remove old submissions of a course, with grades, recordings, and students without remaining submissions.
 
     Raises Forbidden unless called by a command, NotFound, and Invalid for a number of days that is out of range.
@@ -93,6 +93,8 @@ def purge(service: Service, actor: Actor, course_id: int, request: PurgeRequest)
     if not 1 <= request.older_than_days <= _MOST_DAYS:
         raise Invalid("the age must be from 1 to %(most)s days", most=_MOST_DAYS)
     with service.store.reading() as session:
-        course_for(session, actor, course_id)
+        require_course(session, actor, course_id)
         before = now(session) - timedelta(days=request.older_than_days)
-    return purging.purge(service.store, before, actor.name, course_id=course_id, only_count=request.only_count)
+    return purging.purge_submissions(
+        service.store, before, actor.name, course_id=course_id, only_count=request.only_count
+    )

@@ -7,22 +7,22 @@ from typing import TYPE_CHECKING, Literal
 
 from sqlalchemy.orm import Session
 
-from service.operations.batches import assignment_named
+from service.operations.batches import load_course_assignment
 from service.operations.context import Actor, Service
 from service.operations.errors import Conflict
-from service.operations.lookup import batch_in, course_for, job_in, names_for
+from service.operations.lookup import load_names_for_actor, require_batch, require_course, require_job
 from service.store import audit, outbox
 from service.store.batches import publishing, regrades
-from service.store.batches.publishing import Publication as Publication
-from service.store.batches.publishing import Published as Published
+from service.store.batches.publishing import PublicationCounts as PublicationCounts
+from service.store.batches.publishing import PublicationPreview as PublicationPreview
 from service.store.batches.regrades import Change as Change
 from service.store.batches.regrades import ChangesPage as ChangesPage
 from service.store.batches.regrades import CriterionChange as CriterionChange
-from service.store.batches.regrades import Regraded as Regraded
-from service.store.courses.versions import Frozen, freeze
+from service.store.batches.regrades import RegradeBatch as RegradeBatch
+from service.store.courses.assignment_versions import FrozenAssignment, freeze_assignment
 from service.store.engine import now, retry_conflicts
 from service.store.queue import jobs
-from service.store.states import Lane, Role
+from service.store.states import JobQueue, Role
 
 if TYPE_CHECKING:
     from submissions.assignment.definition import Assignment
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 def regrade_batch(
     service: Service, actor: Actor, course_id: int, batch_id: str, assignment: Assignment | str = ""
-) -> Regraded:
+) -> RegradeBatch:
     """Queue a regrade of every graded submission of a batch and notify the workers.
 
     The old grades are in effect until the regrades are published.
@@ -47,9 +47,9 @@ def regrade_batch(
         NotFound: The course does not have the batch, or the actor does not instruct it.
         UsageError: There is nothing to grade again, or the assignment does not exist.
     """
-    frozen = _frozen(service, actor, course_id, assignment)
+    frozen = _freeze_assignment(service, actor, course_id, assignment)
     made = _regrade_batch(service, actor, course_id, batch_id, frozen)
-    service.notifier.grade(Lane.BATCH, made.jobs)
+    service.notifier.grade(JobQueue.BATCH, made.jobs)
     return made
 
 
@@ -58,53 +58,57 @@ def regrade_one(service: Service, actor: Actor, course_id: int, job_id: str, ass
 
     ``assignment`` and errors as in ``regrade_batch``.
     """
-    frozen = _frozen(service, actor, course_id, assignment)
+    frozen = _freeze_assignment(service, actor, course_id, assignment)
     made = _regrade_one(service, actor, course_id, job_id, frozen)
-    service.notifier.grade(Lane.INTERACTIVE)
+    service.notifier.grade(JobQueue.INTERACTIVE)
     return made
 
 
 def list_changes(service: Service, actor: Actor, course_id: int, batch_id: str) -> list[Change]:
     """Return the changes of a batch of regrades, by student; empty for any other batch. Raises NotFound."""
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        batch_in(session, course_id, batch_id)
-        return regrades.changes(session, batch_id, hidden)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        require_batch(session, course_id, batch_id)
+        return regrades.load_changes(session, batch_id, hidden)
 
 
 @retry_conflicts
-def publish(service: Service, actor: Actor, course_id: int, batch_id: str, *, anyway: bool = False) -> Published:
+def publish(
+    service: Service, actor: Actor, course_id: int, batch_id: str, *, anyway: bool = False
+) -> PublicationCounts:
     """Publish the newest grades of a batch, which become the standing grades.
 
     ``anyway`` includes grades with unjudged criteria. Raises NotFound.
     """
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        batch_in(session, course_id, batch_id)
-        done = publishing.publish(session, batch_id, actor=actor.name, anyway=anyway)
-        return _record(session, actor, course_id, "batch", batch_id, done)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        require_batch(session, course_id, batch_id)
+        done = publishing.publish_batch(session, batch_id, actor=actor.name, anyway=anyway)
+        return _record_publication(session, actor, course_id, "batch", batch_id, done)
 
 
 @retry_conflicts
-def publish_one(service: Service, actor: Actor, course_id: int, job_id: str, *, anyway: bool = False) -> Published:
+def publish_one(
+    service: Service, actor: Actor, course_id: int, job_id: str, *, anyway: bool = False
+) -> PublicationCounts:
     """Publish the newest grade of one submission, which becomes its standing grade.
 
     ``anyway`` permits a grade with unjudged criteria. Raises NotFound.
     """
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        job_in(session, course_id, job_id)
-        done = publishing.publish_one(session, job_id, actor=actor.name, anyway=anyway)
-        return _record(session, actor, course_id, "job", job_id, done)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        require_job(session, course_id, job_id)
+        done = publishing.publish_grade(session, job_id, actor=actor.name, anyway=anyway)
+        return _record_publication(session, actor, course_id, "job", job_id, done)
 
 
-def preview(service: Service, actor: Actor, course_id: int, batch_id: str) -> Publication:
+def preview_publication(service: Service, actor: Actor, course_id: int, batch_id: str) -> PublicationPreview:
     """Return the effect of publishing a batch now, without ``anyway``. Raises NotFound."""
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        batch_in(session, course_id, batch_id)
-        return publishing.would_publish(session, batch_id)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        require_batch(session, course_id, batch_id)
+        return publishing.preview_publication(session, batch_id)
 
 
 def grade_over_limit(service: Service, actor: Actor, course_id: int, job_id: str) -> None:
@@ -115,52 +119,61 @@ def grade_over_limit(service: Service, actor: Actor, course_id: int, job_id: str
         Conflict: The submission is not waiting for staff.
     """
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        job_in(session, course_id, job_id)
-        if not jobs.ask_for(session, job_id, now(session)):
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        require_job(session, course_id, job_id)
+        if not jobs.queue_over_limit_job(session, job_id, now(session)):
             raise Conflict("this submission is not waiting for staff to start grading")
-        audit.note(session, actor.name, "grade over limit", "job", job_id)
-    service.notifier.grade(Lane.BATCH)
+        audit.record_action(session, actor.name, "grade over limit", "job", job_id)
+    service.notifier.grade(JobQueue.BATCH)
 
 
 @retry_conflicts
-def _regrade_batch(service: Service, actor: Actor, course_id: int, batch_id: str, frozen: Frozen | None) -> Regraded:
+def _regrade_batch(
+    service: Service, actor: Actor, course_id: int, batch_id: str, frozen: FrozenAssignment | None
+) -> RegradeBatch:
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        original = batch_in(session, course_id, batch_id)
-        made = regrades.regrade(session, original, frozen, max_attempts=service.settings.max_attempts)
-        audit.note(session, actor.name, "regrade", "batch", batch_id, as_batch=made.batch_id, grades=made.jobs)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        original = require_batch(session, course_id, batch_id)
+        made = regrades.queue_regrades(session, original, frozen, max_attempts=service.settings.max_attempts)
+        audit.record_action(session, actor.name, "regrade", "batch", batch_id, as_batch=made.batch_id, grades=made.jobs)
         return made
 
 
 @retry_conflicts
-def _regrade_one(service: Service, actor: Actor, course_id: int, job_id: str, frozen: Frozen | None) -> str:
+def _regrade_one(service: Service, actor: Actor, course_id: int, job_id: str, frozen: FrozenAssignment | None) -> str:
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        asked = job_in(session, course_id, job_id)
-        proposal = regrades.regrade_one(session, asked, frozen, max_attempts=service.settings.max_attempts)
-        audit.note(session, actor.name, "regrade", "job", proposal.regrade_of or job_id, as_job=proposal.id)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        asked = require_job(session, course_id, job_id)
+        proposal = regrades.queue_regrade(session, asked, frozen, max_attempts=service.settings.max_attempts)
+        audit.record_action(session, actor.name, "regrade", "job", proposal.regrade_of or job_id, as_job=proposal.id)
         return proposal.id
 
 
-def _frozen(service: Service, actor: Actor, course_id: int, assignment: Assignment | str) -> Frozen | None:
+def _freeze_assignment(
+    service: Service, actor: Actor, course_id: int, assignment: Assignment | str
+) -> FrozenAssignment | None:
     """Return the assignment to grade against, frozen before the transaction."""
     if isinstance(assignment, str):
         if not assignment:
             return None
         with service.store.reading() as session:
-            course_for(session, actor, course_id, Role.INSTRUCTOR)
-            assignment = assignment_named(session, course_id, assignment)
-    return freeze(assignment)
+            require_course(session, actor, course_id, Role.INSTRUCTOR)
+            assignment = load_course_assignment(session, course_id, assignment)
+    return freeze_assignment(assignment)
 
 
-def _record(
-    session: Session, actor: Actor, course_id: int, subject: Literal["batch", "job"], subject_id: str, done: Published
-) -> Published:
+def _record_publication(
+    session: Session,
+    actor: Actor,
+    course_id: int,
+    subject: Literal["batch", "job"],
+    subject_id: str,
+    done: PublicationCounts,
+) -> PublicationCounts:
     """Record a publication in the activity log, and notify the course's webhooks if a grade was released."""
     counts = {name: count for name, count in asdict(done).items() if count or name in ("published", "replaced")}
-    audit.note(session, actor.name, "publish", subject, subject_id, **counts)
+    audit.record_action(session, actor.name, "publish", subject, subject_id, **counts)
     if done.published:
         named = {"batch" if subject == "batch" else "grade": subject_id}
-        outbox.grades_published(session, course_id, **named, published=done.published)
+        outbox.emit_grades_published(session, course_id, **named, published=done.published)
     return done

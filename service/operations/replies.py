@@ -11,19 +11,19 @@ from datetime import timedelta
 from sqlalchemy import delete, select, update
 
 from service.operations.context import Actor, Service
+from service.store.conditional_insert import insert_if_new
 from service.store.engine import now, retry_conflicts
-from service.store.inserting import insert_if_new
 from service.store.web_tables import IdempotentReply
 
 #: Time for which a key identifies the same request.
-KEPT = timedelta(hours=24)
+RETENTION = timedelta(hours=24)
 #: Requests that started earlier and never finished were interrupted by a stop of the server.
 _ABANDONED = timedelta(minutes=15)
-_BEGUN = 0
+_UNFINISHED = 0
 
 
 @dataclass(frozen=True, slots=True)
-class KeptReply:
+class StoredReply:
     """A stored reply."""
 
     request_sha256: str
@@ -36,25 +36,31 @@ class InProgress(Exception):
 
 
 @retry_conflicts
-def begin(service: Service, actor: Actor, key: str) -> KeptReply | None:
+def reserve_key(service: Service, actor: Actor, key: str) -> StoredReply | None:
     """Return the reply for this key; None if the key is new, which reserves it. Raises InProgress."""
     mine = (IdempotentReply.credential_id == actor.credential_id, IdempotentReply.key == key)
     with service.store.transaction() as session:
         at = now(session)
-        session.execute(delete(IdempotentReply).where(IdempotentReply.made_at < at - KEPT))
-        abandoned = (IdempotentReply.status == _BEGUN, IdempotentReply.made_at < at - _ABANDONED)
+        session.execute(delete(IdempotentReply).where(IdempotentReply.made_at < at - RETENTION))
+        abandoned = (IdempotentReply.status == _UNFINISHED, IdempotentReply.made_at < at - _ABANDONED)
         session.execute(delete(IdempotentReply).where(*mine, *abandoned))
-        held = {"credential_id": actor.credential_id, "key": key, "request_sha256": "", "status": _BEGUN, "body": b""}
+        held = {
+            "credential_id": actor.credential_id,
+            "key": key,
+            "request_sha256": "",
+            "status": _UNFINISHED,
+            "body": b"",
+        }
         if insert_if_new(session, IdempotentReply, **held, made_at=at):
             return None
         row = session.scalars(select(IdempotentReply).where(*mine)).one()
-        if row.status == _BEGUN:
+        if row.status == _UNFINISHED:
             raise InProgress
-        return KeptReply(row.request_sha256, row.status, row.body)
+        return StoredReply(row.request_sha256, row.status, row.body)
 
 
 @retry_conflicts
-def keep(service: Service, actor: Actor, key: str, reply: KeptReply) -> None:
+def store_reply(service: Service, actor: Actor, key: str, reply: StoredReply) -> None:
     """Store the reply for this key."""
     mine = (IdempotentReply.credential_id == actor.credential_id, IdempotentReply.key == key)
     values = {"request_sha256": reply.request_sha256, "status": reply.status, "body": reply.body}
@@ -63,7 +69,7 @@ def keep(service: Service, actor: Actor, key: str, reply: KeptReply) -> None:
 
 
 @retry_conflicts
-def forget(service: Service, actor: Actor, key: str) -> None:
+def release_key(service: Service, actor: Actor, key: str) -> None:
     """Release the key of a failed request."""
     mine = (IdempotentReply.credential_id == actor.credential_id, IdempotentReply.key == key)
     with service.store.transaction() as session:

@@ -18,14 +18,16 @@ SCOPES: Mapping[str, str] = MappingProxyType(
         "sign-in": translatable("sign in a browser with the same scopes; end sessions and tokens"),
     }
 )
-_OF_STAFF = frozenset({"mark", "manage"})
+_STAFF_SCOPES = frozenset({"mark", "manage"})
 
 
-def offered_scopes(roles: Collection[Role], *, operator: bool, limit: frozenset[str] | None = None) -> dict[str, str]:
+def list_offered_scopes(
+    roles: Collection[Role], *, operator: bool, limit: frozenset[str] | None = None
+) -> dict[str, str]:
     """Return the scopes that a token of a person with these roles can use, within those of the current session."""
     is_staff = operator or Role.INSTRUCTOR in roles
     return {
         scope: words
         for scope, words in SCOPES.items()
-        if (is_staff or scope not in _OF_STAFF) and (limit is None or scope in limit)
+        if (is_staff or scope not in _STAFF_SCOPES) and (limit is None or scope in limit)
     }

@@ -21,16 +21,16 @@ def identify(service: Service, secret: str, kind: CredentialKind) -> Identity | 
         return credentials.identify(session, secret, kind)
 
 
-def note_use(service: Service, identity: Identity) -> None:
+def record_use(service: Service, identity: Identity) -> None:
     """Record that a token was used."""
     with service.store.transaction() as session:
-        credentials.note_use(session, identity.credential_id)
+        credentials.record_use(session, identity.credential_id)
 
 
-def show_link(service: Service, link: str) -> LinkOwner | None:
+def find_link_owner(service: Service, link: str) -> LinkOwner | None:
     """Return the person that a link signs in. None if the link is not valid."""
     with service.store.reading() as session:
-        return credentials.owner(session, link)
+        return credentials.find_link_owner(session, link)
 
 
 def sign_in(service: Service, actor: Actor | None, secret: str) -> NewSession | None:
@@ -39,7 +39,7 @@ def sign_in(service: Service, actor: Actor | None, secret: str) -> NewSession | 
     Returns None if the secret is not valid, or the token does not permit browser sign-in.
     """
     with service.store.transaction() as session:
-        started = credentials.redeem(session, secret) or credentials.start_session(session, secret)
+        started = credentials.redeem_link(session, secret) or credentials.start_session(session, secret)
         if started is not None and actor is not None:
             _end_session(session, actor)
     return started
@@ -53,4 +53,4 @@ def sign_out(service: Service, actor: Actor) -> None:
 
 def _end_session(session: Session, actor: Actor) -> None:
     assert actor.person_id is not None
-    credentials.revoke(session, actor.credential_id, actor.person_id)
+    credentials.revoke_credential(session, actor.credential_id, actor.person_id)

@@ -12,11 +12,11 @@ from sqlalchemy.orm import Session
 
 from service.operations.context import Actor, Service
 from service.operations.errors import Invalid
-from service.operations.lookup import check_machine, check_operator, course_for, student_in
+from service.operations.lookup import check_machine, check_operator, require_course, require_student
 from service.store import audit
 from service.store.engine import now
 from service.store.people import credentials, membership
-from service.store.people.credentials import EVERYWHERE, LINK_LIFETIME, Reach
+from service.store.people.credentials import LINK_LIFETIME, UNLIMITED_REACH, Reach
 from service.store.people.membership import Member
 from service.store.people.students import DEFAULT_COURSE
 from service.store.states import Role
@@ -54,12 +54,12 @@ def make_links(service: Service, actor: Actor, course_id: int, days: int = DAYS)
         raise Invalid("sign-in links can be valid for 1 to %(most)s days", most=MOST_DAYS)
     lifetime = timedelta(days=days)
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        listed = membership.students(session, course_id)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        listed = membership.list_students(session, course_id)
         person_ids = [each.person_id for each, more in listed if not more]
-        made = credentials.replace_links(session, person_ids, lifetime, reach=_reach(course_id))
+        made = credentials.replace_links(session, person_ids, lifetime, reach=_build_reach(course_id))
         until = now(session) + lifetime
-        audit.note(session, actor.name, "links", "course", str(course_id), students=len(made), days=days)
+        audit.record_action(session, actor.name, "links", "course", str(course_id), students=len(made), days=days)
     return [
         StudentLink(each, None, None, _ELSEWHERE) if more else StudentLink(each, made[each.person_id], until, "")
         for each, more in listed
@@ -74,10 +74,10 @@ def make_students_link(service: Service, actor: Actor, course_id: int, enrolment
         UsageError: The student is also in other courses, or an operator.
     """
     with service.store.transaction() as session:
-        row = student_in(session, actor, course_id, enrolment_id)
-        if membership.is_more_than(session, row):
+        row = require_student(session, actor, course_id, enrolment_id)
+        if membership.has_other_access(session, row):
             raise UsageError(f"this person {_ELSEWHERE}")
-        return make_link(session, actor, row.person_id, word=word, reach=_reach(course_id))
+        return make_link(session, actor, row.person_id, word=word, reach=_build_reach(course_id))
 
 
 def make_own_link(service: Service, actor: Actor) -> str:
@@ -101,25 +101,25 @@ def make_members_link(service: Service, actor: Actor, course: str, who: str) -> 
     """Return a member of a course by course name and id, with the secret of a new link. Raises NotFound, UsageError."""
     check_operator(actor)
     with service.store.transaction() as session:
-        member = membership.member(session, course, who)
+        member = membership.load_member(session, course, who)
         return member, make_link(session, actor, member.person_id)
 
 
 def find_link(service: Service, word: str) -> UnusedLink | None:
     """Return the link created from a word; None if it does not exist, was used or has expired."""
-    secret = credentials.link_of(word)
+    secret = credentials.build_link_secret(word)
     with service.store.reading() as session:
-        owner = credentials.owner(session, secret)
+        owner = credentials.find_link_owner(session, secret)
     return None if owner is None else UnusedLink(secret, owner.person_id, owner.name, owner.expires_at)
 
 
-def make_link(session: Session, actor: Actor, person_id: int, *, word: str = "", reach: Reach = EVERYWHERE) -> str:
+def make_link(session: Session, actor: Actor, person_id: int, *, word: str = "", reach: Reach = UNLIMITED_REACH) -> str:
     """Return the secret of a person's new link, within the transaction of an operation that has checked the actor."""
     (secret,) = credentials.replace_links(session, [person_id], LINK_LIFETIME, word, reach).values()
-    audit.note(session, actor.name, "link", "person", str(person_id))
+    audit.record_action(session, actor.name, "link", "person", str(person_id))
     return secret
 
 
-def _reach(course_id: int) -> Reach:
+def _build_reach(course_id: int) -> Reach:
     """Return the reach of a link created by an instructor: only the course, and only the student role."""
     return Reach(course_id=course_id, role=Role.STUDENT)

@@ -8,11 +8,11 @@ from pathlib import Path
 
 from service.operations.context import Actor, Service
 from service.operations.errors import Invalid
-from service.operations.lookup import batch_in, course_for, names_for
+from service.operations.lookup import load_names_for_actor, require_batch, require_course
 from service.similarity.pairs import Similarity
 from service.store.batches import batches
 from service.store.batches.batches import BatchLine, JobLine
-from service.store.batches.similarities import MOST_AT_ONCE, SourceTexts, similarities
+from service.store.batches.similarities import MOST_AT_ONCE, SourceTexts, find_similar_submissions
 from service.store.states import Role
 
 
@@ -31,15 +31,15 @@ class ComparedBatch:
 
 def show_similar(service: Service, actor: Actor, course_id: int, batch_id: str) -> ComparedBatch:
     """Compare the newest submissions of the whole course for the assignments of a batch. Raises NotFound."""
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        batch_in(session, course_id, batch_id)
-        line = batches.batch(session, batch_id)
-        assignments = sorted({each.assignment for each in batches.job_lines(session, batch_id)})
-        lines = tuple(batches.course_lines(session, course_id, assignments, hidden))
-    found = tuple(similarities(service.store, lines)) if len(lines) <= MOST_AT_ONCE else None
-    return ComparedBatch(line, lines, found, SourceTexts(service.store, lines).of)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        require_batch(session, course_id, batch_id)
+        line = batches.load_batch(session, batch_id)
+        assignments = sorted({each.assignment for each in batches.load_job_lines(session, batch_id)})
+        lines = tuple(batches.load_course_lines(session, course_id, assignments, hidden))
+    found = tuple(find_similar_submissions(service.store, lines)) if len(lines) <= MOST_AT_ONCE else None
+    return ComparedBatch(line, lines, found, SourceTexts(service.store, lines).load_text)
 
 
 def list_similar(service: Service, actor: Actor, course_id: int, batch_id: str) -> tuple[Similarity, ...]:
@@ -68,11 +68,11 @@ def show_similar_in_batch(
         NotFound: The course does not have the batch, or the actor does not instruct it.
         UsageError: ``given`` cannot be read.
     """
-    hidden = names_for(service, actor, course_id)
+    hidden = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        batch_in(session, course_id, batch_id)
-        line = batches.batch(session, batch_id)
-        lines = tuple(batches.job_lines(session, batch_id, hidden))
-    found = tuple(similarities(service.store, lines, given))
-    return ComparedBatch(line, lines, found, SourceTexts(service.store, lines).of)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        require_batch(session, course_id, batch_id)
+        line = batches.load_batch(session, batch_id)
+        lines = tuple(batches.load_job_lines(session, batch_id, hidden))
+    found = tuple(find_similar_submissions(service.store, lines, given))
+    return ComparedBatch(line, lines, found, SourceTexts(service.store, lines).load_text)

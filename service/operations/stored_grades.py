@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Grading:
+class StoredGrading:
     """A grade as the grader gave it, with the input for grading it again."""
 
     job_id: str
@@ -36,24 +36,24 @@ def find(service: Service, actor: Actor, grade: str) -> JobLine:
     """
     check_operator(actor)
     with service.store.reading() as session:
-        return batches.job_line(session, batches.find_job(session, grade))
+        return batches.load_job_line(session, batches.find_job(session, grade))
 
 
 def find_previous(service: Service, actor: Actor, job_id: str) -> JobLine:
     """Return the standing grade of the same student's previous attempt. Raises NotFound, UsageError."""
     check_operator(actor)
     with service.store.reading() as session:
-        return batches.job_line(session, batches.job_before(session, job_id))
+        return batches.load_job_line(session, batches.find_previous_job(session, job_id))
 
 
-def load_words(service: Service, actor: Actor, job_id: str) -> tuple[Grade, Submission]:
+def load_summary(service: Service, actor: Actor, job_id: str) -> tuple[Grade, Submission]:
     """Load a grade as it counts, with its submission and recordings without ticks and images. Raises NotFound."""
     from service.store.batches import intake
     from service.store.grades import results
 
     check_operator(actor)
     with service.store.reading() as session:
-        return results.load_words(session, job_id), intake.load_submission(session, job_id)
+        return results.load_grade_texts(session, job_id), intake.load_submission(session, job_id)
 
 
 def load(service: Service, actor: Actor, job_id: str) -> Grade:
@@ -62,19 +62,19 @@ def load(service: Service, actor: Actor, job_id: str) -> Grade:
 
     check_operator(actor)
     with service.store.reading() as session:
-        return results.load(session, job_id)
+        return results.load_grade(session, job_id)
 
 
-def load_grading(service: Service, actor: Actor, grade: str) -> Grading:
+def load_grading(service: Service, actor: Actor, grade: str) -> StoredGrading:
     """Load the grading whose id begins with ``grade``. Raises NotFound, and UsageError without a grade."""
     from service.store.batches import intake
     from service.store.grades import results
-    from service.store.installation import secret_of
+    from service.store.installation import load_secret
     from service.store.models import Job
 
     check_operator(actor)
-    own_secret = secret_of(service.store)
+    own_secret = load_secret(service.store)
     with service.store.reading() as session:
         job = session.get_one(Job, batches.find_job(session, grade))
-        stored, request = results.load_graded(session, job.id), intake.load_grading_request(session, job.id)
-        return Grading(job.id, stored, request, job.grader_sha256, job.secret_sha256, own_secret)
+        stored, request = results.load_original_grade(session, job.id), intake.load_grading_request(session, job.id)
+        return StoredGrading(job.id, stored, request, job.grader_sha256, job.secret_sha256, own_secret)

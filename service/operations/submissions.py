@@ -10,39 +10,39 @@ from dataclasses import dataclass
 
 from service.operations.context import Actor, Service
 from service.operations.errors import Invalid, NotFound
-from service.operations.lookup import own_enrolment
+from service.operations.lookup import require_own_enrolment
 from service.store.batches import intake
-from service.store.batches.intake import Accepted
+from service.store.batches.intake import AcceptedSubmission
 from service.store.courses import open_assignments
 from service.store.courses.open_assignments import CourseAssignment
 from service.store.models import Course
-from service.store.states import Lane, Role
+from service.store.states import JobQueue, Role
 from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
-from submissions.bundle import empty_parts, missing_part, submission_of
+from submissions.bundle import build_submission, find_empty_parts, find_missing_part
 from submissions.grading_request import GradingRequest
-from submissions.raw_files import MEGABYTE, SentFile, read_sent, shown
+from submissions.raw_files import MEGABYTE, UploadedFile, read_uploaded, sanitise_name
 from submissions.student_identity import Student
 from submissions.submission import PART_FILES
 
-__all__ = ["Accepted"]
+__all__ = ["AcceptedSubmission"]
 
 
-class LacksPart(Invalid):
+class MissingPart(Invalid):
     """One of two parts is missing, by mistake or on purpose."""
 
 
 @dataclass(frozen=True, slots=True)
-class SendRequest:
+class SubmissionRequest:
     """Files for an assignment; ``even_in_part`` permits a missing part."""
 
     assignment: str
-    sent: Sequence[SentFile]
+    sent: Sequence[UploadedFile]
     even_in_part: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class Sending:
+class SubmissionTarget:
     """A student's enrolment, and the open assignment that they submit to."""
 
     course: str
@@ -51,36 +51,38 @@ class Sending:
     opened: CourseAssignment
     assignment: Assignment
 
-    def read(self, sent: Sequence[SentFile]) -> GradingRequest:
+    def read(self, sent: Sequence[UploadedFile]) -> GradingRequest:
         """Read the submission in these files. Raises UsageError if they are not a valid one."""
         if not sent:
             raise UsageError("no files were submitted; select a file, or paste a program.")
-        source = shown(", ".join(dict.fromkeys(each.flat_name for each in sent)))
+        source = sanitise_name(", ".join(dict.fromkeys(each.flat_name for each in sent)))
         asked = self.assignment
-        submission = submission_of(read_sent(sent, source), source, self.student.id, asked.id, asked.parts)
-        for name in empty_parts(submission):
+        submission = build_submission(read_uploaded(sent, source), source, self.student.id, asked.id, asked.parts)
+        for name in find_empty_parts(submission):
             raise UsageError("%(name)s is empty, expected a program.", name=name)
-        return GradingRequest(submission, asked, source, whose=self.student)
+        return GradingRequest(submission, asked, source, listed_student=self.student)
 
 
-def sending(service: Service, actor: Actor, course_id: int, assignment: str) -> Sending:
+def load_submission_target(service: Service, actor: Actor, course_id: int, assignment: str) -> SubmissionTarget:
     """Return the student's enrolment and the open assignment.
 
     Raises NotFound if students cannot see the assignment, UsageError if it is closed.
     """
     with service.store.reading() as session:
-        enrolment = own_enrolment(session, actor, course_id, Role.STUDENT)
-        opened = {each.assignment: each for each in open_assignments.of_course(session, course_id)}.get(assignment)
+        enrolment = require_own_enrolment(session, actor, course_id, Role.STUDENT)
+        opened = {each.assignment: each for each in open_assignments.list_assignments(session, course_id)}.get(
+            assignment
+        )
         if opened is None or opened.opened_at is None:
             raise NotFound("There is no such page or item, or you have no access to it.")
         if not opened.open:
             raise UsageError("%(title)s is closed; you can no longer submit to it.", title=opened.title)
-        found = open_assignments.load(session, course_id, assignment)
+        found = open_assignments.load_assignment(session, course_id, assignment)
         course = session.get_one(Course, course_id).name
-        return Sending(course, enrolment.id, Student(enrolment.written), opened, found)
+        return SubmissionTarget(course, enrolment.id, Student(enrolment.written), opened, found)
 
 
-def submit(service: Service, actor: Actor, course_id: int, request: SendRequest) -> Accepted:
+def submit(service: Service, actor: Actor, course_id: int, request: SubmissionRequest) -> AcceptedSubmission:
     """Accept a student's files for an assignment, and notify the workers.
 
     Raises:
@@ -88,15 +90,15 @@ def submit(service: Service, actor: Actor, course_id: int, request: SendRequest)
         LacksPart: One of two parts is missing.
         UsageError: The assignment is closed, or the files are not a valid submission.
     """
-    way = sending(service, actor, course_id, request.assignment)
+    way = load_submission_target(service, actor, course_id, request.assignment)
     asked = way.read(request.sent)
-    lacking = missing_part(asked.submission, way.assignment.parts)
+    lacking = find_missing_part(asked.submission, way.assignment.parts)
     if lacking is not None and not request.even_in_part:
-        raise LacksPart(
+        raise MissingPart(
             "there is no %(name)s; add it, or confirm below that you want to submit without it, which uses an attempt.",
             name=PART_FILES[lacking],
         )
-    accepted = intake.accept(
+    accepted = intake.accept_submission(
         service.store,
         asked,
         course=way.course,
@@ -106,5 +108,5 @@ def submit(service: Service, actor: Actor, course_id: int, request: SendRequest)
         enrolment_id=way.enrolment_id,
     )
     if accepted.copied_from is None and not accepted.staff_only:
-        service.notifier.grade(Lane.INTERACTIVE)
+        service.notifier.grade(JobQueue.INTERACTIVE)
     return accepted

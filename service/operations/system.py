@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from service.operations.context import Actor, Service
 from service.operations.lookup import check_operator
-from service.store.queue import dead_letters, tryouts, workers
+from service.store.queue import dead_letters, test_runs, workers
 from service.store.queue.dead_letters import DeadLetter
 from service.store.queue.metrics import ServiceMetrics as ServiceMetrics
-from service.store.queue.metrics import collect
-from service.store.queue.metrics import quantile as quantile
-from service.store.queue.tryouts import TryoutLane
-from service.store.queue.workers import InQuarantine, WorkerLine
+from service.store.queue.metrics import collect_service_metrics
+from service.store.queue.metrics import compute_quantile as compute_quantile
+from service.store.queue.test_runs import QueuedTestRuns
+from service.store.queue.workers import QuarantinedWorker, WorkerLine
 from service.store.states import JobState
 from service.version import GRADER_VERSION
 
@@ -29,10 +29,10 @@ class SystemView:
     version: str
     findings: tuple[Finding, ...]
     metrics: ServiceMetrics
-    quarantined: Mapping[str, InQuarantine]  # by worker
+    quarantined: Mapping[str, QuarantinedWorker]  # by worker
     failed: tuple[DeadLetter, ...]  # the newest
     failed_count: int
-    test_runs: TryoutLane
+    test_runs: QueuedTestRuns
 
 
 def show(service: Service, actor: Actor) -> SystemView:
@@ -42,34 +42,34 @@ def show(service: Service, actor: Actor) -> SystemView:
     check_operator(actor)
     findings = examine_service(service.settings, service.store)
     with service.store.reading() as session:
-        metrics = collect(session)
+        metrics = collect_service_metrics(session)
         return SystemView(
             GRADER_VERSION,
             tuple(findings),
             metrics,
-            {each.worker: each for each in workers.in_quarantine(session)},
-            tuple(dead_letters.dead_letters(session)),
+            {each.worker: each for each in workers.list_quarantined_workers(session)},
+            tuple(dead_letters.list_dead_letters(session)),
             metrics.queue.count(JobState.DEAD),
-            tryouts.lane(session),
+            test_runs.measure_queue(session),
         )
 
 
 def collect_metrics(service: Service) -> ServiceMetrics:
     """Return the metrics of the whole service, which are public because they name no person."""
     with service.store.reading() as session:
-        return collect(session)
+        return collect_service_metrics(session)
 
 
-def list_workers(service: Service, actor: Actor) -> list[tuple[WorkerLine, InQuarantine | None]]:
+def list_workers(service: Service, actor: Actor) -> list[tuple[WorkerLine, QuarantinedWorker | None]]:
     """Return the known workers by name, each with its quarantine if it is in one. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
-        quarantined = {each.worker: each for each in workers.in_quarantine(session)}
-        return [(seen, quarantined.get(seen.worker.name)) for seen in workers.known_workers(session)]
+        quarantined = {each.worker: each for each in workers.list_quarantined_workers(session)}
+        return [(seen, quarantined.get(seen.worker.name)) for seen in workers.load_workers(session)]
 
 
 def list_failed(service: Service, actor: Actor) -> list[DeadLetter]:
     """Return the newest failed jobs of all courses. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
-        return dead_letters.dead_letters(session)
+        return dead_letters.list_dead_letters(session)

@@ -5,9 +5,9 @@ Has no slow imports, so that commands can import it at start-up.
 
 from service.store.states import BatchState as BatchState
 from service.store.states import CredentialKind as CredentialKind
+from service.store.states import JobQueue as JobQueue
 from service.store.states import JobState as JobState
-from service.store.states import Lane as Lane
 from service.store.states import PlotState as PlotState
 from service.store.states import Role as Role
+from service.store.states import RunState as RunState
 from service.store.states import Standing as Standing
-from service.store.states import TryoutState as TryoutState

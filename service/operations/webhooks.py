@@ -7,7 +7,7 @@ from datetime import datetime
 
 from service.operations.context import Actor, Service
 from service.operations.errors import NotFound
-from service.operations.lookup import course_for
+from service.operations.lookup import require_course
 from service.store import audit
 from service.store.outbox import WebhookEvent as WebhookEvent
 from service.store.people import webhooks
@@ -19,8 +19,8 @@ from service.store.states import Role
 def list_webhooks(service: Service, actor: Actor, course_id: int) -> list[WebhookLine]:
     """Return the webhooks of a course, oldest first. Raises NotFound."""
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        return webhooks.of_course(session, course_id)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        return webhooks.list_webhooks(session, course_id)
 
 
 def create(
@@ -31,19 +31,19 @@ def create(
     Raises NotFound, and UsageError for an invalid address or too many webhooks in the course.
     """
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        line, secret = webhooks.create(session, course_id, url, [event.value for event in events])
-        audit.note(session, actor.name, "create webhook", "course", str(course_id), webhook=line.id, url=url)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        line, secret = webhooks.create_webhook(session, course_id, url, [event.value for event in events])
+        audit.record_action(session, actor.name, "create webhook", "course", str(course_id), webhook=line.id, url=url)
         return line, secret
 
 
 def revoke(service: Service, actor: Actor, course_id: int, webhook_id: str) -> None:
     """Revoke a webhook and its pending deliveries. Raises NotFound."""
     with service.store.transaction() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        if not webhooks.revoke(session, course_id, webhook_id):
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        if not webhooks.revoke_webhook(session, course_id, webhook_id):
             raise NotFound("There is no such page or item, or you have no access to it.")
-        audit.note(session, actor.name, "revoke webhook", "course", str(course_id), webhook=webhook_id)
+        audit.record_action(session, actor.name, "revoke webhook", "course", str(course_id), webhook=webhook_id)
 
 
 def list_deliveries(
@@ -51,5 +51,5 @@ def list_deliveries(
 ) -> list[DeliveryLine]:
     """Return deliveries of a course, newest first, after the one with this time and id. Raises NotFound."""
     with service.store.reading() as session:
-        course_for(session, actor, course_id, Role.INSTRUCTOR)
-        return webhooks.deliveries(session, course_id, limit, after)
+        require_course(session, actor, course_id, Role.INSTRUCTOR)
+        return webhooks.list_deliveries(session, course_id, limit, after)

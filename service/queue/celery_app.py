@@ -9,14 +9,14 @@ from celery import Celery
 from kombu import Exchange, Queue
 
 from service.settings import Settings
-from service.store.states import Lane
+from service.store.states import JobQueue
 
-TRYOUTS = "tryouts"
+TEST_RUNS = "tryouts"
 PLOTS = "plots"
 #: In order of priority for a worker. Students wait for test runs, whose number is limited.
-QUEUES = (Lane.INTERACTIVE.value, TRYOUTS, Lane.BATCH.value, PLOTS)
+QUEUES = (JobQueue.INTERACTIVE.value, TEST_RUNS, JobQueue.BATCH.value, PLOTS)
 GRADE_TASK = "robomark.grade"
-TRYOUT_TASK = "robomark.try"
+TEST_RUN_TASK = "robomark.try"
 PLOT_TASK = "robomark.plot"
 
 #: Key with which the worker's command line disables the sandbox of its pool children. No setting, environment variable
@@ -41,9 +41,9 @@ def make_celery(settings: Settings) -> Celery:
         task_serializer="json",
         accept_content=["json"],
         task_queues=[Queue(name, exchange, routing_key=name) for name in QUEUES],
-        task_default_queue=Lane.BATCH.value,
+        task_default_queue=JobQueue.BATCH.value,
         task_default_exchange=exchange.name,
-        task_default_routing_key=Lane.BATCH.value,
+        task_default_routing_key=JobQueue.BATCH.value,
         task_create_missing_queues=False,
         task_acks_late=True,
         worker_prefetch_multiplier=1,

@@ -17,23 +17,23 @@ from sqlalchemy.exc import DBAPIError
 from service.grading.grade import Grade
 from service.grading.grader import GradingProgress, grade
 from service.grading.trial_runner import TrialRunner
-from service.plotting import draw
+from service.plotting import draw_plots
 from service.queue.lease_keeper import LeaseKeeper
 from service.settings import Settings
 from service.store.batches import intake
 from service.store.engine import Store
 from service.store.grades import plots, results
-from service.store.installation import secret_of
+from service.store.installation import load_secret
 from service.store.queue import jobs
 from sim.errors import Cancelled, HostError, UsageError
-from sim.recorded import faults_of
 from sim.recording import Verdict
+from sim.recording_values import collect_faults
 
 _log = structlog.get_logger(__name__)
 Result = TypeVar("Result")
 
 
-class JobOutcome(Enum):
+class GradingOutcome(Enum):
     """The outcome of a notification."""
 
     NOTHING_DUE = "nothing due"
@@ -43,89 +43,93 @@ class JobOutcome(Enum):
     HOST_FAULT = "host fault"  # the job is retried, or dead
 
 
-def grade_next(store: Store, settings: Settings, runner: TrialRunner, worker: str) -> JobOutcome:
+def grade_next_job(store: Store, settings: Settings, runner: TrialRunner, worker: str) -> GradingOutcome:
     """Claim the next job, grade it and store its marks.
 
     Raises only for problems with the database; every other failure of a claimed job is stored in its row.
     """
-    claim = jobs.claim(store, worker, settings.lease_seconds)
+    claim = jobs.claim_job(store, worker, settings.lease_seconds)
     if claim is None:
-        return JobOutcome.NOTHING_DUE
+        return GradingOutcome.NOTHING_DUE
     with structlog.contextvars.bound_contextvars(job=claim.job_id, attempt=claim.attempt, worker=worker):
         try:
-            _grade(store, settings, runner, claim)
+            _grade_job(store, settings, runner, claim)
         except Cancelled as error:
             _log.info("job.stopped", reason=str(error))
-            return JobOutcome.STOPPED
+            return GradingOutcome.STOPPED
         except UsageError as error:
             reason = str(error)
-            _end(lambda: jobs.give_up(store, claim, reason))
-            return JobOutcome.UNUSABLE
+            _apply_unless_fenced(lambda: jobs.give_up_job(store, claim, reason))
+            return GradingOutcome.UNUSABLE
         except Exception as error:
             # This is never the student's fault: their faults are returned as verdicts.
             _log.exception("job.host_error")
             reason = str(error) if isinstance(error, HostError) else f"{type(error).__name__}: {error}"
-            _end(lambda: jobs.fail(store, claim, reason, jobs.Retry(settings.backoff_seconds)))
-            return JobOutcome.HOST_FAULT
-        return JobOutcome.GRADED
+            _apply_unless_fenced(
+                lambda: jobs.fail_job(store, claim, reason, jobs.RetryPolicy(settings.backoff_seconds))
+            )
+            return GradingOutcome.HOST_FAULT
+        return GradingOutcome.GRADED
 
 
-def plot_next(store: Store, settings: Settings) -> str | None:
+def plot_next_job(store: Store, settings: Settings) -> str | None:
     """Draw and store the plots that are due longest. Returns the id of their job; None if none is due."""
-    job_id = plots.claim(store, settings.job_seconds)
+    job_id = plots.claim_plots(store, settings.job_seconds)
     if job_id is None:
         return None
     with store.reading() as session:
-        graded = results.load_graded(session, job_id)
+        graded = results.load_original_grade(session, job_id)
         asked = intake.load_grading_request(session, job_id)
-    drawn = draw(graded, asked.assignment, asked.submission)
-    _persistent(lambda: plots.finish(store, job_id, drawn), settings.lease_seconds)
+    drawn = draw_plots(graded, asked.assignment, asked.submission)
+    _retry_while_unreachable(lambda: plots.store_plots(store, job_id, drawn), settings.lease_seconds)
     return job_id
 
 
-def _grade(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Claim) -> None:
-    if jobs.finish_from_cache(store, claim):
+def _grade_job(store: Store, settings: Settings, runner: TrialRunner, claim: jobs.Claim) -> None:
+    if jobs.finish_job_from_cache(store, claim):
         _log.info("job.copied")
         return
     progress = _Progress(claim)
     with store.reading() as session:
         grading_request = intake.load_grading_request(session, claim.job_id)
-    impatient = store.impatient()
+    impatient = store.with_short_wait()
     with LeaseKeeper(
-        lambda: jobs.heartbeat(impatient, claim, settings.lease_seconds, progress.share),
+        lambda: jobs.renew_lease(impatient, claim, settings.lease_seconds, progress.share),
         settings.lease_seconds,
         settings.job_seconds,
     ) as keeper:
 
         def observe(told: GradingProgress) -> None:
-            progress.saw(told)
+            progress.update_trials(told)
             keeper.check()
 
         graded = grade(
             grading_request.submission,
             grading_request.assignment,
-            secret=secret_of(store),
+            secret=load_secret(store),
             observe=observe,
             runner=runner,
         )
         # Marks made after the time limit may lack interrupted trials.
         keeper.check()
-        graded_at = progress.now()
+        graded_at = progress.estimate_database_time()
         for result in graded.criteria:
             if result.unjudged:
                 _log.error("criterion.unjudged", criterion=result.id, cause=result.unjudged)
-        _refuse_broken(graded)
-        prepared = results.prepare(graded)
+        _check_for_host_error(graded)
+        prepared = results.prepare_grade(graded)
     # The work is done, so a short outage of the database must not lose it.
-    _persistent(lambda: jobs.finish(store, claim, prepared, graded_at, progress.trials_at), settings.lease_seconds)
+    _retry_while_unreachable(
+        lambda: jobs.finish_job(store, claim, prepared, graded_at, progress.trials_at), settings.lease_seconds
+    )
     _log.info("job.graded", verdict=graded.verdict.value, seconds=round(progress.seconds, 3))
 
 
-def _refuse_broken(graded: Grade) -> None:
+def _check_for_host_error(graded: Grade) -> None:
     """Raise HostError if this machine, and not the student, ended a trial."""
     broken = next((trial for trial in graded.trials if trial.verdict is Verdict.HOST_ERROR), None)
     if broken is not None:
-        faults = faults_of(broken.recording)
+        faults = collect_faults(broken.recording)
         raise HostError(faults[0].message if faults else "a trial ended because of a machine fault")
 
 
@@ -143,18 +147,18 @@ class _Progress:
         """Seconds since the claim."""
         return time.monotonic() - self._begun
 
-    def now(self) -> datetime:
+    def estimate_database_time(self) -> datetime:
         """Return the time by the database's clock, because this machine's clock may be wrong."""
         return self._claimed_at + timedelta(seconds=self.seconds)
 
-    def saw(self, told: GradingProgress) -> None:
+    def update_trials(self, told: GradingProgress) -> None:
         """Update the number of finished trials."""
         self.share = told.trials_done / max(1, told.trials)
         if told.trials_done >= told.trials and self.trials_at is None:
-            self.trials_at = self.now()
+            self.trials_at = self.estimate_database_time()
 
 
-def _persistent(change: Callable[[], Result], seconds: float) -> Result:
+def _retry_while_unreachable(change: Callable[[], Result], seconds: float) -> Result:
     """Repeat a change while the database is unreachable, for at most ``seconds``."""
     until = time.monotonic() + seconds
     pause = 0.1
@@ -169,8 +173,8 @@ def _persistent(change: Callable[[], Result], seconds: float) -> Result:
             pause = min(2 * pause, 5.0)
 
 
-def _end(change: Callable[[], object]) -> None:
+def _apply_unless_fenced(change: Callable[[], object]) -> None:
     try:
         change()
-    except jobs.Fenced as error:
+    except jobs.LeaseLost as error:
         _log.info("job.stopped", reason=str(error))

@@ -21,12 +21,14 @@ _log = structlog.get_logger(__name__)
 _PROGRESS_SECONDS = 2.0
 
 #: Delay after a failed renewal, for example because the database was locked.
-_AGAIN_SECONDS = 0.2
+_RETRY_SECONDS = 0.2
 
 # A process forked during a renewal would keep its locks forever. Every fork waits for a running renewal, so a renewal
 # must not wait long.
-_renewing = Lock()
-os.register_at_fork(before=_renewing.acquire, after_in_parent=_renewing.release, after_in_child=_renewing.release)
+_renewal_lock = Lock()
+os.register_at_fork(
+    before=_renewal_lock.acquire, after_in_parent=_renewal_lock.release, after_in_child=_renewal_lock.release
+)
 
 
 class LeaseKeeper:
@@ -62,7 +64,7 @@ class LeaseKeeper:
         wait = self._every
         while not self._ended.wait(wait) and time.monotonic() <= self._until:
             wait = self._every
-            with _renewing:
+            with _renewal_lock:
                 try:
                     self._renew()
                 except Cancelled as lost:
@@ -70,7 +72,7 @@ class LeaseKeeper:
                     return
                 except DBAPIError as error:
                     # The next renewal tries again. If the lease expires meanwhile, its token is rejected.
-                    wait = min(self._every, _AGAIN_SECONDS)
+                    wait = min(self._every, _RETRY_SECONDS)
                     _log.warning("heartbeat.failed", error=str(error))
                 except Exception:
                     _log.exception("heartbeat.failed")

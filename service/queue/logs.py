@@ -28,7 +28,7 @@ def configure_logging(level: str) -> None:
     handler.setFormatter(
         structlog.stdlib.ProcessorFormatter(
             foreign_pre_chain=shared,
-            processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, *_renderers()],
+            processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, *_build_renderers()],
         )
     )
     logging.basicConfig(level=number, handlers=[handler], force=True)
@@ -43,7 +43,7 @@ def configure_logging(level: str) -> None:
     )
 
 
-def announce(event: str, sentence: str) -> None:
+def print_event(event: str, sentence: str) -> None:
     """Print a message of a service to standard output: a sentence on a terminal, otherwise a JSON object."""
     if sys.stdout.isatty():
         print(sentence, flush=True)
@@ -52,7 +52,7 @@ def announce(event: str, sentence: str) -> None:
         print(json.dumps(told), flush=True)
 
 
-def _renderers() -> list[Processor]:
+def _build_renderers() -> list[Processor]:
     if sys.stderr.isatty():
         return [structlog.dev.ConsoleRenderer(colors="NO_COLOR" not in os.environ)]
     return [structlog.processors.format_exc_info, structlog.processors.JSONRenderer()]

@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from sim.errors import HostError
-from sim.processes import start
+from sim.processes import launch_process
 
 _LOG_BYTES = 10_000_000
 _PR_SET_PDEATHSIG = 1
@@ -36,9 +36,9 @@ def start_process(
     Raises HostError if it cannot be started.
     """
     try:
-        keep_small(run_file(log))
+        truncate_log(prepare_run_file(log))
         with log.open("ab") as output:
-            return start(
+            return launch_process(
                 command,
                 extra,
                 stdin=subprocess.DEVNULL,
@@ -47,7 +47,7 @@ def start_process(
                 start_new_session=True,
                 umask=0o077,
                 pass_fds=tuple(kept_open),
-                preexec_fn=_dies_with(os.getpid(), at_our_end),
+                preexec_fn=_end_with_parent(os.getpid(), at_our_end),
             )
     except OSError as error:
         raise HostError(f"{log} cannot be written, or {command[0]} not started: {error.strerror}") from None
@@ -67,14 +67,14 @@ def end_processes(processes: Sequence[subprocess.Popen[bytes]], grace_seconds: f
         process.wait()
 
 
-def keep_small(log: Path) -> None:
+def truncate_log(log: Path) -> None:
     """Truncate a log that is too long and keep a copy of it; the writing process is not affected."""
     if log.exists() and log.stat().st_size > _LOG_BYTES:
         shutil.copyfile(log, log.with_suffix(".log.1"))
         os.truncate(log, 0)
 
 
-def run_file(path: Path, kind: Callable[[int], bool] = stat.S_ISREG) -> Path:
+def prepare_run_file(path: Path, kind: Callable[[int], bool] = stat.S_ISREG) -> Path:
     """Return a path in the run folder after removing anything there that is not a file of this ``kind``.
 
     Raises HostError if the folder is not usable.
@@ -94,7 +94,7 @@ def run_file(path: Path, kind: Callable[[int], bool] = stat.S_ISREG) -> Path:
     return path
 
 
-def _dies_with(parent: int, number: signal.Signals) -> Callable[[], None]:
+def _end_with_parent(parent: int, number: signal.Signals) -> Callable[[], None]:
     def prepare() -> None:
         _libc.prctl(_PR_SET_PDEATHSIG, int(number), 0, 0, 0)
         if os.getppid() != parent:

@@ -20,7 +20,7 @@ import structlog
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.queue.right_answers import QUESTION, RightAnswer
+from service.queue.self_test_record import KNOWN_ANSWER_FOLDER, SelfTestRecord
 from service.store.engine import Store
 from service.store.queue import self_tests
 from sim.recording import Verdict
@@ -30,14 +30,14 @@ from submissions.bundle import read_submission
 from submissions.submission import Submission
 
 _log = structlog.get_logger(__name__)
-_ANSWER = QUESTION / "answer.json"
+_ANSWER_FILE = KNOWN_ANSWER_FOLDER / "answer.json"
 #: Maximum delay of the first self-test if it was skipped at start-up.
-_SOON_SECONDS = 30.0
+_LONGEST_FIRST_DELAY_SECONDS = 30.0
 #: A trial with such an end was cut short by the machine or its load, and is not evidence against the simulator.
-_CUT = frozenset({Verdict.HOST_ERROR, Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED})
+_CUT_SHORT_VERDICTS = frozenset({Verdict.HOST_ERROR, Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED})
 
 
-class SelfTestAnswer(Enum):
+class SelfTestResult(Enum):
     """The result of a self-test."""
 
     RIGHT = "right"
@@ -53,46 +53,49 @@ class KnownAnswer:
     chains: tuple[str, ...]
 
 
-def known() -> KnownAnswer:
+def load_known_answer() -> KnownAnswer:
     """Return the expected result."""
-    told = json.loads(_ANSWER.read_text(encoding="utf-8"))
+    told = json.loads(_ANSWER_FILE.read_text(encoding="utf-8"))
     return KnownAnswer(told["marks"], tuple(told["chains"]))
 
 
-def ask(runner: TrialRunner) -> KnownAnswer | None:
+def run_self_test(runner: TrialRunner) -> KnownAnswer | None:
     """Grade the known submission; None if a limit of the machine cut it short. Raises HostError if grading fails."""
-    submission, assignment = _question()
+    submission, assignment = _load_question()
     graded = grade(submission, assignment, runner=runner)
-    cut = any(trial.verdict in _CUT for trial in graded.trials) or any(result.unjudged for result in graded.criteria)
-    return None if cut else found(graded)
+    cut = any(trial.verdict in _CUT_SHORT_VERDICTS for trial in graded.trials) or any(
+        result.unjudged for result in graded.criteria
+    )
+    return None if cut else extract_answer(graded)
 
 
-def found(graded: Grade) -> KnownAnswer:
+def extract_answer(graded: Grade) -> KnownAnswer:
     """Return the marks of a grade, and the hash of each trial's recording."""
     return KnownAnswer(str(graded.marks), tuple(trial.recording.sha256 for trial in graded.trials))
 
 
-def difference(expected: KnownAnswer, actual: KnownAnswer) -> str:
+def describe_difference(expected: KnownAnswer, actual: KnownAnswer) -> str:
     """Return a sentence that describes the difference; empty if there is none."""
     if actual.chains != expected.chains:
         pairs = zip(expected.chains, actual.chains, strict=False)
         number = next((i for i, (ours, theirs) in enumerate(pairs, 1) if ours != theirs), len(expected.chains))
         return (
-            f"trial {number} of the known answer has hash {_start(actual, number)}, expected {_start(expected, number)}"
+            f"trial {number} of the known answer has hash {_format_hash_start(actual, number)}, expected "
+            f"{_format_hash_start(expected, number)}"
         )
     if actual.marks != expected.marks:
         return f"the known answer got {actual.marks} marks, expected {expected.marks}"
     return ""
 
 
-class Watch:
+class SelfTester:
     """Self-tests of one worker process: at start-up, before a job when one is due, and while idle.
 
     Grading and self-tests exclude each other: use ``busy`` while grading.
     """
 
     def __init__(
-        self, store: Store, runner: TrialRunner, worker: str, every_seconds: float, right: RightAnswer | None = None
+        self, store: Store, runner: TrialRunner, worker: str, every_seconds: float, right: SelfTestRecord | None = None
     ) -> None:
         """Create a watch. ``right`` records a pass for processes that start later."""
         self._right = right
@@ -117,16 +120,16 @@ class Watch:
         """Run the self-test now, or soon if this build has passed recently on this machine."""
         with nullcontext() if self._right is None else self._right.alone():
             if self._right is not None and self._right.given:
-                self._next = time.monotonic() + min(self._every, _SOON_SECONDS)
+                self._next = time.monotonic() + min(self._every, _LONGEST_FIRST_DELAY_SECONDS)
             else:
                 self.look()
 
-    def look(self) -> SelfTestAnswer:
+    def look(self) -> SelfTestResult:
         """Run the self-test now and store its result."""
         with self._lock:
             return self._look()
 
-    def keep_looking(self) -> None:
+    def repeat_in_thread(self) -> None:
         """Repeat the self-test from a thread until the process ends, so that idle workers are tested, too."""
         if self._thread is None:
             self._thread = Thread(target=self._run, name="self_test", daemon=True)
@@ -144,26 +147,26 @@ class Watch:
                 if not self._ended.is_set() and time.monotonic() >= self._next:
                     self._look()
 
-    def _look(self) -> SelfTestAnswer:
+    def _look(self) -> SelfTestResult:
         self._next = time.monotonic() + self._every
         try:
-            actual = ask(self._runner)
+            actual = run_self_test(self._runner)
             if actual is None:
                 _log.warning("self_test.unclear", reason="it was stopped by a limit of this machine")
-                return SelfTestAnswer.UNCLEAR
-            wrong = difference(known(), actual)
+                return SelfTestResult.UNCLEAR
+            wrong = describe_difference(load_known_answer(), actual)
             if not wrong:
-                self_tests.answered_rightly(self._store, self._worker, os.getpid())
+                self_tests.record_pass(self._store, self._worker, os.getpid())
                 if self._right is not None:
                     self._right.note()
-                return SelfTestAnswer.RIGHT
+                return SelfTestResult.RIGHT
             if self._right is not None:
                 self._right.forget()
-            spoilt = self_tests.quarantine(self._store, self._worker, wrong)
+            spoilt = self_tests.quarantine_worker(self._store, self._worker, wrong)
         except Exception:
             # Problems with the machine or the database are visible in the jobs themselves.
             _log.exception("self_test.unclear")
-            return SelfTestAnswer.UNCLEAR
+            return SelfTestResult.UNCLEAR
         _log.error(
             "worker.quarantined",
             worker=self._worker,
@@ -172,28 +175,28 @@ class Watch:
             graded_again=len(spoilt.again),
             taken_back=spoilt.taken_back,
         )
-        return SelfTestAnswer.WRONG
+        return SelfTestResult.WRONG
 
 
 @cache
-def _question() -> tuple[Submission, Assignment]:
-    assignment = read_assignment(QUESTION)
-    return read_submission(QUESTION / "submission", asked=assignment.parts), assignment
+def _load_question() -> tuple[Submission, Assignment]:
+    assignment = read_assignment(KNOWN_ANSWER_FOLDER)
+    return read_submission(KNOWN_ANSWER_FOLDER / "submission", asked=assignment.parts), assignment
 
 
-def _start(answer: KnownAnswer, number: int) -> str:
+def _format_hash_start(answer: KnownAnswer, number: int) -> str:
     return answer.chains[number - 1][:12] if number <= len(answer.chains) else "none"
 
 
-def write_answer() -> None:
+def write_known_answer() -> None:
     """Store the result of this checkout as expected, after an intended change of the simulator."""
     with TrialRunner() as runner:
-        actual = ask(runner)
+        actual = run_self_test(runner)
     if actual is None:
         raise SystemExit("a limit of this machine stopped the trials; try again")
     text = json.dumps({"marks": actual.marks, "chains": actual.chains}, indent=2)
-    _ANSWER.write_text(text + "\n", encoding="utf-8")
+    _ANSWER_FILE.write_text(text + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
-    write_answer()
+    write_known_answer()

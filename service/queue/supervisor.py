@@ -14,14 +14,14 @@ from types import TracebackType
 from typing import Self
 
 from service.home import open_home
-from service.queue.alive import release_dead_workers
 from service.queue.broker import EmbeddedBroker
-from service.queue.processes import run_file
-from service.queue.supervised import SupervisedProcess, SupervisedWorker, stop_all
+from service.queue.live_workers import release_dead_workers
+from service.queue.processes import prepare_run_file
+from service.queue.supervised_processes import SupervisedProcess, SupervisedWorker, stop_processes
 from service.settings import Settings
 from service.store.engine import Store
 from sim.errors import HostError, UsageError
-from sim.processes import python_command
+from sim.processes import build_python_command
 
 _GRACE_SECONDS = 5.0
 _SHORT_LIVES = 3
@@ -37,10 +37,10 @@ class Supervisor:
         logs = settings.home / "log"
         names = ["worker", *(f"worker-{number}" for number in range(2, workers + 1))]
         self.workers = [SupervisedWorker(self.settings, store, logs / f"{name}.log") for name in names]
-        self._web = [] if listening is None else [_web_server(self.settings, listening)]
+        self._web = [] if listening is None else [_build_web_server(self.settings, listening)]
 
     @property
-    def ready(self) -> bool:
+    def is_ready(self) -> bool:
         """Return whether every worker looks for jobs."""
         return all(worker.takes_messages for worker in self.workers)
 
@@ -50,13 +50,13 @@ class Supervisor:
             self._broker.ensure()
         for worker in self.workers:
             worker.ensure()
-            worker.process.keep_log_small()
+            worker.process.truncate_log_file()
         for web in self._web:
-            web.ended()
+            web.detect_end()
             web.start({})
-            web.keep_log_small()
+            web.truncate_log_file()
 
-    def short_lived(self) -> str | None:
+    def describe_short_lived_process(self) -> str | None:
         """Return a sentence about a process that repeatedly ends right after its start; None if there is none."""
         for process in [*(worker.process for worker in self.workers), *self._web]:
             if process.short_lives >= _SHORT_LIVES:
@@ -65,8 +65,8 @@ class Supervisor:
 
     def stop(self) -> int:
         """Stop everything that was started here. Returns the number of requeued jobs."""
-        stop_all([*(worker.process for worker in self.workers), *self._web], _GRACE_SECONDS)
-        given_back = sum(worker.forget() for worker in self.workers)
+        stop_processes([*(worker.process for worker in self.workers), *self._web], _GRACE_SECONDS)
+        given_back = sum(worker.release_jobs() for worker in self.workers)
         if self._broker is not None:
             self._broker.stop()
         return given_back
@@ -82,13 +82,13 @@ class Supervisor:
 
 
 @contextmanager
-def alone_in(settings: Settings) -> Iterator[Callable[[str], None]]:
+def locked_home(settings: Settings) -> Iterator[Callable[[str], None]]:
     """Lock a home for a single service. Yields a function that stores a note for other processes.
 
     Raises UsageError, with the note, if the home is locked. The lock is released when this process ends for any reason.
     """
     open_home(settings.home)
-    path = run_file(settings.home / "run" / "up.lock")
+    path = prepare_run_file(settings.home / "run" / "up.lock")
     try:
         with path.open("a+") as lock:
             try:
@@ -109,7 +109,7 @@ def alone_in(settings: Settings) -> Iterator[Callable[[str], None]]:
         raise HostError(f"{path} cannot be used: {error.strerror}") from None
 
 
-def _web_server(settings: Settings, listening: socket.socket) -> SupervisedProcess:
+def _build_web_server(settings: Settings, listening: socket.socket) -> SupervisedProcess:
     number = listening.fileno()
-    command = python_command("-m", "service.web.server", str(number))
-    return SupervisedProcess(command, settings.environment(), settings.home / "log" / "web.log", [number])
+    command = build_python_command("-m", "service.web.server", str(number))
+    return SupervisedProcess(command, settings.to_environment(), settings.home / "log" / "web.log", [number])

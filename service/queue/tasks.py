@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING
 import structlog
 from celery import Task, current_app, shared_task, signals
 
-from service.queue.celery_app import GRADE_TASK, NO_SANDBOX, PLOT_TASK, TRYOUT_TASK
+from service.queue.celery_app import GRADE_TASK, NO_SANDBOX, PLOT_TASK, TEST_RUN_TASK
 from service.queue.logs import configure_logging
 from service.settings import Settings, load_settings
 
 if TYPE_CHECKING:
     from service.grading.trial_runner import TrialRunner
-    from service.queue.self_test import Watch
+    from service.queue.self_test import SelfTester
     from service.store.engine import Store
 
 _log = structlog.get_logger(__name__)
@@ -36,11 +36,11 @@ class PoolChild:
     settings: Settings
     store: Store
     runner: TrialRunner
-    watch: Watch
+    self_tester: SelfTester
 
     def close(self) -> None:
         """Stop the self-tests, and close the runner and the store."""
-        self.watch.end()
+        self.self_tester.end()
         self.runner.close()
         self.store.close()
 
@@ -53,40 +53,40 @@ class WarmTask(Task):  # type: ignore[type-arg]
     @property
     def child(self) -> PoolChild:
         """The objects of this process, created on first access."""
-        return _children.child
+        return _child_holder.child
 
 
-class _Children:
+class _ChildHolder:
     """Holder of this process's pool child, created on first access."""
 
     @cached_property
     def child(self) -> PoolChild:
         from responders.sandbox import control_group
         from responders.sandbox.manager import Sandboxes
-        from responders.sandbox.zygote import FULL, NONE
-        from service.queue.right_answers import ANSWERED_BY, right_answer
+        from responders.sandbox.zygote import FULL_ISOLATION, NO_ISOLATION
+        from service.queue.self_test_record import SELF_TEST_ROLES, open_self_test_record
 
         settings = load_settings()
         unsafe = current_app.conf.get(NO_SANDBOX)
-        group = None if unsafe else control_group.for_this_process(settings.slot_memory_mb)
-        sandboxes = Sandboxes(NONE if unsafe else FULL, group)
+        group = None if unsafe else control_group.create_slot_group(settings.slot_memory_mb)
+        sandboxes = Sandboxes(NO_ISOLATION if unsafe else FULL_ISOLATION, group)
         try:
             # They load their imports while this process continues.
-            right = right_answer(settings.home / "run")
-            for role in ANSWERED_BY if right.is_ours_to_ask() else ():
+            right = open_self_test_record(settings.home / "run")
+            for role in SELF_TEST_ROLES if right.should_run_here() else ():
                 sandboxes.begin(role, ())
             sandboxes.begin("robot", ())
-            from service.grading.slots import Slots
+            from service.grading.grader_locks import GraderLocks
             from service.grading.trial_runner import TrialRunner
-            from service.queue.alive import worker_name
-            from service.queue.self_test import Watch
+            from service.queue.live_workers import read_worker_name
+            from service.queue.self_test import SelfTester
             from service.store.engine import open_store
 
-            store, runner = open_store(settings), TrialRunner(sandboxes, Slots(settings.home / "run"))
+            store, runner = open_store(settings), TrialRunner(sandboxes, GraderLocks(settings.home / "run"))
         except BaseException:
             sandboxes.close()
             raise
-        watch = Watch(store, runner, worker_name(), settings.self_test_seconds, right)
+        watch = SelfTester(store, runner, read_worker_name(), settings.self_test_seconds, right)
         return PoolChild(settings, store, runner, watch)
 
     def drop(self) -> None:
@@ -96,62 +96,62 @@ class _Children:
             del self.child
 
 
-_children = _Children()
+_child_holder = _ChildHolder()
 
 
 @shared_task(bind=True, base=WarmTask, name=GRADE_TASK)
-def grade_notice(task: WarmTask) -> None:
+def grade_notified_job(task: WarmTask) -> None:
     """Grade the next job, then notify for its plots."""
-    from service.queue.alive import worker_name
-    from service.queue.grading_job import JobOutcome, grade_next
+    from service.queue.grading_job import GradingOutcome, grade_next_job
+    from service.queue.live_workers import read_worker_name
 
     child = task.child
-    child.watch.keep_looking()
-    with child.watch.busy():
-        outcome = grade_next(child.store, child.settings, child.runner, worker_name())
-    if outcome is JobOutcome.GRADED:
+    child.self_tester.repeat_in_thread()
+    with child.self_tester.busy():
+        outcome = grade_next_job(child.store, child.settings, child.runner, read_worker_name())
+    if outcome is GradingOutcome.GRADED:
         from service.queue.notifier import Notifier
 
         Notifier(task.app, child.store, child.settings).plot()
-    elif outcome is JobOutcome.HOST_FAULT:
+    elif outcome is GradingOutcome.HOST_FAULT:
         # The error may have damaged an object that is reused.
-        _children.drop()
+        _child_holder.drop()
 
 
-@shared_task(bind=True, base=WarmTask, name=TRYOUT_TASK)
-def tryout_notice(task: WarmTask) -> None:
+@shared_task(bind=True, base=WarmTask, name=TEST_RUN_TASK)
+def run_notified_test(task: WarmTask) -> None:
     """Run the oldest test run."""
-    from service.queue.trying import try_next
+    from service.queue.test_run_job import run_next_test
 
     child = task.child
-    child.watch.keep_looking()
-    with child.watch.busy():
-        ran_well = try_next(child.store, child.settings, child.runner)
+    child.self_tester.repeat_in_thread()
+    with child.self_tester.busy():
+        ran_well = run_next_test(child.store, child.settings, child.runner)
     if not ran_well:
         # The error may have damaged an object that is reused.
-        _children.drop()
+        _child_holder.drop()
 
 
 @shared_task(bind=True, base=WarmTask, name=PLOT_TASK)
-def plot_notice(task: WarmTask) -> None:
+def plot_notified_job(task: WarmTask) -> None:
     """Draw the plots that are due longest."""
-    from service.queue.grading_job import plot_next
+    from service.queue.grading_job import plot_next_job
 
     child = task.child
     try:
-        plot_next(child.store, child.settings)
+        plot_next_job(child.store, child.settings)
     except Exception:
         # The row still marks them as due, so they are retried a limited number of times.
         _log.exception("plots.failed")
 
 
 @signals.setup_logging.connect
-def _log_as_we_do(**_: object) -> None:
+def _configure_worker_logging(**_: object) -> None:
     configure_logging(load_settings().log_level)
 
 
 @signals.worker_process_init.connect
-def _begin(**_: object) -> None:
+def _prepare_pool_child(**_: object) -> None:
     # If memory runs out, a pool child is killed before its parent, and student code before both.
     with suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text("300")
@@ -159,13 +159,13 @@ def _begin(**_: object) -> None:
     gc.disable()
     # An exception here would end the pool child and each successor; an exception in a task is stored.
     try:
-        child = _children.child
+        child = _child_holder.child
         # Otherwise the first job would wait for it.
         from service.queue import grading_job  # noqa: F401
 
         child.runner.check_sandbox()
-        child.watch.begin()
-        child.watch.keep_looking()
+        child.self_tester.begin()
+        child.self_tester.repeat_in_thread()
     except Exception:
         _log.exception("pool_child.cold")
     finally:
@@ -174,7 +174,7 @@ def _begin(**_: object) -> None:
 
 
 @signals.worker_process_shutdown.connect
-def _end(exitcode: int, **_: object) -> None:
-    _children.drop()
+def _exit_pool_child(exitcode: int, **_: object) -> None:
+    _child_holder.drop()
     # Celery would sleep for a second before its parent, which only waits for the end, kills it.
     os._exit(exitcode)

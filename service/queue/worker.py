@@ -18,12 +18,18 @@ from sqlalchemy.exc import DBAPIError
 
 from responders.sandbox import control_group
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.zygote import FULL, NONE
-from service.home import keep_private, open_home
-from service.queue.alive import WORKER_VARIABLE, alive_path, lock_path, new_worker_name, shown_alive
+from responders.sandbox.zygote import FULL_ISOLATION, NO_ISOLATION
+from service.home import keep_files_private, open_home
 from service.queue.celery_app import NO_SANDBOX, QUEUES, make_celery
+from service.queue.live_workers import (
+    WORKER_VARIABLE,
+    build_heartbeat_path,
+    build_lock_path,
+    create_worker_name,
+    locked_heartbeat_file,
+)
 from service.queue.logs import configure_logging
-from service.queue.processes import run_file
+from service.queue.processes import prepare_run_file
 from service.queue.worker_steps import add_steps
 from service.settings import Settings, load_settings
 from service.store.engine import Store, open_store
@@ -35,7 +41,7 @@ from sim.processes import leave_current_folder
 
 _log = structlog.get_logger(__name__)
 #: Exit status of a worker that failed a self-test.
-QUARANTINED = 3
+QUARANTINED_STATUS = 3
 
 
 def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
@@ -48,28 +54,32 @@ def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
         raise UsageError("a worker needs a broker: set ROBOMARK_BROKER_URL")
     open_home(settings.home)
     leave_current_folder()
-    undivided = control_group.divide()
-    group = None if unsafe else control_group.for_this_process(settings.slot_memory_mb)
+    undivided = control_group.divide_group()
+    group = None if unsafe else control_group.create_slot_group(settings.slot_memory_mb)
     configure_logging(settings.log_level)
     _log.info("worker.control_group", not_used_because=undivided)
-    with Sandboxes(NONE if unsafe else FULL, group) as sandboxes:
+    with Sandboxes(NO_ISOLATION if unsafe else FULL_ISOLATION, group) as sandboxes:
         sandboxes.begin("robot", ())
         app = make_celery(settings)
         app.conf[NO_SANDBOX] = unsafe
         app.finalize()
         # Celery's worker. The sandbox is checked after this import, so that the zygote can start meanwhile.
         celery_worker = app.Worker
-        sandbox = sandboxes.check()
-    os.environ.update(settings.environment())
-    name = os.environ.setdefault(WORKER_VARIABLE, new_worker_name())
+        sandbox = sandboxes.check_isolation()
+    os.environ.update(settings.to_environment())
+    name = os.environ.setdefault(WORKER_VARIABLE, create_worker_name())
     # A responder's arithmetic is small; threads of the linear algebra library would only compete for the cores.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
-    with open_store(settings) as store, run_file(lock_path(settings)).open("a") as lock, shown_alive(settings, name):
+    with (
+        open_store(settings) as store,
+        prepare_run_file(build_lock_path(settings)).open("a") as lock,
+        locked_heartbeat_file(settings, name),
+    ):
         # A shared lock: a home can have several workers, and others only check whether any is alive.
         fcntl.flock(lock, fcntl.LOCK_SH)
         described = WorkerDescription(name, socket.gethostname(), settings.concurrency, GRADER_VERSION, sandbox)
-        add_steps(app, store, settings, described, alive_path(settings, name))
+        add_steps(app, store, settings, described, build_heartbeat_path(settings, name))
         try:
             # Celery's command line would load all of its other commands first.
             worker = celery_worker(
@@ -87,28 +97,28 @@ def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
             status = end.code if isinstance(end.code, int) else 1
         finally:
             # Requeue unfinished jobs after any kind of stop, so that they do not wait for their leases.
-            _give_back(store, name)
+            _release_jobs(store, name)
         with suppress(DBAPIError):
-            status = QUARANTINED if _in_quarantine(store, name) else status
+            status = QUARANTINED_STATUS if _is_in_quarantine(store, name) else status
         return status
 
 
-def _in_quarantine(store: Store, name: str) -> bool:
+def _is_in_quarantine(store: Store, name: str) -> bool:
     with store.reading() as session:
         return workers.is_in_quarantine(session, name)
 
 
-def _give_back(store: Store, name: str) -> None:
+def _release_jobs(store: Store, name: str) -> None:
     try:
         jobs.release_worker(store, name)
-        workers.forget(store, name)
+        workers.delete_heartbeat(store, name)
     except DBAPIError as error:
         _log.warning("worker.not_given_back", error=str(error))
 
 
 def main() -> NoReturn:
     """Run a worker with the settings of the environment."""
-    keep_private()
+    keep_files_private()
     # Imported objects are permanent, so the collector skips them during work and at exit.
     gc.freeze()
     gc.enable()

@@ -22,7 +22,7 @@ from kombu.asynchronous import set_event_loop
 from redis.exceptions import ConnectionError as BrokerGone
 from redis.exceptions import RedisError
 
-from service.queue.broker import broker_client
+from service.queue.broker import create_broker_client
 from service.queue.celery_app import QUEUES
 from service.queue.notifier import Notifier
 from service.settings import Settings
@@ -30,20 +30,20 @@ from service.store.engine import Store
 from service.store.queue import workers
 from service.store.queue.workers import WorkerDescription
 from service.store.revision import needs_newer_code
-from service.version import release_problem
+from service.version import describe_release_problem
 
 _log = structlog.get_logger(__name__)
 _ALIVE_SECONDS = 5.0
 _LONGEST_REAP_SECONDS = 5.0
 _UNBLOCK_SECONDS = 1.0
 #: Number of consecutive beats with waiting messages, an idle worker and no message received.
-_DEAF_BEATS = 3
+_STALLED_BEATS = 3
 #: Reason why a worker claims no jobs if the tables are too new.
-OUTDATED = "it starts no more jobs, because the database needs a newer release: install it and restart"
+OUTDATED_REASON = "it starts no more jobs, because the database needs a newer release: install it and restart"
 
 
 @dataclass(slots=True)
-class _Beat:
+class _BeatState:
     """State shared by the two threads. Times are monotonic."""
 
     at: float = float("-inf")  # time of the last activity of the consumer
@@ -51,18 +51,18 @@ class _Beat:
     is_outdated: bool = False  # the database needs newer code than this worker's
 
     @property
-    def recent(self) -> bool:
+    def is_recent(self) -> bool:
         return time.monotonic() - self.at < 3 * _ALIVE_SECONDS
 
 
-class _Hearing:
+class _ConsumerMonitor:
     """Detection of a consumer that no longer receives messages.
 
     For example, if the broker disappears while every process is busy, their messages are never acknowledged. Then no
     further ones are requested, because kombu pauses the connection without noticing that it is closed.
     """
 
-    def __init__(self, beat: _Beat) -> None:
+    def __init__(self, beat: _BeatState) -> None:
         self._state = beat
         self._taken = 0
         self._beats = 0
@@ -73,14 +73,14 @@ class _Hearing:
         idle = not state.reserved_requests and not state.active_requests
         deaf = idle and self._state.waiting > 0 and taken == self._taken
         self._taken, self._beats = taken, self._beats + 1 if deaf else 0
-        if self._beats >= _DEAF_BEATS:
+        if self._beats >= _STALLED_BEATS:
             self._beats = 0
             raise BrokerGone("messages are queued, but none arrives")
 
 
 def add_steps(app: Celery, store: Store, settings: Settings, worker: WorkerDescription, alive: Path) -> None:
     """Add the lease reaper and the heartbeat, in a file and in the database, to the workers of this app."""
-    beat = _Beat()
+    beat = _BeatState()
     app.conf.broker_transport_options["client_name"] = worker.name
     notifier = Notifier(app, store, settings)
     period = min(settings.lease_seconds / 3, _LONGEST_REAP_SECONDS)
@@ -91,12 +91,12 @@ def add_steps(app: Celery, store: Store, settings: Settings, worker: WorkerDescr
         """Return whether the worker may continue."""
         with store.reading() as session:
             beat.is_outdated = beat.is_outdated or needs_newer_code(session)
-        problem = OUTDATED if beat.is_outdated else release_problem()
+        problem = OUTDATED_REASON if beat.is_outdated else describe_release_problem()
         if problem and problem not in problems:
             problems.add(problem)
             _log.error("worker.must_be_restarted", reason=problem)
-        if beat.recent:
-            workers.beat(store, replace(worker, problem=problem))
+        if beat.is_recent:
+            workers.record_heartbeat(store, replace(worker, problem=problem))
         if beat.is_outdated:
             # Workers with matching code requeue lost jobs and notify.
             return True
@@ -105,20 +105,20 @@ def add_steps(app: Celery, store: Store, settings: Settings, worker: WorkerDescr
         with store.reading() as session:
             return not workers.is_in_quarantine(session, worker.name)
 
-    class LeaseReaper(_Reaping):
+    class LeaseReaper(_LeaseReaperStep):
         what, every_seconds = staticmethod(catch_up), period
 
-    class Alive(_Beating):
+    class Alive(_HeartbeatStep):
         def __init__(self, parent: Any, **options: Any) -> None:
             super().__init__(parent, **options)
-            self.beat, self.file, self.hearing = beat, alive, _Hearing(beat)
+            self.beat, self.file, self.hearing = beat, alive, _ConsumerMonitor(beat)
             self.broker_url, self.client_name = settings.broker_url, worker.name
 
     app.steps["worker"].add(LeaseReaper)
     app.steps["consumer"].add(Alive)
 
 
-class _Reaping(bootsteps.StartStopStep):
+class _LeaseReaperStep(bootsteps.StartStopStep):
     """Catch-up in a separate thread, because the worker's own loop must never wait for the database."""
 
     what: Callable[[], bool]
@@ -149,21 +149,21 @@ class _Reaping(bootsteps.StartStopStep):
                 _log.exception("catch_up.failed")
 
 
-class _Beating(bootsteps.StartStopStep):
+class _HeartbeatStep(bootsteps.StartStopStep):
     """A step of the consumer rather than the worker: a worker without a broker must not look alive."""
 
     requires = ("celery.worker.consumer.tasks:Tasks",)
-    beat: _Beat
+    beat: _BeatState
     file: Path
-    hearing: _Hearing
+    hearing: _ConsumerMonitor
     broker_url: str
     client_name: str  # of the worker's connections to the broker
 
     def start(self, parent: Any) -> None:
         self._consumer = parent
         self._takes = True
-        self._beat()
-        self._timer = parent.timer.call_repeatedly(_ALIVE_SECONDS, self._beat)
+        self._record_beat()
+        self._timer = parent.timer.call_repeatedly(_ALIVE_SECONDS, self._record_beat)
         # Otherwise the consumer would notice a stop only at its next wake-up, after up to a second.
         self._waking = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         parent.hub.add_reader(self._waking[0], os.read, self._waking[0], 64)
@@ -176,20 +176,20 @@ class _Beating(bootsteps.StartStopStep):
         for end in self._waking:
             os.close(end)
         if state.should_stop is not None and not state.reserved_requests:
-            self._hurry()
+            self._skip_exit_waits()
 
-    def _hurry(self) -> None:
+    def _skip_exit_waits(self) -> None:
         """Skip Celery's waits at exit if no task is running."""
         # The thread that runs timers until the pool has ended sleeps for half a second.
         set_event_loop(None)
         # The consumer also waits up to a second for the broker's next message.
-        client = broker_client(self.broker_url, _UNBLOCK_SECONDS)
+        client = create_broker_client(self.broker_url, _UNBLOCK_SECONDS)
         with suppress(RedisError, OSError), client:
             for each in client.client_list():
                 if each["name"] == self.client_name:
                     client.client_unblock(int(each["id"]))
 
-    def _beat(self) -> None:
+    def _record_beat(self) -> None:
         self.beat.at = time.monotonic()
         try:
             self.file.write_text("takes messages\n")
@@ -203,4 +203,4 @@ class _Beating(bootsteps.StartStopStep):
             self._takes = False
             for queue in QUEUES:
                 self._consumer.cancel_task_queue(queue)
-            _log.warning("worker.takes_no_messages", reason=OUTDATED)
+            _log.warning("worker.takes_no_messages", reason=OUTDATED_REASON)

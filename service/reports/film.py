@@ -19,36 +19,47 @@ from numpy.typing import NDArray
 from PIL import Image, ImageColor, ImageDraw, ImageFont
 
 from service.grading.grade import TrialResult
-from service.reports.plots.style import FAINT, FAULT, FONT_FILE, INK, LEFT, PEN, RIGHT, RULE, SECOND_ROBOT, drawable
-from service.reports.readable import one_line
+from service.reports.display_text import to_one_line
+from service.reports.plots.style import (
+    FAINT,
+    FAULT,
+    FONT_FILE,
+    INK,
+    LEFT,
+    PEN,
+    RIGHT,
+    RULE,
+    SECOND_ROBOT,
+    replace_missing_glyphs,
+)
 from service.reports.replay.sources import Sources
-from service.reports.replay.trial import trial_data
-from service.reports.robots import robots_of
-from sim.recorded import floor_of, pose_after, robot_of, ticks_until
+from service.reports.replay.trial import trial_to_json
+from service.reports.robots import iterate_robots
 from sim.recording import Pose, Recording
+from sim.recording_values import count_ticks_until, get_pose_after, get_recorded_robot, rebuild_floor
 from sim.robot import LightSensor
 
 Pixels = NDArray[np.uint8]
 Point = tuple[float, float]
 
 #: Frame duration in milliseconds. A GIF counts in hundredths of a second.
-FRAME = 80
+FRAME_MILLISECONDS = 80
 MOST_FRAMES = 300
-_LAST_FRAME = 2000
+_LAST_FRAME_MILLISECONDS = 2000
 _WIDTH, _LOWEST, _HIGHEST, _STRIP = 640, 240, 420, 50  # pixels
 _MARGIN, _BEYOND, _CLOSEST = 150, 400, 640  # mm
 _FLOOR_WIDTH, _FLOOR_HEIGHT = 2362, 1143  # mm
 _OFF_THE_FLOOR, _PAPER, _OBSTACLE, _RAY = "#a3aab1", "#ffffff", "#c8cdd2", "#3f7d3c"
 _COLOURS = (INK, LEFT, RIGHT, PEN, FAULT, SECOND_ROBOT, FAINT, RULE, _OFF_THE_FLOOR, _PAPER, _OBSTACLE, _RAY)
-_FOUND_COLOURS, _TOO_NEAR = 150, 8
-_FINER = 3  # drawings are enlarged by this factor first, for smooth edges
-_NOTHING_SEEN = 2550  # mm
+_IMAGE_COLOURS, _TOO_NEAR = 150, 8
+_OVERSAMPLING = 3  # drawings are enlarged by this factor first, for smooth edges
+_ULTRASONIC_LIMIT = 2550  # mm
 #: The shortest and longest display of a text, in frames.
 _SHORTEST, _LONGEST = 10, 25
 
 
 @dataclass(frozen=True, slots=True)
-class _Sight:
+class _Viewport:
     """The part of the world that is shown: its upper left corner in mm, and the scale in pixels per mm."""
 
     left: float
@@ -60,19 +71,19 @@ class _Sight:
         return (x - self.left) * self.scale, (self.top - y) * self.scale
 
 
-def film(trial: TrialResult, own_floors: Mapping[str, Pixels]) -> bytes:
+def render_film(trial: TrialResult, own_floors: Mapping[str, Pixels]) -> bytes:
     """Return the trial as a GIF. ``own_floors`` are floors that are not built in, by name."""
     recording = trial.recording
-    sight = _sight(recording)
-    ground = _ground(recording, own_floors.get(recording.background), sight)
-    speed = max(1, math.ceil(recording.end_t * 1000 / FRAME / (MOST_FRAMES - 1)))
-    palette = _palette(_frames(trial, ground.copy(), sight, speed, (0.0, recording.end_t)))
-    moments = [*np.arange(0, recording.end_t, FRAME / 1000 * speed).tolist(), recording.end_t]
+    sight = _choose_viewport(recording)
+    ground = _draw_ground(recording, own_floors.get(recording.background), sight)
+    speed = max(1, math.ceil(recording.end_t * 1000 / FRAME_MILLISECONDS / (MOST_FRAMES - 1)))
+    palette = _build_palette(_draw_frames(trial, ground.copy(), sight, speed, (0.0, recording.end_t)))
+    moments = [*np.arange(0, recording.end_t, FRAME_MILLISECONDS / 1000 * speed).tolist(), recording.end_t]
     frames = (
         frame.quantize(palette=palette, dither=Image.Dither.NONE)
-        for frame in _frames(trial, ground, sight, speed, moments)
+        for frame in _draw_frames(trial, ground, sight, speed, moments)
     )
-    durations = [FRAME] * (len(moments) - 1) + [_LAST_FRAME]
+    durations = [FRAME_MILLISECONDS] * (len(moments) - 1) + [_LAST_FRAME_MILLISECONDS]
     stream = io.BytesIO()
     next(frames).save(
         stream, "GIF", save_all=True, append_images=frames, duration=durations, loop=0, optimize=False, disposal=1
@@ -80,32 +91,32 @@ def film(trial: TrialResult, own_floors: Mapping[str, Pixels]) -> bytes:
     return stream.getvalue()
 
 
-def _frames(
-    trial: TrialResult, ground: Image.Image, sight: _Sight, speed: int, moments: list[float] | tuple[float, ...]
+def _draw_frames(
+    trial: TrialResult, ground: Image.Image, sight: _Viewport, speed: int, moments: list[float] | tuple[float, ...]
 ) -> Iterator[Image.Image]:
     """Yield a frame for each moment. Trails of the robots are drawn on ``ground``."""
     recording = trial.recording
-    words = _Words(trial)
-    robots = [own for _, own in robots_of(recording)]
+    words = _Caption(trial)
+    robots = [own for _, own in iterate_robots(recording)]
     drawn, marked = 0, -math.inf
     for number, t in enumerate(moments):
-        tick = ticks_until(recording, t)
+        tick = count_ticks_until(recording, t)
         for which, own in enumerate(robots):
-            _leave_trail(ground, own, sight, drawn, tick, SECOND_ROBOT if which else LEFT)
-            _leave_marks(ground, own, sight, marked, t)
+            _draw_trail(ground, own, sight, drawn, tick, SECOND_ROBOT if which else LEFT)
+            _draw_touches(ground, own, sight, marked, t)
         drawn, marked = tick, t
         seen = ground.copy()
         for which, own in enumerate(robots):
             _draw_robot(seen, own, sight, tick, SECOND_ROBOT if which else INK)
         frame = Image.new("RGB", (_WIDTH, sight.height + _STRIP), _PAPER)
         frame.paste(seen)
-        _draw_strip(frame, sight.height, t, recording.end_t, speed, words.at(t, number))
+        _draw_caption_strip(frame, sight.height, t, recording.end_t, speed, words.at(t, number))
         yield frame
 
 
-def _sight(recording: Recording) -> _Sight:
+def _choose_viewport(recording: Recording) -> _Viewport:
     """Return the region that the robots visited, with a margin, in the aspect ratio of a screen."""
-    places = np.vstack([_places(own) for _, own in robots_of(recording)])
+    places = np.vstack([_collect_positions(own) for _, own in iterate_robots(recording)])
     if recording.beacon is not None:
         places = np.vstack((places, recording.beacon))
     places = places[np.isfinite(places).all(axis=1)] if np.isfinite(places).any() else np.zeros((1, 2))
@@ -116,18 +127,18 @@ def _sight(recording: Recording) -> _Sight:
     height = round(min(max(_WIDTH * up / across, _LOWEST), _HIGHEST))
     scale = min(_WIDTH / max(across, _CLOSEST), height / up)
     middle_x, middle_y = ((low + high) / 2).tolist()
-    return _Sight(middle_x - _WIDTH / scale / 2, middle_y + height / scale / 2, scale, height)
+    return _Viewport(middle_x - _WIDTH / scale / 2, middle_y + height / scale / 2, scale, height)
 
 
-def _places(own: Recording) -> NDArray[np.float64]:
+def _collect_positions(own: Recording) -> NDArray[np.float64]:
     start = np.array([[own.start.x, own.start.y]])
     return np.vstack((start, np.column_stack((own.ticks.x, own.ticks.y))))
 
 
-def _ground(recording: Recording, own: Pixels | None, sight: _Sight) -> Image.Image:
+def _draw_ground(recording: Recording, own: Pixels | None, sight: _Viewport) -> Image.Image:
     """Return the floor of the trial with its obstacles; white if the floor image is not available any more."""
     ground = Image.new("RGB", (_WIDTH, sight.height), _OFF_THE_FLOOR)
-    built_in = floor_of(recording) if own is None else None
+    built_in = rebuild_floor(recording) if own is None else None
     pixels = own if built_in is None else built_in.pixels
     if pixels is None:
         pixels = np.full((_FLOOR_HEIGHT, _FLOOR_WIDTH, 3), 255, np.uint8)
@@ -155,28 +166,28 @@ def _ground(recording: Recording, own: Pixels | None, sight: _Sight) -> Image.Im
     return ground
 
 
-def _leave_trail(ground: Image.Image, own: Recording, sight: _Sight, since: int, until: int, colour: str) -> None:
+def _draw_trail(ground: Image.Image, own: Recording, sight: _Viewport, since: int, until: int, colour: str) -> None:
     """Draw the path from one tick to the other, and the pen strokes on it."""
     until = min(until, len(own.ticks))
     if until <= since:
         return
-    way = _seen(own, sight, since, until)
+    way = _project_positions(own, sight, since, until)
     with _Layer(ground, way) as layer:
-        for down, up in _strokes(own):
+        for down, up in _list_pen_strokes(own):
             if max(since, down) < min(until, up):
-                pen = _seen(own, sight, max(since, down), min(until, up))
+                pen = _project_positions(own, sight, max(since, down), min(until, up))
                 layer.line(pen, PEN, max(7.0, 8 * sight.scale))
         layer.line(way, _PAPER, 4)
         layer.line(way, colour, 2)
 
 
-def _seen(own: Recording, sight: _Sight, since: int, until: int) -> list[Point]:
+def _project_positions(own: Recording, sight: _Viewport, since: int, until: int) -> list[Point]:
     """Return the robot's known positions on the frame, from one tick to the other."""
-    poses = (pose_after(own, tick) for tick in range(since, until + 1))
+    poses = (get_pose_after(own, tick) for tick in range(since, until + 1))
     return [sight.at(pose.x, pose.y) for pose in poses if math.isfinite(pose.x + pose.y)]
 
 
-def _strokes(own: Recording) -> list[tuple[int, int]]:
+def _list_pen_strokes(own: Recording) -> list[tuple[int, int]]:
     """Return the ticks at which the pen goes down and up, as pairs."""
     strokes: list[tuple[int, int]] = []
     since = None
@@ -189,7 +200,7 @@ def _strokes(own: Recording) -> list[tuple[int, int]]:
     return strokes
 
 
-def _leave_marks(ground: Image.Image, own: Recording, sight: _Sight, since: float, until: float) -> None:
+def _draw_touches(ground: Image.Image, own: Recording, sight: _Viewport, since: float, until: float) -> None:
     """Draw a cross for each touch after ``since`` up to ``until``."""
     for touch in own.touches:
         if since < touch.t <= until and math.isfinite(touch.pose.x + touch.pose.y):
@@ -199,16 +210,16 @@ def _leave_marks(ground: Image.Image, own: Recording, sight: _Sight, since: floa
                     layer.line(way, FAULT, 2.5)
 
 
-def _draw_robot(frame: Image.Image, own: Recording, sight: _Sight, tick: int, colour: str) -> None:
-    body, pose = robot_of(own), pose_after(own, tick)
+def _draw_robot(frame: Image.Image, own: Recording, sight: _Viewport, tick: int, colour: str) -> None:
+    body, pose = get_recorded_robot(own), get_pose_after(own, tick)
     if not math.isfinite(pose.x + pose.y + pose.heading):
         return
-    place = _Placed(pose, sight)
+    place = _RobotFrame(pose, sight)
     row = min(tick, len(own.ticks)) - 1
     distance = float(own.ticks.ultrasonic[row]) if row >= 0 else math.nan
     ray = [place.at(0, body.ultrasonic_y), place.at(0, body.ultrasonic_y + distance)]
-    seen = ray if distance < _NOTHING_SEEN else []
-    outline = place.rounded(-body.half_width, body.back, body.half_width, body.front, 12)
+    seen = ray if distance < _ULTRASONIC_LIMIT else []
+    outline = place.build_rounded_outline(-body.half_width, body.back, body.half_width, body.front, 12)
     with _Layer(frame, [*outline, *seen]) as layer:
         if seen:
             layer.dashes(ray[0], ray[1], _RAY, 1.5)
@@ -217,27 +228,29 @@ def _draw_robot(frame: Image.Image, own: Recording, sight: _Sight, tick: int, co
         wheel = body.wheel_diameter
         for side in (-1, 1):
             middle = side * body.wheel_spacing / 2
-            layer.polygon(place.rounded(middle - 0.18 * wheel, -wheel / 2, middle + 0.18 * wheel, wheel / 2, 4), INK)
+            layer.polygon(
+                place.build_rounded_outline(middle - 0.18 * wheel, -wheel / 2, middle + 0.18 * wheel, wheel / 2, 4), INK
+            )
         lights = ((body.left_light, own.ticks.left_rgb, LEFT), (body.right_light, own.ticks.right_rgb, RIGHT))
         for sensor, column, edge in lights:
-            layer.dot(place.at(sensor.x, sensor.y), _light_radius(sensor, sight) + 1.6, edge)
+            layer.dot(place.at(sensor.x, sensor.y), _compute_light_radius(sensor, sight) + 1.6, edge)
             known = row >= 0 and bool(np.isfinite(column[row]).all())
             light = tuple(np.clip(column[row], 0, 255).astype(int).tolist()) if known else (255, 255, 255)
-            layer.dot(place.at(sensor.x, sensor.y), _light_radius(sensor, sight), light)
+            layer.dot(place.at(sensor.x, sensor.y), _compute_light_radius(sensor, sight), light)
         layer.dot(place.at(0, 0), 4, _PAPER)
         layer.dot(place.at(0, 0), 2.6, colour)
 
 
-def _light_radius(sensor: LightSensor, sight: _Sight) -> float:
+def _compute_light_radius(sensor: LightSensor, sight: _Viewport) -> float:
     return sensor.diameter / 2 * sight.scale
 
 
 @dataclass(frozen=True, slots=True)
-class _Placed:
+class _RobotFrame:
     """Converts a robot's own points to the frame: x to its right, y forward, mm."""
 
     pose: Pose
-    sight: _Sight
+    sight: _Viewport
 
     def at(self, right: float, forward: float) -> Point:
         cosine, sine = math.cos(math.radians(self.pose.heading)), math.sin(math.radians(self.pose.heading))
@@ -245,7 +258,7 @@ class _Placed:
             self.pose.x + forward * cosine + right * sine, self.pose.y + forward * sine - right * cosine
         )
 
-    def rounded(self, left: float, back: float, right: float, front: float, radius: float) -> list[Point]:
+    def build_rounded_outline(self, left: float, back: float, right: float, front: float, radius: float) -> list[Point]:
         """Return a rectangle with round corners."""
         corners = ((right, front, 0), (left, front, 90), (left, back, 180), (right, back, 270))
         points = []
@@ -268,7 +281,7 @@ class _Layer:
         right = min(image.width, math.ceil(max(across)) + room)
         bottom = min(image.height, math.ceil(max(down)) + room)
         self._size = max(0, right - self._left), max(0, bottom - self._top)
-        self._layer = Image.new("RGBA", (self._size[0] * _FINER, self._size[1] * _FINER))
+        self._layer = Image.new("RGBA", (self._size[0] * _OVERSAMPLING, self._size[1] * _OVERSAMPLING))
         self._draw = ImageDraw.Draw(self._layer)
 
     def __enter__(self) -> _Layer:
@@ -280,39 +293,39 @@ class _Layer:
             self._image.paste(small, (self._left, self._top), small)
 
     def line(self, points: list[Point], colour: str, width: float) -> None:
-        fine = [self._fine(point) for point in points]
+        fine = [self._enlarge(point) for point in points]
         if len(set(fine)) > 1:
-            self._draw.line(fine, fill=colour, width=round(width * _FINER), joint="curve")
+            self._draw.line(fine, fill=colour, width=round(width * _OVERSAMPLING), joint="curve")
 
     def dashes(self, begin: Point, end: Point, colour: str, width: float) -> None:
         long = math.dist(begin, end)
         for start in np.arange(0, long, 10).tolist():
             here, there = start / long, min(start + 6, long) / long
             dash = [tuple(np.add(begin, np.multiply(np.subtract(end, begin), part)).tolist()) for part in (here, there)]
-            self._draw.line([self._fine((x, y)) for x, y in dash], fill=colour, width=round(width * _FINER))
+            self._draw.line([self._enlarge((x, y)) for x, y in dash], fill=colour, width=round(width * _OVERSAMPLING))
 
     def polygon(self, points: list[Point], fill: str, outline: str | None = None, width: float = 1) -> None:
-        fine = [self._fine(point) for point in points]
+        fine = [self._enlarge(point) for point in points]
         self._draw.polygon(fine, fill=fill)
         if outline is not None:
-            self._draw.line([*fine, *fine[:2]], fill=outline, width=round(width * _FINER), joint="curve")
+            self._draw.line([*fine, *fine[:2]], fill=outline, width=round(width * _OVERSAMPLING), joint="curve")
 
     def dot(self, place: Point, radius: float, colour: str | tuple[int, ...]) -> None:
-        self._round(self._fine(place), radius * _FINER, colour)
+        self._draw_circle(self._enlarge(place), radius * _OVERSAMPLING, colour)
 
-    def _round(self, fine: Point, radius: float, colour: str | tuple[int, ...]) -> None:
+    def _draw_circle(self, fine: Point, radius: float, colour: str | tuple[int, ...]) -> None:
         x, y = fine
         self._draw.ellipse((x - radius, y - radius, x + radius, y + radius), fill=colour)
 
-    def _fine(self, point: Point) -> Point:
-        return (point[0] - self._left) * _FINER, (point[1] - self._top) * _FINER
+    def _enlarge(self, point: Point) -> Point:
+        return (point[0] - self._left) * _OVERSAMPLING, (point[1] - self._top) * _OVERSAMPLING
 
 
-class _Words:
+class _Caption:
     """The text below the floor: the latest one, shown long enough to read."""
 
     def __init__(self, trial: TrialResult) -> None:
-        told = trial_data(trial, Sources())
+        told = trial_to_json(trial, Sources())
         texts = [*told["events"], *told["messages"]]
         self._texts = sorted(texts, key=lambda text: float(text["t"]))
         self._moments = [float(text["t"]) for text in self._texts]
@@ -325,49 +338,54 @@ class _Words:
             self._count, self._since = count, frame
         if not self._count or frame - self._since > _LONGEST:
             return "", INK
-        return _told(self._texts[self._count - 1])
+        return _format_caption(self._texts[self._count - 1])
 
 
-def _told(text: Mapping[str, Any]) -> tuple[str, str]:
+def _format_caption(text: Mapping[str, Any]) -> tuple[str, str]:
     if "kind" in text:
         return f"{text['who']} {text['kind']}: {text['text']}", FAULT if text["kind"] in ("fault", "touched") else INK
     befell = f"{text['befell']}: " if "befell" in text else ""
     return f"{text['from']} → {text['to']}: {befell}{text['text']}", FAULT if text["arrived"] is None else LEFT
 
 
-def _draw_strip(frame: Image.Image, top: int, t: float, end: float, speed: int, words: tuple[str, str]) -> None:
+def _draw_caption_strip(frame: Image.Image, top: int, t: float, end: float, speed: int, words: tuple[str, str]) -> None:
     """Draw the progress as a bar and as a time, and the latest text."""
     draw = ImageDraw.Draw(frame)
     draw.rectangle((0, top, _WIDTH, top + 3), fill=RULE)
     draw.rectangle((0, top, round(_WIDTH * t / end) if end else _WIDTH, top + 3), fill=LEFT)
     clock = f"{t:.1f} of {end:.1f} s"
-    draw.text((8, top + 8), clock, fill=INK, font=_font())
-    draw.text((_WIDTH - 8, top + 8), f"{speed}×", fill=FAINT, font=_font(), anchor="ra")
+    draw.text((8, top + 8), clock, fill=INK, font=_load_font())
+    draw.text((_WIDTH - 8, top + 8), f"{speed}×", fill=FAINT, font=_load_font(), anchor="ra")
     text, colour = words
-    draw.text((8, top + 28), _shortened(drawable(one_line(text, 200)), _WIDTH - 16), fill=colour, font=_font())
+    draw.text(
+        (8, top + 28),
+        _shorten_text(replace_missing_glyphs(to_one_line(text, 200)), _WIDTH - 16),
+        fill=colour,
+        font=_load_font(),
+    )
 
 
-def _shortened(text: str, width: int) -> str:
-    if _font().getlength(text) <= width:
+def _shorten_text(text: str, width: int) -> str:
+    if _load_font().getlength(text) <= width:
         return text
-    while text and _font().getlength(f"{text}…") > width:
+    while text and _load_font().getlength(f"{text}…") > width:
         text = text[:-1]
     return f"{text}…"
 
 
 @lru_cache(maxsize=1)
-def _font() -> ImageFont.FreeTypeFont:
+def _load_font() -> ImageFont.FreeTypeFont:
     return ImageFont.truetype(str(FONT_FILE), 14, layout_engine=ImageFont.Layout.BASIC)
 
 
-def _palette(frames: Iterator[Image.Image]) -> Image.Image:
+def _build_palette(frames: Iterator[Image.Image]) -> Image.Image:
     """Return one palette for the whole film, from its first and last frame and all drawing colours."""
     first, last = (frame.copy() for frame in frames)
     sample = Image.new("RGB", (_WIDTH, first.height + last.height))
     sample.paste(first)
     sample.paste(last, (0, first.height))
-    quantized = sample.quantize(_FOUND_COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    found = np.reshape(quantized.getpalette() or [], (-1, 3))[:_FOUND_COLOURS]
+    quantized = sample.quantize(_IMAGE_COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    found = np.reshape(quantized.getpalette() or [], (-1, 3))[:_IMAGE_COLOURS]
     exact = np.array([ImageColor.getrgb(colour) for colour in _COLOURS])
     # A pixel gets the first colour that is close, so similar colours would tint white areas.
     others = found[np.abs(found[:, None] - exact).max(axis=2).min(axis=1) > _TOO_NEAR]

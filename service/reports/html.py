@@ -24,20 +24,20 @@ from markupsafe import Markup, escape
 from service.grading.grade import Grade
 from service.grading.ranks import RankTable
 from service.language import ENGLISH, Language
-from service.reports.page import page_of
+from service.reports.display_text import format_decimal, to_display_text
+from service.reports.page import build_page
 from service.reports.plots.plot import DPI
-from service.reports.readable import number, readable
-from service.reports.replay.document import REPORT_BYTES, Pixels, packed, replay_of_grade
-from service.reports.replay.labels import replay_words
+from service.reports.replay.document import REPORT_BYTES, Pixels, build_grade_replay, compress_replay
+from service.reports.replay.labels import translate_labels
 from service.reports.rows import TableRow
-from service.reports.verdict_sentences import verdict_words
-from service.reports.view import NO_OTHERS, OtherTrials, View
+from service.reports.verdict_sentences import describe_verdict
+from service.reports.view import NO_OVERLAY, OverlayTrials, View
 from sim.recording import Verdict
 from submissions.submission import Submission
 
 #: The expected form of a submission, for rejections that don't state it.
-_USUAL = "robot.py and responder.py, or a notebook: side by side, in a folder or a .zip"
-_SHOWN = 100 / DPI
+_EXPECTED_FORM = "robot.py and responder.py, or a notebook: side by side, in a folder or a .zip"
+_CSS_PIXELS = 100 / DPI
 _NO_FLOORS: Mapping[str, Pixels] = MappingProxyType({})
 
 
@@ -72,12 +72,12 @@ class ShownImage:
     height: int
 
 
-def gallery(floors: Sequence[PrintedFloor]) -> str:
+def render_floor_gallery(floors: Sequence[PrintedFloor]) -> str:
     """Return a page with every floor."""
     shown = [
-        {"name": floor.name, "image": _data_uri(floor.image), "labels": ", ".join(floor.labels)} for floor in floors
+        {"name": floor.name, "image": _to_data_uri(floor.image), "labels": ", ".join(floor.labels)} for floor in floors
     ]
-    return render("gallery.html", floors=shown)
+    return render_page("gallery.html", floors=shown)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,49 +95,49 @@ class ReportParts:
     script: str
 
 
-def report_parts(
+def render_report_parts(
     view: View,
     plots: Mapping[str, bytes],
     submission: Submission | None = None,
     own_floors: Mapping[str, Pixels] = _NO_FLOORS,
-    others: OtherTrials = NO_OTHERS,
+    others: OverlayTrials = NO_OVERLAY,
 ) -> ReportParts:
     """Return one grade with its replay, and with the student's source if the submission is given.
 
     Args:
         view: The grade as its reader may see it.
-        plots: The result of ``draw_all``. Missing plots are left out.
+        plots: The result of ``draw_all_plots``. Missing plots are left out.
         submission: The submission, for its source.
         own_floors: Floors that are not built in, by name.
         others: Trials to draw over those of the replay.
     """
-    images = {name: ShownImage(_data_uri(data), *_shown_size(data)) for name, data in plots.items()}
-    replay = replay_of_grade(view, submission, own_floors, REPORT_BYTES, others) if view.grade.trials else None
+    images = {name: ShownImage(_to_data_uri(data), *_compute_display_size(data)) for name, data in plots.items()}
+    replay = build_grade_replay(view, submission, own_floors, REPORT_BYTES, others) if view.grade.trials else None
     played = frozenset(trial["trial"] for trial in replay["trials"]) if replay else frozenset()
-    body = _environment(view.language).get_template("report_body.html")
+    body = _create_environment(view.language).get_template("report_body.html")
     told = body.render(
-        page=page_of(view, submission, played),
+        page=build_page(view, submission, played),
         images=images,
-        replay=_written_out(replay) if replay else "",
-        words=replay_words(view.language),
+        replay=_encode_replay(replay) if replay else "",
+        words=translate_labels(view.language),
     )
     title = f"{view.grade.assignment_title}: {view.grade.student}"
-    return ReportParts(title, Markup(told), report_style(), report_script())
+    return ReportParts(title, Markup(told), load_report_style(), load_report_script())
 
 
-def prepare() -> None:
+def preload_templates() -> None:
     """Preload the English templates of a batch's reports, to save time later."""
     for template in ("report.html", "report_body.html", "batch.html"):
-        _environment(ENGLISH).get_template(template)
+        _create_environment(ENGLISH).get_template(template)
 
 
-def report_style() -> str:
+def load_report_style() -> str:
     """Return the style sheet of all reports."""
-    return _style("report.css", "replay.css")
+    return _read_styles("report.css", "replay.css")
 
 
 @lru_cache(maxsize=1)
-def report_script() -> str:
+def load_report_script() -> str:
     """Return the replay script of all reports: its files in order of name, wrapped in one function scope."""
     folder = files("service.reports.replay").joinpath("component")
     parts = sorted((each for each in folder.iterdir() if each.name.endswith(".js")), key=lambda each: each.name)
@@ -145,97 +145,101 @@ def report_script() -> str:
     return f'\n(() => {{\n"use strict";\n{code}}})();\n'
 
 
-def report(
+def render_report_page(
     view: View,
     plots: Mapping[str, bytes],
     submission: Submission | None = None,
     own_floors: Mapping[str, Pixels] = _NO_FLOORS,
-    others: OtherTrials = NO_OTHERS,
+    others: OverlayTrials = NO_OVERLAY,
 ) -> str:
     """Return the page of one grade, with all parts in one file."""
-    parts = report_parts(view, plots, submission, own_floors, others)
+    parts = render_report_parts(view, plots, submission, own_floors, others)
     script = parts.script if view.grade.trials else ""
-    return _render("report.html", parts.style, script, {"title": parts.title, "body": parts.body}, view.language)
+    return _render_secured_page(
+        "report.html", parts.style, script, {"title": parts.title, "body": parts.body}, view.language
+    )
 
 
-def replay_page(replay: Mapping[str, Any], language: Language = ENGLISH) -> str:
+def render_replay_page(replay: Mapping[str, Any], language: Language = ENGLISH) -> str:
     """Return a page with only a replay. ``language`` must be that of its document."""
-    context = {"title": replay["title"], "replay": _written_out(replay), "words": replay_words(language)}
-    return _render("replay.html", report_style(), report_script(), context, language)
+    context = {"title": replay["title"], "replay": _encode_replay(replay), "words": translate_labels(language)}
+    return _render_secured_page("replay.html", load_report_style(), load_report_script(), context, language)
 
 
-def replay_section(document: bytes, language: Language = ENGLISH) -> Markup:
+def render_replay_section(document: bytes, language: Language = ENGLISH) -> Markup:
     """Return a ``packed`` replay as a part of a page that has the style and script of reports."""
     written = Markup(base64.b64encode(document).decode("ascii"))
-    return render_part("replay_section.html", language, replay=written, words=replay_words(language))
+    return render_part("replay_section.html", language, replay=written, words=translate_labels(language))
 
 
-def refusal_page(row: TableRow[Grade]) -> str:
+def render_refusal_page(row: TableRow[Grade]) -> str:
     """Return the page of a rejected submission: what was found, what was expected, what to do next."""
     found, _, expected = row.reason.partition(", expected ")
-    return render(
+    return render_page(
         "refusal.html",
         who=row.student.name or row.who,
         source=row.source,
         assignment=row.assignment,
         found=f"{found.rstrip('.')}.",
-        expected=f"{(expected or _USUAL).rstrip('.')}.",
+        expected=f"{(expected or _EXPECTED_FORM).rstrip('.')}.",
     )
 
 
-def batch_index(
+def render_batch_index(
     rows: Sequence[BatchRow], title: str = "Batch", sandbox: str = "", ranks: Sequence[RankTable] = ()
 ) -> str:
     """Return a page with one row per student (marks, verdict, link to the report), and the ranking tables."""
     graded = [row for row in rows if row.marks is not None]
     cells = [
         {
-            "student": _breakable(row.student),
+            "student": _add_line_breaks(row.student),
             "name": row.name,
-            "marks": "" if row.marks is None else number(row.marks),
-            "max_marks": "" if row.max_marks is None else number(row.max_marks),
-            "share": _share(row.marks, row.max_marks),
-            "words": None if row.verdict is None else verdict_words(row.verdict),
-            "report": None if row.report is None else _relative_link(row.report),
+            "marks": "" if row.marks is None else format_decimal(row.marks),
+            "max_marks": "" if row.max_marks is None else format_decimal(row.max_marks),
+            "share": _compute_share(row.marks, row.max_marks),
+            "words": None if row.verdict is None else describe_verdict(row.verdict),
+            "report": None if row.report is None else _to_relative_link(row.report),
             "note": row.note,
         }
         for row in rows
     ]
-    return render("batch.html", title=title, rows=cells, graded=len(graded), sandbox=sandbox, ranks=ranks)
+    return render_page("batch.html", title=title, rows=cells, graded=len(graded), sandbox=sandbox, ranks=ranks)
 
 
 def render_part(template: str, language: Language, **context: object) -> Markup:
     """Render a part of a page that has the style of reports."""
-    return Markup(_environment(language).get_template(template).render(**context))
+    return Markup(_create_environment(language).get_template(template).render(**context))
 
 
-def render(template: str, **context: object) -> str:
+def render_page(template: str, **context: object) -> str:
     """Render a page from ``templates`` in English, with the report style and a policy without loading or scripts."""
-    return _render(template, _style("report.css"), "", context, ENGLISH)
+    return _render_secured_page(template, _read_styles("report.css"), "", context, ENGLISH)
 
 
-def _written_out(replay: Mapping[str, Any]) -> Markup:
-    return Markup(base64.b64encode(packed(replay)).decode("ascii"))
+def _encode_replay(replay: Mapping[str, Any]) -> Markup:
+    return Markup(base64.b64encode(compress_replay(replay)).decode("ascii"))
 
 
-def _render(template: str, style: str, script: str, context: Mapping[str, object], language: Language) -> str:
-    policy = f"default-src 'none'; img-src data:; style-src {_digest(style)}; base-uri 'none'; form-action 'none'"
+def _render_secured_page(
+    template: str, style: str, script: str, context: Mapping[str, object], language: Language
+) -> str:
+    policy = f"default-src 'none'; img-src data:; style-src {_hash_source(style)}; base-uri 'none'; form-action 'none'"
     if script:
-        policy += f"; script-src {_digest(script)}"
-    page = _environment(language).get_template(template)
+        policy += f"; script-src {_hash_source(script)}"
+    page = _create_environment(language).get_template(template)
     return page.render(style=Markup(style), script=Markup(script), policy=policy, language=language.code, **context)
 
 
-def _digest(text: str) -> str:
+def _hash_source(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 @lru_cache(maxsize=16)
-def _environment(language: Language) -> Environment:
+def _create_environment(language: Language) -> Environment:
     environment = Environment(
         loader=PackageLoader("service.reports"),
         autoescape=True,
-        finalize=_shown,
+        finalize=_make_readable,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -246,35 +250,37 @@ def _environment(language: Language) -> Environment:
 
 
 @lru_cache(maxsize=2)
-def _style(*names: str) -> str:
+def _read_styles(*names: str) -> str:
     folder = files("service.reports").joinpath("templates")
     return "\n" + "".join(folder.joinpath(name).read_text(encoding="utf-8") for name in names)
 
 
-def _shown(value: object) -> object:
+def _make_readable(value: object) -> object:
     """Make a value readable. Applied to every expression of a template, before escaping."""
-    return readable(value, 20_000, lines=400) if isinstance(value, str) and not isinstance(value, Markup) else value
+    return (
+        to_display_text(value, 20_000, lines=400) if isinstance(value, str) and not isinstance(value, Markup) else value
+    )
 
 
-def _data_uri(data: bytes) -> Markup:
+def _to_data_uri(data: bytes) -> Markup:
     return Markup("data:image/png;base64,") + Markup(base64.b64encode(data).decode("ascii"))
 
 
-def _shown_size(image: bytes) -> tuple[int, int]:
+def _compute_display_size(image: bytes) -> tuple[int, int]:
     """Return the display size of a PNG from its header: 100 CSS pixels an inch, so 8 point type is 11 pixels high."""
     across, down = (int.from_bytes(image[start : start + 4], "big") for start in (16, 20))
-    return round(across * _SHOWN), round(down * _SHOWN)
+    return round(across * _CSS_PIXELS), round(down * _CSS_PIXELS)
 
 
-def _breakable(name: str) -> Markup:
+def _add_line_breaks(name: str) -> Markup:
     """Return a name that a narrow screen breaks between its parts, not inside a word."""
-    return Markup(re.sub(r"([_.@])", r"\1<wbr>", str(escape(readable(name, 400)))))
+    return Markup(re.sub(r"([_.@])", r"\1<wbr>", str(escape(to_display_text(name, 400)))))
 
 
-def _relative_link(path: str) -> str:
+def _to_relative_link(path: str) -> str:
     # A quoted colon cannot start a scheme, and without leading slashes no host can be named.
     return quote(path.encode("utf-8", "replace").decode("utf-8").lstrip("/"), safe="/")
 
 
-def _share(marks: Decimal | None, max_marks: Decimal | None) -> float:
+def _compute_share(marks: Decimal | None, max_marks: Decimal | None) -> float:
     return 0.0 if not marks or not max_marks else round(100 * float(marks / max_marks), 1)

@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from service.grading.grade import Accuracy, CriterionResult
-from service.grading.judging.per_class import class_scores
+from service.grading.judging.class_scores import compute_class_scores
 from service.language import ENGLISH, Language
-from service.reports.readable import one_line
-from service.reports.verdict_sentences import accuracy_counted
+from service.reports.display_text import to_one_line
+from service.reports.verdict_sentences import count_correct
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,38 +37,38 @@ class RecognitionTable:
     classes: tuple[ClassLine, ...]
 
 
-def recognition_table(result: CriterionResult, language: Language = ENGLISH) -> RecognitionTable:
+def build_recognition_table(result: CriterionResult, language: Language = ENGLISH) -> RecognitionTable:
     """Return the figures of a criterion that measured an accuracy."""
     accuracy = result.accuracy
     assert accuracy is not None
     return RecognitionTable(
-        title=one_line(result.title, 200),
+        title=to_one_line(result.title, 200),
         accuracy=language.say(
             "Accuracy %(value)s, 95 %% interval %(low)s to %(high)s, n = %(n)s %(of)s.",
             value=f"{accuracy.value:.3f}",
             low=f"{accuracy.low:.3f}",
             high=f"{accuracy.high:.3f}",
             n=accuracy.n,
-            of=accuracy_counted(accuracy, language)[1],
+            of=count_correct(accuracy, language)[1],
         ),
-        sums=_sums(accuracy, language),
-        confidence=_confidence(accuracy, language),
+        sums=_describe_counts(accuracy, language),
+        confidence=_describe_confidence(accuracy, language),
         classes=tuple(
             ClassLine(
-                one_line(score.label, 60),
+                to_one_line(score.label, 60),
                 score.shown,
                 score.answered,
                 score.right,
-                _share(score.precision),
-                _share(score.recall),
+                _format_share(score.precision),
+                _format_share(score.recall),
             )
-            for score in class_scores(accuracy)
+            for score in compute_class_scores(accuracy)
             if score.shown or score.answered
         ),
     )
 
 
-def _sums(accuracy: Accuracy, language: Language) -> str:
+def _describe_counts(accuracy: Accuracy, language: Language) -> str:
     counts = accuracy.counts
     if counts is None:
         return ""
@@ -82,7 +82,7 @@ def _sums(accuracy: Accuracy, language: Language) -> str:
         unanswered=counts.unanswered,
         duplicates=counts.duplicates,
     )
-    of = accuracy_counted(accuracy, language)[1]
+    of = count_correct(accuracy, language)[1]
     counted = language.say("Counted: %(counted)s %(of)s.", counted=counts.counted, of=of)
     if counts.missing:
         counted = language.say(
@@ -94,7 +94,7 @@ def _sums(accuracy: Accuracy, language: Language) -> str:
     return f"{sent} {counted}"
 
 
-def _confidence(accuracy: Accuracy, language: Language) -> str:
+def _describe_confidence(accuracy: Accuracy, language: Language) -> str:
     found = accuracy.confidence
     if found is None:
         return ""
@@ -106,5 +106,5 @@ def _confidence(accuracy: Accuracy, language: Language) -> str:
     return language.say("Mean confidence %(means)s.", means=language.say(" and ").join(means))
 
 
-def _share(value: float | None) -> str:
+def _format_share(value: float | None) -> str:
     return "\N{EN DASH}" if value is None else f"{value:.2f}"

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 
 from service.language import ENGLISH, Language, translatable
-from sim.recorded import without_responder
 from sim.recording import Message, Recording
+from sim.recording_values import has_no_responder
 
 #: The name of the second robot.
 SECOND = "robot 2"
@@ -21,7 +21,7 @@ PARTNER_OF: Mapping[str, str] = MappingProxyType({"robot": SECOND, SECOND: "robo
 SIMULATOR = "simulator"
 
 #: Display names of the parties.
-CALLED: Mapping[str, str] = MappingProxyType(
+PARTY_NAMES: Mapping[str, str] = MappingProxyType(
     {
         "robot": translatable("robot"),
         SECOND: translatable("robot 2"),
@@ -37,29 +37,29 @@ CALLED: Mapping[str, str] = MappingProxyType(
 )
 
 
-def called(party: str, language: Language) -> str:
+def format_party_name(party: str, language: Language) -> str:
     """Return the display name of a party. Agents and other parties named by the student keep their names."""
-    return language.say(CALLED[party]) if party in CALLED else party
+    return language.say(PARTY_NAMES[party]) if party in PARTY_NAMES else party
 
 
-def answering(recording: Recording) -> str:
+def select_answering_party(recording: Recording) -> str:
     """Return the party that answers a robot that has no other robot to talk to."""
-    return SIMULATOR if without_responder(recording) else "responder"
+    return SIMULATOR if has_no_responder(recording) else "responder"
 
 
-def robots_of(recording: Recording) -> Iterator[tuple[str, Recording]]:
+def iterate_robots(recording: Recording) -> Iterator[tuple[str, Recording]]:
     """Yield each robot's name and recording."""
     yield "robot", recording
     if recording.partner is not None:
         yield SECOND, recording.partner
 
 
-def messages_of(recording: Recording, language: Language = ENGLISH) -> list[tuple[str, Message]]:
+def collect_messages(recording: Recording, language: Language = ENGLISH) -> list[tuple[str, Message]]:
     """Return every message with its sender, in order of sending."""
     said = []
-    for name, own in robots_of(recording):
-        robot, responder = called(name, language), called(answering(own), language)
-        if own is not recording and not without_responder(own):
+    for name, own in iterate_robots(recording):
+        robot, responder = format_party_name(name, language), format_party_name(select_answering_party(own), language)
+        if own is not recording and not has_no_responder(own):
             responder = language.say("responder to %(robot)s", robot=robot)
         for message in own.messages:
             if message.sender != "partner":  # the other robot's list has it

@@ -30,7 +30,7 @@ class TableRow(Generic[_V]):
     grade: _V | None = None
     reason: str = ""
     refused: bool = False
-    told: str = ""
+    student_reason: str = ""
     for_staff: bool = False
 
     @property
@@ -38,17 +38,24 @@ class TableRow(Generic[_V]):
         """The student's id, or the name of the submission if the student is unknown."""
         return self.student.id or self.source
 
-    def shown(self, view: Callable[[_V], _W]) -> TableRow[_W]:
+    def apply_view(self, view: Callable[[_V], _W]) -> TableRow[_W]:
         """Return the row with its grade as seen through ``view``."""
         grade = None if self.grade is None else view(self.grade)
         return TableRow(
-            self.student, self.source, self.assignment, grade, self.reason, self.refused, self.told, self.for_staff
+            self.student,
+            self.source,
+            self.assignment,
+            grade,
+            self.reason,
+            self.refused,
+            self.student_reason,
+            self.for_staff,
         )
 
 
-def rows_for_students(rows: Iterable[TableRow[_V]]) -> list[TableRow[_V]]:
+def select_student_rows(rows: Iterable[TableRow[_V]]) -> list[TableRow[_V]]:
     """Return the rows for students in a gradebook, without rows for staff only and without internal errors."""
-    return [replace(row, reason=row.told or row.reason) for row in rows if not row.for_staff]
+    return [replace(row, reason=row.student_reason or row.reason) for row in rows if not row.for_staff]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +66,6 @@ class ReportPage:
     html: str
 
 
-def missing_words(missing: str) -> str:
+def describe_missing_part(missing: str) -> str:
     """Return a note that a part was not submitted; empty if none is missing."""
     return f"there is no {missing}; the rest was graded" if missing else ""

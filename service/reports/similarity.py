@@ -14,25 +14,25 @@ from typing import Any
 from markupsafe import Markup
 
 from service.language import ENGLISH, Language, translatable
-from service.reports.html import render, render_part
-from service.reports.readable import one_line
+from service.reports.display_text import to_one_line
+from service.reports.html import render_page, render_part
 from service.reports.view import SimilarityView
-from service.similarity.behaviour import Aspect, SameInTrial
+from service.similarity.behaviour import Aspect, SharedBehaviour
 from service.similarity.pairs import Similarity, SimilarPair
-from service.similarity.writing import FEWEST_TOKENS, AlikeSources, Stretch
+from service.similarity.similar_sources import FEWEST_TOKENS, SimilarSources, Stretch
 
 #: The aspects in which two students' trials can be the same.
 _ASPECTS: Mapping[Aspect, str] = MappingProxyType(
     {"path": translatable("path"), "messages": translatable("messages"), "faults": translatable("faults")}
 )
 #: Returns the text of a source by assignment, student and file.
-Texts = Callable[[str, str, str], str]
+SourceReader = Callable[[str, str, str], str]
 
 #: Limits of a pair's stretches, of a stretch's lines, and of a line's characters.
 _MOST_STRETCHES, _MOST_LINES, _MOST_OF_LINE = 12, 60, 160
 
 
-def what_it_says(found: Similarity, language: Language = ENGLISH) -> str:
+def describe_similarity(found: Similarity, language: Language = ENGLISH) -> str:
     """Return a sentence on an assignment: the number of pairs, and what could not be compared."""
     parts: dict[str, object] = {"assignment": found.assignment, "students": found.students}
     groups = len({*found.same, *found.same_recordings})
@@ -65,15 +65,20 @@ def what_it_says(found: Similarity, language: Language = ENGLISH) -> str:
     return said
 
 
-def similarity_rows(found: Similarity, language: Language = ENGLISH) -> list[tuple[str, ...]]:
+def build_similarity_rows(found: Similarity, language: Language = ENGLISH) -> list[tuple[str, ...]]:
     """Return rows with both students, the similar fraction of a source, its place, and the trials in common."""
     return [
-        (*pair.students, f"{pair.share:.0%}" if pair.sources else "", _where(pair, language), _same(pair, language))
+        (
+            *pair.students,
+            f"{pair.share:.0%}" if pair.sources else "",
+            _format_files(pair, language),
+            _format_trial_count(pair, language),
+        )
         for pair in found.pairs
     ]
 
 
-def as_plain(view: SimilarityView) -> list[dict[str, Any]]:
+def similarity_to_json(view: SimilarityView) -> list[dict[str, Any]]:
     """Return all findings by assignment, as plain JSON values."""
     return [
         {**asdict(found), "pairs": [{**asdict(pair), "share": pair.share} for pair in found.pairs]}
@@ -81,49 +86,53 @@ def as_plain(view: SimilarityView) -> list[dict[str, Any]]:
     ]
 
 
-def similarity_page(view: SimilarityView, texts: Texts, title: str, most: int) -> str:
+def render_similarity_page(view: SimilarityView, texts: SourceReader, title: str, most: int) -> str:
     """Return a page with the first ``most`` pairs of each assignment."""
-    return render("similarity.html", title=title, assignments=_assignments(view, texts, most), links={})
+    return render_page("similarity.html", title=title, assignments=_build_assignments(view, texts, most), links={})
 
 
-def similarity_body(view: SimilarityView, texts: Texts, most: int, links: Mapping[tuple[str, str], str]) -> Markup:
+def render_similarity_body(
+    view: SimilarityView, texts: SourceReader, most: int, links: Mapping[tuple[str, str], str]
+) -> Markup:
     """Return the findings as a part of another page, with ``links`` by assignment and student."""
-    return render_part("similarity_body.html", view.language, assignments=_assignments(view, texts, most), links=links)
+    return render_part(
+        "similarity_body.html", view.language, assignments=_build_assignments(view, texts, most), links=links
+    )
 
 
-def _assignments(view: SimilarityView, texts: Texts, most: int) -> list[dict[str, object]]:
+def _build_assignments(view: SimilarityView, texts: SourceReader, most: int) -> list[dict[str, object]]:
     return [
         {
             "name": found.assignment,
-            "words": what_it_says(found, view.language),
+            "words": describe_similarity(found, view.language),
             "same": found.same,
             "same_recordings": found.same_recordings,
-            "rows": similarity_rows(found, view.language)[:most],
+            "rows": build_similarity_rows(found, view.language)[:most],
             "more": len(found.pairs) - most,
-            "pairs": [_pair(found.assignment, pair, texts, view.language) for pair in found.pairs[:most]],
+            "pairs": [_build_pair(found.assignment, pair, texts, view.language) for pair in found.pairs[:most]],
         }
         for found in view.found
     ]
 
 
-def _where(pair: SimilarPair, language: Language) -> str:
+def _format_files(pair: SimilarPair, language: Language) -> str:
     return "; ".join(language.say(" and ").join(dict.fromkeys(each.files)) for each in pair.sources)
 
 
-def _same(pair: SimilarPair, language: Language) -> str:
+def _format_trial_count(pair: SimilarPair, language: Language) -> str:
     trials = {same.trial for same in pair.trials}
     return language.counted("%(count)s trial", "%(count)s trials", len(trials)) if trials else ""
 
 
-def _pair(assignment: str, pair: SimilarPair, texts: Texts, language: Language) -> dict[str, object]:
+def _build_pair(assignment: str, pair: SimilarPair, texts: SourceReader, language: Language) -> dict[str, object]:
     return {
         "students": pair.students,
-        "sources": [_source(assignment, each, texts, language) for each in pair.sources],
-        "trials": [_trial(same, language) for same in pair.trials],
+        "sources": [_build_source(assignment, each, texts, language) for each in pair.sources],
+        "trials": [_format_trial(same, language) for same in pair.trials],
     }
 
 
-def _source(assignment: str, alike: AlikeSources, texts: Texts, language: Language) -> dict[str, object]:
+def _build_source(assignment: str, alike: SimilarSources, texts: SourceReader, language: Language) -> dict[str, object]:
     both = [
         texts(assignment, student, file).split("\n") for student, file in zip(alike.students, alike.files, strict=True)
     ]
@@ -140,33 +149,33 @@ def _source(assignment: str, alike: AlikeSources, texts: Texts, language: Langua
     in_order = sorted(alike.stretches[:_MOST_STRETCHES], key=lambda stretch: stretch.lines)
     return {
         "heads": heads,
-        "stretches": [list(_side_by_side(stretch, *both)) for stretch in in_order],
+        "stretches": [list(_align_lines(stretch, *both)) for stretch in in_order],
         "more": len(alike.stretches) - _MOST_STRETCHES,
     }
 
 
-def _side_by_side(stretch: Stretch, one: Sequence[str], other: Sequence[str]) -> Iterator[tuple[str, str, str, str]]:
-    sides = (_numbered(one, stretch.lines), _numbered(other, stretch.other_lines))
+def _align_lines(stretch: Stretch, one: Sequence[str], other: Sequence[str]) -> Iterator[tuple[str, str, str, str]]:
+    sides = (_number_lines(one, stretch.lines), _number_lines(other, stretch.other_lines))
     for left, right in zip_longest(*sides, fillvalue=("", "")):
         yield *left, *right
 
 
-def _numbered(lines: Sequence[str], span: tuple[int, int]) -> list[tuple[str, str]]:
+def _number_lines(lines: Sequence[str], span: tuple[int, int]) -> list[tuple[str, str]]:
     first, last = span
     shown = [
-        (str(number), "    " * _depth(text) + one_line(text, _MOST_OF_LINE))
+        (str(number), "    " * _measure_indentation(text) + to_one_line(text, _MOST_OF_LINE))
         for number, text in enumerate(lines[first - 1 : last][:_MOST_LINES], first)
     ]
     return shown if last - first < _MOST_LINES else [*shown, ("", "…")]
 
 
-def _depth(line: str) -> int:
+def _measure_indentation(line: str) -> int:
     """Return how far a line is indented, in steps of four."""
     start = line[: 4 * 10].expandtabs(4)
     return (len(start) - len(start.lstrip())) // 4
 
 
-def _trial(same: SameInTrial, language: Language) -> tuple[str, ...]:
+def _format_trial(same: SharedBehaviour, language: Language) -> tuple[str, ...]:
     say = language.say
     chance = say("with noise") if same.trial.noisy else say("without noise")
     sharing = say("%(sharing)s of %(students)s", sharing=same.sharing, students=same.students)

@@ -9,11 +9,11 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from sim.recorded import seconds_at
-from sim.recording import Image, Line, Pose, Recording
+from sim.recording import Image, Pose, Recording, TimedText
+from sim.recording_values import tick_to_seconds
 
 
-def trace(recording: Recording) -> dict[str, Any]:
+def build_trace(recording: Recording) -> dict[str, Any]:
     """Return ``recording`` as a JSON-serialisable dict: one row per tick under ``ticks``, then texts and messages.
 
     Times are seconds, lengths mm, headings degrees anticlockwise and unwrapped, light 0..255, gyro degrees clockwise,
@@ -21,52 +21,55 @@ def trace(recording: Recording) -> dict[str, Any]:
     is the first; the second is its ``partner``.
     """
     return {
-        "ticks": {name: _numbers(column.tolist()) for name, column in recording.ticks.told().items()},
-        "printed": _lines(recording.printed),
-        "spoken": _lines(recording.spoken),
+        "ticks": {
+            name: _replace_non_finite(column.tolist())
+            for name, column in recording.ticks.to_displayed_columns().items()
+        },
+        "printed": _lines_to_json(recording.printed),
+        "spoken": _lines_to_json(recording.spoken),
         "messages": [
             {
-                "t": _finite(message.t),
+                "t": _to_finite(message.t),
                 "sender": message.sender,
-                "text": storable(message.text),
-                "delivered": None if message.delivered is None else _finite(message.delivered),
+                "text": replace_surrogates(message.text),
+                "delivered": None if message.delivered is None else _to_finite(message.delivered),
                 "reply_to": message.reply_to,
                 "note": message.note,
                 "lost": message.lost,
                 "distance": message.distance,
                 "angle": message.angle,
-                "arrived_as": None if message.arrived_as is None else storable(message.arrived_as),
+                "arrived_as": None if message.arrived_as is None else replace_surrogates(message.arrived_as),
             }
             for message in recording.messages
         ],
-        **agent_messages(recording),
+        **agent_messages_to_json(recording),
         "datalog": [
             {
-                "t": _finite(datum.t),
-                "name": storable(datum.name),
-                "value": _finite(datum.value),
-                "simtime": None if datum.simtime is None else _finite(datum.simtime),
+                "t": _to_finite(datum.t),
+                "name": replace_surrogates(datum.name),
+                "value": _to_finite(datum.value),
+                "simtime": None if datum.simtime is None else _to_finite(datum.simtime),
             }
             for datum in recording.datalog
         ],
-        "images": _images(recording),
+        "images": _images_to_json(recording),
         "verdict": recording.verdict.value,
-        "start": {"t": 0.0, **_pose(recording.start)},
-        "end": {"t": _finite(recording.end_t), **_pose(recording.end)},
+        "start": {"t": 0.0, **_pose_to_json(recording.start)},
+        "end": {"t": _to_finite(recording.end_t), **_pose_to_json(recording.end)},
         "sha256": recording.sha256,
         "sandbox": recording.sandbox,
-        **({"partner": trace(recording.partner)} if recording.partner is not None else {}),
+        **({"partner": build_trace(recording.partner)} if recording.partner is not None else {}),
     }
 
 
-def agent_messages(recording: Recording) -> dict[str, Any]:
+def agent_messages_to_json(recording: Recording) -> dict[str, Any]:
     """Return the messages between the responder and its agents, under their key; empty if there are none."""
     told = [
         {
-            "t": _finite(each.t),
+            "t": _to_finite(each.t),
             "sender": each.sender,
             "receiver": each.receiver,
-            "text": storable(each.text),
+            "text": replace_surrogates(each.text),
             "message": each.message,
             "reply_to": each.reply_to,
             "note": each.note,
@@ -76,18 +79,18 @@ def agent_messages(recording: Recording) -> dict[str, Any]:
     return {"agent_messages": told} if told else {}
 
 
-def storable(text: str) -> str:
+def replace_surrogates(text: str) -> str:
     """Return ``text`` with lone surrogates replaced, so that every JSON reader and encoding accepts it."""
     return text.encode("utf-8", "replace").decode("utf-8")
 
 
-def _images(recording: Recording) -> list[dict[str, Any]]:
+def _images_to_json(recording: Recording) -> list[dict[str, Any]]:
     """Return images sent by ``IMG_DATA`` (both sides, with pose) and logged by ``image_data`` (one side), by tick."""
-    rows = [_sent(image) for image in recording.images]
+    rows = [_image_to_json(image) for image in recording.images]
     for side, csv, tick in recording.image_log:
         rows.append(
             {
-                "t": seconds_at(recording, tick),
+                "t": tick_to_seconds(recording, tick),
                 "tick": tick,
                 "source": "image_data",
                 side: [int(value) for value in csv.split(",") if value.strip().isdecimal()],
@@ -96,12 +99,12 @@ def _images(recording: Recording) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: int(row["tick"]))
 
 
-def _sent(image: Image) -> dict[str, Any]:
+def _image_to_json(image: Image) -> dict[str, Any]:
     return {
-        "t": _finite(image.t),
+        "t": _to_finite(image.t),
         "tick": image.tick,
         "source": "IMG_DATA",
-        **_pose(image.pose),
+        **_pose_to_json(image.pose),
         "side": image.side,
         "left": list(image.left),
         "right": list(image.right),
@@ -110,17 +113,17 @@ def _sent(image: Image) -> dict[str, Any]:
     }
 
 
-def _pose(pose: Pose) -> dict[str, float | None]:
-    return {"x": _finite(pose.x), "y": _finite(pose.y), "heading": _finite(pose.heading)}
+def _pose_to_json(pose: Pose) -> dict[str, float | None]:
+    return {"x": _to_finite(pose.x), "y": _to_finite(pose.y), "heading": _to_finite(pose.heading)}
 
 
-def _lines(lines: Iterable[Line]) -> list[list[float | str | None]]:
-    return [[_finite(line.t), storable(line.text)] for line in lines]
+def _lines_to_json(lines: Iterable[TimedText]) -> list[list[float | str | None]]:
+    return [[_to_finite(line.t), replace_surrogates(line.text)] for line in lines]
 
 
-def _numbers(values: Iterable[Any]) -> list[Any]:
-    return [_numbers(value) if isinstance(value, list) else _finite(value) for value in values]
+def _replace_non_finite(values: Iterable[Any]) -> list[Any]:
+    return [_replace_non_finite(value) if isinstance(value, list) else _to_finite(value) for value in values]
 
 
-def _finite(value: float) -> float | None:
+def _to_finite(value: float) -> float | None:
     return value if math.isfinite(value) else None

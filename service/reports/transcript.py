@@ -5,24 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from service.reports.crossing import befell_in_full
-from service.reports.robots import SIMULATOR, answering, robots_of
-from sim.recorded import printed_alone
+from service.reports.message_losses import describe_loss_fully
+from service.reports.robots import SIMULATOR, iterate_robots, select_answering_party
 from sim.recording import Recording
+from sim.recording_values import collect_printed_lines
 
-_ANSWERED: Mapping[str, str] = MappingProxyType({"responder": "answer", SIMULATOR: "answer of the simulator"})
+_ANSWER_LABELS: Mapping[str, str] = MappingProxyType({"responder": "answer", SIMULATOR: "answer of the simulator"})
 
 
-def transcript(recording: Recording) -> list[tuple[float, str]]:
+def build_transcript(recording: Recording) -> list[tuple[float, str]]:
     """Return the simulated second and the line of each text, from all robots."""
     shown: list[tuple[float, int, str]] = []
-    for which, own in robots_of(recording):
+    for which, own in iterate_robots(recording):
         whose = "" if own is recording else f"{which}: "
-        shown += [(line.t, 0, whose + line.text) for line in printed_alone(own)]
+        shown += [(line.t, 0, whose + line.text) for line in collect_printed_lines(own)]
         shown += [(line.t, 1, f"{whose}(says) {line.text}") for line in own.spoken]
         lost = [message for message in own.messages if message.lost and message.sender != "partner"]
-        shown += [(message.t, 2, f"{whose}(lost) {message.text}: {befell_in_full(message)}") for message in lost]
-        arrived = {"responder": _ANSWERED[answering(own)], "partner": "heard"}
+        shown += [(message.t, 2, f"{whose}(lost) {message.text}: {describe_loss_fully(message)}") for message in lost]
+        arrived = {"responder": _ANSWER_LABELS[select_answering_party(own)], "partner": "heard"}
         shown += [
             (message.delivered, 2, f"{whose}({arrived[message.sender]}) {message.received}")
             for message in own.messages

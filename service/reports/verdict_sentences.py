@@ -12,11 +12,11 @@ from types import MappingProxyType
 from typing import Literal
 
 from service.grading.grade import Accuracy, CriterionResult, Grade, TrialResult
-from service.grading.verdict_labels import ENDED
+from service.grading.verdict_labels import VERDICT_LABELS
 from service.language import ENGLISH, Language, translatable
-from service.reports.readable import number, one_line, readable
-from sim.recorded import faults_of
+from service.reports.display_text import format_decimal, to_display_text, to_one_line
 from sim.recording import LossReason, Verdict
+from sim.recording_values import collect_faults
 
 FULL_MARKS = translatable("Full marks.")
 Tone = Literal["good", "notice", "bad"]
@@ -37,14 +37,14 @@ class VerdictWords:
 _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
     {
         Verdict.FINISHED: VerdictWords(
-            ENDED[Verdict.FINISHED],
+            VERDICT_LABELS[Verdict.FINISHED],
             translatable("Your program completed without errors."),
             translatable("No error stopped it."),
             translatable("Compare each criterion with the actions of your robot."),
             "good",
         ),
         Verdict.PROGRAM_ERROR: VerdictWords(
-            ENDED[Verdict.PROGRAM_ERROR],
+            VERDICT_LABELS[Verdict.PROGRAM_ERROR],
             translatable("Your robot program stopped with an error before it completed."),
             translatable("The error is in your robot program."),
             translatable(
@@ -53,14 +53,14 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
             "bad",
         ),
         Verdict.RESPONDER_ERROR: VerdictWords(
-            ENDED[Verdict.RESPONDER_ERROR],
+            VERDICT_LABELS[Verdict.RESPONDER_ERROR],
             translatable("Your responder stopped with an error, so the robot got no answer."),
             translatable("The error is in your responder or in a module that it imports."),
             translatable("Fix this in your responder. Test it by calling it with a message, then submit again."),
             "bad",
         ),
         Verdict.PROTOCOL_ERROR: VerdictWords(
-            ENDED[Verdict.PROTOCOL_ERROR],
+            VERDICT_LABELS[Verdict.PROTOCOL_ERROR],
             translatable("Your responder answered, but the robot cannot read the answer."),
             translatable("The error is in the value that your responder returns."),
             translatable(
@@ -69,7 +69,7 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
             "bad",
         ),
         Verdict.TIME_LIMIT: VerdictWords(
-            ENDED[Verdict.TIME_LIMIT],
+            VERDICT_LABELS[Verdict.TIME_LIMIT],
             translatable("Your program was still running at the end of the simulated time."),
             translatable(
                 "This is a mistake only if the program must end by itself. A line follower, for example, may run "
@@ -79,7 +79,7 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
             "notice",
         ),
         Verdict.CPU_LIMIT: VerdictWords(
-            ENDED[Verdict.CPU_LIMIT],
+            VERDICT_LABELS[Verdict.CPU_LIMIT],
             translatable("Your code was stopped because it computed for too long without waiting."),
             translatable(
                 "A loop never ends or never waits, or a calculation takes too long. The robot moves only while your "
@@ -92,21 +92,21 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
             "bad",
         ),
         Verdict.MEMORY_LIMIT: VerdictWords(
-            ENDED[Verdict.MEMORY_LIMIT],
+            VERDICT_LABELS[Verdict.MEMORY_LIMIT],
             translatable("Your code was stopped because it used too much memory."),
             translatable("A value in your code keeps growing."),
             translatable("Look for a list or a string that grows in every pass of a loop."),
             "bad",
         ),
         Verdict.OUTPUT_LIMIT: VerdictWords(
-            ENDED[Verdict.OUTPUT_LIMIT],
+            VERDICT_LABELS[Verdict.OUTPUT_LIMIT],
             translatable("Your code was stopped because it printed too much."),
             translatable("A loop in your code prints in every pass."),
             translatable("Print only when a value changes, or add a short time.sleep to the loop."),
             "bad",
         ),
         Verdict.STALLED: VerdictWords(
-            ENDED[Verdict.STALLED],
+            VERDICT_LABELS[Verdict.STALLED],
             translatable("Your code was stopped because it did nothing: it did not compute and did not use the robot."),
             translatable("Your code waits for an event that never happens."),
             translatable(
@@ -116,21 +116,21 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
             "bad",
         ),
         Verdict.SANDBOX_VIOLATION: VerdictWords(
-            ENDED[Verdict.SANDBOX_VIOLATION],
+            VERDICT_LABELS[Verdict.SANDBOX_VIOLATION],
             translatable("Your code was stopped because it tried an action that is not allowed."),
             translatable("The attempt came from your code or from a module that it imports."),
             translatable("Do not use the network, other programs, or files outside your folder."),
             "bad",
         ),
         Verdict.ASSIGNMENT_ERROR: VerdictWords(
-            ENDED[Verdict.ASSIGNMENT_ERROR],
+            VERDICT_LABELS[Verdict.ASSIGNMENT_ERROR],
             translatable("The assignment has an error, so your submission could not be graded fairly."),
             translatable("This is not your fault. Your instructor must fix the assignment."),
             translatable("Please tell your instructor. Your submission can then be graded again."),
             "notice",
         ),
         Verdict.HOST_ERROR: VerdictWords(
-            ENDED[Verdict.HOST_ERROR],
+            VERDICT_LABELS[Verdict.HOST_ERROR],
             translatable("The grading computer failed before grading was complete."),
             translatable("This is not your fault, and it does not count as an attempt."),
             translatable("You don't need to do anything. The grading can be repeated."),
@@ -151,15 +151,15 @@ _LOSSES: Mapping[LossReason, str] = MappingProxyType(
 
 
 #: The units of an accuracy.
-_COUNTED: Mapping[str, str] = MappingProxyType({"images": translatable("images"), "patterns": translatable("patterns")})
+_UNITS: Mapping[str, str] = MappingProxyType({"images": translatable("images"), "patterns": translatable("patterns")})
 
 
-def verdict_words(verdict: Verdict, language: Language = ENGLISH) -> VerdictWords:
+def describe_verdict(verdict: Verdict, language: Language = ENGLISH) -> VerdictWords:
     """Return the words for ``verdict``. Every verdict has some."""
-    return _said(_WORDS[verdict], language)
+    return _translate_words(_WORDS[verdict], language)
 
 
-def _said(words: VerdictWords, language: Language) -> VerdictWords:
+def _translate_words(words: VerdictWords, language: Language) -> VerdictWords:
     say = language.say
     return VerdictWords(say(words.short), say(words.happened), say(words.whose), say(words.next_step), words.tone)
 
@@ -175,7 +175,7 @@ _NO_ROBOT = VerdictWords(
 
 
 #: One part was graded, and the other is missing.
-_WITHOUT: Mapping[str, VerdictWords] = MappingProxyType(
+_MISSING_PART: Mapping[str, VerdictWords] = MappingProxyType(
     {
         "robot.py": VerdictWords(
             translatable("no robot.py"),
@@ -204,15 +204,15 @@ _AGENT_ERROR = VerdictWords(
 )
 
 
-def grade_words(grade: Grade, language: Language = ENGLISH) -> VerdictWords:
+def describe_grade(grade: Grade, language: Language = ENGLISH) -> VerdictWords:
     """Return the words for a grade's verdict, or for a missing part or run, with the next step."""
-    words = _what_happened(grade, language)
-    return replace(words, next_step=_next_step(grade, words, language))
+    words = _describe_outcome(grade, language)
+    return replace(words, next_step=_describe_next_step(grade, words, language))
 
 
-def _next_step(grade: Grade, words: VerdictWords, language: Language) -> str:
+def _describe_next_step(grade: Grade, words: VerdictWords, language: Language) -> str:
     """Return the verdict's advice if there was a problem, otherwise where most marks can be gained."""
-    if words.tone == "bad" or is_ours(grade.verdict):
+    if words.tone == "bad" or is_not_students_fault(grade.verdict):
         return words.next_step
     lost = max(grade.criteria, key=lambda result: result.max_marks - result.marks, default=None)
     if lost is None:
@@ -221,46 +221,50 @@ def _next_step(grade: Grade, words: VerdictWords, language: Language) -> str:
         return language.say(FULL_MARKS)
     most = language.say(
         "The most marks are available for “%(criterion)s”: %(missing)s of %(of)s.",
-        criterion=one_line(lost.title, 100),
-        missing=number(lost.max_marks - lost.marks),
-        of=number(lost.max_marks),
+        criterion=to_one_line(lost.title, 100),
+        missing=format_decimal(lost.max_marks - lost.marks),
+        of=format_decimal(lost.max_marks),
     )
-    advice = words.next_step if _costs_marks_by_time(grade) else _said(_WORDS[Verdict.FINISHED], language).next_step
+    advice = (
+        words.next_step
+        if _is_verdict_advice_relevant(grade)
+        else _translate_words(_WORDS[Verdict.FINISHED], language).next_step
+    )
     return f"{most} {advice}"
 
 
-def _costs_marks_by_time(grade: Grade) -> bool:
+def _is_verdict_advice_relevant(grade: Grade) -> bool:
     """Return whether the verdict's advice applies: a time limit counts only if a criterion names it."""
     if grade.missing or grade.verdict is not Verdict.TIME_LIMIT:
         return True
     told = [each.message for one in grade.criteria if one.marks < one.max_marks for each in one.evidence]
-    faults = (fault for trial in grade.trials for fault in faults_of(trial.recording))
+    faults = (fault for trial in grade.trials for fault in collect_faults(trial.recording))
     return any(fault.verdict is Verdict.TIME_LIMIT and fault.message in each for fault in faults for each in told)
 
 
-def _what_happened(grade: Grade, language: Language) -> VerdictWords:
+def _describe_outcome(grade: Grade, language: Language) -> VerdictWords:
     if not grade.missing:
-        return _said(_ended(grade) if grade.trials else _NO_ROBOT, language)
-    words = _said(_WITHOUT[grade.missing], language)
+        return _translate_words(_select_verdict_words(grade) if grade.trials else _NO_ROBOT, language)
+    words = _translate_words(_MISSING_PART[grade.missing], language)
     if grade.verdict in (Verdict.FINISHED, Verdict.TIME_LIMIT):
         return words
-    ended = _said(_ended(grade), language)
+    ended = _translate_words(_select_verdict_words(grade), language)
     return replace(ended, short=f"{ended.short}; {words.short}", happened=f"{words.happened} {ended.happened}")
 
 
-def _ended(grade: Grade) -> VerdictWords:
-    if grade.verdict is Verdict.RESPONDER_ERROR and _is_of_an_agent(grade):
+def _select_verdict_words(grade: Grade) -> VerdictWords:
+    if grade.verdict is Verdict.RESPONDER_ERROR and _is_agent_error(grade):
         return _AGENT_ERROR
     return _WORDS[grade.verdict]
 
 
-def _is_of_an_agent(grade: Grade) -> bool:
+def _is_agent_error(grade: Grade) -> bool:
     faults = next(trial.recording.faults for trial in grade.trials if trial.verdict is Verdict.RESPONDER_ERROR)
     return bool(faults and faults[0].agent)
 
 
 #: The kinds of events in a trial.
-KINDS: Mapping[str, str] = MappingProxyType(
+EVENT_KINDS: Mapping[str, str] = MappingProxyType(
     {
         "printed": translatable("printed"),
         "said": translatable("said"),
@@ -271,62 +275,62 @@ KINDS: Mapping[str, str] = MappingProxyType(
 )
 
 
-def trial_words(trial: TrialResult, language: Language = ENGLISH, longest: int = 60) -> str:
+def format_trial_name(trial: TrialResult, language: Language = ENGLISH, longest: int = 60) -> str:
     """Return the name of a trial: its scenario and its number."""
-    scenario = one_line(trial.scenario, longest)
+    scenario = to_one_line(trial.scenario, longest)
     return language.say("%(scenario)s, trial %(number)s", scenario=scenario, number=trial.index + 1)
 
 
-def hints_of(grade: Grade) -> tuple[str, ...]:
+def format_hints(grade: Grade) -> tuple[str, ...]:
     """Return the likely causes of lost marks as sentences that are safe to show, before anything else."""
-    told = (readable(hint, 600).rstrip(".") for hint in grade.hints)
+    told = (to_display_text(hint, 600).rstrip(".") for hint in grade.hints)
     # A file name keeps its case.
     began = (hint if "." in hint.partition(" ")[0] else hint[:1].upper() + hint[1:] for hint in told)
     return tuple(hint if hint.endswith("?") else f"{hint}." for hint in began)
 
 
-def is_ours(verdict: Verdict) -> bool:
+def is_not_students_fault(verdict: Verdict) -> bool:
     """Return whether the student has nothing to fix."""
     return verdict in (Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
 
 
-def accuracy_counted(accuracy: Accuracy, language: Language = ENGLISH) -> tuple[int, str]:
+def count_correct(accuracy: Accuracy, language: Language = ENGLISH) -> tuple[int, str]:
     """Return how many were identified correctly, and the unit."""
     of = accuracy.counts.of if accuracy.counts else "images"
-    return round(accuracy.value * accuracy.n), language.say(_COUNTED.get(of, "%(of)s"), of=of)
+    return round(accuracy.value * accuracy.n), language.say(_UNITS.get(of, "%(of)s"), of=of)
 
 
-def by_hand_words(result: CriterionResult, language: Language = ENGLISH) -> str:
+def describe_adjustment(result: CriterionResult, language: Language = ENGLISH) -> str:
     """Return a sentence on a staff adjustment and its reason; empty if there is none."""
     said = result.set_by_hand
     if said is None:
         return ""
-    reason = one_line(said.reason, 500)
+    reason = to_one_line(said.reason, 500)
     reason += "" if reason.endswith((".", "!", "?", "…")) else "."
-    marks = number(result.marks)
+    marks = format_decimal(result.marks)
     if said.excused and said.graded is None:
         return language.say("Excused, does not count: %(reason)s", reason=reason)
     if said.graded is None:
         return language.say("Adjusted by staff to %(marks)s: %(reason)s", marks=marks, reason=reason)
-    had = number(said.graded)
+    had = format_decimal(said.graded)
     if said.excused:
         return language.say(
             "Excused, does not count (before: %(had)s of %(worth)s): %(reason)s",
             had=had,
-            worth=number(said.worth),
+            worth=format_decimal(said.worth),
             reason=reason,
         )
     return language.say("Adjusted by staff from %(had)s to %(marks)s: %(reason)s", had=had, marks=marks, reason=reason)
 
 
-def comments_of(grade: Grade) -> tuple[str, ...]:
+def format_comments(grade: Grade) -> tuple[str, ...]:
     """Return the instructors' comments with their criterion, for display beside the marks."""
-    titles = {result.id: one_line(result.title, 200) for result in grade.criteria}
-    about = ((titles.get(each.criterion, ""), readable(each.text, 2000)) for each in grade.comments)
+    titles = {result.id: to_one_line(result.title, 200) for result in grade.criteria}
+    about = ((titles.get(each.criterion, ""), to_display_text(each.text, 2000)) for each in grade.comments)
     return tuple(f"{title}: {text}" if title else text for title, text in about)
 
 
-def accuracy_words(grade: Grade) -> str:
+def describe_accuracy(grade: Grade) -> str:
     """Return a sentence with value, interval and n, and whether it is unmarked; empty without a classification."""
     result, accuracy = grade.recognition, grade.accuracy
     if result is None or accuracy is None:
@@ -334,11 +338,11 @@ def accuracy_words(grade: Grade) -> str:
     practice = "" if result.worth else " for practice (not marked):"
     return (
         f"Accuracy{practice} {accuracy.value:.3f} (95 % interval {accuracy.low:.3f} to {accuracy.high:.3f}, "
-        f"{accuracy.n} {accuracy_counted(accuracy)[1]})."
+        f"{accuracy.n} {count_correct(accuracy)[1]})."
     )
 
 
-def channel_words(grade: Grade, language: Language = ENGLISH) -> str:
+def describe_channel_losses(grade: Grade, language: Language = ENGLISH) -> str:
     """Return one or two sentences on the channel's losses in all trials, and the reasons; empty without losses."""
     messages = [message for trial in grade.trials for message in trial.recording.messages]
     lost: Counter[LossReason] = Counter(message.lost for message in messages if message.lost)
@@ -355,7 +359,7 @@ def channel_words(grade: Grade, language: Language = ENGLISH) -> str:
     return f"{told} {fair}" if lost["chance"] else told
 
 
-def cost_words(grade: Grade, language: Language = ENGLISH) -> str:
+def describe_cost(grade: Grade, language: Language = ENGLISH) -> str:
     """Return one sentence with what all trials cost together; empty if that is not shown."""
     if grade.cost is None or grade.cost.spent is None:
         return ""

@@ -12,11 +12,11 @@ from decimal import Decimal
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from service.grading.grade import CriterionResult, Grade, Shown, TrialResult, unjudged_notes
-from service.grading.judging.message_parts import shown_words
-from service.grading.statistics import marks_out_of_all
+from service.grading.class_statistics import scale_marks
+from service.grading.grade import CriterionResult, Grade, TrialResult, VisibleFeedback, build_unjudged_notes
+from service.grading.judging.message_parts import add_hidden_note
 from service.language import ENGLISH, Language
-from service.reports.verdict_sentences import by_hand_words
+from service.reports.verdict_sentences import describe_adjustment
 from sim.errors import UsageError
 from sim.recording import Verdict
 from submissions.assignment.folder import REFERENCE
@@ -55,11 +55,11 @@ class GradebookView:
     @property
     def marks(self) -> Decimal | None:
         """The marks scaled to the assignment's maximum, which is all a gradebook knows; None if all are excused."""
-        return marks_out_of_all(self.entry.marks, self.entry.max_marks, self.entry.worth)
+        return scale_marks(self.entry.marks, self.entry.max_marks, self.entry.worth)
 
 
 @dataclass(frozen=True, slots=True)
-class OtherTrials:
+class OverlayTrials:
     """Trials that may be drawn over those of a view: the owner's name, and the trials by index in the view."""
 
     name: str
@@ -75,21 +75,23 @@ class SimilarityView:
 
 
 #: No trials to draw over others.
-NO_OTHERS = OtherTrials("", MappingProxyType({}))
+NO_OVERLAY = OverlayTrials("", MappingProxyType({}))
 
 
-def staff_similarity(found: Sequence[Similarity], language: Language = ENGLISH) -> SimilarityView:
+def build_similarity_view(found: Sequence[Similarity], language: Language = ENGLISH) -> SimilarityView:
     """Return everything."""
     return SimilarityView(tuple(found), language)
 
 
-def staff_view(grade: Grade, language: Language = ENGLISH) -> View:
+def build_staff_view(grade: Grade, language: Language = ENGLISH) -> View:
     """Return everything."""
-    told = tuple(_with_by_hand(result, language) for result in grade.criteria)
+    told = tuple(_add_adjustment(result, language) for result in grade.criteria)
     return View(replace(grade, criteria=told), staff=True, withheld=False, language=language)
 
 
-def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION, language: Language = ENGLISH) -> View:
+def build_student_view(
+    grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION, language: Language = ENGLISH
+) -> View:
     """Return ``grade`` for a student: without staff notes, cost, and parts whose visibility is not in ``released``.
 
     A comment on a criterion is visible with the criterion, one on the whole submission with any visible part.
@@ -104,12 +106,12 @@ def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION, la
     left = replace(
         grade,
         criteria=tuple(
-            _with_by_hand(replace(_without_hidden_trials(result, new_index), for_staff="", unjudged=""), language)
+            _add_adjustment(replace(_remove_hidden_trials(result, new_index), for_staff="", unjudged=""), language)
             for result in grade.criteria
             if result.id in shown
         ),
         trials=tuple(grade.trials[index] for index in kept),
-        notes=_notes_on(grade, shown),
+        notes=_select_notes(grade, shown),
         cost=None,  # the CPU limit depends on the number of trials, including hidden ones
         comments=tuple(each for each in grade.comments if shown and each.criterion in ("", *shown)),
     )
@@ -117,14 +119,14 @@ def student_view(grade: Grade, released: frozenset[str] = BEFORE_PUBLICATION, la
     return View(left, staff=False, withheld=withheld, language=language)
 
 
-def _notes_on(grade: Grade, shown: Set[str]) -> tuple[str, ...]:
+def _select_notes(grade: Grade, shown: Set[str]) -> tuple[str, ...]:
     """Return the notes on a grade. The note on unjudged criteria counts only visible ones."""
     seen = [result for result in grade.criteria if result.id in shown]
-    notes = [note for note in grade.notes if note not in unjudged_notes(grade.criteria)]
-    return (*notes, *unjudged_notes(seen))
+    notes = [note for note in grade.notes if note not in build_unjudged_notes(grade.criteria)]
+    return (*notes, *build_unjudged_notes(seen))
 
 
-def other_trials(view: View, other: Grade, name: str, released: frozenset[str]) -> OtherTrials:
+def select_overlay_trials(view: View, other: Grade, name: str, released: frozenset[str]) -> OverlayTrials:
     """Return the trials of ``other`` with the same settings as those of the view, as far as the reader may see them.
 
     Staff see all. Students see their own. They also see the reference solution's once the grade that they read is
@@ -137,26 +139,26 @@ def other_trials(view: View, other: Grade, name: str, released: frozenset[str]) 
     if view.staff:
         seen = other.trials
     elif other.student == view.grade.student or (other.student == REFERENCE and "after_published" in released):
-        seen = student_view(other, released).grade.trials
+        seen = build_student_view(other, released).grade.trials
     elif other.student == REFERENCE:
         raise UsageError("the reference is shown over a student's trials once the grade is published, not before")
     else:
         raise UsageError("this is another student's grade; expected one of the same student, or the reference's")
     same = other.assignment == view.grade.assignment
-    run_as = {_circumstances(trial): trial for trial in seen} if same else {}
-    pairs = ((index, run_as.get(_circumstances(trial))) for index, trial in enumerate(view.grade.trials))
+    run_as = {_collect_settings(trial): trial for trial in seen} if same else {}
+    pairs = ((index, run_as.get(_collect_settings(trial))) for index, trial in enumerate(view.grade.trials))
     trials = {index: trial for index, trial in pairs if trial is not None}
     if not trials:
         raise UsageError(
             "no trial of both grades has the same scenario, seed, place and floor, so none lies over another"
         )
-    return OtherTrials(name, trials)
+    return OverlayTrials(name, trials)
 
 
-def gradebook_view(grade: Grade) -> GradebookView:
+def build_gradebook_view(grade: Grade) -> GradebookView:
     """Return all marks with their visibilities, which the gradebook applies itself."""
-    told = tuple(_told(grade, result) for result in grade.criteria)
-    return GradebookView(replace(grade, criteria=told, trials=()), student_view(grade).grade)
+    told = tuple(_limit_text(grade, result) for result in grade.criteria)
+    return GradebookView(replace(grade, criteria=told, trials=()), build_student_view(grade).grade)
 
 
 def is_for_staff(visibility: str) -> bool:
@@ -164,7 +166,7 @@ def is_for_staff(visibility: str) -> bool:
     return visibility not in BEFORE_PUBLICATION
 
 
-def tells_of_hidden(grade: Grade, result: CriterionResult) -> bool:
+def has_hidden_content(grade: Grade, result: CriterionResult) -> bool:
     """Return whether a criterion is hidden, or shows images from hidden trials."""
     return is_for_staff(result.visibility) or any(
         is_for_staff(grade.trials[prediction.trial].visibility)
@@ -173,7 +175,7 @@ def tells_of_hidden(grade: Grade, result: CriterionResult) -> bool:
     )
 
 
-def worst_trial(grade: Grade, scenario: str) -> int:
+def find_worst_trial(grade: Grade, scenario: str) -> int:
     """Return the index in ``grade.trials`` of the scenario's trial that lost most, the first among equals.
 
     A trial loses the marks of every criterion it failed. Among equals, a fault is worse than a time limit, and a time
@@ -185,15 +187,15 @@ def worst_trial(grade: Grade, scenario: str) -> int:
             if not evidence.passed and 0 <= evidence.trial < len(lost):
                 lost[evidence.trial] += result.worth
     candidates = [index for index, trial in enumerate(grade.trials) if trial.scenario == scenario]
-    return max(candidates, key=lambda index: (lost[index], _severity(grade.trials[index]), -index))
+    return max(candidates, key=lambda index: (lost[index], _rank_severity(grade.trials[index]), -index))
 
 
-def scenarios(grade: Grade) -> tuple[str, ...]:
+def list_scenarios(grade: Grade) -> tuple[str, ...]:
     """Return the scenarios of the grade's trials, in the order they were run."""
     return tuple(dict.fromkeys(trial.scenario for trial in grade.trials))
 
 
-def _circumstances(trial: TrialResult) -> Hashable:
+def _collect_settings(trial: TrialResult) -> Hashable:
     """Return the settings that two trials must share to be drawn together. A new version may change any of them."""
     recording = trial.recording
     ground = (recording.background, recording.label_patches, recording.sheet, recording.obstacles)
@@ -201,24 +203,24 @@ def _circumstances(trial: TrialResult) -> Hashable:
     return trial.scenario, trial.index, trial.seed, trial.place, noise, ground
 
 
-def _told(grade: Grade, result: CriterionResult) -> CriterionResult:
+def _limit_text(grade: Grade, result: CriterionResult) -> CriterionResult:
     """Return the criterion with the text for the readers it is visible to."""
-    view = student_view(replace(grade, criteria=(result,)), BEFORE_PUBLICATION | {result.visibility})
+    view = build_student_view(replace(grade, criteria=(result,)), BEFORE_PUBLICATION | {result.visibility})
     return replace(view.grade.criteria[0], evidence=(), predictions=())
 
 
-def _with_by_hand(result: CriterionResult, language: Language) -> CriterionResult:
-    words = by_hand_words(result, language)
+def _add_adjustment(result: CriterionResult, language: Language) -> CriterionResult:
+    words = describe_adjustment(result, language)
     return replace(result, message=" ".join(filter(None, (words, result.message)))) if words else result
 
 
-def _severity(trial: TrialResult) -> int:
+def _rank_severity(trial: TrialResult) -> int:
     if trial.verdict is Verdict.FINISHED:
         return 0
     return 1 if trial.verdict is Verdict.TIME_LIMIT else 2
 
 
-def _without_hidden_trials(result: CriterionResult, new_index: dict[int, int]) -> CriterionResult:
+def _remove_hidden_trials(result: CriterionResult, new_index: dict[int, int]) -> CriterionResult:
     evidence = tuple(replace(item, trial=new_index[item.trial]) for item in result.evidence if item.trial in new_index)
     predictions = tuple(
         replace(prediction, trial=new_index[prediction.trial])
@@ -229,5 +231,5 @@ def _without_hidden_trials(result: CriterionResult, new_index: dict[int, int]) -
     if len(evidence) == len(result.evidence):
         return replace(kept, shown=None)
     # Older grades without a separate visible part show nothing.
-    shown = result.shown or Shown(shown_words(""))
+    shown = result.shown or VisibleFeedback(add_hidden_note(""))
     return replace(kept, message=shown.message, accuracy=shown.accuracy, curves=shown.curves, shown=None)

@@ -17,20 +17,20 @@ from typing import Literal
 import numpy as np
 
 from service.grading.grade import TrialResult
-from sim.recorded import faults_of
 from sim.recording import Fault, Recording, Verdict
+from sim.recording_values import collect_faults
 
 Aspect = Literal["path", "messages", "faults"]
 #: The smallest number of active students in a trial for which rarity can be judged.
 FEWEST_STUDENTS = 8
 #: The largest fraction of them that may share rare behaviour; always at least two.
-RARE_PART = 0.1
+RARE_FRACTION = 0.1
 
 #: Changes between left and right that make a path winding: more than a planned path has.
 WINDING_TURNS = 20
 
 #: The machine decides how far such a trial gets.
-_CUT = frozenset({Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR})
+_CUT_SHORT_VERDICTS = frozenset({Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED, Verdict.HOST_ERROR})
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class TrialName:
 
 
 @dataclass(frozen=True, slots=True)
-class SameInTrial:
+class SharedBehaviour:
     """A trial in which two students behaved equally: the aspect, how many shared it, and how many were active."""
 
     trial: TrialName
@@ -66,21 +66,25 @@ class Behaviour:
         return len({trial for trial, _ in self.aspects})
 
 
-def behaviour_of(trials: Iterable[TrialResult]) -> Behaviour:
+def extract_behaviour(trials: Iterable[TrialResult]) -> Behaviour:
     """Return the data to compare of a student's trials, without those that the machine cut short."""
     trials = list(trials)
-    compared = [trial for trial in trials if trial.verdict not in _CUT]
-    aspects = {(_name(trial), aspect): digest for trial in compared for aspect, digest in _aspects(trial.recording)}
+    compared = [trial for trial in trials if trial.verdict not in _CUT_SHORT_VERDICTS]
+    aspects = {
+        (_build_trial_name(trial), aspect): digest
+        for trial in compared
+        for aspect, digest in _digest_aspects(trial.recording)
+    }
     did_something = any(aspect != "faults" for _, aspect in aspects)
     whole = did_something and len(compared) == len(trials)
     return Behaviour(
         aspects,
-        frozenset(_name(trial) for trial in compared if _turns(trial.recording) >= WINDING_TURNS),
-        _digest(_whole(trial) for trial in trials) if whole else "",
+        frozenset(_build_trial_name(trial) for trial in compared if _count_turns(trial.recording) >= WINDING_TURNS),
+        _compute_digest(_encode_trial(trial) for trial in trials) if whole else "",
     )
 
 
-def same_recordings(behaviours: Mapping[str, Behaviour]) -> tuple[tuple[str, ...], ...]:
+def group_same_recordings(behaviours: Mapping[str, Behaviour]) -> tuple[tuple[str, ...], ...]:
     """Return groups of students with equal recordings, the largest first, however large."""
     groups: dict[str, list[str]] = defaultdict(list)
     for student in sorted(behaviours):
@@ -91,7 +95,7 @@ def same_recordings(behaviours: Mapping[str, Behaviour]) -> tuple[tuple[str, ...
     )
 
 
-def same_in_trials(behaviours: Mapping[str, Behaviour]) -> dict[tuple[str, str], tuple[SameInTrial, ...]]:
+def find_shared_behaviour(behaviours: Mapping[str, Behaviour]) -> dict[tuple[str, str], tuple[SharedBehaviour, ...]]:
     """Return the rare equal behaviour of each two students, by their names in order."""
     sharing: dict[tuple[TrialName, Aspect], dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
     active: dict[TrialName, set[str]] = defaultdict(set)
@@ -99,26 +103,26 @@ def same_in_trials(behaviours: Mapping[str, Behaviour]) -> dict[tuple[str, str],
         for (trial, aspect), digest in behaviours[student].aspects.items():
             sharing[trial, aspect][digest].append(student)
             active[trial].add(student)
-    found: dict[tuple[str, str], list[SameInTrial]] = defaultdict(list)
+    found: dict[tuple[str, str], list[SharedBehaviour]] = defaultdict(list)
     for (trial, aspect), groups in sorted(sharing.items(), key=lambda item: (item[0][0].scenario, item[0][0].index)):
         students = len(active[trial])
-        most = max(2, RARE_PART * students)
+        most = max(2, RARE_FRACTION * students)
         for group in groups.values():
             if students >= FEWEST_STUDENTS and 2 <= len(group) <= most:
                 for pair in combinations(group, 2):
-                    found[pair].append(SameInTrial(trial, aspect, len(group), students))
+                    found[pair].append(SharedBehaviour(trial, aspect, len(group), students))
     return {pair: tuple(same) for pair, same in found.items()}
 
 
-def _name(trial: TrialResult) -> TrialName:
+def _build_trial_name(trial: TrialResult) -> TrialName:
     return TrialName(trial.scenario, trial.index, trial.light_noise > 0 or trial.motor_noise > 0)
 
 
-def _aspects(recording: Recording) -> Iterable[tuple[Aspect, str]]:
+def _digest_aspects(recording: Recording) -> Iterable[tuple[Aspect, str]]:
     robots = [recording] if recording.partner is None else [recording, recording.partner]
-    if any(_moved(robot) for robot in robots):
+    if any(_has_moved(robot) for robot in robots):
         columns = [column for robot in robots for column in (robot.ticks.x, robot.ticks.y, robot.ticks.heading)]
-        yield "path", _digest(column.tobytes() for column in columns)
+        yield "path", _compute_digest(column.tobytes() for column in columns)
     said = [
         f"{who}\n{text}"
         for robot in robots
@@ -129,34 +133,34 @@ def _aspects(recording: Recording) -> Iterable[tuple[Aspect, str]]:
         )
     ]
     if said:
-        yield "messages", _digest(text.encode("utf-8", "surrogatepass") for text in said)
-    faults = [f"{fault.t} {fault.verdict} {fault.who} {fault.message}" for fault in _mistakes(recording)]
+        yield "messages", _compute_digest(text.encode("utf-8", "surrogatepass") for text in said)
+    faults = [f"{fault.t} {fault.verdict} {fault.who} {fault.message}" for fault in _filter_faults(recording)]
     if faults:
-        yield "faults", _digest(fault.encode("utf-8", "surrogatepass") for fault in faults)
+        yield "faults", _compute_digest(fault.encode("utf-8", "surrogatepass") for fault in faults)
 
 
-def _whole(trial: TrialResult) -> bytes:
+def _encode_trial(trial: TrialResult) -> bytes:
     return f"{trial.scenario} {trial.index} {trial.recording.sha256}".encode()
 
 
-def _turns(recording: Recording) -> int:
+def _count_turns(recording: Recording) -> int:
     """Return how often the robot changed between turning left and turning right."""
     turning = np.sign(np.diff(recording.ticks.heading).round(3))
     turning = turning[turning != 0]
     return int(np.count_nonzero(turning[1:] != turning[:-1]))
 
 
-def _moved(recording: Recording) -> bool:
+def _has_moved(recording: Recording) -> bool:
     ticks = recording.ticks
     return len(ticks) > 0 and bool((ticks.x != ticks.x[0]).any() or (ticks.heading != ticks.heading[0]).any())
 
 
-def _mistakes(recording: Recording) -> list[Fault]:
+def _filter_faults(recording: Recording) -> list[Fault]:
     """Return the faults without time limits, because many programs may run forever."""
-    return [fault for fault in faults_of(recording) if fault.verdict is not Verdict.TIME_LIMIT]
+    return [fault for fault in collect_faults(recording) if fault.verdict is not Verdict.TIME_LIMIT]
 
 
-def _digest(pieces: Iterable[bytes]) -> str:
+def _compute_digest(pieces: Iterable[bytes]) -> str:
     made = hashlib.sha256()
     for piece in pieces:
         made.update(b"%d\n" % len(piece))

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from service.similarity.behaviour import Behaviour, SameInTrial, same_in_trials, same_recordings
-from service.similarity.writing import AlikeSources, Source, compare
+from service.similarity.behaviour import Behaviour, SharedBehaviour, find_shared_behaviour, group_same_recordings
+from service.similarity.similar_sources import SimilarSources, Source, compare_sources
 
 #: The fraction and least number of trials with the same path that make a pair without similar sources. A winding path
 #: counts twice. Equal messages make no pair: if few are right, those few send the same.
@@ -21,8 +21,8 @@ class SimilarPair:
     """Two students, their similar sources, and the trials in which their robots shared rare behaviour."""
 
     students: tuple[str, str]
-    sources: tuple[AlikeSources, ...]
-    trials: tuple[SameInTrial, ...]
+    sources: tuple[SimilarSources, ...]
+    trials: tuple[SharedBehaviour, ...]
 
     @property
     def share(self) -> float:
@@ -43,16 +43,18 @@ class Similarity:
     same_recordings: tuple[tuple[str, ...], ...] = ()  # groups with equal recordings
 
 
-def similarity(
+def compare_submissions(
     assignment: str, sources: Sequence[Source], given: Sequence[str], behaviours: Mapping[str, Behaviour]
 ) -> Similarity:
     """Return all similar pairs among these students' submissions."""
-    writing = compare(sources, given)
-    alike: dict[tuple[str, str], list[AlikeSources]] = {}
+    writing = compare_sources(sources, given)
+    alike: dict[tuple[str, str], list[SimilarSources]] = {}
     for each in writing.alike:
         alike.setdefault(each.students, []).append(each)
-    same = same_in_trials(behaviours)
-    often = {pair for pair, found in same.items() if _often(found, [behaviours[student] for student in pair])}
+    same = find_shared_behaviour(behaviours)
+    often = {
+        pair for pair, found in same.items() if _has_enough_trials(found, [behaviours[student] for student in pair])
+    }
     pairs = [SimilarPair(pair, tuple(alike.get(pair, ())), same.get(pair, ())) for pair in {*alike, *often}]
     pairs.sort(key=lambda pair: (-pair.share, -len(pair.trials), pair.students))
     students = {source.student for source in sources} | set(behaviours)
@@ -63,11 +65,11 @@ def similarity(
         writing.too_short,
         writing.not_compared,
         writing.same,
-        same_recordings(behaviours),
+        group_same_recordings(behaviours),
     )
 
 
-def _often(same: Sequence[SameInTrial], behaviours: Sequence[Behaviour]) -> bool:
+def _has_enough_trials(same: Sequence[SharedBehaviour], behaviours: Sequence[Behaviour]) -> bool:
     paths = [each.trial for each in same if each.aspect == "path"]
     weight = sum(2 if trial in behaviours[0].winding else 1 for trial in paths)
     return weight >= FEWEST_TRIALS and len(paths) >= SAME_PART * max(each.trials for each in behaviours)

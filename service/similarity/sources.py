@@ -12,7 +12,7 @@ from pathlib import Path
 from responders import library
 from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
-from submissions.assignment.folder import assignment_folder, catalogue
+from submissions.assignment.folder import list_catalogue_ids, locate_assignment_folder
 from submissions.source_text import decode_source
 from submissions.submission import Submission
 
@@ -20,7 +20,7 @@ from submissions.submission import Submission
 MOST_FILES = 20
 
 
-def sources_of(submission: Submission) -> Mapping[str, str]:
+def extract_sources(submission: Submission) -> Mapping[str, str]:
     """Return the texts by name. A notebook's code cells form one text, in order."""
     found: dict[str, str] = {}
     for part in (submission.program, submission.responder):
@@ -32,7 +32,7 @@ def sources_of(submission: Submission) -> Mapping[str, str]:
     return dict(list(found.items())[:MOST_FILES])
 
 
-def given_with(assignment: Assignment, more: Path | None = None) -> tuple[str, ...]:
+def collect_given_code(assignment: Assignment, more: Path | None = None) -> tuple[str, ...]:
     """Return the code that students are given: the assignment's, its starter, the library's responders, and ``more``.
 
     Only the catalogue has starters, because stored assignments lack them.
@@ -40,15 +40,15 @@ def given_with(assignment: Assignment, more: Path | None = None) -> tuple[str, .
     Raises:
         UsageError: ``more`` cannot be read.
     """
-    texts = [*assignment.given_parts.values(), *(text for _, text in _python_in(assignment.given))]
+    texts = [*assignment.given_parts.values(), *(text for _, text in _decode_python_files(assignment.given))]
     texts += map(library.source, library.names())
     folders = [] if more is None else [more]
-    if assignment.id in catalogue():
-        folders.append(assignment_folder(assignment.id) / "starter")
-    return (*texts, *(text for folder in folders for text in _python_below(folder)))
+    if assignment.id in list_catalogue_ids():
+        folders.append(locate_assignment_folder(assignment.id) / "starter")
+    return (*texts, *(text for folder in folders for text in _read_python_files(folder)))
 
 
-def _python_in(files: Mapping[str, bytes]) -> Iterator[tuple[str, str]]:
+def _decode_python_files(files: Mapping[str, bytes]) -> Iterator[tuple[str, str]]:
     for name, data in files.items():
         if name.lower().endswith(".py"):
             try:
@@ -58,7 +58,7 @@ def _python_in(files: Mapping[str, bytes]) -> Iterator[tuple[str, str]]:
 
 
 @cache
-def _python_below(path: Path) -> tuple[str, ...]:
+def _read_python_files(path: Path) -> tuple[str, ...]:
     paths = sorted(path.rglob("*.py")) if path.is_dir() else [path]
     try:
         return tuple(decode_source(each.read_bytes(), each.name).text for each in paths)

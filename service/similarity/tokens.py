@@ -14,7 +14,7 @@ from keyword import iskeyword
 import numpy as np
 from numpy.typing import NDArray
 
-from service.similarity.normalising import Word, normalised
+from service.similarity.normal_form import Word, normalise_statement
 
 #: The number of tokens read per file. A program of a thousand lines has about 10 000.
 MOST_TOKENS = 20_000
@@ -48,23 +48,23 @@ class Tokens:
 
 
 @dataclass(frozen=True, slots=True)
-class _Piece:
+class _RawToken:
     kind: str
     text: str
     line: int
 
 
-def tokens_of(source: str) -> Tokens:
+def tokenise_source(source: str) -> Tokens:
     """Return the tokens of a Python file, without comments, layout, imports and unused texts.
 
     Operands that may be swapped are in a fixed order, so line numbers need not ascend within a statement.
     """
-    statements = [_worth_comparing(statement) for statement in _statements(source)]
-    own = _own_names([piece for statement in statements for piece in statement])
+    statements = [_filter_statement(statement) for statement in _split_statements(source)]
+    own = _collect_own_names([piece for statement in statements for piece in statement])
     words = [
         word
         for statement in statements
-        for word in normalised([Word(_text(piece, own), piece.line) for piece in statement])
+        for word in normalise_statement([Word(_normalise_text(piece, own), piece.line) for piece in statement])
     ]
     return Tokens(
         np.array([zlib.crc32(word.text.encode("utf-8", "surrogatepass")) for word in words], np.uint64),
@@ -72,9 +72,9 @@ def tokens_of(source: str) -> Tokens:
     )
 
 
-def _statements(source: str) -> Iterator[list[_Piece]]:
+def _split_statements(source: str) -> Iterator[list[_RawToken]]:
     """Yield the statements: lines, joined while a bracket is open."""
-    statement: list[_Piece] = []
+    statement: list[_RawToken] = []
     line, depth, count = 1, 0, 0
     for match in _TOKEN.finditer(source):
         kind, text = str(match.lastgroup), match[0]
@@ -82,7 +82,7 @@ def _statements(source: str) -> Iterator[list[_Piece]]:
             yield statement
             statement = []
         elif kind not in ("blank", "newline"):
-            statement.append(_Piece(kind, text, line))
+            statement.append(_RawToken(kind, text, line))
             depth = max(0, depth + (text in _OPENING) - (text in _CLOSING))
             count += 1
         line += text.count("\n")
@@ -91,13 +91,13 @@ def _statements(source: str) -> Iterator[list[_Piece]]:
     yield statement
 
 
-def _worth_comparing(statement: list[_Piece]) -> list[_Piece]:
+def _filter_statement(statement: list[_RawToken]) -> list[_RawToken]:
     if not statement or statement[0].text in ("import", "from"):
         return []
     return [] if all(piece.kind == "text" for piece in statement) else statement
 
 
-def _own_names(pieces: Sequence[_Piece]) -> frozenset[str]:
+def _collect_own_names(pieces: Sequence[_RawToken]) -> frozenset[str]:
     """Return the names that the author chose, as their places show: assigned, defined, looped over."""
     own: set[str] = set()
     until = ""
@@ -121,7 +121,7 @@ def _own_names(pieces: Sequence[_Piece]) -> frozenset[str]:
     return frozenset(own)
 
 
-def _text(piece: _Piece, own: frozenset[str]) -> str:
+def _normalise_text(piece: _RawToken, own: frozenset[str]) -> str:
     if piece.kind in ("text", "number"):
         return piece.kind
     return "name" if piece.text in own else piece.text

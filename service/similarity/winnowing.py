@@ -16,12 +16,12 @@ from service.similarity.tokens import Tokens
 #: The number of tokens in a gram, and of neighbours from which one is selected.
 GRAM, WINDOW = 8, 3
 #: The least number of different tokens in a significant gram; ``[number], [number]`` has four.
-FEWEST_DIFFERENT = 5
+FEWEST_DIFFERENT_TOKENS = 5
 
 _FACTOR, _MIX = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9)
 
 
-def grams(tokens: Tokens) -> NDArray[np.uint64]:
+def compute_grams(tokens: Tokens) -> NDArray[np.uint64]:
     """Return a number for each run of GRAM tokens, in order; equal runs have equal numbers."""
     if len(tokens) < GRAM:
         return np.empty(0, np.uint64)
@@ -33,16 +33,16 @@ def grams(tokens: Tokens) -> NDArray[np.uint64]:
     return made ^ (made >> np.uint64(32))
 
 
-def varied(tokens: Tokens) -> NDArray[np.bool_]:
+def mark_varied_grams(tokens: Tokens) -> NDArray[np.bool_]:
     """Return for each gram whether it has enough different tokens. Grams of number tables don't."""
     if len(tokens) < GRAM:
         return np.empty(0, np.bool_)
     in_order = np.sort(sliding_window_view(tokens.numbers, GRAM), axis=1)
     steps = np.count_nonzero(in_order[:, 1:] != in_order[:, :-1], axis=1)
-    return np.asarray(steps + 1 >= FEWEST_DIFFERENT)
+    return np.asarray(steps + 1 >= FEWEST_DIFFERENT_TOKENS)
 
 
-def winnowed(numbers: NDArray[np.uint64]) -> NDArray[np.int64]:
+def select_fingerprints(numbers: NDArray[np.uint64]) -> NDArray[np.int64]:
     """Return the places of the fingerprints: the smallest number in every window, the last among equals."""
     if len(numbers) == 0:
         return np.empty(0, np.int64)
@@ -52,7 +52,7 @@ def winnowed(numbers: NDArray[np.uint64]) -> NDArray[np.int64]:
     return np.unique(least + np.arange(len(windows)))
 
 
-def covered(places: NDArray[np.bool_], tokens: int) -> NDArray[np.bool_]:
+def mark_covered_tokens(places: NDArray[np.bool_], tokens: int) -> NDArray[np.bool_]:
     """Return which tokens are in a marked gram."""
     edges = np.zeros(tokens + 1, np.int64)
     np.add.at(edges, np.flatnonzero(places), 1)

@@ -32,7 +32,7 @@ class File:
     data: bytes
 
 
-def put(session: Session, job_id: str, files: list[File], at: datetime) -> None:
+def store_files(session: Session, job_id: str, files: list[File], at: datetime) -> None:
     """Store the files of a job, replacing files with the same name. Raises HostError for a file over the cap."""
     for file in files:
         compressed = zlib.compress(file.data, 6)
@@ -52,12 +52,14 @@ def put(session: Session, job_id: str, files: list[File], at: datetime) -> None:
         )
 
 
-def get(session: Session, job_id: str, *, prefix: str = "") -> dict[str, File]:
-    """Return the files of a job whose names begin with ``prefix``, by name. Raises like ``get_each``."""
-    return dict(get_each(session, [job_id], prefix=prefix)).get(job_id, {})
+def load_files(session: Session, job_id: str, *, prefix: str = "") -> dict[str, File]:
+    """Return the files of a job whose names begin with ``prefix``, by name. Raises like ``load_each_files``."""
+    return dict(load_each_files(session, [job_id], prefix=prefix)).get(job_id, {})
 
 
-def get_each(session: Session, job_ids: Collection[str], *, prefix: str = "") -> Iterator[tuple[str, dict[str, File]]]:
+def load_each_files(
+    session: Session, job_ids: Collection[str], *, prefix: str = ""
+) -> Iterator[tuple[str, dict[str, File]]]:
     """Yield each job id with its files, read in one statement and ordered by id.
 
     Only the files of one job are in memory at a time. Raises HostError if a file does not match its hash.
@@ -73,10 +75,10 @@ def get_each(session: Session, job_ids: Collection[str], *, prefix: str = "") ->
     for job_id, of_job in groupby(rows, key=lambda row: row[0]):
         # A job without such files yields one row without a file.
         kept = [(name, media_type, sha256, data) for _, name, media_type, sha256, data in of_job if name is not None]
-        yield job_id, {each[0]: _file(job_id, *each) for each in kept}
+        yield job_id, {each[0]: _unpack_file(job_id, *each) for each in kept}
 
 
-def _file(job_id: str, name: str, media_type: str, sha256: str, compressed: bytes) -> File:
+def _unpack_file(job_id: str, name: str, media_type: str, sha256: str, compressed: bytes) -> File:
     try:
         data = zlib.decompress(compressed)
     except zlib.error as error:

@@ -25,7 +25,7 @@ class AuditEntry:
     detail: dict[str, Any]
 
 
-def this_user() -> str:
+def describe_current_user() -> str:
     """Return the account and machine that run this command, as ``account@host``."""
     try:
         account = getpass.getuser()
@@ -34,14 +34,14 @@ def this_user() -> str:
     return f"{account}@{socket.gethostname()}"
 
 
-def note(session: Session, actor: str, action: str, subject: str, subject_id: str, **detail: object) -> None:
+def record_action(session: Session, actor: str, action: str, subject: str, subject_id: str, **detail: object) -> None:
     """Record that ``actor`` did ``action`` to the row ``subject_id`` of the table ``subject``."""
     session.add(
         Audit(at=now(session), actor=actor, action=action, subject=subject, subject_id=subject_id, detail=detail)
     )
 
 
-def entries(session: Session, subject: str, subject_id: str) -> list[AuditEntry]:
+def load_entries(session: Session, subject: str, subject_id: str) -> list[AuditEntry]:
     """Return the activity log of a row, oldest entry first."""
     query = select(Audit).where(Audit.subject == subject, Audit.subject_id == subject_id).order_by(Audit.id)
     return [AuditEntry(row.at, row.actor, row.action, dict(row.detail)) for row in session.scalars(query)]

@@ -18,9 +18,9 @@ from sqlalchemy.engine import Connection
 from sqlalchemy.exc import OperationalError
 
 from service.store.engine import open_engine
-from service.store.migrate import upgrade
+from service.store.migrate import upgrade_database
 from service.store.models import Course, Installation, Job, SchemaCompatibility
-from service.store.revision import current_revision, newest_revision
+from service.store.revision import find_newest_revision, load_current_revision
 from service.store.web_tables import METADATA
 from sim.errors import HostError, UsageError
 
@@ -45,8 +45,8 @@ def back_up(source: Engine, file: Path) -> None:
         if source.dialect.name == "sqlite":
             _copy_file(Path(str(source.url.database)), file)
         else:
-            with _opened(file) as target:
-                upgrade(target)
+            with _open_file(file) as target:
+                upgrade_database(target)
                 _copy_rows(source, target)
     except (OSError, sqlite3.Error, OperationalError) as error:
         file.unlink(missing_ok=True)
@@ -75,15 +75,15 @@ def restore(file: Path, target: Engine) -> None:
             raise UsageError(
                 f"{file}: cannot be read ({error}), expected a file that robomark db backup made"
             ) from None
-        with _opened(copy) as source:
-            if current_revision(source) is None:
+        with _open_file(copy) as source:
+            if load_current_revision(source) is None:
                 raise UsageError(f"{file}: is no database of Robomark's, {_EXPECTED}")
-            upgrade(source)
+            upgrade_database(source)
             _copy_rows(source, target)
 
 
 @contextmanager
-def _opened(file: Path) -> Iterator[Engine]:
+def _open_file(file: Path) -> Iterator[Engine]:
     engine = open_engine(f"sqlite:///{file.absolute()}")
     try:
         yield engine
@@ -102,11 +102,12 @@ def _copy_file(source: Path, target: Path) -> None:
 def _copy_rows(source: Engine, target: Engine) -> None:
     """Copy every row of every table from one snapshot. Raises HostError for tables of another release."""
     for engine in (source, target):
-        revision = current_revision(engine)
-        if revision != newest_revision():
+        revision = load_current_revision(engine)
+        if revision != find_newest_revision():
             where = engine.url.render_as_string(hide_password=True)
             raise HostError(
-                f"The tables of {where} are at revision {revision}, this Robomark copies those at {newest_revision()}: "
+                f"The tables of {where} are at revision {revision}, this Robomark copies those at "
+                f"{find_newest_revision()}: "
                 "use the release that they are of."
             )
     reading = source.execution_options(isolation_level="REPEATABLE READ") if source.dialect.name != "sqlite" else source
@@ -128,7 +129,7 @@ def _copy_table(table: Table, rows: Connection, into: Connection) -> None:
     (key,) = table.primary_key.columns
     found = rows.execution_options(yield_per=_ROWS_AT_A_TIME).execute(select(table))
     for some in found.mappings().partitions():
-        into.execute(insert(table), [_without(row, own) for row in some])
+        into.execute(insert(table), [_clear_columns(row, own) for row in some])
         later += [
             {"of": row[key.name], **{column.name: row[column.name] for column in own}}
             for row in some
@@ -144,5 +145,5 @@ def _copy_table(table: Table, rows: Connection, into: Connection) -> None:
         into.execute(select(func.setval(sequence, last)))
 
 
-def _without(row: Mapping[Any, Any], columns: list[Column[Any]]) -> dict[str, Any]:
+def _clear_columns(row: Mapping[Any, Any], columns: list[Column[Any]]) -> dict[str, Any]:
     return dict(row) | {column.name: None for column in columns}

@@ -71,22 +71,22 @@ def decode(kind: type[T], value: Json) -> T:
 
     Unknown fields are ignored, missing ones get their defaults. Raises TypeError or ValueError for a mismatch.
     """
-    return cast(T, _read(kind, value))
+    return cast(T, _decode_value(kind, value))
 
 
-def decoded_arguments(kind: type, value: Mapping[str, Any]) -> dict[str, Any]:
+def decode_arguments(kind: type, value: Mapping[str, Any]) -> dict[str, Any]:
     """Return decoded arguments for the dataclass ``kind`` from the fields present; the caller adds the others."""
-    known = _hints(kind)
-    return {name: _read(known[name], item) for name, item in value.items() if name in known}
+    known = _load_type_hints(kind)
+    return {name: _decode_value(known[name], item) for name, item in value.items() if name in known}
 
 
 @cache
-def _hints(kind: type) -> dict[str, Any]:
+def _load_type_hints(kind: type) -> dict[str, Any]:
     return get_type_hints(kind, include_extras=True)
 
 
 @cache
-def _adapter(kind: Any) -> TypeAdapter[Any]:
+def _build_adapter(kind: Any) -> TypeAdapter[Any]:
     from pydantic import TypeAdapter
 
     return TypeAdapter(kind)
@@ -101,40 +101,42 @@ def _is_model(kind: Any) -> bool:
     return pydantic is not None and isinstance(kind, type) and issubclass(kind, pydantic.BaseModel)
 
 
-def _read(kind: Any, value: Any) -> Any:
+def _decode_value(kind: Any, value: Any) -> Any:
     origin = get_origin(kind)
     if origin is Annotated or _is_model(kind):
-        return _adapter(kind).validate_python(value)
+        return _build_adapter(kind).validate_python(value)
     if origin is Union or origin is types.UnionType:
-        return _read_union(get_args(kind), value)
+        return _decode_union(get_args(kind), value)
     if origin is Literal:
         return value
     if origin is tuple:
-        return _read_tuple(get_args(kind), value)
+        return _decode_tuple(get_args(kind), value)
     if origin is not None and issubclass(origin, Mapping):
-        return {key: _read(get_args(kind)[1], item) for key, item in value.items()}
+        return {key: _decode_value(get_args(kind)[1], item) for key, item in value.items()}
     if is_dataclass(kind):
-        known = _hints(cast(type, kind))
-        return cast(type, kind)(**{name: _read(known[name], item) for name, item in value.items() if name in known})
-    return _read_scalar(kind, value)
+        known = _load_type_hints(cast(type, kind))
+        return cast(type, kind)(
+            **{name: _decode_value(known[name], item) for name, item in value.items() if name in known}
+        )
+    return _decode_scalar(kind, value)
 
 
-def _read_union(kinds: tuple[Any, ...], value: Any) -> Any:
+def _decode_union(kinds: tuple[Any, ...], value: Any) -> Any:
     if value is None and type(None) in kinds:
         return None
     rest = [kind for kind in kinds if kind is not type(None)]
     if len(rest) != 1:
         raise TypeError(f"cannot tell which of {rest} is meant")
-    return _read(rest[0], value)
+    return _decode_value(rest[0], value)
 
 
-def _read_tuple(kinds: tuple[Any, ...], value: Sequence[Any]) -> tuple[Any, ...]:
+def _decode_tuple(kinds: tuple[Any, ...], value: Sequence[Any]) -> tuple[Any, ...]:
     if len(kinds) == 2 and kinds[1] is Ellipsis:
-        return tuple(_read(kinds[0], item) for item in value)
-    return tuple(_read(kind, item) for kind, item in zip(kinds, value, strict=True))
+        return tuple(_decode_value(kinds[0], item) for item in value)
+    return tuple(_decode_value(kind, item) for kind, item in zip(kinds, value, strict=True))
 
 
-def _read_scalar(kind: Any, value: Any) -> Any:
+def _decode_scalar(kind: Any, value: Any) -> Any:
     if kind is bytes:
         return base64.b64decode(value, validate=True)
     if kind in (float, Decimal) or (isinstance(kind, type) and issubclass(kind, Enum)):

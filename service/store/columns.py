@@ -29,21 +29,21 @@ from sqlalchemy.types import TypeEngine
 from service.store.codec import Json
 
 
-def storable(text: str) -> str:
+def make_storable(text: str) -> str:
     """Replace NUL by U+2400 and lone surrogates by U+FFFD, so that every database accepts the text."""
     return text.replace("\0", "\u2400").encode("utf-16", "surrogatepass").decode("utf-16", "replace")
 
 
-def storable_json(value: Json) -> Json:
+def make_json_storable(value: Json) -> Json:
     """Apply ``storable`` to every string in a JSON value. Raises ValueError for infinite floats and NaN."""
     if isinstance(value, str):
-        return storable(value)
+        return make_storable(value)
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"JSON has no {value}")
     if isinstance(value, list):
-        return [storable_json(item) for item in value]
+        return [make_json_storable(item) for item in value]
     if isinstance(value, dict):
-        return {storable(key): storable_json(item) for key, item in value.items()}
+        return {make_storable(key): make_json_storable(item) for key, item in value.items()}
     return value
 
 
@@ -116,7 +116,7 @@ class SafeText(TypeDecorator[str]):
 
     def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
         """Replace characters that a database would reject."""
-        return None if value is None else storable(value)
+        return None if value is None else make_storable(value)
 
 
 class SafeJson(TypeDecorator[Any]):
@@ -136,4 +136,4 @@ class SafeJson(TypeDecorator[Any]):
 
     def process_bind_param(self, value: Json, dialect: Dialect) -> Json:
         """Make all strings storable. Raises ValueError for infinite floats and NaN."""
-        return storable_json(value)
+        return make_json_storable(value)

@@ -24,8 +24,8 @@ from sqlalchemy.pool import NullPool
 
 from service.home import open_home
 from service.settings import Settings
-from service.store.migrate import upgrade
-from service.store.revision import schema_state
+from service.store.migrate import upgrade_database
+from service.store.revision import load_schema_state
 from sim.errors import HostError
 from submissions.seeds import Secret
 
@@ -44,16 +44,16 @@ R = TypeVar("R")
 
 def is_conflict(error: BaseException) -> bool:
     """Return whether the database aborted a transaction because of another one, so that a retry can succeed."""
-    return _state_of(error) in _CONFLICTS
+    return _find_sqlstate(error) in _CONFLICTS
 
 
 def is_overtaken(error: BaseException) -> bool:
     """Return whether another transaction inserted the same row, or removed a row that this one relied on."""
     is_gone = isinstance(error, NoResultFound | StaleDataError | ObjectDeletedError)
-    return is_gone or _state_of(error) in _OVERTAKEN
+    return is_gone or _find_sqlstate(error) in _OVERTAKEN
 
 
-def _state_of(error: BaseException) -> str | None:
+def _find_sqlstate(error: BaseException) -> str | None:
     """Return the SQLSTATE of an error, or SQLite's name for it."""
     orig = error.orig if isinstance(error, DBAPIError) else None
     return getattr(orig, "sqlstate", None) or getattr(orig, "sqlite_errorname", None)
@@ -97,7 +97,7 @@ class Store:
         with Session(engine, expire_on_commit=False) as session, session.begin():
             yield session
 
-    def impatient(self) -> Store:
+    def with_short_wait(self) -> Store:
         """Return the same database for transactions that fail instead of waiting long for SQLite's write lock."""
         return replace(self, engine=self.engine.execution_options(**{_BUSY_SECONDS: IMPATIENT_SECONDS}))
 
@@ -169,8 +169,8 @@ def open_store(settings: Settings) -> Store:
         with suppress(OSError):
             os.close(os.open(file, os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600))
     try:
-        if not schema_state(engine.execution_options(**{_ONLY_READS: True})).is_usable:
-            upgrade(engine)
+        if not load_schema_state(engine.execution_options(**{_ONLY_READS: True})).is_usable:
+            upgrade_database(engine)
     except OperationalError as error:
         engine.dispose()
         where = engine.url.render_as_string(hide_password=True)

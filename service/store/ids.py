@@ -8,6 +8,6 @@ ALPHABET = "0123456789abcdefghjkmnpqrstvwxyz"
 LENGTH = 12
 
 
-def new_id() -> str:
+def generate_id() -> str:
     """Return a random id of 60 bits."""
     return "".join(secrets.choice(ALPHABET) for _ in range(LENGTH))

@@ -13,15 +13,15 @@ from sim.errors import HostError
 from submissions.seeds import Secret
 
 
-def secret_of(store: Store) -> Secret:
+def load_secret(store: Store) -> Secret:
     """Return the secret that trials are run with. Raises HostError if the database has lost its secret."""
     if store.secret is not None:
         return store.secret
     with store.reading() as session:
-        return secret_read(session.scalar(select(Installation.secret)))
+        return require_secret(session.scalar(select(Installation.secret)))
 
 
-def secret_read(text: str | None) -> Secret:
+def require_secret(text: str | None) -> Secret:
     """Return the database's secret from its column. Raises HostError if it is missing."""
     if text is None:
         raise HostError("The database is damaged: the secret that it was made with is gone; restore a backup")

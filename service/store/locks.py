@@ -30,7 +30,7 @@ def lock_persons(session: Session, *ids: int) -> None:
 
 def lock_jobs(session: Session, *which: ColumnElement[bool]) -> None:
     """Lock the jobs that match these conditions until the end of the transaction."""
-    session.execute(_ordered_jobs(*which)).all()
+    session.execute(_select_jobs_for_update(*which)).all()
 
 
 def lock_submissions(session: Session, *which: ColumnElement[bool]) -> None:
@@ -42,10 +42,10 @@ def lock_submissions(session: Session, *which: ColumnElement[bool]) -> None:
     session.execute(query.with_for_update(key_share=True)).all()
 
 
-def locked_jobs(*which: ColumnElement[bool]) -> ColumnElement[bool]:
+def match_and_lock_jobs(*which: ColumnElement[bool]) -> ColumnElement[bool]:
     """Return a condition for an UPDATE of several jobs, which locks them in order before the first change."""
-    return Job.id.in_(_ordered_jobs(*which))
+    return Job.id.in_(_select_jobs_for_update(*which))
 
 
-def _ordered_jobs(*which: ColumnElement[bool]) -> Select[str]:
+def _select_jobs_for_update(*which: ColumnElement[bool]) -> Select[str]:
     return select(Job.id).where(*which).order_by(Job.id).with_for_update(key_share=True)

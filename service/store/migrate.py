@@ -12,7 +12,7 @@ from sqlalchemy import Engine, text
 from sqlalchemy.engine import Connection
 
 from service.store import new_database
-from service.store.revision import newest_revision, revision_of
+from service.store.revision import find_newest_revision, read_revision
 from sim.errors import HostError
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _LOCK = 0x526F626F
 
 
-def configuration(connection: Connection) -> Config:
+def build_alembic_config(connection: Connection) -> Config:
     """Return Alembic's configuration for the scripts in this package, on an open connection."""
     # Importing it takes as long as everything else in a read-only command.
     from alembic.config import Config
@@ -38,7 +38,7 @@ def refuse_downgrade() -> None:
     raise HostError("A database cannot be taken back to an older Robomark; restore the backup made before the upgrade.")
 
 
-def upgrade(engine: Engine) -> None:
+def upgrade_database(engine: Engine) -> None:
     """Apply the missing migrations in one transaction, under a lock.
 
     Raises HostError if the database was made by a newer Robomark.
@@ -47,21 +47,21 @@ def upgrade(engine: Engine) -> None:
         # SQLite already has its write lock from BEGIN IMMEDIATE.
         if engine.dialect.name == "postgresql":
             connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _LOCK})
-        if revision_of(connection) == newest_revision():
+        if read_revision(connection) == find_newest_revision():
             return
-        if new_database.can_be_laid(connection):
-            new_database.lay(connection, newest_revision())
+        if new_database.is_empty_sqlite(connection):
+            new_database.create_tables(connection, find_newest_revision())
         else:
-            migrate(connection)
+            apply_migrations(connection)
 
 
-def migrate(connection: Connection) -> None:
+def apply_migrations(connection: Connection) -> None:
     """Apply the missing migrations one by one. Raises HostError if the database was made by a newer Robomark."""
     from alembic import command
     from alembic.script import ScriptDirectory
 
-    config = configuration(connection)
-    present = revision_of(connection)
+    config = build_alembic_config(connection)
+    present = read_revision(connection)
     known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
     if present is not None and present not in known:
         raise HostError(

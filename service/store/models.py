@@ -16,11 +16,11 @@ from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 from service.store.columns import ExactDecimal, SafeJson, SafeText, UtcDateTime
 from service.store.ids import LENGTH as ID_LENGTH
-from service.store.ids import new_id
-from service.store.states import BatchState, CancelReason, CredentialKind, JobState, Lane, PlotState, Role, Standing
+from service.store.ids import generate_id
+from service.store.states import BatchState, CancelReason, CredentialKind, JobQueue, JobState, PlotState, Role, Standing
 
 
-def _enum(kind: type[StrEnum]) -> Enum:
+def _build_enum_type(kind: type[StrEnum]) -> Enum:
     return Enum(
         kind,
         native_enum=False,
@@ -47,14 +47,14 @@ class Base(DeclarativeBase):
         Decimal: ExactDecimal(),
         str: SafeText(),
         Any: SafeJson(),
-        Role: _enum(Role),
-        CredentialKind: _enum(CredentialKind),
-        Lane: _enum(Lane),
-        JobState: _enum(JobState),
-        CancelReason: _enum(CancelReason),
-        PlotState: _enum(PlotState),
-        BatchState: _enum(BatchState),
-        Standing: _enum(Standing),
+        Role: _build_enum_type(Role),
+        CredentialKind: _build_enum_type(CredentialKind),
+        JobQueue: _build_enum_type(JobQueue),
+        JobState: _build_enum_type(JobState),
+        CancelReason: _build_enum_type(CancelReason),
+        PlotState: _build_enum_type(PlotState),
+        BatchState: _build_enum_type(BatchState),
+        Standing: _build_enum_type(Standing),
     }
 
 
@@ -134,11 +134,11 @@ class Batch(Base):
 
     __tablename__ = "batch"
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=new_id)
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=generate_id)
     course_id: Mapped[int] = mapped_column(ForeignKey("course.id"))
     name: Mapped[str]
     state: Mapped[BatchState] = mapped_column(default=BatchState.OPEN)
-    refusals: Mapped[Any] = mapped_column(default=list)  # one ``Refusal`` for each rejected file
+    refusals: Mapped[Any] = mapped_column(default=list)  # one ``RejectedSubmission`` for each rejected file
     regrade_of: Mapped[str | None] = mapped_column(ForeignKey("batch.id"))  # the batch that was graded again
     created_at: Mapped[datetime]
 
@@ -187,13 +187,13 @@ class Job(Base):
         CheckConstraint("(state = 'running') = (lease IS NOT NULL)", name="lease"),
     )
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=new_id)
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=generate_id)
     submission_id: Mapped[int] = mapped_column(ForeignKey("submission.id"), index=True)
     assignment_version_id: Mapped[int] = mapped_column(ForeignKey("assignment_version.id"), index=True)
     # The shares that a claim weighs, stored in the job so that a claim reads one table.
     enrolment_id: Mapped[int] = mapped_column(ForeignKey("enrolment.id"), index=True)
     batch_id: Mapped[str | None] = mapped_column(ForeignKey("batch.id"))
-    lane: Mapped[Lane]
+    lane: Mapped[JobQueue]
     state: Mapped[JobState] = mapped_column(default=JobState.QUEUED)
 
     attempt: Mapped[int] = mapped_column(default=0)  # times started; not the student's attempts

@@ -12,22 +12,22 @@ from pathlib import Path
 from sqlalchemy import insert, inspect
 from sqlalchemy.engine import Connection
 
-RECORD = Path(__file__).with_name("migrations") / "schema.sql"
+SCHEMA_FILE = Path(__file__).with_name("migrations") / "schema.sql"
 #: Separates statements, which contain no empty lines.
-BETWEEN = ";\n\n"
+STATEMENT_SEPARATOR = ";\n\n"
 
 
-def can_be_laid(connection: Connection) -> bool:
+def is_empty_sqlite(connection: Connection) -> bool:
     """Return whether this is an empty SQLite database."""
     return connection.dialect.name == "sqlite" and not inspect(connection).get_table_names()
 
 
-def lay(connection: Connection, revision: str) -> None:
+def create_tables(connection: Connection, revision: str) -> None:
     """Create the tables of ``revision``, which is the newest, and the rows that the migrations insert."""
     # Imported only for a new database: read-only commands do not need the tables.
     from service.store.models import Installation
 
-    for statement in RECORD.read_text(encoding="utf-8").split(BETWEEN):
+    for statement in SCHEMA_FILE.read_text(encoding="utf-8").split(STATEMENT_SEPARATOR):
         connection.exec_driver_sql(statement)
     connection.exec_driver_sql("INSERT INTO alembic_version VALUES (?)", (revision,))
     made = {"id": 1, "secret": secrets.token_hex(32), "made_at": datetime.now(UTC)}

@@ -21,12 +21,12 @@ from service.store.states import UNFINISHED, JobState
 from service.store.web_tables import Delivery, OpenAssignment, Webhook
 
 #: Time after which a delivery is given up.
-TRIED_FOR = timedelta(days=1)
+RETRY_PERIOD = timedelta(days=1)
 _FIRST_WAIT = timedelta(seconds=15)
 _LONGEST_WAIT = timedelta(hours=2)
 #: Time to send a claimed delivery, before it can be claimed again.
 _LEASE = timedelta(minutes=2)
-_FORGOTTEN = timedelta(days=30)
+_RETENTION = timedelta(days=30)
 
 
 class WebhookEvent(StrEnum):
@@ -51,54 +51,54 @@ class ClaimedDelivery:
     attempt: int  # 1 is the first
 
 
-def grade_finished(session: Session, job_id: str) -> None:
+def emit_grade_finished(session: Session, job_id: str) -> None:
     """Report that a job is graded, and that its batch is finished if this was the last one."""
-    if hooks := _of_job(session, job_id):
-        _grade_finished(session, hooks, job_id)
-        _batch_ended(session, hooks, session.scalar(select(Job.batch_id).where(Job.id == job_id)))
+    if hooks := _load_job_webhooks(session, job_id):
+        _add_grade_finished(session, hooks, job_id)
+        _add_batch_finished(session, hooks, session.scalar(select(Job.batch_id).where(Job.id == job_id)))
 
 
-def grade_copied(session: Session, job_id: str) -> None:
+def emit_grade_copied(session: Session, job_id: str) -> None:
     """Report that a job got the grade of an identical one, during the intake of its batch."""
-    if hooks := _of_job(session, job_id):
-        _grade_finished(session, hooks, job_id)
+    if hooks := _load_job_webhooks(session, job_id):
+        _add_grade_finished(session, hooks, job_id)
 
 
-def job_ended(session: Session, job_id: str) -> None:
+def emit_job_ended(session: Session, job_id: str) -> None:
     """Handle a job that ended without a grade: report its batch as finished if this was the last one."""
-    if hooks := _of_job(session, job_id):
-        _batch_ended(session, hooks, session.scalar(select(Job.batch_id).where(Job.id == job_id)))
+    if hooks := _load_job_webhooks(session, job_id):
+        _add_batch_finished(session, hooks, session.scalar(select(Job.batch_id).where(Job.id == job_id)))
 
 
-def batch_ended(session: Session, batch_id: str) -> None:
+def emit_batch_finished(session: Session, batch_id: str) -> None:
     """Report a batch as finished if all its jobs have ended."""
     course_id = select(Batch.course_id).where(Batch.id == batch_id).scalar_subquery()
-    if hooks := _hooks(session, select(Webhook).where(Webhook.course_id == course_id)):
-        _batch_ended(session, hooks, batch_id)
+    if hooks := _load_webhooks(session, select(Webhook).where(Webhook.course_id == course_id)):
+        _add_batch_finished(session, hooks, batch_id)
 
 
-def superseded(session: Session, submissions: Select[int], at: datetime) -> None:
+def emit_superseded_batches(session: Session, submissions: Select[int], at: datetime) -> None:
     """Report the batches of jobs that were cancelled at this time for newer submissions."""
     which = (Job.submission_id.in_(submissions), Job.state == JobState.CANCELLED, Job.finished_at == at)
     for batch_id in session.scalars(select(Job.batch_id).where(*which, Job.batch_id.is_not(None)).distinct()).all():
-        batch_ended(session, str(batch_id))
+        emit_batch_finished(session, str(batch_id))
 
 
-def grades_published(session: Session, course_id: int, **told: object) -> None:
+def emit_grades_published(session: Session, course_id: int, **told: object) -> None:
     """Report that grades were released to their students."""
-    _tell(session, _of_course(session, course_id), WebhookEvent.GRADES_PUBLISHED, told)
+    _add_deliveries(session, _load_course_webhooks(session, course_id), WebhookEvent.GRADES_PUBLISHED, told)
 
 
-def appeal_opened(session: Session, submission_id: int, appeal_id: int) -> None:
+def emit_appeal_opened(session: Session, submission_id: int, appeal_id: int) -> None:
     """Report that a student opened an appeal."""
     of_submission = select(Enrolment.course_id).join(SubmissionRow, SubmissionRow.enrolment_id == Enrolment.id)
     course_id = session.scalars(of_submission.where(SubmissionRow.id == submission_id)).one()
     told = {"appeal": appeal_id, "submission": submission_id}
-    _tell(session, _of_course(session, course_id), WebhookEvent.APPEAL_OPENED, told)
+    _add_deliveries(session, _load_course_webhooks(session, course_id), WebhookEvent.APPEAL_OPENED, told)
 
 
 @retry_conflicts
-def claim(store: Store, most: int) -> list[ClaimedDelivery]:
+def claim_deliveries(store: Store, most: int) -> list[ClaimedDelivery]:
     """Claim the deliveries that are due; no other process gets them until the claim expires."""
     with store.reading() as session:
         at = now(session)
@@ -107,8 +107,8 @@ def claim(store: Store, most: int) -> list[ClaimedDelivery]:
             return []
     with store.transaction() as session:
         at = now(session)
-        given_up = (Delivery.delivered_at.is_(None), Delivery.due_at.is_(None), Delivery.made_at < at - _FORGOTTEN)
-        session.execute(delete(Delivery).where(or_(Delivery.delivered_at < at - _FORGOTTEN, and_(*given_up))))
+        given_up = (Delivery.delivered_at.is_(None), Delivery.due_at.is_(None), Delivery.made_at < at - _RETENTION)
+        session.execute(delete(Delivery).where(or_(Delivery.delivered_at < at - _RETENTION, and_(*given_up))))
         query = (
             select(Delivery, Webhook)
             .join(Webhook, Delivery.webhook_id == Webhook.id)
@@ -137,7 +137,7 @@ def claim(store: Store, most: int) -> list[ClaimedDelivery]:
 
 
 @retry_conflicts
-def delivered(store: Store, claimed: ClaimedDelivery) -> None:
+def record_delivery(store: Store, claimed: ClaimedDelivery) -> None:
     """Record that a delivery succeeded."""
     with store.transaction() as session:
         values = {"delivered_at": now(session), "error": None}
@@ -145,39 +145,39 @@ def delivered(store: Store, claimed: ClaimedDelivery) -> None:
 
 
 @retry_conflicts
-def failed(store: Store, claimed: ClaimedDelivery, error: str) -> None:
+def record_failure(store: Store, claimed: ClaimedDelivery, error: str) -> None:
     """Record that a delivery failed: it is retried later, or given up after a day."""
     wait = min(_FIRST_WAIT * 2 ** min(claimed.attempt - 1, 20), _LONGEST_WAIT)
     with store.transaction() as session:
         again = now(session) + wait
-        due_at = again if again < claimed.made_at + TRIED_FOR else None
+        due_at = again if again < claimed.made_at + RETRY_PERIOD else None
         mine = (Delivery.id == claimed.id, Delivery.attempts == claimed.attempt, Delivery.due_at.is_not(None))
         session.execute(update(Delivery).where(*mine).values(due_at=due_at, error=error[:500]))
 
 
-def _grade_finished(session: Session, hooks: Sequence[Webhook], job_id: str) -> None:
+def _add_grade_finished(session: Session, hooks: Sequence[Webhook], job_id: str) -> None:
     query = select(Job.batch_id, Job.standing, SubmissionRow.id, SubmissionRow.assignment, SubmissionRow.attempt)
     found = session.execute(query.join(SubmissionRow, Job.submission_id == SubmissionRow.id).where(Job.id == job_id))
     batch_id, standing, submission_id, assignment, attempt = found.one()
     told: dict[str, object] = {"job": job_id, "batch": batch_id, "standing": standing.value}
     told |= {"submission": submission_id, "assignment": assignment, "attempt": attempt}
-    _tell(session, hooks, WebhookEvent.GRADE_FINISHED, told)
+    _add_deliveries(session, hooks, WebhookEvent.GRADE_FINISHED, told)
 
 
-def _of_job(session: Session, job_id: str) -> Sequence[Webhook]:
+def _load_job_webhooks(session: Session, job_id: str) -> Sequence[Webhook]:
     query = select(Webhook).join(Enrolment, Enrolment.course_id == Webhook.course_id)
-    return _hooks(session, query.join(Job, Job.enrolment_id == Enrolment.id).where(Job.id == job_id))
+    return _load_webhooks(session, query.join(Job, Job.enrolment_id == Enrolment.id).where(Job.id == job_id))
 
 
-def _of_course(session: Session, course_id: int) -> Sequence[Webhook]:
-    return _hooks(session, select(Webhook).where(Webhook.course_id == course_id))
+def _load_course_webhooks(session: Session, course_id: int) -> Sequence[Webhook]:
+    return _load_webhooks(session, select(Webhook).where(Webhook.course_id == course_id))
 
 
-def _hooks(session: Session, query: Select[Webhook]) -> Sequence[Webhook]:
+def _load_webhooks(session: Session, query: Select[Webhook]) -> Sequence[Webhook]:
     return session.scalars(query.where(Webhook.revoked_at.is_(None)).order_by(Webhook.id)).all()
 
 
-def _batch_ended(session: Session, hooks: Sequence[Webhook], batch_id: str | None) -> None:
+def _add_batch_finished(session: Session, hooks: Sequence[Webhook], batch_id: str | None) -> None:
     if batch_id is None:
         return
     if session.get_bind().dialect.name == "postgresql":
@@ -191,10 +191,12 @@ def _batch_ended(session: Session, hooks: Sequence[Webhook], batch_id: str | Non
     states = dict(session.execute(counted.group_by(Job.state)).all())
     if states and not any(state in UNFINISHED for state in states):
         told = {"batch": batch_id, "states": {state.value: count for state, count in states.items()}}
-        _tell(session, hooks, WebhookEvent.BATCH_FINISHED, told)
+        _add_deliveries(session, hooks, WebhookEvent.BATCH_FINISHED, told)
 
 
-def _tell(session: Session, hooks: Sequence[Webhook], event: WebhookEvent, told: Mapping[str, object]) -> None:
+def _add_deliveries(
+    session: Session, hooks: Sequence[Webhook], event: WebhookEvent, told: Mapping[str, object]
+) -> None:
     for hook in hooks:
         if event.value in hook.events:
             at = now(session)

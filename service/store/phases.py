@@ -30,13 +30,13 @@ SPANS: Mapping[str, tuple[str, str]] = MappingProxyType(
 )
 
 
-def written(moments: Mapping[str, datetime | None]) -> dict[str, str]:
+def encode_times(moments: Mapping[str, datetime | None]) -> dict[str, str]:
     """Return the times as stored: ISO 8601 by name, in order, without those that are None."""
     present = {name: moments.get(name) for name in NAMES}
     return {name: moment.isoformat() for name, moment in present.items() if moment is not None}
 
 
-def durations(stored: Any) -> dict[str, timedelta]:
+def compute_durations(stored: Any) -> dict[str, timedelta]:
     """Return the duration of each span in ``SPANS`` with both ends stored."""
     moments = {name: datetime.fromisoformat(text) for name, text in dict(stored or {}).items() if name in NAMES}
     return {

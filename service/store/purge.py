@@ -29,7 +29,7 @@ from service.store.web_tables import (
     Tryout,
 )
 from sim.errors import UsageError
-from submissions.names import shown_name
+from submissions.student_names import normalise_name
 
 _TEMPORARY = MetaData()
 #: Ids of submissions and enrolments to remove; there may be more than a statement accepts as parameters.
@@ -42,7 +42,7 @@ _leaving = select(_LEAVING.c.id)
 
 
 @dataclass(frozen=True, slots=True)
-class Purged:
+class PurgeCounts:
     """Numbers of removed rows, or of rows that would be removed."""
 
     submissions: int
@@ -51,9 +51,9 @@ class Purged:
 
 
 @retry_conflicts
-def purge(
+def purge_submissions(
     store: Store, before: datetime, actor: str, *, course_id: int | None = None, only_count: bool = False
-) -> Purged:
+) -> PurgeCounts:
     """Remove the submissions accepted before a moment, with their results, and students without remaining submissions.
 
     Applies to all courses or to one. Unfinished submissions and the sources of later copies are kept. With
@@ -61,12 +61,12 @@ def purge(
     """
     with store.transaction() as session:
         _TEMPORARY.create_all(session.connection())
-        _choose(session, before, course_id)
-        found = _found(session)
+        _mark_old_submissions(session, before, course_id)
+        found = _count_marked_rows(session)
         if found.submissions and not only_count:
-            _remove(session)
+            _delete_marked(session)
             detail = {"submissions": found.submissions, "grades": found.grades, "students": found.students}
-            audit.note(session, actor, "purged", "submission", f"before {before.isoformat()}", **detail)
+            audit.record_action(session, actor, "purged", "submission", f"before {before.isoformat()}", **detail)
         _TEMPORARY.drop_all(session.connection())
         return found
 
@@ -90,7 +90,7 @@ def has_submitted(session: Session, enrolment_id: int, without: Set[str] = froze
     return session.scalar(own.limit(1)) is not None
 
 
-def erase_student(session: Session, enrolment_id: int, actor: str) -> Purged:
+def erase_student(session: Session, enrolment_id: int, actor: str) -> PurgeCounts:
     """Remove all data of one student of a course: submissions, results and personal data.
 
     A person with other courses is removed only from this one. Grades copied from the student's are kept. The caller
@@ -109,24 +109,24 @@ def erase_student(session: Session, enrolment_id: int, actor: str) -> Purged:
     own = select(SubmissionRow.id).where(SubmissionRow.enrolment_id == enrolment_id)
     session.execute(insert(_GOING).from_select(["id"], own))
     session.execute(insert(_LEAVING).values(id=enrolment_id))
-    found = _found(session)
-    _forget_names(session, enrolment)
-    _remove(session)
+    found = _count_marked_rows(session)
+    _erase_names(session, enrolment)
+    _delete_marked(session)
     detail = {"submissions": found.submissions, "grades": found.grades}
-    audit.note(session, actor, "erased", "enrolment", str(enrolment_id), **detail)
+    audit.record_action(session, actor, "erased", "enrolment", str(enrolment_id), **detail)
     _TEMPORARY.drop_all(session.connection())
     return found
 
 
-def _found(session: Session) -> Purged:
+def _count_marked_rows(session: Session) -> PurgeCounts:
     grades = select(func.count()).select_from(Job).where(Job.submission_id.in_(_going))
-    return Purged(_count(session, _GOING), session.scalar(grades) or 0, _count(session, _LEAVING))
+    return PurgeCounts(_count_rows(session, _GOING), session.scalar(grades) or 0, _count_rows(session, _LEAVING))
 
 
-def _forget_names(session: Session, enrolment: Enrolment) -> None:
+def _erase_names(session: Session, enrolment: Enrolment) -> None:
     """Remove a student's name from other rows: rejections of batches, and the activity log."""
     for batch in session.scalars(select(Batch).where(Batch.course_id == enrolment.course_id)):
-        kept = [each for each in batch.refusals if shown_name(each["student"]["id"]) != enrolment.student]
+        kept = [each for each in batch.refusals if normalise_name(each["student"]["id"]) != enrolment.student]
         if len(kept) < len(batch.refusals):
             batch.refusals = kept
     of_course = (Audit.subject == "course", Audit.subject_id == str(enrolment.course_id))
@@ -137,7 +137,7 @@ def _forget_names(session: Session, enrolment: Enrolment) -> None:
     session.execute(update(Audit).where(by_them).values(actor=f"{_ERASED} (person {enrolment.person_id})"))
 
 
-def _choose(session: Session, before: datetime, course_id: int | None) -> None:
+def _mark_old_submissions(session: Session, before: datetime, course_id: int | None) -> None:
     unfinished = select(Job.submission_id).where(Job.state.in_(UNFINISHED))
     old = select(SubmissionRow.id).where(SubmissionRow.created_at < before, SubmissionRow.id.not_in(unfinished))
     if course_id is not None:
@@ -158,7 +158,7 @@ def _choose(session: Session, before: datetime, course_id: int | None) -> None:
     session.execute(insert(_LEAVING).from_select(["id"], losing.except_(keeping)))
 
 
-def _remove(session: Session) -> None:
+def _delete_marked(session: Session) -> None:
     of_them = Job.submission_id.in_(_going)
     theirs = select(Job.id).where(of_them)
     copies = or_(of_them, Job.copied_from.in_(theirs))
@@ -206,5 +206,5 @@ def _sign_out_leaving(session: Session) -> None:
     session.execute(ended.execution_options(synchronize_session=False))
 
 
-def _count(session: Session, table: Table) -> int:
+def _count_rows(session: Session, table: Table) -> int:
     return session.scalar(select(func.count()).select_from(table)) or 0

@@ -11,12 +11,12 @@ from sqlalchemy import select
 from sqlalchemy.engine import Connection
 
 from service.store.engine import open_engine
-from service.store.migrate import migrate
+from service.store.migrate import apply_migrations
 from service.store.models import SchemaCompatibility
-from service.store.new_database import BETWEEN, RECORD
+from service.store.new_database import SCHEMA_FILE, STATEMENT_SEPARATOR
 
 
-def statements_of(connection: Connection) -> list[str]:
+def read_statements(connection: Connection) -> list[str]:
     """Return the statements that create the tables of a SQLite database, in order."""
     asked = "SELECT sql FROM sqlite_master WHERE sql IS NOT NULL ORDER BY rowid"
     return list(connection.exec_driver_sql(asked).scalars())
@@ -27,11 +27,11 @@ def write_schema() -> None:
     with tempfile.TemporaryDirectory() as folder:
         engine = open_engine(f"sqlite:///{folder}/new.db")
         with engine.begin() as connection:
-            migrate(connection)
+            apply_migrations(connection)
             oldest = connection.scalar(select(SchemaCompatibility.oldest_compatible))
             compatibility = f"INSERT INTO {SchemaCompatibility.__tablename__} VALUES (1, '{oldest}')"
-            statements = [*statements_of(connection), compatibility]
-            RECORD.write_text(BETWEEN.join(statements) + "\n", encoding="utf-8")
+            statements = [*read_statements(connection), compatibility]
+            SCHEMA_FILE.write_text(STATEMENT_SEPARATOR.join(statements) + "\n", encoding="utf-8")
         engine.dispose()
 
 

@@ -20,7 +20,7 @@ _OLDER_ADVICE = "robomark db upgrade"
 
 
 @cache
-def newest_revision() -> str:
+def find_newest_revision() -> str:
     """Return the newest revision that the running code knows, from the migrations' file names (``v0009_people.py``).
 
     Cached, because another release can be installed in the same place while this process runs.
@@ -39,24 +39,24 @@ class SchemaState:
     @property
     def is_usable(self) -> bool:
         """Return whether the running code can use the tables."""
-        return self.revision is not None and self.oldest_compatible <= newest_revision() <= self.revision
+        return self.revision is not None and self.oldest_compatible <= find_newest_revision() <= self.revision
 
     @property
     def problem(self) -> str:
         """Return the reason why the tables are unusable, with the fix; empty if they are usable."""
         if self.is_usable or self.revision is None:
             return ""
-        advice = _OLDER_ADVICE if self.revision < newest_revision() else _NEWER_ADVICE
-        return f"at revision {self.revision}, this Robomark at {newest_revision()}: {advice}"
+        advice = _OLDER_ADVICE if self.revision < find_newest_revision() else _NEWER_ADVICE
+        return f"at revision {self.revision}, this Robomark at {find_newest_revision()}: {advice}"
 
 
-def current_revision(engine: Engine) -> str | None:
+def load_current_revision(engine: Engine) -> str | None:
     """Return the revision of the database; None for an empty one."""
     with engine.begin() as connection:
-        return revision_of(connection)
+        return read_revision(connection)
 
 
-def revision_of(connection: Connection) -> str | None:
+def read_revision(connection: Connection) -> str | None:
     """Return the revision of the database within the caller's transaction; None for an empty one."""
     if not inspect(connection).has_table(_TABLE):
         return None
@@ -64,10 +64,10 @@ def revision_of(connection: Connection) -> str | None:
     return found
 
 
-def schema_state(engine: Engine) -> SchemaState:
+def load_schema_state(engine: Engine) -> SchemaState:
     """Return the revision of the database and its compatibility. Before 0017, only the same revision is compatible."""
     with engine.begin() as connection:
-        revision = revision_of(connection)
+        revision = read_revision(connection)
         oldest = None
         if revision is not None and inspect(connection).has_table(_COMPATIBILITY.name):
             oldest = connection.scalar(select(_COMPATIBILITY.c.oldest_compatible))
@@ -76,4 +76,4 @@ def schema_state(engine: Engine) -> SchemaState:
 
 def needs_newer_code(session: Session) -> bool:
     """Return whether a migration has made the tables unusable for the running code."""
-    return str(session.scalar(select(_COMPATIBILITY.c.oldest_compatible)) or "") > newest_revision()
+    return str(session.scalar(select(_COMPATIBILITY.c.oldest_compatible)) or "") > find_newest_revision()

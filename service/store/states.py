@@ -23,7 +23,7 @@ class CredentialKind(StrEnum):
     TOKEN = "token"  # for a program
 
 
-class Lane(StrEnum):
+class JobQueue(StrEnum):
     """The queue of a job: interactive for a person who waits, or batch."""
 
     INTERACTIVE = "interactive"
@@ -50,7 +50,7 @@ class CancelReason(StrEnum):
 UNFINISHED = (JobState.QUEUED, JobState.RUNNING)
 
 
-class TryoutState(StrEnum):
+class RunState(StrEnum):
     """The state of a test run."""
 
     QUEUED = "queued"

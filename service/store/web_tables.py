@@ -13,7 +13,7 @@ from sqlalchemy import CheckConstraint, ForeignKey, Index, LargeBinary, String
 from sqlalchemy.orm import Mapped, mapped_column
 
 from service.store.ids import LENGTH as ID_LENGTH
-from service.store.ids import new_id
+from service.store.ids import generate_id
 from service.store.models import Base
 from service.store.states import CredentialKind, Role
 
@@ -23,7 +23,7 @@ class Credential(Base):
 
     __tablename__ = "credential"
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=new_id)
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=generate_id)
     person_id: Mapped[int] = mapped_column(ForeignKey("person.id"), index=True)
     kind: Mapped[CredentialKind]
     sha256: Mapped[str] = mapped_column(String(64), unique=True)  # of the secret
@@ -111,7 +111,7 @@ class Tryout(Base):
     __tablename__ = "tryout"
     __table_args__ = (Index(None, "state", "queued_at"),)
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=new_id)
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=generate_id)
     enrolment_id: Mapped[int] = mapped_column(ForeignKey("enrolment.id"), index=True)
     assignment_version_id: Mapped[int] = mapped_column(ForeignKey("assignment_version.id"))
     packed: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
@@ -130,7 +130,7 @@ class Webhook(Base):
 
     __tablename__ = "webhook"
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=new_id)
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=generate_id)
     course_id: Mapped[int] = mapped_column(ForeignKey("course.id"), index=True)
     url: Mapped[str]
     secret: Mapped[str] = mapped_column(String(64))  # signs the deliveries
@@ -145,7 +145,7 @@ class Delivery(Base):
     __tablename__ = "delivery"
     __table_args__ = (Index(None, "delivered_at", "due_at"),)
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=new_id)
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=generate_id)
     webhook_id: Mapped[str] = mapped_column(ForeignKey("webhook.id"), index=True)
     event: Mapped[str]
     payload: Mapped[Any]
@@ -223,7 +223,7 @@ class LtiKey(Base):
 
     __tablename__ = "lti_key"
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=new_id)
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True, default=generate_id)
     private_pem: Mapped[str]
     created_at: Mapped[datetime]
 

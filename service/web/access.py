@@ -20,13 +20,13 @@ from service.operations.context import Actor
 from service.operations.sign_in import Identity
 from service.operations.types import CredentialKind, Role
 from service.web.context import Context
-from service.web.page_scopes import scope_of_page
+from service.web.page_scopes import find_page_scope
 from sim.errors import RobomarkError
 
 SESSION_COOKIE = "robomark"
 CSRF_FIELD = "csrf"
 CSRF_HEADER = "x-csrf-token"
-_SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
+_SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 #: Row numbers and names in paths, queries and forms, limited to values that every database accepts.
 HIGHEST_NUMBER = 2**31 - 1
 RowNumber = Annotated[int, Path(ge=1, le=HIGHEST_NUMBER)]
@@ -50,13 +50,13 @@ class Reader:
     link_key: bytes = field(repr=False)  # key for deriving the links that they create for others
 
     @property
-    def acting(self) -> Actor:
+    def actor(self) -> Actor:
         """Return the reader as an actor for operations."""
-        return actor_from(self.identity)
+        return build_actor(self.identity)
 
 
 @dataclass(frozen=True, slots=True)
-class InCourse:
+class ReaderInCourse:
     """A reader with a role in a course."""
 
     reader: Reader
@@ -65,12 +65,12 @@ class InCourse:
     appeals: int = 0  # number of open appeals, for instructors
 
     @property
-    def acting(self) -> Actor:
+    def actor(self) -> Actor:
         """Return the reader as an actor for operations."""
-        return self.reader.acting
+        return self.reader.actor
 
 
-def actor_from(identity: Identity) -> Actor:
+def build_actor(identity: Identity) -> Actor:
     """Return the actor for a signed-in person."""
     return Actor(
         f"{identity.name} (person {identity.person_id})",
@@ -82,32 +82,36 @@ def actor_from(identity: Identity) -> Actor:
     )
 
 
-def csrf_word(session_secret: str) -> str:
+def derive_csrf_token(session_secret: str) -> str:
     """Return the CSRF token for a session. It does not reveal the session's secret."""
-    return _following(session_secret, b"robomark csrf").hex()
+    return _derive_key(session_secret, b"robomark csrf").hex()
 
 
-def _following(session_secret: str, what: bytes) -> bytes:
+def _derive_key(session_secret: str, what: bytes) -> bytes:
     return hmac.digest(session_secret.encode(), what, "sha256")
 
 
-def reader_of(request: Request, context: Context) -> Reader | None:
+def find_reader(request: Request, context: Context) -> Reader | None:
     """Return the signed-in reader, or None."""
     secret = request.cookies.get(SESSION_COOKIE, "")
     if not secret:
         return None
     identity = sign_in.identify(context.service, secret, CredentialKind.SESSION)
-    return None if identity is None else Reader(identity, csrf_word(secret), _following(secret, b"robomark links"))
+    return (
+        None
+        if identity is None
+        else Reader(identity, derive_csrf_token(secret), _derive_key(secret, b"robomark links"))
+    )
 
 
-MaybeReader = Annotated[Reader | None, Depends(reader_of)]
+OptionalReader = Annotated[Reader | None, Depends(find_reader)]
 
 
-def _signed_in(request: Request, reader: MaybeReader, context: Context) -> Reader:
+def _require_sign_in(request: Request, reader: OptionalReader, context: Context) -> Reader:
     if reader is None:
         raise SignInNeeded("sign in first")
     context.limits.page_calls.spend(str(reader.identity.person_id))
-    needed = scope_of_page(request.method, request.scope["route"].path)
+    needed = find_page_scope(request.method, request.scope["route"].path)
     if reader.identity.scopes is not None and needed is not None and needed not in reader.identity.scopes:
         raise HTTPException(
             403,
@@ -116,18 +120,18 @@ def _signed_in(request: Request, reader: MaybeReader, context: Context) -> Reade
     return reader
 
 
-SignedIn = Annotated[Reader, Depends(_signed_in)]
+SignedInReader = Annotated[Reader, Depends(_require_sign_in)]
 
 
-async def same_site(request: Request, reader: MaybeReader) -> None:
+async def check_same_site(request: Request, reader: OptionalReader) -> None:
     """Reject changes that other sites send, by the CSRF token and the browser's origin headers.
 
     Raises:
         HTTPException: 403 if the request comes from another site or its CSRF token is wrong.
     """
-    if request.method in _SAFE:
+    if request.method in _SAFE_METHODS:
         return
-    if not _is_from_here(request):
+    if not _is_same_origin(request):
         raise HTTPException(
             403, translatable("This request came from another website. Open the page in Robomark, and try again.")
         )
@@ -145,7 +149,7 @@ async def same_site(request: Request, reader: MaybeReader) -> None:
         )
 
 
-def _is_from_here(request: Request) -> bool:
+def _is_same_origin(request: Request) -> bool:
     """Return whether the browser reports this site as the request's origin.
 
     Older browsers send only ``Origin``. Clients that send neither header are accepted.
@@ -161,28 +165,28 @@ def _is_from_here(request: Request) -> bool:
     return origin.lower() in {public.lower(), f"http://{here}", f"https://{here}"} - {""}
 
 
-def nothing_here() -> HTTPException:
+def build_not_found() -> HTTPException:
     """Return the 404 response for objects that do not exist or that the reader may not see."""
     return HTTPException(404, translatable("There is no such page or item, or you have no access to it."))
 
 
-def _instructing(course_id: RowNumber, reader: SignedIn, context: Context) -> InCourse:
-    course = courses.show_taught(context.service, reader.acting, course_id)
-    return InCourse(reader, course.id, course.name, course.open_appeals)
+def _require_instructor(course_id: RowNumber, reader: SignedInReader, context: Context) -> ReaderInCourse:
+    course = courses.show_taught(context.service, reader.actor, course_id)
+    return ReaderInCourse(reader, course.id, course.name, course.open_appeals)
 
 
-def _studying(course_id: RowNumber, reader: SignedIn, context: Context) -> InCourse:
-    course = courses.show_own(context.service, reader.acting, course_id, Role.STUDENT)
-    return InCourse(reader, course.id, course.name)
+def _require_student(course_id: RowNumber, reader: SignedInReader, context: Context) -> ReaderInCourse:
+    course = courses.show_own(context.service, reader.actor, course_id, Role.STUDENT)
+    return ReaderInCourse(reader, course.id, course.name)
 
 
-def _operating(reader: SignedIn) -> Reader:
+def _require_operator(reader: SignedInReader) -> Reader:
     if not reader.identity.operator:
-        raise nothing_here()
+        raise build_not_found()
     return reader
 
 
 #: An instructor of the course in the path, a student of it, and an operator.
-Instructing = Annotated[InCourse, Depends(_instructing)]
-Studying = Annotated[InCourse, Depends(_studying)]
-Operating = Annotated[Reader, Depends(_operating)]
+CourseInstructor = Annotated[ReaderInCourse, Depends(_require_instructor)]
+CourseStudent = Annotated[ReaderInCourse, Depends(_require_student)]
+OperatorReader = Annotated[Reader, Depends(_require_operator)]

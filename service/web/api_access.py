@@ -16,10 +16,10 @@ from service.operations.context import Actor
 from service.operations.scopes import SCOPES
 from service.operations.sign_in import Identity
 from service.operations.types import CredentialKind, Role
-from service.web.access import RowNumber, SignInNeeded, actor_from, nothing_here
+from service.web.access import RowNumber, SignInNeeded, build_actor, build_not_found
 from service.web.context import Context
 
-#: Describes the authentication in the OpenAPI document. ``caller_of`` checks the token.
+#: Describes the authentication in the OpenAPI document. ``require_caller`` checks the token.
 bearer = HTTPBearer(auto_error=False, description="A token from `/account` or `robomark user token`.")
 
 
@@ -30,9 +30,9 @@ class Caller:
     identity: Identity
 
     @property
-    def acting(self) -> Actor:
+    def actor(self) -> Actor:
         """Return the caller as an actor for operations."""
-        return actor_from(self.identity)
+        return build_actor(self.identity)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +43,12 @@ class CallerInCourse:
     course_id: int
 
     @property
-    def acting(self) -> Actor:
+    def actor(self) -> Actor:
         """Return the caller as an actor for operations."""
-        return self.caller.acting
+        return self.caller.actor
 
 
-def caller_of(request: Request, context: Context) -> Caller:
+def require_caller(request: Request, context: Context) -> Caller:
     """Return the owner of the request's token.
 
     Raises:
@@ -63,22 +63,22 @@ def caller_of(request: Request, context: Context) -> Caller:
         raise SignInNeeded("the token is invalid or has expired")
     context.limits.api_calls.spend(identity.credential_id)
     if not identity.use_is_noted:
-        sign_in.note_use(context.service, identity)
+        sign_in.record_use(context.service, identity)
     return Caller(identity)
 
 
-def _called(request: Request, context: Context, _told: Annotated[object, Depends(bearer)]) -> Caller:
-    return caller_of(request, context)
+def _require_caller(request: Request, context: Context, _told: Annotated[object, Depends(bearer)]) -> Caller:
+    return require_caller(request, context)
 
 
-Called = Annotated[Caller, Depends(_called)]
+AuthenticatedCaller = Annotated[Caller, Depends(_require_caller)]
 
 
-def with_scope(scope: str) -> Callable[[Caller], Caller]:
+def require_scope(scope: str) -> Callable[[Caller], Caller]:
     """Return a dependency that requires a token scope. Use as ``Depends(with_scope("read"))``."""
     assert scope in SCOPES
 
-    def caller(caller: Called) -> Caller:
+    def caller(caller: AuthenticatedCaller) -> Caller:
         if caller.identity.scopes is None or scope not in caller.identity.scopes:
             raise HTTPException(403, f"This token does not have the scope {scope}.")
         return caller
@@ -86,24 +86,24 @@ def with_scope(scope: str) -> Callable[[Caller], Caller]:
     return caller
 
 
-def in_course(role: Role, scope: str) -> Callable[[int, Caller, Context], CallerInCourse]:
+def require_role(role: Role, scope: str) -> Callable[[int, Caller, Context], CallerInCourse]:
     """Return a dependency that requires a role in the path's course and a token scope."""
-    scoped = with_scope(scope)
+    scoped = require_scope(scope)
 
-    def caller_in_course(course_id: RowNumber, caller: Called, context: Context) -> CallerInCourse:
-        course = courses.show_own(context.service, caller.acting, course_id, role)
+    def caller_in_course(course_id: RowNumber, caller: AuthenticatedCaller, context: Context) -> CallerInCourse:
+        course = courses.show_own(context.service, caller.actor, course_id, role)
         return CallerInCourse(scoped(caller), course.id)
 
     return caller_in_course
 
 
-def operating(scope: str) -> Callable[[Caller], Caller]:
+def require_operator(scope: str) -> Callable[[Caller], Caller]:
     """Return a dependency that requires an operator and a token scope."""
-    scoped = with_scope(scope)
+    scoped = require_scope(scope)
 
-    def operator(caller: Called) -> Caller:
+    def operator(caller: AuthenticatedCaller) -> Caller:
         if not caller.identity.operator:
-            raise nothing_here()
+            raise build_not_found()
         return scoped(caller)
 
     return operator

@@ -13,7 +13,7 @@ from fastapi.openapi.utils import get_openapi
 from service.web.api_routes import KEY_HEADER, LONGEST_KEY
 from service.web.request_bodies import LARGEST_FORM, MEGABYTE
 
-_ABOUT = f"""
+_DESCRIPTION = f"""
 The API covers all functions of the pages.
 
 **Authentication**: send a token from `/account` or `robomark user token` as `Authorization: Bearer rmt_...`. A token
@@ -51,7 +51,7 @@ _PROBLEM = {
         }
     ],
 }
-_ALWAYS = {
+_COMMON_ERRORS = {
     "400": "The body does not match its content type.",
     "401": "The token is missing, invalid or expired.",
     "403": "The token does not have the scope.",
@@ -60,12 +60,12 @@ _ALWAYS = {
     "429": "Too many requests; wait for the seconds in `Retry-After`.",
     "503": "The database or the service failed; check whether the change was saved before you try again.",
 }
-_OF_CHANGES = {
+_CHANGE_ERRORS = {
     "409": "The first request with this key is still in progress.",
     "413": "The body is too large.",
     "415": "The body has an unexpected content type.",
 }
-_KEY = {
+_KEY_PARAMETER = {
     "name": KEY_HEADER.title(),
     "in": "header",
     "required": False,
@@ -74,17 +74,17 @@ _KEY = {
 }
 
 
-def described(app: FastAPI) -> dict[str, Any]:
+def build_openapi(app: FastAPI) -> dict[str, Any]:
     """Return the OpenAPI document. It is generated once."""
     if app.openapi_schema is None:
-        found = get_openapi(title="Robomark", version=app.version, description=_ABOUT.strip(), routes=app.routes)
+        found = get_openapi(title="Robomark", version=app.version, description=_DESCRIPTION.strip(), routes=app.routes)
         schemas = found.setdefault("components", {}).setdefault("schemas", {})
         schemas["Problem"] = _PROBLEM
         for unused in ("HTTPValidationError", "ValidationError"):
             schemas.pop(unused, None)
         for operations in found["paths"].values():
             for method, operation in operations.items():
-                _complete(method, operation)
+                _add_error_responses(method, operation)
         for schema in schemas.values():
             # FastAPI omits null values, in examples too.
             for example in schema.get("examples", ()):
@@ -93,10 +93,10 @@ def described(app: FastAPI) -> dict[str, Any]:
     return app.openapi_schema
 
 
-def _complete(method: str, operation: dict[str, Any]) -> None:
-    sentences = _ALWAYS | (_OF_CHANGES if method != "get" else {})
+def _add_error_responses(method: str, operation: dict[str, Any]) -> None:
+    sentences = _COMMON_ERRORS | (_CHANGE_ERRORS if method != "get" else {})
     content = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
     for status, sentence in sentences.items():
         operation["responses"][status] = {"description": sentence, "content": content}
     if method == "post" and not operation.pop("x-no-key", False):
-        operation.setdefault("parameters", []).append(_KEY)
+        operation.setdefault("parameters", []).append(_KEY_PARAMETER)

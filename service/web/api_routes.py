@@ -24,12 +24,12 @@ from starlette.types import Message, Receive
 
 from service.operations import replies
 from service.operations.database_errors import DatabaseError
-from service.operations.replies import InProgress, KeptReply
+from service.operations.replies import InProgress, StoredReply
 from service.operations.sign_in import Identity
-from service.web.api_access import caller_of
+from service.web.api_access import require_caller
 from service.web.context import WebContext
 from sim.readers.json_text import read_json
-from sim.readers.unreadable import Unreadable
+from sim.readers.reader_errors import UnreadableDataError
 
 _log = structlog.get_logger(__name__)
 KEY_HEADER = "idempotency-key"
@@ -40,7 +40,7 @@ _MOST_VALUES = 20_000
 NO_KEY: Mapping[str, Any] = MappingProxyType({"x-no-key": True})
 _Item = TypeVar("_Item")
 #: Responses of a route for the OpenAPI document, by status.
-Described = dict[int | str, dict[str, Any]]
+ResponseDescriptions = dict[int | str, dict[str, Any]]
 
 Limit = Annotated[int, Query(ge=1, le=200, description="Maximum number of items.")]
 After = Annotated[
@@ -55,7 +55,7 @@ class Listed(BaseModel, Generic[_Item]):
     next: str | None = Field(description="Value of `after` for the next page; null on the last page.", default=None)
 
 
-def page_of(
+def build_list_page(
     found: Sequence[_Item], limit: int, place: Callable[[_Item], Sequence[str | int | datetime]]
 ) -> Listed[_Item]:
     """Return a page of a list.
@@ -66,26 +66,26 @@ def page_of(
         place: Returns the sort key of an item, which the next page starts after.
     """
     more = len(found) > limit
-    return Listed(items=list(found[:limit]), next=_cursor(place(found[limit - 1])) if more else None)
+    return Listed(items=list(found[:limit]), next=_encode_cursor(place(found[limit - 1])) if more else None)
 
 
-def _cursor(place: Sequence[str | int | datetime]) -> str:
+def _encode_cursor(place: Sequence[str | int | datetime]) -> str:
     told = [part.isoformat() if isinstance(part, datetime) else part for part in place]
     return base64.urlsafe_b64encode(json.dumps(told).encode()).decode().rstrip("=")
 
 
-def place_after(after: str, *kinds: type) -> tuple[Any, ...] | None:
+def decode_cursor(after: str, *kinds: type) -> tuple[Any, ...] | None:
     """Return the sort key in a cursor, or None for the first page. Raises HTTPException 422 for an invalid cursor."""
     if not after:
         return None
     try:
         place = read_json(base64.b64decode(after + "=" * (-len(after) % 4), altchars=b"-_", validate=True))
-        return tuple(_part(part, kind) for part, kind in zip(place, kinds, strict=True))
+        return tuple(_parse_cursor_part(part, kind) for part, kind in zip(place, kinds, strict=True))
     except (ValueError, TypeError, OverflowError):
         raise HTTPException(422, "after: expected the `next` of the previous page.") from None
 
 
-def _part(part: object, kind: type) -> object:
+def _parse_cursor_part(part: object, kind: type) -> object:
     if kind is datetime and isinstance(part, str):
         return datetime.fromisoformat(part).astimezone(UTC)
     if type(part) is not kind or (isinstance(part, int) and not 0 <= part < 2**31):
@@ -93,7 +93,7 @@ def _part(part: object, kind: type) -> object:
     return part
 
 
-def tagged(request: Request, body: bytes, media_type: str, **headers: str) -> Response:
+def respond_with_etag(request: Request, body: bytes, media_type: str, **headers: str) -> Response:
     """Return the response with an entity tag, or 304 without a body if the client already has this version."""
     tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
     told = {"etag": tag, "cache-control": "private, no-cache", **headers}
@@ -111,7 +111,7 @@ class ApiRequest(Request):
         if not hasattr(self, "_json"):
             try:
                 self._json = await run_in_threadpool(read_json, await self.body(), most_values=_MOST_VALUES)
-            except Unreadable as error:
+            except UnreadableDataError as error:
                 raise HTTPException(422, f"The JSON of the body cannot be read: {error}.") from None
         return self._json
 
@@ -128,7 +128,7 @@ class RepeatableRoute(APIRoute):
             key = request.headers.get(KEY_HEADER)
             if key is None or request.method != "POST" or NO_KEY.keys() <= (self.openapi_extra or {}).keys():
                 return await run(request)
-            return await _once(request, key, run)
+            return await _run_once(request, key, run)
 
         return handler
 
@@ -138,47 +138,47 @@ def api_router(tag: str) -> APIRouter:
     return APIRouter(tags=[tag], route_class=RepeatableRoute)
 
 
-async def _once(request: Request, key: str, run: Callable[[Request], Awaitable[Response]]) -> Response:
+async def _run_once(request: Request, key: str, run: Callable[[Request], Awaitable[Response]]) -> Response:
     if not 0 < len(key) <= LONGEST_KEY or not key.isascii() or not key.isprintable():
         raise HTTPException(422, f"Idempotency-Key: expected from 1 to {LONGEST_KEY} printable characters.")
     context: WebContext = request.app.state.context
-    caller = await run_in_threadpool(caller_of, request, context)
+    caller = await run_in_threadpool(require_caller, request, context)
     # The role is part of the key: after a change of role, the request runs again and is checked again.
-    mine = (context.service, caller.acting, f"{_standing(request, caller.identity)} {key}")
-    hashed = _Hashed(request)
+    mine = (context.service, caller.actor, f"{_format_role_key(request, caller.identity)} {key}")
+    hashed = _HashedRequest(request)
     try:
-        known = await run_in_threadpool(replies.begin, *mine)
+        known = await run_in_threadpool(replies.reserve_key, *mine)
     except InProgress:
         raise HTTPException(
             409, "The first request with this Idempotency-Key is still in progress.", {"retry-after": "5"}
         ) from None
     if known is not None:
-        if await hashed.whole() != known.request_sha256:
+        if await hashed.finish_hash() != known.request_sha256:
             raise HTTPException(422, "Idempotency-Key: another request used this key; expected a new key.")
         media_type = "application/json" if known.body else None
         return Response(known.body, known.status, {"idempotent-replay": "true"}, media_type)
     try:
         answer = await run(ApiRequest(request.scope, hashed.receive))
     except BaseException:
-        await run_in_threadpool(replies.forget, *mine)
+        await run_in_threadpool(replies.release_key, *mine)
         raise
-    reply = KeptReply(await hashed.whole(), answer.status_code, bytes(answer.body))
+    reply = StoredReply(await hashed.finish_hash(), answer.status_code, bytes(answer.body))
     try:
-        await run_in_threadpool(replies.keep, *mine, reply)
+        await run_in_threadpool(replies.store_reply, *mine, reply)
     except DatabaseError as error:
         # The request has succeeded, so the client gets its response. Repetitions are rejected until the key expires.
         _log.error("web.reply_not_kept", path=request.url.path, error=str(error))
     return answer
 
 
-def _standing(request: Request, identity: Identity) -> str:
+def _format_role_key(request: Request, identity: Identity) -> str:
     """Return the caller's role in the path's course, and ``operator`` for operators, as part of the key."""
     course = str(request.path_params.get("course_id", ""))
     role = identity.roles.get(int(course)) if course.isdecimal() and len(course) < 20 else None
     return f"{role or ''}{' operator' if identity.operator else ''}"
 
 
-class _Hashed:
+class _HashedRequest:
     """A request that computes a hash of method, address and body while the body is read."""
 
     def __init__(self, request: Request) -> None:
@@ -196,7 +196,7 @@ class _Hashed:
             self._ended = True
         return message
 
-    async def whole(self) -> str:
+    async def finish_hash(self) -> str:
         """Read the rest of the body and return the hash."""
         while not self._ended:
             await self.receive()

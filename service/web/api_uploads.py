@@ -14,7 +14,7 @@ from fastapi import Depends, Request
 from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
 
-from submissions.raw_files import MAX_FILES, MAX_TOTAL_BYTES, MEGABYTE, SentFile
+from submissions.raw_files import MAX_FILES, MAX_TOTAL_BYTES, MEGABYTE, UploadedFile
 
 #: Maximum size of each kind of upload. The readers of the files limit their contents.
 LARGEST_BATCH = 200 * MEGABYTE
@@ -22,16 +22,16 @@ LARGEST_ASSIGNMENT = 130 * MEGABYTE
 LARGEST_SUBMISSION = MAX_TOTAL_BYTES + 2 * MEGABYTE
 LARGEST_TABLE = 11 * MEGABYTE
 _ZIP = "application/zip"
-_ZIPS = (_ZIP, "application/x-zip-compressed", "application/octet-stream")
+_ZIP_TYPES = (_ZIP, "application/x-zip-compressed", "application/octet-stream")
 #: OpenAPI description of a body that is a zip.
 ZIP_BODY: dict[str, Any] = {
     "requestBody": {"required": True, "content": {_ZIP: {"schema": {"type": "string", "format": "binary"}}}}
 }
 
 
-async def _uploaded(request: Request) -> AsyncIterator[Path]:
+async def _receive_zip(request: Request) -> AsyncIterator[Path]:
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    if kind not in _ZIPS:
+    if kind not in _ZIP_TYPES:
         raise HTTPException(415, f"Expected a zip, sent as {_ZIP}; this is {kind[:100] or 'of no type'}.")
     with tempfile.TemporaryDirectory(prefix="robomark-upload-") as folder:
         path = Path(folder) / "upload.zip"
@@ -42,7 +42,7 @@ async def _uploaded(request: Request) -> AsyncIterator[Path]:
 
 
 #: An uploaded zip. Put it after the permission dependency, so that only permitted uploads are read.
-Uploaded = Annotated[Path, Depends(_uploaded)]
+UploadedZip = Annotated[Path, Depends(_receive_zip)]
 
 _FORM = "multipart/form-data"
 SENT_BODY: dict[str, Any] = {
@@ -63,14 +63,14 @@ SENT_BODY: dict[str, Any] = {
 }
 
 
-async def _sent(request: Request) -> AsyncIterator[Sequence[SentFile]]:
+async def _receive_files(request: Request) -> AsyncIterator[Sequence[UploadedFile]]:
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind != _FORM:
         raise HTTPException(415, f"Expected files as {_FORM}; this is {kind[:100] or 'of no type'}.")
     async with request.form(max_files=MAX_FILES, max_fields=10) as form:
         found = [each for each in form.getlist("files") if isinstance(each, UploadFile)]
-        yield [SentFile(each.filename or "", each.file) for each in found]
+        yield [UploadedFile(each.filename or "", each.file) for each in found]
 
 
 #: The files of an uploaded form. The same order applies.
-Sent = Annotated[Sequence[SentFile], Depends(_sent)]
+SentFiles = Annotated[Sequence[UploadedFile], Depends(_receive_files)]

@@ -24,15 +24,15 @@ from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.version import GRADER_VERSION
 from service.web import api, pages
-from service.web.access import same_site
-from service.web.api_description import described
+from service.web.access import check_same_site
+from service.web.api_description import build_openapi
 from service.web.context import WebContext
 from service.web.errors import add_error_pages
-from service.web.metrics import metrics_text
+from service.web.metrics import render_metrics
 from service.web.rate_limits import RateLimit, RateLimits
-from service.web.rendering import static_files
-from service.web.request_bodies import BodyGate
-from service.web.security import Guarded
+from service.web.rendering import load_static_files
+from service.web.request_bodies import BodyLimitMiddleware
+from service.web.security import SecurityMiddleware
 
 
 def make_app(settings: Settings, store: Store) -> FastAPI:
@@ -44,38 +44,38 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
         docs_url=None,
         redoc_url=None,
         openapi_url="/api/openapi.json",
-        routes=list(_pages_and_api().routes),
+        routes=list(_collect_routes().routes),
     )
     app.router.redirect_slashes = False
     calls = settings.api_calls_per_minute
     limits = RateLimits(api_calls=RateLimit(round(calls), calls), page_calls=RateLimit(round(calls), calls))
     service = Service(settings, store, Notifier(make_celery(settings), store, settings))
     app.state.context = WebContext(service, limits)
-    app.add_middleware(BodyGate)
-    app.add_middleware(Guarded, public_url=settings.public_url, probe_hosts=settings.probe_hosts)
+    app.add_middleware(BodyLimitMiddleware)
+    app.add_middleware(SecurityMiddleware, public_url=settings.public_url, probe_hosts=settings.probe_hosts)
     add_error_pages(app)
     _add_probes(app, service)
 
     @app.get("/static/{name}", include_in_schema=False)
     def static(name: str) -> Response:
         """Return a static file. Its name contains its hash, so caches can store it for ever."""
-        if name not in static_files():
+        if name not in load_static_files():
             raise HTTPException(404, translatable("This file does not exist."))
-        media_type, data = static_files()[name]
+        media_type, data = load_static_files()[name]
         return Response(data, media_type=media_type, headers={"cache-control": "public, max-age=31536000, immutable"})
 
-    app.openapi = partial(described, app)  # type: ignore[method-assign]
+    app.openapi = partial(build_openapi, app)  # type: ignore[method-assign]
     return app
 
 
 @cache
-def _pages_and_api() -> APIRouter:
+def _collect_routes() -> APIRouter:
     """Return the routes of all modules. They are cached, because creating them takes half a second."""
     all_routes = APIRouter()
     for module in pkgutil.iter_modules(pages.__path__, f"{pages.__name__}."):
         found = importlib.import_module(module.name)
         if router := getattr(found, "router", None):
-            all_routes.include_router(router, dependencies=[Depends(same_site)], include_in_schema=False)
+            all_routes.include_router(router, dependencies=[Depends(check_same_site)], include_in_schema=False)
         if router := getattr(found, "cross_site_router", None):
             all_routes.include_router(router, include_in_schema=False)
     for module in pkgutil.iter_modules(api.__path__, f"{api.__name__}."):
@@ -102,6 +102,6 @@ def _add_probes(app: FastAPI, service: Service) -> None:
     def metrics() -> Response:
         """Return the metrics of the whole service for Prometheus."""
         try:
-            return Response(metrics_text(service), media_type=CONTENT_TYPE_LATEST)
+            return Response(render_metrics(service), media_type=CONTENT_TYPE_LATEST)
         except DatabaseError:
             return PlainTextResponse("the database does not respond\n", status_code=503)

@@ -9,13 +9,13 @@ from urllib.parse import quote
 from fastapi.responses import Response
 
 #: Maximum length of a file name. A character takes up to twelve bytes, and proxies limit headers to a few kilobytes.
-_LONGEST = 150
+_LONGEST_NAME = 150
 
 
-def attachment(data: bytes, name: str, media_type: str = "application/octet-stream") -> Response:
+def respond_with_attachment(data: bytes, name: str, media_type: str = "application/octet-stream") -> Response:
     """Return a response that the browser saves as a file. Any ``name`` is allowed; long names are shortened."""
     suffix = PurePosixPath(name).suffix[:20]
-    name = name if len(name) <= _LONGEST else name[: _LONGEST - len(suffix)] + suffix
+    name = name if len(name) <= _LONGEST_NAME else name[: _LONGEST_NAME - len(suffix)] + suffix
     plain = re.sub(r"[^\w.-]+", "_", name, flags=re.ASCII).lstrip(".") or "file"
     whole = quote(name.encode("utf-8", "replace"), safe="")
     disposition = f"attachment; filename=\"{plain}\"; filename*=UTF-8''{whole}"

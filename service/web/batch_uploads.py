@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from service.operations.batches import assignment_for
+from service.operations.batches import find_batch_assignment
 from service.operations.context import Actor
 from service.web.context import WebContext
-from service.web.refusing import Declined
+from service.web.http_errors import TranslatableHTTPException
 from sim.sentences import Sentence
 from submissions.batch_folder import BatchContents, read_batch_for
 from submissions.student_identity import People
@@ -35,10 +35,12 @@ def read_upload(
         UsageError: The upload cannot be read.
         HTTPException: 503 if another upload is being read.
     """
-    asked = assignment_for(context.service, actor, course_id, assignment)
+    asked = find_batch_assignment(context.service, actor, course_id, assignment)
     # One at a time, because an upload may need gigabytes of temporary disk space.
     if not context.unpacking.acquire(timeout=_UNPACKING_SECONDS):
-        raise Declined(503, Sentence("Another upload is in progress. Try again in a minute."), {"retry-after": "60"})
+        raise TranslatableHTTPException(
+            503, Sentence("Another upload is in progress. Try again in a minute."), {"retry-after": "60"}
+        )
     try:
         return read_batch_for(path, asked, people)
     finally:

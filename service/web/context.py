@@ -28,10 +28,10 @@ class WebContext:
         return self.service.settings
 
 
-def _context(request: Request) -> WebContext:
+def _read_context(request: Request) -> WebContext:
     found = request.app.state.context
     assert isinstance(found, WebContext)
     return found
 
 
-Context = Annotated[WebContext, Depends(_context)]
+Context = Annotated[WebContext, Depends(_read_context)]

@@ -14,24 +14,24 @@ from fastapi.responses import RedirectResponse, Response
 from starlette.exceptions import HTTPException
 
 from service.language import ENGLISH, Language
-from service.lti.fetching import PlatformError
+from service.lti.platform_requests import PlatformError
 from service.operations.database_errors import DatabaseError, DatabaseFailure, classify
 from service.operations.errors import Conflict, Forbidden, NotFound
-from service.web.access import SignInNeeded, reader_of
-from service.web.language import language_of
-from service.web.problems import API, problem
-from service.web.refusing import said_in
-from service.web.rendering import page
+from service.web.access import SignInNeeded, find_reader
+from service.web.http_errors import extract_message
+from service.web.language import detect_language
+from service.web.problems import API_PREFIX, respond_with_problem
+from service.web.rendering import render_page
 from sim.errors import HostError, RobomarkError, UsageError
 from sim.sentences import Sentence
 
 _log = structlog.get_logger(__name__)
 #: Messages for the router's own errors: unknown paths and methods.
-_OF_THE_ROUTER = {
+_ROUTER_ERRORS = {
     (404, "Not Found"): Sentence("There is no such page or item, or you have no access to it."),
     (405, "Method Not Allowed"): Sentence("This address accepts only forms. Go back to the form and submit it again."),
 }
-_OURS = Sentence(
+_INTERNAL_ERROR = Sentence(
     "The server could not process this request. This is not your fault. The error was logged. Try again in a minute."
 )
 #: HTTP status of each kind of UsageError; all others give 422.
@@ -46,19 +46,21 @@ _CONFLICT = Sentence("Another user changed this at the same time. Reload the pag
 
 def add_error_pages(app: FastAPI) -> None:
     """Register the handlers that turn exceptions of routes into responses."""
-    app.add_exception_handler(SignInNeeded, _sign_in_needed)
-    app.add_exception_handler(HTTPException, _refused)
-    app.add_exception_handler(RequestValidationError, _misread)
-    app.add_exception_handler(UsageError, _usage)
-    app.add_exception_handler(PlatformError, _platform)
-    app.add_exception_handler(HostError, _host)
-    app.add_exception_handler(DatabaseError, _database)
-    app.add_exception_handler(Exception, _surprise)
+    app.add_exception_handler(SignInNeeded, _redirect_to_sign_in)
+    app.add_exception_handler(HTTPException, _respond_to_http_error)
+    app.add_exception_handler(RequestValidationError, _respond_to_validation_error)
+    app.add_exception_handler(UsageError, _respond_to_usage_error)
+    app.add_exception_handler(PlatformError, _respond_to_platform_error)
+    app.add_exception_handler(HostError, _respond_to_host_error)
+    app.add_exception_handler(DatabaseError, _respond_to_database_error)
+    app.add_exception_handler(Exception, _respond_to_unexpected_error)
 
 
-async def _sign_in_needed(request: Request, _error: Exception) -> Response:
-    if request.url.path.startswith(API):
-        return problem(401, "A token is required: Authorization: Bearer rmt_...", {"www-authenticate": "Bearer"})
+async def _redirect_to_sign_in(request: Request, _error: Exception) -> Response:
+    if request.url.path.startswith(API_PREFIX):
+        return respond_with_problem(
+            401, "A token is required: Authorization: Bearer rmt_...", {"www-authenticate": "Bearer"}
+        )
     target = f"{request.url.path}?{request.url.query}" if request.url.query else request.url.path
     where = f"/sign-in?next={quote(target)}" if request.method == "GET" else "/sign-in"
     if request.headers.get("hx-request") == "true":
@@ -66,76 +68,78 @@ async def _sign_in_needed(request: Request, _error: Exception) -> Response:
     return RedirectResponse(where, 303)
 
 
-async def _refused(request: Request, error: Exception) -> Response:
+async def _respond_to_http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    routers = _OF_THE_ROUTER.get((error.status_code, str(error.detail)))
-    said = said_in(error) if routers is None else routers
-    return answer(request, error.status_code, said, dict(error.headers or {}))
+    routers = _ROUTER_ERRORS.get((error.status_code, str(error.detail)))
+    said = extract_message(error) if routers is None else routers
+    return respond_with_error(request, error.status_code, said, dict(error.headers or {}))
 
 
-async def _misread(request: Request, error: Exception) -> Response:
+async def _respond_to_validation_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
     where = ".".join(str(part) for part in first["loc"][1:]) or str(first["loc"][0])
     message = str(first["msg"])
-    return answer(request, 422, Sentence(f"{where}: {message[:1].lower()}{message[1:]}"))
+    return respond_with_error(request, 422, Sentence(f"{where}: {message[:1].lower()}{message[1:]}"))
 
 
-async def _usage(request: Request, error: Exception) -> Response:
+async def _respond_to_usage_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, UsageError)
     status = next((status for kind, status in _STATUS.items() if isinstance(error, kind)), 422)
-    return answer(request, status, error)
+    return respond_with_error(request, status, error)
 
 
-async def _host(request: Request, error: Exception) -> Response:
+async def _respond_to_host_error(request: Request, error: Exception) -> Response:
     _log.error("web.host_error", path=request.url.path, error=str(error))
-    return answer(request, 503, _OURS)
+    return respond_with_error(request, 503, _INTERNAL_ERROR)
 
 
-async def _platform(request: Request, error: Exception) -> Response:
+async def _respond_to_platform_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, PlatformError)
-    return answer(request, 502, error)
+    return respond_with_error(request, 502, error)
 
 
-async def _database(request: Request, error: Exception) -> Response:
+async def _respond_to_database_error(request: Request, error: Exception) -> Response:
     failure = classify(error)
     if failure is DatabaseFailure.CONFLICT:
         _log.warning("web.conflict", path=request.url.path, exc_info=error)
-        return answer(request, 409, _CONFLICT)
+        return respond_with_error(request, 409, _CONFLICT)
     if failure is DatabaseFailure.UNEXPECTED:
         _log.error("web.surprise", path=request.url.path, exc_info=error)
-        return answer(request, 500, _OURS)
+        return respond_with_error(request, 500, _INTERNAL_ERROR)
     _log.error("web.no_database", path=request.url.path, error=str(error))
-    return answer(request, 503, _NO_DATABASE if request.method in ("GET", "HEAD") else _NO_DATABASE_CHANGING)
+    return respond_with_error(
+        request, 503, _NO_DATABASE if request.method in ("GET", "HEAD") else _NO_DATABASE_CHANGING
+    )
 
 
-async def _surprise(request: Request, error: Exception) -> Response:
+async def _respond_to_unexpected_error(request: Request, error: Exception) -> Response:
     # The server logs the traceback of unhandled exceptions.
     _log.error("web.surprise", path=request.url.path, error=f"{type(error).__name__}: {error}")
-    return answer(request, 500, _OURS)
+    return respond_with_error(request, 500, _INTERNAL_ERROR)
 
 
-def answer(
+def respond_with_error(
     request: Request, status: int, said: Sentence | RobomarkError, headers: dict[str, str] | None = None
 ) -> Response:
     """Return an error response: a page in the reader's language, or a problem in English for the API."""
-    asked_by_program = request.url.path.startswith(API)
-    language = ENGLISH if asked_by_program else language_of(request)
-    sentence = language.tell(said) if isinstance(said, Sentence) else sentence_of(said, language)
+    asked_by_program = request.url.path.startswith(API_PREFIX)
+    language = ENGLISH if asked_by_program else detect_language(request)
+    sentence = language.translate_sentence(said) if isinstance(said, Sentence) else describe_error(said, language)
     if asked_by_program:
-        return problem(status, sentence, headers)
+        return respond_with_problem(status, sentence, headers)
     try:
-        reader = reader_of(request, request.app.state.context)
+        reader = find_reader(request, request.app.state.context)
     except (RobomarkError, DatabaseError):
         reader = None
-    shown = page(request, reader, "error.html", status_code=status, status=status, sentence=sentence)
+    shown = render_page(request, reader, "error.html", status_code=status, status=status, sentence=sentence)
     shown.headers.update(headers or {})
     return shown
 
 
-def sentence_of(error: RobomarkError, language: Language) -> str:
+def describe_error(error: RobomarkError, language: Language) -> str:
     """Return the error's message as a complete sentence in this language."""
-    text = language.tell(error.said)
+    text = language.translate_sentence(error.message)
     # A file name at the beginning is not capitalised.
     first = text[:1] if "." in text.partition(" ")[0] else text[:1].upper()
     return f"{first}{text[1:]}{'' if text.endswith(('.', '!', '?')) else '.'}"

@@ -5,15 +5,17 @@ from __future__ import annotations
 from babel.core import negotiate_locale
 from fastapi import Request
 
-from service.language import SOURCE, Language, language_called, languages
+from service.language import SOURCE_LANGUAGE, Language, list_languages, load_language
 
 COOKIE = "language"
 
 
-def language_of(request: Request) -> Language:
+def detect_language(request: Request) -> Language:
     """Return the language that the reader chose, else the one that the browser prefers, else English."""
     chosen = request.cookies.get(COOKIE, "")
-    if chosen in languages():
-        return language_called(chosen)
+    if chosen in list_languages():
+        return load_language(chosen)
     asked = [part.split(";")[0].strip() for part in request.headers.get("accept-language", "")[:200].split(",")]
-    return language_called(negotiate_locale([code for code in asked if code], list(languages()), sep="-") or SOURCE)
+    return load_language(
+        negotiate_locale([code for code in asked if code], list(list_languages()), sep="-") or SOURCE_LANGUAGE
+    )

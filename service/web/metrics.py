@@ -13,8 +13,8 @@ from prometheus_client.registry import Collector
 
 from service.operations import system
 from service.operations.context import Service
-from service.operations.system import ServiceMetrics, quantile
-from service.operations.types import JobState, Lane, PlotState
+from service.operations.system import ServiceMetrics, compute_quantile
+from service.operations.types import JobQueue, JobState, PlotState
 from service.version import GRADER_VERSION
 
 _QUANTILES = (0.5, 0.95, 0.99)
@@ -22,32 +22,32 @@ _UNFINISHED = (JobState.QUEUED, JobState.RUNNING)
 _ENDED = (JobState.DONE, JobState.DEAD, JobState.CANCELLED)
 
 
-def metrics_text(service: Service) -> bytes:
+def render_metrics(service: Service) -> bytes:
     """Return all metrics in Prometheus's text format."""
     registry = CollectorRegistry(auto_describe=False)
-    registry.register(_Figures(service))
+    registry.register(_MetricsCollector(service))
     return generate_latest(registry)
 
 
-class _Figures(Collector):
+class _MetricsCollector(Collector):
     def __init__(self, service: Service) -> None:
         self._service = service
 
     def collect(self) -> Iterable[Metric]:
         metrics = system.collect_metrics(self._service)
-        yield from _queue(metrics)
-        yield from _endings(metrics)
-        yield from _workers(metrics)
-        yield from _times(metrics)
+        yield from _collect_queue_metrics(metrics)
+        yield from _collect_outcome_metrics(metrics)
+        yield from _collect_worker_metrics(metrics)
+        yield from _collect_phase_times(metrics)
 
     def describe(self) -> Iterable[Metric]:
         """Return no descriptions, so that the collector can be created without the database."""
         return ()
 
 
-def _queue(metrics: ServiceMetrics) -> Iterator[Metric]:
+def _collect_queue_metrics(metrics: ServiceMetrics) -> Iterator[Metric]:
     open_jobs = GaugeMetricFamily("robomark_jobs_open", "Jobs that have not ended.", labels=["lane", "state"])
-    for lane in Lane:
+    for lane in JobQueue:
         for state in _UNFINISHED:
             open_jobs.add_metric([lane.value, state.value], metrics.queue.jobs.get((lane, state), 0))
     yield open_jobs
@@ -57,7 +57,7 @@ def _queue(metrics: ServiceMetrics) -> Iterator[Metric]:
         "How long the oldest job that a worker could begin has waited.",
         labels=["lane"],
     )
-    for lane in Lane:
+    for lane in JobQueue:
         depth.add_metric([lane.value], metrics.queue.claimable.get(lane, 0))
         oldest.add_metric([lane.value], metrics.queue.oldest_seconds.get(lane, 0.0))
     yield depth
@@ -69,9 +69,9 @@ def _queue(metrics: ServiceMetrics) -> Iterator[Metric]:
     yield GaugeMetricFamily("robomark_batches_paused", "Batches that are held back.", metrics.paused_batches)
 
 
-def _endings(metrics: ServiceMetrics) -> Iterator[Metric]:
+def _collect_outcome_metrics(metrics: ServiceMetrics) -> Iterator[Metric]:
     ended = CounterMetricFamily("robomark_jobs_ended", "Jobs that have ended.", labels=["lane", "state"])
-    for lane in Lane:
+    for lane in JobQueue:
         for state in _ENDED:
             ended.add_metric([lane.value, state.value], metrics.queue.jobs.get((lane, state), 0))
     yield ended
@@ -90,7 +90,7 @@ def _endings(metrics: ServiceMetrics) -> Iterator[Metric]:
     )
 
 
-def _workers(metrics: ServiceMetrics) -> Iterator[Metric]:
+def _collect_worker_metrics(metrics: ServiceMetrics) -> Iterator[Metric]:
     lately = [seen for seen in metrics.queue.workers if seen.lately]
     yield GaugeMetricFamily("robomark_workers", "Workers heard of in the last 30 s.", len(lately))
     yield GaugeMetricFamily(
@@ -111,7 +111,7 @@ def _workers(metrics: ServiceMetrics) -> Iterator[Metric]:
     yield build
 
 
-def _times(metrics: ServiceMetrics) -> Iterator[Metric]:
+def _collect_phase_times(metrics: ServiceMetrics) -> Iterator[Metric]:
     times = GaugeMetricFamily(
         "robomark_phase_seconds",
         "How long each phase took in the jobs that ended within the last hour.",
@@ -122,6 +122,6 @@ def _times(metrics: ServiceMetrics) -> Iterator[Metric]:
         counts.add_metric([phase], len(values))
         for share in _QUANTILES:
             if values:
-                times.add_metric([phase, str(share)], quantile(values, share))
+                times.add_metric([phase, str(share)], compute_quantile(values, share))
     yield times
     yield counts

@@ -16,7 +16,7 @@ _CHANGES = (
 )
 
 
-def scope_of_page(method: str, route: str) -> str | None:
+def find_page_scope(method: str, route: str) -> str | None:
     """Return the scope for a method and a route such as ``/courses/{course_id}/batches``, or None if none is needed."""
     if f"{method} {route}" in _FOR_EVERY_SESSION:
         return None

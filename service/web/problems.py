@@ -6,10 +6,10 @@ from http import HTTPStatus
 
 from starlette.responses import JSONResponse
 
-API = "/api/"
+API_PREFIX = "/api/"
 
 
-def problem(status: int, sentence: str, headers: dict[str, str] | None = None) -> JSONResponse:
+def respond_with_problem(status: int, sentence: str, headers: dict[str, str] | None = None) -> JSONResponse:
     """Return a problem+json response with one sentence."""
     body = {"type": "about:blank", "title": HTTPStatus(status).phrase, "status": status, "detail": sentence}
     return JSONResponse(body, status, headers, "application/problem+json")

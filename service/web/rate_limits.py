@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NoReturn
 
-from service.web.refusing import Declined
+from service.web.http_errors import TranslatableHTTPException
 from sim.sentences import Sentence
 
 _MOST_KNOWN = 10_000
@@ -28,7 +28,7 @@ class RateLimit:
     def spend(self, who: str) -> None:
         """Count one call of ``who``. Raises HTTPException 429 with ``Retry-After`` if the bucket is empty."""
         with self._lock:
-            left, at = self._now(who)
+            left, at = self._compute_left(who)
             self._left.pop(who, None)
             self._left[who] = (max(0.0, left - 1), at)
             if len(self._left) > _MOST_KNOWN:
@@ -36,7 +36,7 @@ class RateLimit:
         if left < 1:
             self._refuse(left)
 
-    def _now(self, who: str) -> tuple[float, float]:
+    def _compute_left(self, who: str) -> tuple[float, float]:
         at = self._clock()
         left, since = self._left.get(who, (self._burst, at))
         return min(self._burst, left + (at - since) * self._per_second), at
@@ -44,7 +44,7 @@ class RateLimit:
     def _refuse(self, left: float) -> NoReturn:
         seconds = max(1, round((1 - left) / self._per_second))
         said = Sentence("Too many requests. Try again in %(seconds)s s.", {"seconds": seconds})
-        raise Declined(429, said, {"retry-after": str(seconds)})
+        raise TranslatableHTTPException(429, said, {"retry-after": str(seconds)})
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class RateLimits:
     #: Submissions of one person, in all courses, by page or API.
     submissions: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
     #: Test runs of one person. The store limits the total number.
-    tryouts: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
+    test_runs: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
     #: API calls, by token. The settings define the limit.
     api_calls: RateLimit = field(default_factory=lambda: RateLimit(burst=600, per_minute=600))
     #: Pages and their images, by person. The limit is the same as for API calls.

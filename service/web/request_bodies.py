@@ -23,24 +23,24 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from service.operations import sign_in
 from service.operations.sign_in import Identity
 from service.operations.types import CredentialKind, Role
-from service.web.access import SESSION_COOKIE, SignInNeeded, nothing_here
+from service.web.access import SESSION_COOKIE, SignInNeeded, build_not_found
 from service.web.context import WebContext
-from service.web.problems import API
-from service.web.refusing import Declined
+from service.web.http_errors import TranslatableHTTPException
+from service.web.problems import API_PREFIX
 from sim.sentences import Sentence
 
 MEGABYTE = 2**20
 #: Maximum size of a form or JSON body, for routes that declare no upload.
 LARGEST_FORM = MEGABYTE
 #: Maximum size for public routes: sign-in links and launches by learning platforms.
-_LARGEST_OF_ANYBODY = 128 * 1024
-_FOR_ANYBODY = frozenset({"/sign-in", "/language", "/lti/login", "/lti/launch"})
-_WITHOUT_BODY = frozenset({"GET", "HEAD", "OPTIONS", "TRACE"})
-_MARK = "robomark_upload"
+_LARGEST_PUBLIC_BODY = 128 * 1024
+_PUBLIC_PATHS = frozenset({"/sign-in", "/language", "/lti/login", "/lti/launch"})
+_BODILESS_METHODS = frozenset({"GET", "HEAD", "OPTIONS", "TRACE"})
+_UPLOAD_ATTRIBUTE = "robomark_upload"
 _Endpoint = TypeVar("_Endpoint", bound=Callable[..., object])
 
 
-class TooMuch(Declined):
+class BodyTooLarge(TranslatableHTTPException):
     """The request body is too large."""
 
     def __init__(self, most: int) -> None:
@@ -49,7 +49,7 @@ class TooMuch(Declined):
 
 
 @dataclass(frozen=True, slots=True)
-class Upload:
+class UploadLimit:
     """The maximum size in bytes of a route's upload, and the course role that may send it."""
 
     most: int
@@ -60,7 +60,7 @@ def takes_upload(most: int, role: Role) -> Callable[[_Endpoint], _Endpoint]:
     """Declare that an endpoint accepts bodies of up to ``most`` bytes. All others accept ``LARGEST_FORM``."""
 
     def declared(endpoint: _Endpoint) -> _Endpoint:
-        setattr(endpoint, _MARK, Upload(most, role))
+        setattr(endpoint, _UPLOAD_ATTRIBUTE, UploadLimit(most, role))
         return endpoint
 
     return declared
@@ -70,10 +70,10 @@ def takes_upload(most: int, role: Role) -> Callable[[_Endpoint], _Endpoint]:
 class _UploadRoute:
     path: re.Pattern[str]
     methods: frozenset[str]
-    upload: Upload
+    upload: UploadLimit
 
 
-class BodyGate:
+class BodyLimitMiddleware:
     """ASGI middleware that limits the size of bodies and rejects unknown senders."""
 
     def __init__(self, app: ASGIApp) -> None:
@@ -85,13 +85,13 @@ class BodyGate:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        upload, course = self._upload(scope)
+        upload, course = self._find_upload(scope)
         most = LARGEST_FORM if upload is None else upload.most
-        if scope["path"] in _FOR_ANYBODY:
-            most = _LARGEST_OF_ANYBODY
+        if scope["path"] in _PUBLIC_PATHS:
+            most = _LARGEST_PUBLIC_BODY
         request = Request(scope, receive)
         try:
-            if scope["method"] not in _WITHOUT_BODY and scope["path"] not in _FOR_ANYBODY:
+            if scope["method"] not in _BODILESS_METHODS and scope["path"] not in _PUBLIC_PATHS:
                 await run_in_threadpool(_check_sender, request, upload, course)
             _check_charset(request.headers)
             _check_length(request.headers, most)
@@ -101,15 +101,15 @@ class BodyGate:
             answer = await handler(request, error)
             await answer(scope, receive, send)
             return
-        await self._app(scope, _counted(receive, most), send)
+        await self._app(scope, _limit_body(receive, most), send)
 
-    def _upload(self, scope: Scope) -> tuple[Upload | None, str]:
+    def _find_upload(self, scope: Scope) -> tuple[UploadLimit | None, str]:
         """Return the upload that the request's route declares, and the course id in the path."""
         if self._uploads is None:
             self._uploads = tuple(
                 _UploadRoute(compile_path(route.path)[0], frozenset(route.methods or ()), upload)
                 for route in iter_route_contexts(scope["app"].routes)
-                if (upload := getattr(route.endpoint, _MARK, None)) is not None and route.path is not None
+                if (upload := getattr(route.endpoint, _UPLOAD_ATTRIBUTE, None)) is not None and route.path is not None
             )
         for route in self._uploads:
             if scope["method"] in route.methods and (found := route.path.match(scope["path"])):
@@ -117,18 +117,18 @@ class BodyGate:
         return None, ""
 
 
-def _check_sender(request: Request, upload: Upload | None, course: str) -> None:
+def _check_sender(request: Request, upload: UploadLimit | None, course: str) -> None:
     """Raise the exception that the route would raise for this sender."""
-    identity = _identity(request)
+    identity = _find_identity(request)
     if identity is None:
         raise SignInNeeded("sign in first")
     if upload is not None and not (course.isdecimal() and identity.roles.get(int(course)) is upload.role):
-        raise nothing_here()
+        raise build_not_found()
 
 
-def _identity(request: Request) -> Identity | None:
+def _find_identity(request: Request) -> Identity | None:
     context: WebContext = request.app.state.context
-    if request.url.path.startswith(API):
+    if request.url.path.startswith(API_PREFIX):
         scheme, secret = get_authorization_scheme_param(request.headers.get("authorization"))
         kind = CredentialKind.TOKEN
         secret = secret if scheme.lower() == "bearer" else ""
@@ -142,7 +142,7 @@ def _identity(request: Request) -> Identity | None:
 def _check_length(headers: Headers, most: int) -> None:
     length = headers.get("content-length", "0")
     if not length.isdecimal() or len(length) > 18 or int(length) > most:
-        raise TooMuch(most)
+        raise BodyTooLarge(most)
 
 
 def _check_charset(headers: Headers) -> None:
@@ -153,10 +153,10 @@ def _check_charset(headers: Headers) -> None:
     """
     kind, options = parse_options_header(headers.get("content-type"))
     if kind == b"multipart/form-data" and options.get(b"charset", b"utf-8").lower() not in (b"utf-8", b"utf8"):
-        raise Declined(415, Sentence("Forms are read in UTF-8 only."))
+        raise TranslatableHTTPException(415, Sentence("Forms are read in UTF-8 only."))
 
 
-def _counted(receive: Receive, most: int) -> Receive:
+def _limit_body(receive: Receive, most: int) -> Receive:
     """Wrap ``receive`` and raise TooMuch when the body exceeds ``most`` bytes."""
     so_far = 0
 
@@ -165,7 +165,7 @@ def _counted(receive: Receive, most: int) -> Receive:
         message = await receive()
         so_far += len(message.get("body", b""))
         if so_far > most:
-            raise TooMuch(most)
+            raise BodyTooLarge(most)
         return message
 
     return counted

@@ -13,8 +13,8 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.settings import names_in
-from service.web.problems import API, problem
+from service.settings import split_names
+from service.web.problems import API_PREFIX, respond_with_problem
 
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
@@ -35,7 +35,7 @@ _LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
 _PROBES = ("/health/", "/metrics")
 
 
-class Guarded:
+class SecurityMiddleware:
     """ASGI middleware that sets the headers, checks the Host header and drops cookies of others.
 
     ``public_url`` is empty if only this machine can reach the server.
@@ -45,28 +45,28 @@ class Guarded:
         self._app = app
         parts = urlsplit(public_url)
         self._names = _LOOPBACK | ({parts.hostname} if parts.hostname else frozenset())
-        self._probe_names = self._names | set(names_in(probe_hosts))
+        self._probe_names = self._names | set(split_names(probe_hosts))
         self._secure = parts.scheme == "https"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Handle one ASGI request."""
         if scope["type"] != "http":
             return
-        scope["headers"] = [_without_quoted_cookies(*header) for header in scope["headers"]]
+        scope["headers"] = [_remove_quoted_cookies(*header) for header in scope["headers"]]
         headers = Headers(scope=scope)
-        if not self._answers_to(_host(headers.get("host", "")), scope["path"]):
+        if not self._is_known_host(_parse_host(headers.get("host", "")), scope["path"]):
             sentence = "This host name is unknown. ROBOMARK_PUBLIC_URL defines the host name of this server."
-            await _refusal(scope["path"], 400, sentence)(scope, receive, send)
+            await _respond_with_refusal(scope["path"], 400, sentence)(scope, receive, send)
             return
-        await self._app(scope, receive, self._headed(send))
+        await self._app(scope, receive, self._add_headers(send))
 
-    def _answers_to(self, host: str, path: str) -> bool:
+    def _is_known_host(self, host: str, path: str) -> bool:
         if not path.startswith(_PROBES):
             return host in self._names
         # In DNS rebinding, the browser sends the attacker's host name. It cannot omit the Host header.
         return not host or _is_address(host) or host in self._probe_names
 
-    def _headed(self, send: Send) -> Send:
+    def _add_headers(self, send: Send) -> Send:
         async def headed(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
@@ -80,11 +80,15 @@ class Guarded:
         return headed
 
 
-def _refusal(path: str, status: int, sentence: str) -> Response:
-    return problem(status, sentence) if path.startswith(API) else PlainTextResponse(f"{sentence}\n", status)
+def _respond_with_refusal(path: str, status: int, sentence: str) -> Response:
+    return (
+        respond_with_problem(status, sentence)
+        if path.startswith(API_PREFIX)
+        else PlainTextResponse(f"{sentence}\n", status)
+    )
 
 
-def _without_quoted_cookies(name: bytes, value: bytes) -> tuple[bytes, bytes]:
+def _remove_quoted_cookies(name: bytes, value: bytes) -> tuple[bytes, bytes]:
     """Return a header; of a Cookie header, only the cookies without quotation marks. Robomark's own have none.
 
     Older versions of Python 3.11 take time proportional to the square of the length of a quoted cookie with
@@ -103,7 +107,7 @@ def _is_address(host: str) -> bool:
     return True
 
 
-def _host(header: str) -> str:
+def _parse_host(header: str) -> str:
     """Return the host name of a Host header without the port."""
     found = _NAME_AND_PORT.fullmatch(header)
     return (found[1] or header if found else header).lower()

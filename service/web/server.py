@@ -11,10 +11,10 @@ import sys
 import uvicorn
 from starlette.types import ASGIApp
 
-from service.home import keep_private, open_home
+from service.home import keep_files_private, open_home
 from service.operations.context import open_store
-from service.outside import ALL_OTHERS, NO_OTHERS
-from service.queue.broker import broker_url
+from service.outgoing_requests import ALL_NETWORKS, NO_NETWORKS
+from service.queue.broker import build_broker_url
 from service.queue.logs import configure_logging
 from service.settings import Settings, load_settings
 from service.web.app import make_app
@@ -33,14 +33,14 @@ def serve_on(settings: Settings, listening: socket.socket) -> None:
     open_home(settings.home)
     leave_current_folder()
     if not settings.broker_url:
-        settings = settings.with_broker(broker_url(settings))
+        settings = settings.with_broker(build_broker_url(settings))
     with own_temporary_folder(), open_store(settings) as store:
-        config = server_config(settings, make_app(settings, store))
-        with WebhookSender(store, ALL_OTHERS if settings.webhooks_inside else NO_OTHERS):
+        config = build_server_config(settings, make_app(settings, store))
+        with WebhookSender(store, ALL_NETWORKS if settings.webhooks_inside else NO_NETWORKS):
             uvicorn.Server(config).run(sockets=[listening])
 
 
-def server_config(settings: Settings, application: ASGIApp) -> uvicorn.Config:
+def build_server_config(settings: Settings, application: ASGIApp) -> uvicorn.Config:
     """Return the uvicorn configuration for the application."""
     return uvicorn.Config(
         application,
@@ -56,5 +56,5 @@ def server_config(settings: Settings, application: ASGIApp) -> uvicorn.Config:
 
 
 if __name__ == "__main__":
-    keep_private()
+    keep_files_private()
     serve_on(load_settings(), socket.socket(fileno=int(sys.argv[1])))

@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from responders.sandbox.private_folders import locked_folder, remove_left_overs
+from responders.sandbox.private_folders import create_locked_folder, remove_left_overs
 
 _PREFIX = "robomark-web-"
 #: Folders of earlier versions and of commands. They have no lock, so they are removed by age.
@@ -22,9 +22,9 @@ _OLD_SECONDS = 24 * 3600
 def own_temporary_folder() -> Iterator[Path]:
     """Use a separate folder for all temporary files of this process, and remove folders left by other processes."""
     remove_left_overs(_PREFIX)
-    _remove_old()
+    _remove_old_folders()
     before = tempfile.gettempdir()
-    folder, lock = locked_folder(_PREFIX, 0o700)
+    folder, lock = create_locked_folder(_PREFIX, 0o700)
     tempfile.tempdir = str(folder)
     try:
         yield folder
@@ -34,7 +34,7 @@ def own_temporary_folder() -> Iterator[Path]:
         os.close(lock)
 
 
-def _remove_old() -> None:
+def _remove_old_folders() -> None:
     for prefix in _UNLOCKED:
         for folder in Path(tempfile.gettempdir()).glob(f"{prefix}*"):
             # Another server may be removing the same folder.

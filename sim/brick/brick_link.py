@@ -23,7 +23,7 @@ FREE_READS = 100_000
 _WAITS = frozenset({"until", "until_said", "paid_motor"})
 
 #: Packed format for frequent actions: kind, part of the robot, set point and command of a motor, and a value.
-_packed = struct.Struct("<BBBBd").pack
+_pack = struct.Struct("<BBBBd").pack
 _READ, _WAIT, _MOTOR, _LINE = range(4)
 #: Maximum number of lookups of the current line. A program pays processor time for them. A notification counts as four,
 #: because a program that prints without end sends nothing else.
@@ -77,7 +77,7 @@ class Link:
         self._seen_until = 0
         self._tick = SECOND
         self._place: Callable[[], int] = int
-        self._told_place = 0
+        self._sent_place = 0
         self._place_lookups = _PLACE_LOOKUPS
 
     def connect(
@@ -98,13 +98,13 @@ class Link:
         for index, (name, width) in enumerate(sensors.items()):
             where = slice(start, start + width) if width else start
             for times in (1, 2):
-                self._sensors[name, times] = _packed(_READ, index, 0, 0, times), times * READ, where
+                self._sensors[name, times] = _pack(_READ, index, 0, 0, times), times * READ, where
             start += width or 1
 
-    def tell(self, frame: Frame) -> None:
+    def notify(self, frame: Frame) -> None:
         """Send a notification that needs no answer."""
         self.read_freely()
-        self._tell_place(_LOOKUPS_OF_A_NOTIFICATION)
+        self._send_place(_LOOKUPS_OF_A_NOTIFICATION)
         self._wire.send(frame)
 
     def set_motor(
@@ -112,7 +112,7 @@ class Link:
     ) -> None:
         """Send set points and a command with the next wait. They take effect only when the world moves."""
         self.read_freely()
-        self._tell_place()
+        self._send_place()
         if command not in _COMMANDS:
             raise ValueError(
                 f"a motor has no command {command!r}: expected one of {', '.join(filter(None, _COMMANDS))}"
@@ -123,16 +123,16 @@ class Link:
         for name, value in set_points.items():
             left -= 1
             self._wire.act_later(
-                _packed(_MOTOR, part, _SET_POINTS[name], 0 if left else _COMMANDS[command], finite(name, value))
+                _pack(_MOTOR, part, _SET_POINTS[name], 0 if left else _COMMANDS[command], clamp_to_finite(name, value))
             )
         if not set_points and command is not None:
-            self._wire.act_later(_packed(_MOTOR, part, 0, _COMMANDS[command], 0))
+            self._wire.act_later(_pack(_MOTOR, part, 0, _COMMANDS[command], 0))
 
     def run_forever(self, port: str, speed: float) -> None:
         """Set a speed and run. This is a fast path of ``set_motor`` for programs that steer all the time."""
         self.read_freely()
-        self._tell_place()
-        self._wire.act_later(_packed(_MOTOR, _PORTS[port], _SET_POINTS["speed_sp"], _COMMANDS["run-forever"], speed))
+        self._send_place()
+        self._wire.act_later(_pack(_MOTOR, _PORTS[port], _SET_POINTS["speed_sp"], _COMMANDS["run-forever"], speed))
 
     def ask(self, frame: Frame) -> Any:
         """Send a question and return the value of the answer. The world moves as far as the question requires."""
@@ -140,21 +140,21 @@ class Link:
             self._free = 0
         else:
             self.read_freely()
-        self._tell_place()
+        self._send_place()
         self._wire.send(frame)
-        return self._answer()
+        return self._receive_answer()
 
-    def _tell_place(self, lookups: int = 1) -> None:
+    def _send_place(self, lookups: int = 1) -> None:
         """Send the line of the program that is running, if it has changed; 0 once if no more lines follow."""
         if self._place_lookups < 0:
             return
         self._place_lookups -= lookups
         place = self._place() if self._place_lookups >= 0 else 0
-        if place != self._told_place:
-            self._told_place = place
-            self._wire.act_later(_packed(_LINE, 0, 0, 0, place))
+        if place != self._sent_place:
+            self._sent_place = place
+            self._wire.act_later(_pack(_LINE, 0, 0, 0, place))
 
-    def _answer(self) -> Any:
+    def _receive_answer(self) -> Any:
         answer = self._wire.receive()
         self.units = answer["t"]
         arrived = answer.get("m")
@@ -171,14 +171,14 @@ class Link:
         """
         packed, lasts, where = self._sensors[what, times]
         self._free = 0
-        self._tell_place()
+        self._send_place()
         end = self.units + lasts
         if end < self._seen_until:
             self.units = end
             self._wire.act_later(packed)
         else:
             self._wire.act(packed)
-            self._seen = self._answer()
+            self._seen = self._receive_answer()
             self._seen_until = (self.ticks + 1) * self._tick
         return self._seen[where]
 
@@ -200,15 +200,15 @@ class Link:
     def wait_units(self, units: int) -> None:
         """Let the world move for this time in thirds of a microsecond, at most the maximum wait."""
         self._free = 0
-        self._tell_place()
-        self._wire.act(_packed(_WAIT, 0, 0, 0, min(units, MOST_UNITS)))
-        self._answer()
+        self._send_place()
+        self._wire.act(_pack(_WAIT, 0, 0, 0, min(units, MOST_UNITS)))
+        self._receive_answer()
 
 
 link = Link()
 
 
-def finite(name: str, value: float) -> float:
+def clamp_to_finite(name: str, value: float) -> float:
     """Return the nearest number that the world can represent.
 
     Raises:
@@ -219,12 +219,12 @@ def finite(name: str, value: float) -> float:
     return min(max(float(value), -sys.float_info.max), sys.float_info.max)
 
 
-def number(value: float) -> float:
+def to_plain_number(value: float) -> float:
     """Return whole numbers as ``int``, so that they print as in the simulator."""
     return int(value) if value == int(value) else value
 
 
-def clock() -> float:
+def read_clock() -> float:
     """Return the seconds since the start of the program, in whole ticks. The original has thirty ticks a second."""
     link.read_freely()
-    return number(link.ticks / 30)
+    return to_plain_number(link.ticks / 30)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from brick_link import clock, link
+from brick_link import link, read_clock
 from ev3dev2.motor import Motor
 from ev3dev2.sensor.lego import ColorSensor, GyroSensor, UltrasonicSensor
 from ev3dev2.sound import Sound
@@ -24,7 +24,7 @@ __all__ = [
 
 def get_clock() -> float:
     """Return the seconds since the start of the program. The value changes thirty times a second during waits."""
-    return clock()
+    return read_clock()
 
 
 def pyState() -> dict[str, list[Any]]:

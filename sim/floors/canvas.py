@@ -32,7 +32,7 @@ BLUE: Colour = (0, 0, 255)
 YELLOW: Colour = (255, 255, 0)
 
 
-def grey(level: int) -> Colour:
+def make_grey(level: int) -> Colour:
     """Return the colour whose three channels equal ``level``, 0 (black) to 255 (white)."""
     return (level, level, level)
 
@@ -74,27 +74,27 @@ class SmoothCanvas:
         """Draw a circular line; ``radius`` is measured to the middle of the line."""
         x, y = centre
         outer = radius + width / 2
-        box = self._inside((x - outer, y - outer, x + outer, y + outer))
+        box = self._shrink_box((x - outer, y - outer, x + outer, y + outer))
         self._canvas.ellipse(box, outline=colour, width=round(width * SCALE))
 
     def ellipse(self, box: Box, colour: Colour) -> None:
         """Fill the ellipse inscribed in ``box``: left, top, right, bottom."""
-        self._canvas.ellipse(self._inside(box), colour)
+        self._canvas.ellipse(self._shrink_box(box), colour)
 
     def rectangle(self, box: Box, colour: Colour) -> None:
         """Fill ``box``: left, top, right, bottom."""
-        self._canvas.rectangle(self._inside(box), colour)
+        self._canvas.rectangle(self._shrink_box(box), colour)
 
     def polygon(self, corners: Sequence[Point], colour: Colour) -> None:
         """Fill the polygon with these corners, given in either direction."""
         self._canvas.polygon([(x * SCALE, y * SCALE) for x, y in corners], colour)
 
-    def pixels(self) -> Pixels:
+    def to_pixels(self) -> Pixels:
         """Return the image, shape (1143, 2362, 3)."""
         return np.asarray(self._image.reduce(SCALE))
 
     @staticmethod
-    def _inside(box: Box) -> Box:
+    def _shrink_box(box: Box) -> Box:
         """Shrink a box by one small pixel at its far edges, because Pillow includes both edges."""
         left, top, right, bottom = box
         return (left * SCALE, top * SCALE, right * SCALE - 1, bottom * SCALE - 1)

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from sim.floors.canvas import HEIGHT, Point
-from sim.floors.tracks import TrackLine, lines_of
+from sim.floors.tracks import TrackLine, load_track_lines
 
 #: The lines of Line_Following_Test in the order of the data file. Each name is the x where the line starts, with
 #: ``high`` for lines that start half-way up. The broken line with its three parts is not included.
@@ -19,16 +19,18 @@ _TEST_LINES = ("141", "440", "771", "1076", "1453-high", "1453", "1821", "1821-h
 
 
 @functools.lru_cache(maxsize=1)
-def centrelines() -> Mapping[str, tuple[Point, ...]]:
+def load_centrelines() -> Mapping[str, tuple[Point, ...]]:
     """Return all centrelines by name: ``Line_Following_Test/141`` ..., and ``Thruxton_Circuit`` (clockwise, closed)."""
-    test = lines_of("line_following_test.json")
-    found = {f"Line_Following_Test/{name}": _upwards(line) for name, line in zip(_TEST_LINES, test, strict=False)}
-    (circuit,) = lines_of("thruxton_circuit.json")
+    test = load_track_lines("line_following_test.json")
+    found = {
+        f"Line_Following_Test/{name}": _orient_upwards(line) for name, line in zip(_TEST_LINES, test, strict=False)
+    }
+    (circuit,) = load_track_lines("thruxton_circuit.json")
     found["Thruxton_Circuit"] = tuple((x, HEIGHT - y) for x, y in circuit.points)
     return MappingProxyType(found)
 
 
-def _upwards(line: TrackLine) -> tuple[Point, ...]:
+def _orient_upwards(line: TrackLine) -> tuple[Point, ...]:
     """Return the line from its lower end, clipped at the floor's edge."""
     points = [(x, HEIGHT - y) for x, y in line.points]
     if points[0][1] > points[-1][1]:

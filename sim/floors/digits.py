@@ -17,9 +17,9 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.chance import Stream
 from sim.floors.canvas import HEIGHT, WIDTH, Pixels
-from sim.floors.registry import FloorLabel, drawn_anew
+from sim.floors.registry import FloorLabel, register_seeded_floor
+from sim.random_streams import RandomStream
 from sim.recording import Pose
 
 COLUMNS, ROWS = 20, 11
@@ -39,48 +39,48 @@ GREY_STEP = 25
 _DIGITS = tuple(map(str, range(10)))
 
 
-@drawn_anew("MNIST_Digits", Pose(400, 50, 90), menu=23, label_names=_DIGITS)
-def white_sheet(seed: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
+@register_seeded_floor("MNIST_Digits", Pose(400, 50, 90), menu=23, label_names=_DIGITS)
+def draw_white_sheet(seed: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
     """Draw handwriting on white paper."""
-    return _sheet(seed, 255, label_patches=label_patches)
+    return _draw_sheet(seed, 255, label_patches=label_patches)
 
 
-@drawn_anew("MNIST_Digits_Black", Pose(400, 50, 90), menu=24, label_names=_DIGITS)
-def black_sheet(seed: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
+@register_seeded_floor("MNIST_Digits_Black", Pose(400, 50, 90), menu=24, label_names=_DIGITS)
+def draw_black_sheet(seed: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
     """Draw handwriting on black paper."""
-    return _sheet(seed, 0, label_patches=label_patches)
+    return _draw_sheet(seed, 0, label_patches=label_patches)
 
 
-def _sheet(seed: int, paper: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
+def _draw_sheet(seed: int, paper: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
     """Return sheet ``seed`` on paper of grey ``paper``. Each position shows any of the 1000 images, equally likely."""
-    images, shown = sheet_digits()
-    chance = Stream(seed, "digit sheet")
+    images, shown = load_sheet_digits()
+    chance = RandomStream(seed, "digit sheet")
     level = np.full((HEIGHT, WIDTH), paper, dtype=np.uint8)
     labels = []
     for place in range(COLUMNS * ROWS):
         row, column = divmod(place, COLUMNS)
         chosen = chance.integer(place) % len(images)
         digit = int(shown[chosen])
-        labels.append(_label(digit, column, row))
-        _put(level, images[chosen], DIGIT_LEFT + PITCH * column, DIGIT_TOP + PITCH * row)
+        labels.append(_build_label(digit, column, row))
+        _paste_piece(level, images[chosen], DIGIT_LEFT + PITCH * column, DIGIT_TOP + PITCH * row)
         if label_patches:
             patch = np.full((PATCH_HEIGHT, PATCH_WIDTH), GREY_STEP * digit, dtype=np.uint8)
-            _put(level, patch, PATCH_LEFT + PITCH * column, PATCH_TOP + PITCH * row)
+            _paste_piece(level, patch, PATCH_LEFT + PITCH * column, PATCH_TOP + PITCH * row)
     return np.repeat(level[:, :, None], 3, axis=2), tuple(labels)
 
 
-def _label(digit: int, column: int, row: int) -> FloorLabel:
+def _build_label(digit: int, column: int, row: int) -> FloorLabel:
     """Return a label that covers 10 mm in each direction from the course's position of the left sensor."""
     return FloorLabel(str(digit), 80.0 + PITCH * column - 10, 1080.0 - PITCH * row - 10, 20.0, 20.0)
 
 
-def _put(level: NDArray[np.uint8], piece: NDArray[np.uint8], left: int, top: int) -> None:
+def _paste_piece(level: NDArray[np.uint8], piece: NDArray[np.uint8], left: int, top: int) -> None:
     height, width = piece.shape
     level[top : top + height, left : left + width] = piece
 
 
 @functools.cache
-def sheet_digits() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+def load_sheet_digits() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """Return the images for sheets, shape (1000, 14, 14), and their digits, shape (1000,)."""
     with resources.files(__package__).joinpath("digits_14x14.npz").open("rb") as stream, np.load(stream) as packed:
         return packed["images"], packed["labels"]

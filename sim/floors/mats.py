@@ -8,9 +8,22 @@ from __future__ import annotations
 import itertools
 import math
 
-from sim.chance import Stream
-from sim.floors.canvas import BLACK, BLUE, HEIGHT, RED, WHITE, WIDTH, Box, Colour, Pixels, Point, SmoothCanvas, grey
-from sim.floors.registry import printed
+from sim.floors.canvas import (
+    BLACK,
+    BLUE,
+    HEIGHT,
+    RED,
+    WHITE,
+    WIDTH,
+    Box,
+    Colour,
+    Pixels,
+    Point,
+    SmoothCanvas,
+    make_grey,
+)
+from sim.floors.registry import register_floor
+from sim.random_streams import RandomStream
 from sim.recording import Pose
 
 #: Bars of Into Orbit that a robot must not cross: both ends, and the radius with the white border.
@@ -42,11 +55,11 @@ _WRO_BLACK: Colour = (35, 31, 32)
 _WRO_BLUE: Colour = (0, 105, 180)
 
 
-@printed("FLL_2018_Into_Orbit", Pose(150, 150, 90), menu=17)
-def fll_2018_into_orbit() -> Pixels:
+@register_floor("FLL_2018_Into_Orbit", Pose(150, 150, 90), menu=17)
+def draw_fll_2018() -> Pixels:
     """Draw space with a satellite, a moon base, an asteroid, and bordered black bars as obstacles."""
     canvas = SmoothCanvas((18, 24, 58))
-    _stars(canvas)
+    _draw_stars(canvas)
     canvas.disc((0, HEIGHT), 420, (52, 66, 120))
     canvas.ring((0, HEIGHT), 420, 8, WHITE)
     canvas.disc((WIDTH, 0), 460, (168, 166, 160))
@@ -54,22 +67,22 @@ def fll_2018_into_orbit() -> Pixels:
         canvas.disc(centre, size, (140, 138, 132))
     canvas.disc(ORBIT_MOON_BASE, ORBIT_MOON_BASE_RADIUS, (226, 120, 40))
     canvas.ring(ORBIT_MOON_BASE, ORBIT_MOON_BASE_RADIUS - 4, 8, WHITE)
-    _asteroid(canvas)
+    _draw_asteroid(canvas)
     for inset, colour in ((0.0, WHITE), (ORBIT_BORDER, BLACK)):
         for start, end, radius in ORBIT_BARS:
             canvas.capsule(start, end, radius - inset, colour)
-    _satellite(canvas)
-    return canvas.pixels()
+    _draw_satellite(canvas)
+    return canvas.to_pixels()
 
 
-def _stars(canvas: SmoothCanvas) -> None:
-    chance = Stream(2018, "stars")
+def _draw_stars(canvas: SmoothCanvas) -> None:
+    chance = RandomStream(2018, "stars")
     for star in range(160):
         place = (chance.between(0, WIDTH, star, 0), chance.between(0, HEIGHT, star, 1))
-        canvas.disc(place, chance.between(1, 3, star, 2), grey(150 + chance.integer(star, 3) % 90))
+        canvas.disc(place, chance.between(1, 3, star, 2), make_grey(150 + chance.integer(star, 3) % 90))
 
 
-def _asteroid(canvas: SmoothCanvas) -> None:
+def _draw_asteroid(canvas: SmoothCanvas) -> None:
     """Draw an irregular rock that fills its box."""
     left, top, right, bottom = ORBIT_ASTEROID
     middle, half = ((left + right) / 2, (top + bottom) / 2), ((right - left) / 2, (bottom - top) / 2)
@@ -83,7 +96,7 @@ def _asteroid(canvas: SmoothCanvas) -> None:
         canvas.disc(centre, radius, (92, 75, 62))
 
 
-def _satellite(canvas: SmoothCanvas) -> None:
+def _draw_satellite(canvas: SmoothCanvas) -> None:
     """Draw a body between two solar panels, on a light disc."""
     x, y = ORBIT_SATELLITE
     canvas.ring(ORBIT_SATELLITE, 78, 6, WHITE)
@@ -93,8 +106,8 @@ def _satellite(canvas: SmoothCanvas) -> None:
     canvas.rectangle((x - 18, y - 26, x + 18, y + 26), (214, 180, 90))
 
 
-@printed("FLL_2019_City_Shaper", Pose(500, 150, 90), menu=16)
-def fll_2019_city_shaper() -> Pixels:
+@register_floor("FLL_2019_City_Shaper", Pose(500, 150, 90), menu=16)
+def draw_fll_2019() -> Pixels:
     """Draw a city plan freely: launch area, streets with bordered black lines, building circles and a bridge."""
     canvas = SmoothCanvas((226, 222, 208))
     for left, top, right, bottom in (
@@ -123,11 +136,11 @@ def fll_2019_city_shaper() -> Pixels:
     ):  # fmt: skip
         canvas.disc(centre, 90, WHITE)
         canvas.disc(centre, 78, colour)
-    return canvas.pixels()
+    return canvas.to_pixels()
 
 
-@printed("WRO_2018_Regular_Junior", Pose(1181, 150, 90), menu=15)
-def wro_2018_regular_junior() -> Pixels:
+@register_floor("WRO_2018_Regular_Junior", Pose(1181, 150, 90), menu=15)
+def draw_wro_2018() -> Pixels:
     """Draw a blue base, three coloured targets of three cells, and black lines from the base to each target."""
     canvas = SmoothCanvas()
     width = 20
@@ -140,17 +153,17 @@ def wro_2018_regular_junior() -> Pixels:
         ((red[0] - 200, crossing), (red[0] - 200, 155), (green[2], 155)),
     ):
         canvas.line(points, width, _WRO_BLACK)
-    canvas.rectangle(_whole(WRO_2018_BASE), _WRO_BLUE)
+    canvas.rectangle(_include_far_edges(WRO_2018_BASE), _WRO_BLUE)
     canvas.rectangle((902, 992, 1461, 1143), WHITE)
     for box, colour in WRO_2018_TARGETS:
-        canvas.rectangle(_whole(box), colour)
-        for cell in _cells(box):
+        canvas.rectangle(_include_far_edges(box), colour)
+        for cell in _split_into_cells(box):
             canvas.rectangle(cell, _CELL_GREY)
-    return canvas.pixels()
+    return canvas.to_pixels()
 
 
-@printed("WRO_2019_Regular_Junior", Pose(2215, 150, 90), menu=14)
-def wro_2019_regular_junior() -> Pixels:
+@register_floor("WRO_2019_Regular_Junior", Pose(2215, 150, 90), menu=14)
+def draw_wro_2019() -> Pixels:
     """Draw a start area at the lower right, black lines, and rows of coloured cells, all freely."""
     canvas = SmoothCanvas()
     width = 20
@@ -169,24 +182,24 @@ def wro_2019_regular_junior() -> Pixels:
     for left, colour in zip((288, 868, 1448), colours, strict=True):
         target = (left, 110, left + 264, 229)
         canvas.rectangle(target, colour)
-        for cell in _cells(target):
+        for cell in _split_into_cells(target):
             canvas.rectangle(cell, _CELL_GREY)
     for left in (600, 1300):
         canvas.rectangle((left, 900, left + 200, 1060), _CELL_GREY)
         canvas.rectangle((left + 20, 920, left + 180, 1040), WHITE)
     canvas.rectangle((80, 471, 180, 671), _WRO_BLUE)
-    return canvas.pixels()
+    return canvas.to_pixels()
 
 
-def _whole(box: Box) -> Box:
+def _include_far_edges(box: Box) -> Box:
     """Return the box with the far edges of its last pixels."""
     left, top, right, bottom = box
     return (left, top, right + 1, bottom + 1)
 
 
-def _cells(box: Box) -> tuple[Box, ...]:
+def _split_into_cells(box: Box) -> tuple[Box, ...]:
     """Return three squares of side 60, spaced evenly along the longer side of ``box``."""
-    left, top, right, bottom = _whole(box)
+    left, top, right, bottom = _include_far_edges(box)
     side, middle = 60, ((left + right) / 2, (top + bottom) / 2)
     third = max(right - left, bottom - top) / 3
     steps = (-third, 0, third)

@@ -26,46 +26,46 @@ from sim.floors.canvas import (
     Colour,
     Painter,
     Pixels,
-    grey,
+    make_grey,
     paint,
 )
-from sim.floors.registry import printed
+from sim.floors.registry import register_floor
 from sim.recording import Pose
 
 
-def painted(name: str, pose: Pose, *, menu: int, paper: Colour = WHITE) -> Callable[[Painter], Painter]:
+def register_painted_floor(name: str, pose: Pose, *, menu: int, paper: Colour = WHITE) -> Callable[[Painter], Painter]:
     """Return a decorator that registers the floor drawn by a painter on ``paper``."""
 
     def register(painter: Painter) -> Painter:
-        printed(name, pose, menu=menu)(lambda: paint(painter, paper))
+        register_floor(name, pose, menu=menu)(lambda: paint(painter, paper))
         return painter
 
     return register
 
 
-@painted("Empty_Map", Pose(100, 800, 0), menu=1)
-def nothing(canvas: Canvas) -> None:
+@register_painted_floor("Empty_Map", Pose(100, 800, 0), menu=1)
+def draw_nothing(canvas: Canvas) -> None:
     """Draw nothing."""
 
 
-@painted("Grey_bands", Pose(150, 500, 0), menu=4)
-def grey_bands(canvas: Canvas) -> None:
+@register_painted_floor("Grey_bands", Pose(150, 500, 0), menu=4)
+def draw_grey_bands(canvas: Canvas) -> None:
     """Draw four vertical bands, three grey and one black, and to their right a red, a green and a blue disc."""
     for left, level in ((250, 220), (650, 211), (1050, 128), (1450, 0)):
-        canvas.rectangle((left, 150, left + 200, 900), grey(level))
+        canvas.rectangle((left, 150, left + 200, 900), make_grey(level))
     for top, colour in ((250, RED), (450, GREEN), (650, BLUE)):
         canvas.ellipse((1850, top, 1950, top + 100), colour)
 
 
-@painted("Coloured_bands", Pose(100, 800, 0), menu=8)
-def coloured_bands(canvas: Canvas) -> None:
+@register_painted_floor("Coloured_bands", Pose(100, 800, 0), menu=8)
+def draw_coloured_bands(canvas: Canvas) -> None:
     """Draw four separate vertical bands: red, green, blue and black."""
     for left, colour in ((250, RED), (650, GREEN), (1050, BLUE), (1450, BLACK)):
         canvas.rectangle((left, 150, left + 200, 750), colour)
 
 
-@painted("Rainbow_bands", Pose(100, 800, 0), menu=9)
-def rainbow_bands(canvas: Canvas) -> None:
+@register_painted_floor("Rainbow_bands", Pose(100, 800, 0), menu=9)
+def draw_rainbow_bands(canvas: Canvas) -> None:
     """Draw seven adjacent vertical bands: red, green, blue, cyan, magenta, yellow and black."""
     colours = (RED, GREEN, BLUE, (0, 255, 255), (255, 0, 255), YELLOW, BLACK)
     for index, colour in enumerate(colours):
@@ -73,30 +73,30 @@ def rainbow_bands(canvas: Canvas) -> None:
         canvas.rectangle((left, 150, left + 200, 750), colour)
 
 
-@painted("Grey_and_black", Pose(400, 700, 90), menu=10)
-def grey_and_black(canvas: Canvas) -> None:
+@register_painted_floor("Grey_and_black", Pose(400, 700, 90), menu=10)
+def draw_grey_and_black(canvas: Canvas) -> None:
     """Draw a black strip near the top, and below it a strip with three greys and black."""
     canvas.rectangle((200, 100, 1800, 200), BLACK)
     for left, level in ((200, 211), (600, 0), (1000, 220), (1400, 128)):
-        canvas.rectangle((left, 600, left + 400, 700), grey(level))
+        canvas.rectangle((left, 600, left + 400, 700), make_grey(level))
 
 
-@painted("Square", Pose(550, 300, -90), menu=13)
-def square(canvas: Canvas) -> None:
+@register_painted_floor("Square", Pose(550, 300, -90), menu=13)
+def draw_square(canvas: Canvas) -> None:
     """Draw a grey square inside the grey outline of a larger square."""
-    canvas.rectangle((600, 400, 1000, 800), grey(128))
-    canvas.rectangle((300, 100, 1300, 1100), outline=grey(128), width=20)
+    canvas.rectangle((600, 400, 1000, 800), make_grey(128))
+    canvas.rectangle((300, 100, 1300, 1100), outline=make_grey(128), width=20)
 
 
-@painted("Loop", Pose(500, 500, 90), menu=2)
-def loop(canvas: Canvas) -> None:
+@register_painted_floor("Loop", Pose(500, 500, 90), menu=2)
+def draw_loop(canvas: Canvas) -> None:
     """Draw a black track with rounded corners, 100 pixels wide."""
     canvas.rounded_rectangle((200, 200, 1900, 1000), 80, BLACK)
     canvas.rounded_rectangle((300, 300, 1800, 900), 50, WHITE)
 
 
-@painted("Two_shapes", Pose(200, 500, 90), menu=3)
-def two_shapes(canvas: Canvas) -> None:
+@register_painted_floor("Two_shapes", Pose(200, 500, 90), menu=3)
+def draw_two_shapes(canvas: Canvas) -> None:
     """Draw thick black outlines: a rounded square and, to its right, a circle."""
     canvas.rounded_rectangle((200, 400, 700, 900), 80, BLACK)
     canvas.rounded_rectangle((300, 500, 600, 800), 50, WHITE)
@@ -104,7 +104,7 @@ def two_shapes(canvas: Canvas) -> None:
     canvas.ellipse((1300, 500, 1600, 800), WHITE)
 
 
-def _oval(canvas: Canvas, box: Box, colour: Colour) -> None:
+def _draw_oval(canvas: Canvas, box: Box, colour: Colour) -> None:
     """Draw the ellipse in ``box`` as a polygon with one corner per degree.
 
     The original Lollipop uses this polygon. Pillow's smoother ellipse would change sensor readings at the edge.
@@ -120,12 +120,12 @@ def _oval(canvas: Canvas, box: Box, colour: Colour) -> None:
     canvas.polygon(corners, colour)
 
 
-@painted("Lollipop", Pose(750, 375, -180), menu=11, paper=grey(211))
-def lollipop(canvas: Canvas) -> None:
+@register_painted_floor("Lollipop", Pose(750, 375, -180), menu=11, paper=make_grey(211))
+def draw_lollipop(canvas: Canvas) -> None:
     """Draw the line follower's track."""
-    _oval(canvas, (400, 371.5, 900, 771.5), BLACK)
-    _oval(canvas, (420.5, 391, 879.5, 752), grey(211))
-    canvas.rectangle((860, 522.5, 920, 593.5), grey(211))
+    _draw_oval(canvas, (400, 371.5, 900, 771.5), BLACK)
+    _draw_oval(canvas, (420.5, 391, 879.5, 752), make_grey(211))
+    canvas.rectangle((860, 522.5, 920, 593.5), make_grey(211))
     canvas.arc((878, 549.5, 1078, 644.5), 180, 270, BLACK, width=20)
     canvas.arc((874, 474.5, 1078, 569.5), 90, 180, BLACK, width=20)
     canvas.rectangle((1680, 371.5, 1720, 771.5), YELLOW)
@@ -133,8 +133,8 @@ def lollipop(canvas: Canvas) -> None:
     canvas.rectangle((1880, 371.5, 1920, 771.5), RED)
 
 
-@painted("Sensor_Diameter_Test", Pose(550, 450, 90), menu=20)
-def sensor_diameter_test(canvas: Canvas) -> None:
+@register_painted_floor("Sensor_Diameter_Test", Pose(550, 450, 90), menu=20)
+def draw_sensor_diameter_test(canvas: Canvas) -> None:
     """Draw black and red lines, horizontal and vertical, each 1, 3, 5, 7 and 9 pixels wide, and two blue dots."""
     for top, lefts, colour in ((200, (200, 240), BLACK), (640, (1000, 1040), RED)):
         for index in range(5):
@@ -148,8 +148,8 @@ def sensor_diameter_test(canvas: Canvas) -> None:
         canvas.ellipse((x - 5, 195, x + 5, 205), BLUE)
 
 
-@printed("Linear_grey", Pose(200, 50, 90), menu=5)
-def linear_grey() -> Pixels:
+@register_floor("Linear_grey", Pose(200, 50, 90), menu=5)
+def draw_linear_grey() -> Pixels:
     """Draw a linear gradient from white at image row 100 to black at row 1043, 51 black rows, and white below."""
     column = np.full(HEIGHT, 255, dtype=np.uint8)
     for row in range(100, 1043):
@@ -158,19 +158,19 @@ def linear_grey() -> Pixels:
     return np.repeat(column[:, None], WIDTH * 3, axis=1).reshape(HEIGHT, WIDTH, 3)
 
 
-@printed("Radial_grey", Pose(100, 400, 0), menu=6)
-def radial_grey() -> Pixels:
+@register_floor("Radial_grey", Pose(100, 400, 0), menu=6)
+def draw_radial_grey() -> Pixels:
     """Draw a radial gradient from white in the middle to black at the corners."""
-    return _radial(inner=WHITE, outer=BLACK)
+    return _draw_radial_gradient(inner=WHITE, outer=BLACK)
 
 
-@printed("Radial_red", Pose(100, 400, 0), menu=7)
-def radial_red() -> Pixels:
+@register_floor("Radial_red", Pose(100, 400, 0), menu=7)
+def draw_radial_red() -> Pixels:
     """Draw a radial gradient from light red in the middle to dark red at the corners."""
-    return _radial(inner=(255, 80, 80), outer=(80, 0, 0))
+    return _draw_radial_gradient(inner=(255, 80, 80), outer=(80, 0, 0))
 
 
-def _radial(inner: Colour, outer: Colour) -> Pixels:
+def _draw_radial_gradient(inner: Colour, outer: Colour) -> Pixels:
     """Draw a gradient from ``inner`` at (1181, 571.5) to ``outer``: the cube root of distance / (sqrt(2) * 1181).
 
     The levels decrease with the distance, so the code computes the distance at which each level ends. Colours then
@@ -179,11 +179,11 @@ def _radial(inner: Colour, outer: Colour) -> Pixels:
     x = 2 * np.arange(WIDTH, dtype=np.int64) - 2362
     y = 2 * np.arange(HEIGHT, dtype=np.int64) - 1143
     quarters = x[None, :] ** 2 + y[:, None] ** 2  # four times the squared distance, an integer
-    channels = [_radial_channel(quarters, low, high) for low, high in zip(outer, inner, strict=True)]
+    channels = [_compute_radial_channel(quarters, low, high) for low, high in zip(outer, inner, strict=True)]
     return np.stack(channels, axis=2)
 
 
-def _radial_channel(quarters: NDArray[np.int64], outer: int, inner: int) -> Pixels:
+def _compute_radial_channel(quarters: NDArray[np.int64], outer: int, inner: int) -> Pixels:
     def darkness(quarter: int) -> int:
         t = (math.sqrt(quarter) / 2 / (math.sqrt(2) * 1181)) ** (1 / 3)
         return inner - int(outer * t + inner * (1 - t))

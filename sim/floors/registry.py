@@ -18,7 +18,7 @@ from PIL import Image
 from sim.errors import UsageError
 from sim.floors.canvas import HEIGHT, WIDTH, Pixels
 from sim.readers.raster_image import read_image
-from sim.readers.unreadable import Unreadable
+from sim.readers.reader_errors import UnreadableDataError
 from sim.recording import Pose
 
 Obstacle = tuple[float, float, float, float]
@@ -49,7 +49,7 @@ class FloorLabel:
     width: float
     height: float
 
-    def holds(self, x: float, y: float) -> bool:
+    def contains_point(self, x: float, y: float) -> bool:
         """Return whether the point (world mm) is inside the label, edges included."""
         return self.x <= x <= self.x + self.width and self.y <= y <= self.y + self.height
 
@@ -66,36 +66,36 @@ class Floor:
     label_patches: bool = True  # the image shows the grey patches that encode the answers, if the floor has them
     sheet: int = 0  # the seed of the handwritten digits of a digit sheet, or of the order of the shapes
 
-    def label_at(self, x: float, y: float) -> str | None:
+    def find_label(self, x: float, y: float) -> str | None:
         """Return the label at the position (x, y) of the left sensor's centre in mm, if any."""
-        return next((label.label for label in self.labels if label.holds(x, y)), None)
+        return next((label.label for label in self.labels if label.contains_point(x, y)), None)
 
 
 Drawing = tuple[Pixels, tuple[FloorLabel, ...]]
 _Draw = Callable[[], Pixels]
 
 
-class _DrawAnew(Protocol):
+class _DrawFromSeed(Protocol):
     """Function that draws the floor for a seed, with or without the patches that encode the answers."""
 
     def __call__(self, seed: int, /, *, label_patches: bool) -> Drawing: ...
 
 
 @dataclass(frozen=True, slots=True)
-class _Plan:
+class _FloorDefinition:
     name: str
     pose: Pose
     menu: int | None  # position in the course's menu, from 1; None for floors outside the course
     label_names: tuple[str, ...]
     obstacles: tuple[Obstacle, ...]
     seeded: bool
-    draw: _DrawAnew
+    draw: _DrawFromSeed
 
 
-_PLANS: dict[str, _Plan] = {}
+_DEFINITIONS: dict[str, _FloorDefinition] = {}
 
 
-def printed(
+def register_floor(
     name: str,
     pose: Pose,
     *,
@@ -111,41 +111,43 @@ def printed(
             return (draw if label_patches or unlabelled is None else unlabelled)(), labels
 
         named = tuple(dict.fromkeys(label.label for label in labels))
-        _add(_Plan(name, pose, menu, named, obstacles, False, drawing))
+        _register(_FloorDefinition(name, pose, menu, named, obstacles, False, drawing))
         return draw
 
     return register
 
 
-def drawn_anew(
+def register_seeded_floor(
     name: str, pose: Pose, *, menu: int | None = None, label_names: tuple[str, ...]
-) -> Callable[[_DrawAnew], _DrawAnew]:
-    """Return a decorator that registers a floor drawn for each seed, with labels from ``label_names``."""
+) -> Callable[[_DrawFromSeed], _DrawFromSeed]:
+    """Return a decorator that registers a floor drawn for each seed, with labels from ``list_label_names``."""
 
-    def register(draw: _DrawAnew) -> _DrawAnew:
-        _add(_Plan(name, pose, menu, label_names, (), True, draw))
+    def register(draw: _DrawFromSeed) -> _DrawFromSeed:
+        _register(_FloorDefinition(name, pose, menu, label_names, (), True, draw))
         return draw
 
     return register
 
 
-def _add(plan: _Plan) -> None:
-    if plan.name in _PLANS:
+def _register(plan: _FloorDefinition) -> None:
+    if plan.name in _DEFINITIONS:
         raise ValueError(f"there are two floors called {plan.name}")
-    _PLANS[plan.name] = plan
+    _DEFINITIONS[plan.name] = plan
 
 
-def names() -> tuple[str, ...]:
+def list_floor_names() -> tuple[str, ...]:
     """Return the names of all floors: the course's in the order of its menu, then the others in alphabetical order."""
-    return tuple(sorted(_PLANS, key=lambda name: (_PLANS[name].menu is None, _PLANS[name].menu or 0, name)))
+    return tuple(
+        sorted(_DEFINITIONS, key=lambda name: (_DEFINITIONS[name].menu is None, _DEFINITIONS[name].menu or 0, name))
+    )
 
 
-def seeded_names() -> tuple[str, ...]:
+def list_seeded_floor_names() -> tuple[str, ...]:
     """Return the names of the floors that depend on a seed."""
-    return tuple(name for name in names() if _PLANS[name].seeded)
+    return tuple(name for name in list_floor_names() if _DEFINITIONS[name].seeded)
 
 
-def floor(name: str, *, labels: bool = True, seed: int = 0) -> Floor:
+def build_floor(name: str, *, labels: bool = True, seed: int = 0) -> Floor:
     """Return the floor called ``name``; with ``labels=False`` without the grey patches that encode the answers.
 
     On floors that depend on a seed, ``seed`` decides the positions of the objects. Other floors ignore it.
@@ -153,40 +155,40 @@ def floor(name: str, *, labels: bool = True, seed: int = 0) -> Floor:
     Raises:
         UsageError: No floor has this name. The message suggests similar names.
     """
-    return _seeded(name, labels, seed) if _plan(name).seeded else _printed(name, labels)
+    return _build_seeded_floor(name, labels, seed) if _get_definition(name).seeded else _build_fixed_floor(name, labels)
 
 
 @functools.lru_cache(maxsize=12)  # an image takes 8 MB, and flags can select every floor
-def _printed(name: str, labels: bool) -> Floor:
-    return _floor(_plan(name), labels, 0)
+def _build_fixed_floor(name: str, labels: bool) -> Floor:
+    return _draw_floor(_get_definition(name), labels, 0)
 
 
 @functools.lru_cache(maxsize=12)  # a worker receives new seeds all the time
-def _seeded(name: str, labels: bool, seed: int) -> Floor:
-    return _floor(_plan(name), labels, seed)
+def _build_seeded_floor(name: str, labels: bool, seed: int) -> Floor:
+    return _draw_floor(_get_definition(name), labels, seed)
 
 
-def _floor(plan: _Plan, labels: bool, seed: int) -> Floor:
+def _draw_floor(plan: _FloorDefinition, labels: bool, seed: int) -> Floor:
     pixels, found = plan.draw(seed, label_patches=labels)
-    return Floor(plan.name, _read_only(pixels), plan.pose, found, plan.obstacles, labels, seed)
+    return Floor(plan.name, _make_read_only(pixels), plan.pose, found, plan.obstacles, labels, seed)
 
 
-def start_of(name: str) -> tuple[Pose, tuple[Obstacle, ...]]:
+def get_floor_start(name: str) -> tuple[Pose, tuple[Obstacle, ...]]:
     """Return the default pose and the obstacles of the floor called ``name``, without drawing it.
 
     Raises:
         UsageError: No floor has this name.
     """
-    plan = _plan(name)
+    plan = _get_definition(name)
     return plan.pose, plan.obstacles
 
 
-def label_names(name: str) -> tuple[str, ...]:
+def list_label_names(name: str) -> tuple[str, ...]:
     """Return all possible labels of the floor called ``name``, in the course's order; empty for an unknown name."""
-    return _PLANS[name].label_names if name in _PLANS else ()
+    return _DEFINITIONS[name].label_names if name in _DEFINITIONS else ()
 
 
-def floor_from_image(name: str, data: bytes, default_pose: Pose = Pose(200, 800, 0)) -> Floor:  # noqa: B008
+def build_floor_from_image(name: str, data: bytes, default_pose: Pose = Pose(200, 800, 0)) -> Floor:  # noqa: B008
     """Return a floor made from an instructor's PNG or JPEG file of 2362 x 1143 pixels.
 
     Transparent parts become white.
@@ -196,32 +198,32 @@ def floor_from_image(name: str, data: bytes, default_pose: Pose = Pose(200, 800,
     """
     try:
         image = read_image(data, WIDTH, HEIGHT)
-    except Unreadable as error:
+    except UnreadableDataError as error:
         raise UsageError(
             f"The background image {name!r} cannot be used: {error}; "
             f"it must be a PNG or JPEG of {WIDTH} x {HEIGHT} pixels, one a millimetre."
         ) from error
     paper = Image.new("RGBA", image.size, (255, 255, 255, 255))
     pixels = np.asarray(Image.alpha_composite(paper, image).convert("RGB"))
-    return Floor(name, _read_only(pixels), default_pose)
+    return Floor(name, _make_read_only(pixels), default_pose)
 
 
-def _plan(name: str) -> _Plan:
-    if name not in _PLANS:
-        raise UsageError(f"There is no background called {name!r}; {_suggestion(name)}")
-    return _PLANS[name]
+def _get_definition(name: str) -> _FloorDefinition:
+    if name not in _DEFINITIONS:
+        raise UsageError(f"There is no background called {name!r}; {_suggest_floors(name)}")
+    return _DEFINITIONS[name]
 
 
-def _suggestion(name: str) -> str:
+def _suggest_floors(name: str) -> str:
     """Return the end of an error message that suggests floors similar to ``name``, or lists all floors."""
-    by_lower = {known.lower(): known for known in names()}
+    by_lower = {known.lower(): known for known in list_floor_names()}
     near = difflib.get_close_matches(name.lower(), by_lower, n=3, cutoff=0.5)
     if near:
         return "did you mean " + " or ".join(by_lower[match] for match in near) + "?"
-    return "there are " + ", ".join(names()) + "."
+    return "there are " + ", ".join(list_floor_names()) + "."
 
 
-def _read_only(pixels: Pixels) -> Pixels:
+def _make_read_only(pixels: Pixels) -> Pixels:
     fixed = np.ascontiguousarray(pixels)
     fixed.setflags(write=False)
     return fixed

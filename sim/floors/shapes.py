@@ -9,9 +9,9 @@ import functools
 import math
 from collections.abc import Sequence
 
-from sim.chance import Stream
-from sim.floors.canvas import BLACK, Canvas, Pixels, grey, paint
-from sim.floors.registry import FloorLabel, drawn_anew, printed
+from sim.floors.canvas import BLACK, Canvas, Pixels, make_grey, paint
+from sim.floors.registry import FloorLabel, register_floor, register_seeded_floor
+from sim.random_streams import RandomStream
 from sim.recording import Pose
 
 #: The six shapes of Simple_Shapes, in the order of the codes 0 to 5 that the course gives them.
@@ -28,7 +28,7 @@ SHAPES = (
 LABEL_GREYS = tuple(k * 255 // 6 for k in range(6))
 
 
-def _outlines(x: float, y: float) -> tuple[tuple[tuple[float, float], ...], ...]:
+def _compute_outlines(x: float, y: float) -> tuple[tuple[tuple[float, float], ...], ...]:
     """Return the six shapes of side 10 with upper left anchor (x, y), in the order of the codes 0 to 5."""
     s = math.sqrt(3) * 5
     return (
@@ -55,20 +55,20 @@ def _draw_rows(canvas: Canvas, upper: Sequence[int], lower: Sequence[int], *, la
         _draw_shape(canvas, code, 225 + 80 * column, 218)
         if label_patches:
             left = 221 + 80 * column
-            canvas.rectangle((left, 251, left + 18, 275), grey(LABEL_GREYS[code]))
+            canvas.rectangle((left, 251, left + 18, 275), make_grey(LABEL_GREYS[code]))
     for column, code in enumerate(lower):
         _draw_shape(canvas, code, 225 + 80 * column, 418)
 
 
 def _draw_shape(canvas: Canvas, code: int, x: float, y: float) -> None:
-    outline = _outlines(x, y)[code]
+    outline = _compute_outlines(x, y)[code]
     if code == 0:
         canvas.rectangle((outline[0], outline[2]), BLACK)
     else:
         canvas.polygon(outline, BLACK)
 
 
-def _labels(upper: Sequence[int], lower: Sequence[int]) -> tuple[FloorLabel, ...]:
+def _build_labels(upper: Sequence[int], lower: Sequence[int]) -> tuple[FloorLabel, ...]:
     """Return labels that cover 10 mm in each direction from the course's positions of the left sensor.
 
     Within this area the whole shape is in the sensor's view.
@@ -80,29 +80,33 @@ def _labels(upper: Sequence[int], lower: Sequence[int]) -> tuple[FloorLabel, ...
     )
 
 
-def _rows(upper: Sequence[int], lower: Sequence[int], *, label_patches: bool) -> Pixels:
+def _paint_rows(upper: Sequence[int], lower: Sequence[int], *, label_patches: bool) -> Pixels:
     return paint(functools.partial(_draw_rows, upper=upper, lower=lower, label_patches=label_patches))
 
 
-def _without_patches() -> Pixels:
-    return _rows(_UPPER_ROW, _LOWER_ROW, label_patches=False)
+def _draw_without_patches() -> Pixels:
+    return _paint_rows(_UPPER_ROW, _LOWER_ROW, label_patches=False)
 
 
-@printed(
-    "Simple_Shapes", Pose(800, 400, 0), menu=21, labels=_labels(_UPPER_ROW, _LOWER_ROW), unlabelled=_without_patches
+@register_floor(
+    "Simple_Shapes",
+    Pose(800, 400, 0),
+    menu=21,
+    labels=_build_labels(_UPPER_ROW, _LOWER_ROW),
+    unlabelled=_draw_without_patches,
 )
-def simple_shapes() -> Pixels:
+def draw_simple_shapes() -> Pixels:
     """Draw the course's shapes and their label patches."""
-    return _rows(_UPPER_ROW, _LOWER_ROW, label_patches=True)
+    return _paint_rows(_UPPER_ROW, _LOWER_ROW, label_patches=True)
 
 
-@drawn_anew("Shuffled_Shapes", Pose(800, 400, 0), label_names=SHAPES)
-def shuffled_shapes(seed: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
+@register_seeded_floor("Shuffled_Shapes", Pose(800, 400, 0), label_names=SHAPES)
+def draw_shuffled_shapes(seed: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
     """Draw each shape once in the upper row, in an order drawn from the seed, and any four shapes in the lower row.
 
     This floor is not part of the course. It prevents programs from inferring the shape from the robot's position.
     """
-    chance = Stream(seed, "shapes")
+    chance = RandomStream(seed, "shapes")
     upper = sorted(_UPPER_ROW, key=chance.integer)
     lower = [chance.integer(100 + column) % len(SHAPES) for column in range(len(_LOWER_ROW))]
-    return _rows(upper, lower, label_patches=label_patches), _labels(upper, lower)
+    return _paint_rows(upper, lower, label_patches=label_patches), _build_labels(upper, lower)

@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 from importlib import resources
 
-from sim.floors.canvas import BLACK, RED, WHITE, Pixels, Point, SmoothCanvas, grey
-from sim.floors.registry import Obstacle, printed
+from sim.floors.canvas import BLACK, RED, WHITE, Pixels, Point, SmoothCanvas, make_grey
+from sim.floors.registry import Obstacle, register_floor
 from sim.recording import Pose
 
 
@@ -24,7 +24,7 @@ class TrackLine:
     points: tuple[Point, ...]
 
 
-def lines_of(file_name: str) -> tuple[TrackLine, ...]:
+def load_track_lines(file_name: str) -> tuple[TrackLine, ...]:
     """Return the centrelines in a data file of this package."""
     text = resources.files(__package__).joinpath(file_name).read_text(encoding="utf-8")
     return tuple(
@@ -32,13 +32,13 @@ def lines_of(file_name: str) -> tuple[TrackLine, ...]:
     )
 
 
-@printed("Line_Following_Test", Pose(141, 125, 90), menu=18)
-def line_following_test() -> Pixels:
+@register_floor("Line_Following_Test", Pose(141, 125, 90), menu=18)
+def draw_line_following_test() -> Pixels:
     """Draw eleven black lines of different kinds."""
     canvas = SmoothCanvas()
-    for line in lines_of("line_following_test.json"):
+    for line in load_track_lines("line_following_test.json"):
         canvas.line(line.points, line.width)
-    return canvas.pixels()
+    return canvas.to_pixels()
 
 
 #: Default obstacles on Obstacles_Test.
@@ -47,20 +47,20 @@ _TEST_OBSTACLES: tuple[Obstacle, ...] = tuple(
 )
 
 
-@printed("Obstacles_Test", Pose(121, 125, 90), menu=25, obstacles=_TEST_OBSTACLES)
-def obstacles_test() -> Pixels:
+@register_floor("Obstacles_Test", Pose(121, 125, 90), menu=25, obstacles=_TEST_OBSTACLES)
+def draw_obstacles_test() -> Pixels:
     """Draw six lines that lead to obstacles, and a broad black band."""
     canvas = SmoothCanvas()
-    lines = lines_of("obstacles_test.json")
+    lines = load_track_lines("obstacles_test.json")
     for line in lines:
         canvas.line(line.points, line.width)
     first, last = 63.0, 1097.0
     canvas.rectangle((1036, first, 1334, last), BLACK)
-    return canvas.pixels()
+    return canvas.to_pixels()
 
 
-@printed("Junction_Handling_Test", Pose(698, 130, 90), menu=19)
-def junction_handling_test() -> Pixels:
+@register_floor("Junction_Handling_Test", Pose(698, 130, 90), menu=19)
+def draw_junction_handling_test() -> Pixels:
     """Draw a street grid with a roundabout and green markers that show where to turn.
 
     A marker is in the right or left corner of a crossing. The drawing is new, with the original's dimensions: lines 20
@@ -85,55 +85,60 @@ def junction_handling_test() -> Pixels:
         far = near + sides[side] * marker
         bottom = rows[row] + width / 2  # behind the crossing, seen by a robot that comes from below
         canvas.rectangle((min(near, far), bottom, max(near, far), bottom + marker), green)
-    return canvas.pixels()
+    return canvas.to_pixels()
 
 
-@printed("Thruxton_Circuit", Pose(457, 242, 120), menu=22)
-def thruxton_circuit() -> Pixels:
+@register_floor("Thruxton_Circuit", Pose(457, 242, 120), menu=22)
+def draw_thruxton_circuit() -> Pixels:
     """Draw the closed loop with the grey start bar across it, and flags and chequers beside the bar."""
     canvas = SmoothCanvas()
-    (track,) = lines_of("thruxton_circuit.json")
+    (track,) = load_track_lines("thruxton_circuit.json")
     canvas.line(track.points, track.width)
     for point in track.points:  # closes the loop, and fills the specks that Pillow leaves at bends
         canvas.disc(point, track.width / 2, BLACK)
-    bar = Stand(centre=(423.2, 847.9), turn=27.4)
+    bar = LocalFrame(centre=(423.2, 847.9), turn=27.4)
     for middle in ((551, 785), (220, 955)):
-        _flag(canvas, middle)
-    canvas.polygon(bar.box(along=(-258 / 2, 258 / 2), across=(-25 / 2, 25 / 2)), grey(192))
+        _draw_flag(canvas, middle)
+    canvas.polygon(bar.map_rectangle(along=(-258 / 2, 258 / 2), across=(-25 / 2, 25 / 2)), make_grey(192))
     for start in (-200.0, 185.0):
-        _chequers(canvas, bar, start)
-    return canvas.pixels()
+        _draw_chequers(canvas, bar, start)
+    return canvas.to_pixels()
 
 
 @dataclass(frozen=True, slots=True)
-class Stand:
+class LocalFrame:
     """Local coordinate system on the image; ``turn`` is its angle in degrees anticlockwise."""
 
     centre: Point
     turn: float
 
-    def at(self, along: float, across: float) -> Point:
+    def map_point(self, along: float, across: float) -> Point:
         """Return the image point at distance ``along`` the first axis and ``across`` downwards from it, in pixels."""
         cosine, sine = math.cos(math.radians(self.turn)), math.sin(math.radians(self.turn))
         x, y = self.centre
         return (x + along * cosine + across * sine, y - along * sine + across * cosine)
 
-    def box(self, along: tuple[float, float], across: tuple[float, float]) -> tuple[Point, ...]:
+    def map_rectangle(self, along: tuple[float, float], across: tuple[float, float]) -> tuple[Point, ...]:
         """Return the four corners of a rectangle, in order, given its ranges along and across the axis in pixels."""
         (near, far), (top, bottom) = along, across
-        return (self.at(near, top), self.at(far, top), self.at(far, bottom), self.at(near, bottom))
+        return (
+            self.map_point(near, top),
+            self.map_point(far, top),
+            self.map_point(far, bottom),
+            self.map_point(near, bottom),
+        )
 
 
-def _chequers(canvas: SmoothCanvas, bar: Stand, start: float) -> None:
+def _draw_chequers(canvas: SmoothCanvas, bar: LocalFrame, start: float) -> None:
     """Draw a strip with two rows of squares on the bar's axis, away from the track."""
     side, count = 12.5, 5
     for row in range(2):
         for column in range(row % 2, count, 2):
             left, top = start + column * side, (row - 1) * side
-            canvas.polygon(bar.box((left, left + side), (top, top + side)), BLACK)
+            canvas.polygon(bar.map_rectangle((left, left + side), (top, top + side)), BLACK)
 
 
-def _flag(canvas: SmoothCanvas, middle: Point) -> None:
+def _draw_flag(canvas: SmoothCanvas, middle: Point) -> None:
     """Draw a red pennant centred at ``middle``, with its pole on the right."""
     width, height, pole = 24.0, 24.0, 4.0
     x, y = middle

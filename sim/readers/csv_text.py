@@ -11,7 +11,7 @@ import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from sim.readers.unreadable import TooMany, Unreadable
+from sim.readers.reader_errors import TooManyValuesError, UnreadableDataError
 
 MOST_CELLS = 2_000_000
 #: Maximum lines of a row of people or submissions. A longer row has an unmatched quotation mark.
@@ -33,20 +33,20 @@ def read_rows(text: str, separator: str = ",") -> list[list[str]]:
     Raises:
         Unreadable: There are too many cells, or a cell is too long.
     """
-    _check(text.count(separator) + text.count("\n"))
+    _check_cell_count(text.count(separator) + text.count("\n"))
     try:
         return list(csv.reader(io.StringIO(text, newline=""), delimiter=separator))
     except csv.Error as error:
-        raise Unreadable("its rows cannot be told apart (%(problem)s)", problem=str(error)) from None
+        raise UnreadableDataError("its rows cannot be told apart (%(problem)s)", problem=str(error)) from None
 
 
-def records(lines: Sequence[str], separator: str) -> Iterator[CsvRecord]:
+def read_records(lines: Sequence[str], separator: str) -> Iterator[CsvRecord]:
     """Yield the rows of ``lines``, which end with line feeds. After a broken row, continue at the next line.
 
     Raises:
         Unreadable: There are too many cells.
     """
-    _check(sum(line.count(separator) for line in lines) + len(lines))
+    _check_cell_count(sum(line.count(separator) for line in lines) + len(lines))
     begun = 0
 
     def following(start: int) -> Iterator[str]:
@@ -68,6 +68,6 @@ def records(lines: Sequence[str], separator: str) -> Iterator[CsvRecord]:
             begun += 1
 
 
-def _check(cells: int) -> None:
+def _check_cell_count(cells: int) -> None:
     if cells > MOST_CELLS:
-        raise TooMany("it has more than %(most)s cells", most=MOST_CELLS)
+        raise TooManyValuesError("it has more than %(most)s cells", most=MOST_CELLS)

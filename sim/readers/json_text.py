@@ -12,7 +12,7 @@ from collections.abc import Callable
 from json import JSONDecodeError
 from typing import Any
 
-from sim.readers.unreadable import DEEPEST, TooMany, Unreadable, check_depth
+from sim.readers.reader_errors import MAX_DEPTH, TooManyValuesError, UnreadableDataError, check_depth
 
 __all__ = ["MOST_VALUES", "JSONDecodeError", "read_json"]
 
@@ -38,26 +38,26 @@ def read_json(
         try:
             text = text.decode("utf-8-sig")
         except UnicodeDecodeError:
-            raise Unreadable("it is not UTF-8") from None
-    _check(text, most_values)
+            raise UnreadableDataError("it is not UTF-8") from None
+    _check_limits(text, most_values)
     try:
         return json.loads(text, parse_constant=parse_constant, strict=strict)
     except JSONDecodeError:
         raise
     except RecursionError:
-        raise Unreadable("it is nested too deeply") from None
+        raise UnreadableDataError("it is nested too deeply") from None
     except ValueError as error:
         if "integer string conversion" not in str(error):
             raise
         # Python rejects integers with thousands of digits.
-        raise Unreadable("it has a number that is too long") from None
+        raise UnreadableDataError("it has a number that is too long") from None
 
 
-def _check(text: str, most_values: int) -> None:
+def _check_limits(text: str, most_values: int) -> None:
     opened = text.count("[") + text.count("{")
-    if opened <= DEEPEST and opened + text.count(",") <= most_values:
+    if opened <= MAX_DEPTH and opened + text.count(",") <= most_values:
         return
     structure = _STRINGS.sub("", text)
     if structure.count(",") + structure.count("[") + structure.count("{") > most_values:
-        raise TooMany("it has more than %(most)s values", most=most_values)
+        raise TooManyValuesError("it has more than %(most)s values", most=most_values)
     check_depth(structure)

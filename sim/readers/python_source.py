@@ -8,7 +8,7 @@ from __future__ import annotations
 import ast
 import re
 
-from sim.readers.unreadable import TooMany, Unreadable
+from sim.readers.reader_errors import TooManyValuesError, UnreadableDataError
 
 MOST_TOKENS = 200_000
 _TOKEN = re.compile(r"\w++|[^\w\s]")
@@ -22,10 +22,10 @@ def parse_module(text: str, most_tokens: int = MOST_TOKENS) -> ast.Module:
         Unreadable: Parsing would take too much work.
     """
     if len(text) > most_tokens and sum(1 for _ in _TOKEN.finditer(text)) > most_tokens:
-        raise TooMany("it has more than %(most)s tokens", most=most_tokens)
+        raise TooManyValuesError("it has more than %(most)s tokens", most=most_tokens)
     try:
         return ast.parse(text)
     except (RecursionError, MemoryError):
-        raise Unreadable("it is nested too deeply") from None
+        raise UnreadableDataError("it is nested too deeply") from None
     except ValueError:
-        raise Unreadable("it has a character that Python source cannot have") from None
+        raise UnreadableDataError("it has a character that Python source cannot have") from None

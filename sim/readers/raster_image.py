@@ -6,7 +6,7 @@ import io
 
 from PIL import Image
 
-from sim.readers.unreadable import Unreadable
+from sim.readers.reader_errors import UnreadableDataError
 
 #: Each scan of a progressive JPEG draws the whole image; encoders use about ten.
 _MOST_SCANS = 64
@@ -22,11 +22,11 @@ def read_image(data: bytes, width: int, height: int) -> Image.Image:
     try:
         with Image.open(io.BytesIO(data), formats=("PNG", "JPEG")) as image:
             if image.size != (width, height):
-                raise Unreadable("it is %(width)s x %(height)s pixels", width=image.width, height=image.height)
+                raise UnreadableDataError("it is %(width)s x %(height)s pixels", width=image.width, height=image.height)
             if image.format == "JPEG" and data.count(_SCAN) > _MOST_SCANS:
-                raise Unreadable("it has more than %(most)s scans", most=_MOST_SCANS)
+                raise UnreadableDataError("it has more than %(most)s scans", most=_MOST_SCANS)
             return image.convert("RGBA")
-    except Unreadable:
+    except UnreadableDataError:
         raise
     except (OSError, SyntaxError, ValueError, MemoryError, Image.DecompressionBombError):
-        raise Unreadable("it cannot be read as PNG or JPEG") from None
+        raise UnreadableDataError("it cannot be read as PNG or JPEG") from None

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from tomllib import TOMLDecodeError
 from typing import Any
 
-from sim.readers.unreadable import TooMany, Unreadable, check_depth
+from sim.readers.reader_errors import TooManyValuesError, UnreadableDataError, check_depth
 
 __all__ = ["MOST_KEY_PARTS", "TOMLDecodeError", "read_toml"]
 
@@ -39,16 +39,16 @@ def read_toml(text: str, parse_float: Callable[[str], Any] = float) -> dict[str,
         TOMLDecodeError: The text is not TOML.
         Unreadable: Parsing would take too much work.
     """
-    _check(_TEXTS.sub(_placeholder, text))
+    _check_structure(_TEXTS.sub(_make_placeholder, text))
     try:
         document = tomllib.loads(text, parse_float=parse_float)
     except TOMLDecodeError:
         raise
     except RecursionError:
-        raise Unreadable("it is nested too deeply") from None
+        raise UnreadableDataError("it is nested too deeply") from None
     except ValueError:
         # Python rejects integers with thousands of digits.
-        raise Unreadable("it has a number that is too long") from None
+        raise UnreadableDataError("it has a number that is too long") from None
     _check_numbers(document)
     return document
 
@@ -56,25 +56,25 @@ def read_toml(text: str, parse_float: Callable[[str], Any] = float) -> dict[str,
 def _check_numbers(value: object) -> None:
     """Raise Unreadable for a number beyond TOML's 64 bits. Python cannot print numbers with thousands of digits."""
     if isinstance(value, int) and value.bit_length() > 64:
-        raise Unreadable("it has a number that is too long")
+        raise UnreadableDataError("it has a number that is too long")
     for each in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
         _check_numbers(each)
 
 
-def _placeholder(found: re.Match[str]) -> str:
+def _make_placeholder(found: re.Match[str]) -> str:
     return "" if found[0].startswith("#") else "x"
 
 
-def _check(structure: str) -> None:
+def _check_structure(structure: str) -> None:
     check_depth(structure)
     parts = 0
     for dotted in _DOTTED.finditer(structure):
         dots = dotted[0].count(".")
         if dots >= MOST_KEY_PARTS:
-            raise Unreadable("it has a key of more than %(most)s parts", most=MOST_KEY_PARTS)
+            raise UnreadableDataError("it has a key of more than %(most)s parts", most=MOST_KEY_PARTS)
         # One dot can be a decimal point.
         parts += dots if dots > 1 else 0
     if structure.count("=") + structure.count("[") + structure.count("{") + parts > MOST_KEYS:
-        raise TooMany("it has more than %(most)s keys, tables and lists", most=MOST_KEYS)
+        raise TooManyValuesError("it has more than %(most)s keys, tables and lists", most=MOST_KEYS)
     if structure.count(",") > MOST_VALUES:
-        raise TooMany("it has more than %(most)s values", most=MOST_VALUES)
+        raise TooManyValuesError("it has more than %(most)s values", most=MOST_VALUES)

@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from sim.readers.unreadable import DEEPEST, TooMany, Unreadable
+from sim.readers.reader_errors import MAX_DEPTH, TooManyValuesError, UnreadableDataError
 
 MOST_BYTES = 20_000_000
 #: Parser events: values, and starts or ends of lists and tables.
@@ -20,23 +20,23 @@ def read_yaml(data: bytes) -> Any:
         Unreadable: The text is not YAML (the message has the line), or parsing would take too much work.
     """
     if len(data) > MOST_BYTES:
-        raise Unreadable("it is larger than %(most)s MB", most=MOST_BYTES // 10**6)
+        raise UnreadableDataError("it is larger than %(most)s MB", most=MOST_BYTES // 10**6)
     try:
-        _check(data)
+        _check_limits(data)
         return yaml.load(data, Loader=yaml.CBaseLoader)
     except (yaml.YAMLError, RecursionError, UnicodeError) as error:
         mark = getattr(error, "problem_mark", None)
         if mark is None:
-            raise Unreadable("it is not YAML") from None
-        raise Unreadable("it is not YAML at line %(line)s", line=mark.line + 1) from None
+            raise UnreadableDataError("it is not YAML") from None
+        raise UnreadableDataError("it is not YAML at line %(line)s", line=mark.line + 1) from None
 
 
-def _check(data: bytes) -> None:
+def _check_limits(data: bytes) -> None:
     depth = 0
     for count, event in enumerate(yaml.parse(data, Loader=yaml.CBaseLoader)):
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         # libyaml recurses without a limit and would exhaust the stack.
-        if depth > DEEPEST:
-            raise Unreadable("it is nested too deeply")
+        if depth > MAX_DEPTH:
+            raise UnreadableDataError("it is nested too deeply")
         if count > MOST_EVENTS:
-            raise TooMany("it has more than %(most)s values", most=MOST_EVENTS)
+            raise TooManyValuesError("it has more than %(most)s values", most=MOST_EVENTS)

@@ -14,9 +14,9 @@ from contextlib import contextmanager
 from typing import BinaryIO
 from zipfile import ZipFile, ZipInfo
 
-from sim.readers.unreadable import TooMany, Unreadable
+from sim.readers.reader_errors import TooManyValuesError, UnreadableDataError
 
-__all__ = ["CHUNK", "PLAIN_COMPRESSION", "ZipFile", "ZipInfo", "entry_chunks", "is_zip", "open_zip"]
+__all__ = ["CHUNK", "PLAIN_COMPRESSION", "ZipFile", "ZipInfo", "is_zip", "open_zip", "read_entry_chunks"]
 
 CHUNK = 64 * 1024
 #: Other compression methods can allocate gigabytes before they return a byte.
@@ -48,38 +48,38 @@ def open_zip(source: BinaryIO, most_entries: int) -> Iterator[ZipFile]:
         Unreadable: The data are not an archive, or there are more than ``most_entries`` entries. Entries of stored
             archives inside it count.
     """
-    if _entries(source) > most_entries:
-        raise TooMany("it has more than %(most)s files", most=most_entries)
+    if _count_entries(source) > most_entries:
+        raise TooManyValuesError("it has more than %(most)s files", most=most_entries)
     try:
         archive = ZipFile(source)
     except (*_BROKEN, OSError):
-        raise Unreadable("it is not a zip archive that can be read") from None
+        raise UnreadableDataError("it is not a zip archive that can be read") from None
     with archive:
         yield archive
 
 
 def is_zip(source: BinaryIO) -> bool:
     """Return whether the source contains an archive, regardless of its first bytes."""
-    return _entries(source) > 0 and zipfile.is_zipfile(source)
+    return _count_entries(source) > 0 and zipfile.is_zipfile(source)
 
 
-def entry_chunks(archive: ZipFile, info: ZipInfo) -> Iterator[bytes]:
+def read_entry_chunks(archive: ZipFile, info: ZipInfo) -> Iterator[bytes]:
     """Yield the content of an entry in chunks.
 
     Raises:
         Unreadable: The entry is damaged or uses an unusual compression method.
     """
     if info.compress_type not in PLAIN_COMPRESSION:
-        raise Unreadable("it is compressed in an unusual way")
+        raise UnreadableDataError("it is compressed in an unusual way")
     try:
         with archive.open(info) as stream:
             while chunk := stream.read(CHUNK):
                 yield chunk
     except (*_BROKEN, OSError):
-        raise Unreadable("it is damaged in the archive") from None
+        raise UnreadableDataError("it is damaged in the archive") from None
 
 
-def _entries(source: BinaryIO) -> int:
+def _count_entries(source: BinaryIO) -> int:
     """Return an upper bound for the number of entries: the number of entry signatures in the data."""
     source.seek(0)
     count, before = 0, b""

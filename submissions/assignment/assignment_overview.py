@@ -31,7 +31,7 @@ TOPICS: Mapping[str, str] = MappingProxyType(
     }
 )
 _SENTENCE_ENDS = re.compile(r"(?<=[.!?]) (?=[A-Z])")
-_WHERE_IT_STARTS = re.compile(r"(The|This)( small)? robot |There are two robots")
+_START_POSE_SENTENCE = re.compile(r"(The|This)( small)? robot |There are two robots")
 _LONGEST_SENTENCE = 200
 
 
@@ -51,37 +51,37 @@ class AssignmentOverview:
         """The number of the assignment's part of the course; empty if it has none."""
         return self.section[:2] if self.section[:2] in TOPICS else ""
 
-    def says(self, text: str) -> bool:
+    def matches_text(self, text: str) -> bool:
         """Return whether the overview contains every word of the text, ignoring case."""
         told = f"{self.section} {self.id} {self.title} {self.sentence} {TOPICS.get(self.topic, '')}".casefold()
         return all(word in told for word in text.casefold().split())
 
 
-def overview(folder: Path) -> AssignmentOverview:
+def read_overview(folder: Path) -> AssignmentOverview:
     """Read the overview of the catalogue assignment in this folder."""
     table = read_toml((folder / FILE_NAME).read_text(encoding="utf-8"), Decimal)
     return AssignmentOverview(
         table.get("section", ""),
         table["id"],
         table["title"],
-        _sentence(table.get("description", "")),
+        _choose_sentence(table.get("description", "")),
         sum((Decimal(criterion["marks"]) for criterion in table["criterion"]), Decimal(0)),
-        sum(_trials(scenario) for scenario in table.get("scenario", ())),
+        sum(_count_trials(scenario) for scenario in table.get("scenario", ())),
     )
 
 
-def _sentence(description: str) -> str:
+def _choose_sentence(description: str) -> str:
     """Return the first sentence of the task, skipping sentences about the start pose.
 
     A sentence that begins with "Write" takes precedence.
     """
     sentences = _SENTENCE_ENDS.split(" ".join(description.split()))
     asking = (each for each in sentences if each.startswith("Write "))
-    others = (each for each in sentences if not _WHERE_IT_STARTS.match(each))
+    others = (each for each in sentences if not _START_POSE_SENTENCE.match(each))
     return textwrap.shorten(next(asking, next(others, sentences[0])), _LONGEST_SENTENCE, placeholder=" …")
 
 
-def _trials(scenario: Mapping[str, Any]) -> int:
+def _count_trials(scenario: Mapping[str, Any]) -> int:
     """Return the number of trials: poses x swept levels x noise levels x seeds."""
     poses = 1 if scenario.get("choose") == "random" else len(scenario["poses"])
     swept = sum(map(len, scenario.get("sweep", {}).values())) or 1

@@ -16,16 +16,25 @@ from types import MappingProxyType
 from responders import library
 from responders.channel import Channel
 from sim.errors import UsageError
-from sim.floors import HEIGHT, WIDTH, Floor, floor, floor_from_image, label_names, names, seeded_names
-from sim.motion import gap
+from sim.floors import (
+    HEIGHT,
+    WIDTH,
+    Floor,
+    build_floor,
+    build_floor_from_image,
+    list_floor_names,
+    list_label_names,
+    list_seeded_floor_names,
+)
+from sim.motion import measure_gap
 from sim.recording import Pose
-from sim.robot import usual_robot
-from submissions.assignment.criterion_parts import check_given, read_criteria, sources_of
+from sim.robot import get_default_robot_name
+from submissions.assignment.criterion_parts import check_given_files, read_check_sources, read_criteria
 from submissions.assignment.definition import Assignment, Parts, Scenario, Training, WorldSpec
 from submissions.assignment.limits import Limits
-from submissions.assignment.other_parts import SAME, check_robots, read_agents, second_poses_of
+from submissions.assignment.other_parts import SAME, build_second_poses, check_robots, read_agents
 from submissions.assignment.problems import Path as Place
-from submissions.assignment.problems import Problems, checked_table, no_double, tables_of, texts_in
+from submissions.assignment.problems import Problems, check_table, check_unique_id, filter_texts, read_tables
 from submissions.assignment.schema import (
     HeadTable,
     LimitsTable,
@@ -34,9 +43,9 @@ from submissions.assignment.schema import (
     TrainingTable,
     WorldTable,
 )
-from submissions.criteria.common import Surroundings
-from submissions.nearest import did_you_mean, listed
+from submissions.criteria.common import AssignmentContext
 from submissions.source_text import decode_source
+from submissions.suggestions import join_with_or, suggest_name
 from submissions.sweep import Sweep
 
 _HEAD = tuple(HeadTable.model_fields)
@@ -58,23 +67,25 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     for key in document:
         if key not in _HEAD and key not in _TABLES:
             known = (*_HEAD, *_TABLES)
-            problems.add((key,), f'"{key[:60]}" is not a key here, expected {listed(known)}{did_you_mean(key, known)}')
-    head = checked_table(HeadTable, {k: v for k, v in document.items() if k in _HEAD}, (), problems)
-    world_table = checked_table(WorldTable, document.get("world", {}), ("world",), problems)
-    parts = checked_table(PartsTable, document.get("parts", {}), ("parts",), problems)
-    limits = checked_table(LimitsTable, document.get("limits", {}), ("limits",), problems)
-    ground = _ground(world_table or _background_alone(document), files, problems)
-    world = _world(world_table, ground, files, problems) if world_table and ground else None
+            problems.add(
+                (key,), f'"{key[:60]}" is not a key here, expected {join_with_or(known)}{suggest_name(key, known)}'
+            )
+    head = check_table(HeadTable, {k: v for k, v in document.items() if k in _HEAD}, (), problems)
+    world_table = check_table(WorldTable, document.get("world", {}), ("world",), problems)
+    parts = check_table(PartsTable, document.get("parts", {}), ("parts",), problems)
+    limits = check_table(LimitsTable, document.get("limits", {}), ("limits",), problems)
+    ground = _load_floor(world_table or _read_background_only(document), files, problems)
+    world = _build_world(world_table, ground, files, problems) if world_table and ground else None
     robotless = _runs_no_robot(document)
-    scenarios = [] if robotless else _scenarios(document, ground, problems)
+    scenarios = [] if robotless else _build_scenarios(document, ground, problems)
     if world_table and parts:
         check_robots(document, world_table, parts, problems)
     agents, agents_sources = read_agents(document, parts, files, problems)
-    _clear_beacons(scenarios, world, problems)
-    around = Surroundings(
+    _check_beacons(scenarios, world, problems)
+    around = AssignmentContext(
         scenarios=[scenario for scenario in scenarios if scenario],
         ground=ground,
-        without=_nobodys(parts),
+        without=_find_absent_parts(parts),
         agents=frozenset(agents),
         robots=world_table.robots if world_table else 1,
         files=files,
@@ -83,13 +94,13 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     criteria = read_criteria(document, around, robotless, problems)
     training = None
     if "training" in document:
-        training_table = checked_table(TrainingTable, document["training"], ("training",), problems)
-        training = _training(training_table, scenarios, ground, problems) if training_table else None
-    check_given(document, problems)
-    given_parts = sources_of(criteria, files, problems)
-    given_parts |= _given_parts(parts, robotless, files, problems) if parts else {}
+        training_table = check_table(TrainingTable, document["training"], ("training",), problems)
+        training = _build_training(training_table, scenarios, ground, problems) if training_table else None
+    check_given_files(document, problems)
+    given_parts = read_check_sources(criteria, files, problems)
+    given_parts |= _read_given_parts(parts, robotless, files, problems) if parts else {}
     given_parts |= agents_sources
-    given = _given(document, files, problems)
+    given = _collect_given_files(document, files, problems)
     if problems.found or not (head and world and parts and limits):
         return None
     assignment = Assignment(
@@ -110,7 +121,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         description=head.description,
         given=MappingProxyType(given),
         given_parts=MappingProxyType(given_parts),
-        version=_version(files, given, {name: text for name, text in given_parts.items() if name not in files}),
+        version=_compute_version(files, given, {name: text for name, text in given_parts.items() if name not in files}),
         training=training,
         secret=head.secret,
     )
@@ -133,7 +144,7 @@ def _check_lengths(value: object, place: Place, problems: Problems) -> None:
         _check_lengths(entry, (*place, key), problems)
 
 
-def _version(files: Files, given: Files, packaged: Mapping[str, str]) -> str:
+def _compute_version(files: Files, given: Files, packaged: Mapping[str, str]) -> str:
     """Return the SHA-256 over names and bytes, sorted by name. Packaged networks and responders count as files."""
     digest = hashlib.sha256()
     responders = {name: text.encode() for name, text in packaged.items()}
@@ -143,38 +154,38 @@ def _version(files: Files, given: Files, packaged: Mapping[str, str]) -> str:
     return digest.hexdigest()
 
 
-def _background_alone(document: Mapping[str, object]) -> WorldTable:
+def _read_background_only(document: Mapping[str, object]) -> WorldTable:
     """Return a world with only the background, so that other mistakes in the table don't prevent its check."""
     world = document.get("world")
     name = world.get("background") if isinstance(world, dict) else None
     return WorldTable(background=name) if isinstance(name, str) else WorldTable()
 
 
-def _ground(table: WorldTable, files: Files, problems: Problems) -> Floor | None:
+def _load_floor(table: WorldTable, files: Files, problems: Problems) -> Floor | None:
     name = table.background
     place = ("world", "background")
     try:
-        if name in names():
-            return floor(name, labels=table.labels)
+        if name in list_floor_names():
+            return build_floor(name, labels=table.labels)
         if name.lower().endswith(_IMAGE_SUFFIXES) and name in files:
-            return floor_from_image(name, files[name])
+            return build_floor_from_image(name, files[name])
     except UsageError as error:
         problems.add(place, f"{str(error).rstrip('.')}, expected an image that can be used")
         return None
     if name.lower().endswith(_IMAGE_SUFFIXES):
         problems.add(place, f'background is "{name[:60]}", expected an image beside this file')
         return None
-    hint = did_you_mean(name, names()) or f"; there are {', '.join(names())}"
+    hint = suggest_name(name, list_floor_names()) or f"; there are {', '.join(list_floor_names())}"
     problems.add(
         place, f'background is "{name[:60]}", expected a background or an image (.png, .jpg) beside this file{hint}'
     )
     return None
 
 
-def _world(table: WorldTable, ground: Floor, files: Files, problems: Problems) -> WorldSpec:
+def _build_world(table: WorldTable, ground: Floor, files: Files, problems: Problems) -> WorldSpec:
     name = table.background
-    if "sheet" in table.model_fields_set and name not in seeded_names():
-        seeded = listed(seeded_names())
+    if "sheet" in table.model_fields_set and name not in list_seeded_floor_names():
+        seeded = join_with_or(list_seeded_floor_names())
         problems.add(("world", "sheet"), f"{name} is not drawn from a seed, expected sheet only with {seeded}")
     obstacles = table.obstacles if "obstacles" in table.model_fields_set else ground.obstacles
     for number, (x, y, width, height) in enumerate(obstacles):
@@ -183,10 +194,10 @@ def _world(table: WorldTable, ground: Floor, files: Files, problems: Problems) -
                 ("world", "obstacles", number),
                 f"obstacles[{number}] is not on the floor, expected [x, y, width, height] within {WIDTH} x {HEIGHT} mm",
             )
-    robot = table.robot if "robot" in table.model_fields_set else usual_robot(name)
+    robot = table.robot if "robot" in table.model_fields_set else get_default_robot_name(name)
     return WorldSpec(
         name,
-        files.get(name) if name not in names() else None,
+        files.get(name) if name not in list_floor_names() else None,
         labels=table.labels,
         obstacles=obstacles,
         robot=robot,
@@ -195,30 +206,32 @@ def _world(table: WorldTable, ground: Floor, files: Files, problems: Problems) -
         drive=table.drive,
         noise=table.noise,
         tick=table.tick,
-        sheet=_sheet(table),
+        sheet=_choose_sheet_seed(table),
     )
 
 
-def _sheet(table: WorldTable) -> int | None:
+def _choose_sheet_seed(table: WorldTable) -> int | None:
     """Return the seed of the digit sheet; None if each trial has its own."""
     if table.sheet == "per-seed":
         return None
     return table.sheet if isinstance(table.sheet, int) else 0
 
 
-def _scenarios(document: Mapping[str, object], ground: Floor | None, problems: Problems) -> Sequence[Scenario | None]:
-    tables = tables_of(document, "scenario", problems)
+def _build_scenarios(
+    document: Mapping[str, object], ground: Floor | None, problems: Problems
+) -> Sequence[Scenario | None]:
+    tables = read_tables(document, "scenario", problems)
     seen: dict[str, int] = {}
     scenarios = []
     for number, raw in enumerate(tables):
         place = ("scenario", number)
-        table = checked_table(ScenarioTable, raw, place, problems)
-        no_double(raw, seen, place, "scenario", problems)
-        scenarios.append(_scenario(table, ground, place, problems) if table else None)
+        table = check_table(ScenarioTable, raw, place, problems)
+        check_unique_id(raw, seen, place, "scenario", problems)
+        scenarios.append(_build_scenario(table, ground, place, problems) if table else None)
     return scenarios
 
 
-def _scenario(table: ScenarioTable, ground: Floor | None, place: Place, problems: Problems) -> Scenario | None:
+def _build_scenario(table: ScenarioTable, ground: Floor | None, place: Place, problems: Problems) -> Scenario | None:
     for key in ("poses", "second_poses"):
         for number, (x, y, _) in enumerate(getattr(table, key)):
             if not (0 <= x <= WIDTH and 0 <= y <= HEIGHT):
@@ -229,7 +242,7 @@ def _scenario(table: ScenarioTable, ground: Floor | None, place: Place, problems
     poses = tuple(Pose(*pose) for pose in table.poses)
     if not poses:
         poses = (ground.default_pose if ground else Pose(100, 800, 0),)
-    second_poses = second_poses_of(table, len(poses), place, problems)
+    second_poses = build_second_poses(table, len(poses), place, problems)
     return Scenario(
         id=table.id,
         poses=poses,
@@ -247,20 +260,20 @@ def _scenario(table: ScenarioTable, ground: Floor | None, place: Place, problems
     )
 
 
-def _clear_beacons(scenarios: Sequence[Scenario | None], world: WorldSpec | None, problems: Problems) -> None:
+def _check_beacons(scenarios: Sequence[Scenario | None], world: WorldSpec | None, problems: Problems) -> None:
     """Report beacons inside an obstacle, which would block every path to them."""
     for number, scenario in enumerate(scenarios):
         beacon = scenario.channel.beacon if scenario and scenario.channel.blocked_by == "obstacles" else None
-        if world and beacon and any(gap(box, *beacon) == 0 for box in world.obstacles):
+        if world and beacon and any(measure_gap(box, *beacon) == 0 for box in world.obstacles):
             sentence = "beacon is in an obstacle, which blocks every way to it, expected a place beside them"
             problems.add(("scenario", number, "channel", "beacon"), sentence)
 
 
-def _nobodys(parts: PartsTable | None) -> frozenset[str]:
+def _find_absent_parts(parts: PartsTable | None) -> frozenset[str]:
     return frozenset(part for part in ("program", "responder") if parts and getattr(parts, part) == "none")
 
 
-def _given_parts(parts: PartsTable, robotless: bool, files: Files, problems: Problems) -> dict[str, str]:
+def _read_given_parts(parts: PartsTable, robotless: bool, files: Files, problems: Problems) -> dict[str, str]:
     sources = {}
     for part in ("program", "responder", "second_program"):
         name = getattr(parts, part)
@@ -286,9 +299,9 @@ def _given_parts(parts: PartsTable, robotless: bool, files: Files, problems: Pro
     return sources
 
 
-def _given(document: Mapping[str, object], files: Files, problems: Problems) -> dict[str, bytes]:
+def _collect_given_files(document: Mapping[str, object], files: Files, problems: Problems) -> dict[str, bytes]:
     given = {}
-    for number, name in enumerate(texts_in(document.get("given"))):
+    for number, name in enumerate(filter_texts(document.get("given"))):
         if name in files and "/" not in name:
             given[name] = files[name]
         else:
@@ -298,42 +311,43 @@ def _given(document: Mapping[str, object], files: Files, problems: Problems) -> 
         if not isinstance(model, str):
             continue
         place = ("given_models", name)
-        data = packaged_model(model)
+        data = load_packaged_model(model)
         if not re.fullmatch(r"[\w][\w.-]*", name):
             problems.add(place, f'given_models has the file name "{name[:60]}", expected letters, digits, ., - and _')
         elif name in given:
             problems.add(place, f'"{name}" is given twice, expected it in given or in given_models')
         elif data is None:
-            known = packaged_models()
+            known = list_packaged_models()
             problems.add(
                 place,
-                f'"{model[:60]}" is not a packaged model, expected {listed(known) if known else "one (there are none)"}'
-                f"{did_you_mean(model, known)}",
+                f'"{model[:60]}" is not a packaged model, expected '
+                f"{join_with_or(known) if known else 'one (there are none)'}"
+                f"{suggest_name(model, known)}",
             )
         else:
             given[name] = data
     return given
 
 
-def packaged_models() -> tuple[str, ...]:
+def list_packaged_models() -> tuple[str, ...]:
     """Return the names of the packaged networks, as on their cards."""
-    folder = _weights_folder()
+    folder = _locate_weights_folder()
     return tuple(sorted(card.stem for card in folder.glob("*.json"))) if folder.is_dir() else ()
 
 
-def packaged_model(name: str) -> bytes | None:
+def load_packaged_model(name: str) -> bytes | None:
     """Return the bytes of a packaged network, for use by student code inside the sandbox; None if it does not exist."""
-    if name not in packaged_models():
+    if name not in list_packaged_models():
         return None
-    card = json.loads((_weights_folder() / f"{name}.json").read_text("utf-8"))
-    return (_weights_folder() / str(card["file"])).read_bytes()
+    card = json.loads((_locate_weights_folder() / f"{name}.json").read_text("utf-8"))
+    return (_locate_weights_folder() / str(card["file"])).read_bytes()
 
 
-def _weights_folder() -> Path:
+def _locate_weights_folder() -> Path:
     return Path(str(resources.files("models"))) / "weights"
 
 
-def _training(
+def _build_training(
     table: TrainingTable, scenarios: Sequence[Scenario | None], ground: Floor | None, problems: Problems
 ) -> Training:
     """Return the training table. Report missing scenarios for training or for tests, and a floor without labels."""
@@ -346,14 +360,14 @@ def _training(
         if name not in ids:
             problems.add(
                 ("training", "scenarios", number),
-                f'scenarios names "{name[:60]}", expected the id of a scenario{did_you_mean(name, ids)}',
+                f'scenarios names "{name[:60]}", expected the id of a scenario{suggest_name(name, ids)}',
             )
     if ids and not set(ids) - set(table.scenarios):
         problems.add(
             ("training", "scenarios"),
             "scenarios names every scenario, expected at least one scenario without training images",
         )
-    if ground is not None and not label_names(ground.name):
+    if ground is not None and not list_label_names(ground.name):
         problems.add(
             ("training",), f"the images of {ground.name} have no labels for training, expected a floor with labels"
         )

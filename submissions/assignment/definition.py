@@ -13,14 +13,14 @@ from types import MappingProxyType
 from typing import Literal
 
 from responders.channel import Channel
-from sim.chance import Stream
+from sim.random_streams import RandomStream
 from sim.recording import Pose
 from submissions.assignment.limits import DEFAULT_LIMITS, Limits
 from submissions.criteria import AnyCriterion
-from submissions.seeds import PUBLIC, Secret, world_seed
+from submissions.seeds import PUBLIC_SECRET, Secret, compute_world_seed
 from submissions.sweep import NO_SWEEP, Coordinates, Sweep
 
-_USUAL_CHANNEL = Channel()
+_DEFAULT_CHANNEL = Channel()
 
 Visibility = Literal["visible", "hidden", "after_due_date", "after_published"]
 
@@ -71,7 +71,7 @@ class Scenario:
     seconds: float = 60.0
     light_noise: tuple[float, ...] = (0.0,)
     motor_noise: tuple[float, ...] = (0.0,)
-    channel: Channel = _USUAL_CHANNEL
+    channel: Channel = _DEFAULT_CHANNEL
     visibility: Visibility = "visible"
     start_jitter: tuple[float, float, float] = (0.0, 0.0, 0.0)
     sweep: Sweep = NO_SWEEP
@@ -146,12 +146,12 @@ class Assignment:
         """The number of trials, computed without creating them."""
         return sum(scenario.trial_count for scenario in self.scenarios)
 
-    def trials(self, secret: Secret = PUBLIC) -> Iterator[Trial]:
+    def trials(self, secret: Secret = PUBLIC_SECRET) -> Iterator[Trial]:
         """Return all trials for the installation with this secret, in a fixed order."""
         for scenario in self.scenarios:
             levels = list(
                 itertools.product(
-                    self._places(scenario, secret),
+                    self._order_poses(scenario, secret),
                     scenario.sweep.coordinates(),
                     scenario.light_noise,
                     scenario.motor_noise,
@@ -160,12 +160,12 @@ class Assignment:
             repeated = (level for level in levels for _ in range(scenario.trials))
             for index, (fixed, sweep, light_noise, motor_noise) in enumerate(repeated):
                 seed = self.seed(scenario, index, secret)
-                place = Stream(seed, "start pose").integer(0) % len(scenario.poses) if fixed is None else fixed
+                place = RandomStream(seed, "start pose").integer(0) % len(scenario.poses) if fixed is None else fixed
                 varied = dict(sweep)
                 yield Trial(
                     scenario,
                     index,
-                    _start(scenario, place, varied, seed),
+                    _compute_start_pose(scenario, place, varied, seed),
                     varied.get("light_noise", light_noise),
                     varied.get("motor_noise", motor_noise),
                     seed,
@@ -176,40 +176,42 @@ class Assignment:
                         delay=varied.get("delay", scenario.channel.delay),
                     ),
                     sweep,
-                    _moved(scenario, scenario.second_poses[place], seed, "second start jitter")
+                    _apply_offsets(scenario, scenario.second_poses[place], seed, "second start jitter")
                     if scenario.second_poses
                     else None,
                 )
 
-    def _places(self, scenario: Scenario, secret: Secret) -> Sequence[int | None]:
+    def _order_poses(self, scenario: Scenario, secret: Secret) -> Sequence[int | None]:
         """Return the pose numbers in the order of the trials; None if each trial draws its own."""
         places = range(len(scenario.poses))
         match scenario.choose:
             case "random":
                 return (None,)
             case "shuffled":
-                chance = Stream(self.seed(scenario, 0, secret), "order of poses")
+                chance = RandomStream(self.seed(scenario, 0, secret), "order of poses")
                 return sorted(places, key=chance.integer)
             case "each":
                 return places
 
-    def seed(self, scenario: Scenario, index: int, secret: Secret = PUBLIC) -> int:
+    def seed(self, scenario: Scenario, index: int, secret: Secret = PUBLIC_SECRET) -> int:
         """Return the seed of a trial's world, the same for every student."""
         own = "" if scenario.visibility == "visible" else self.secret
-        return world_seed(secret, f"{self.id}\n{scenario.id}\n{index}\n{own}")
+        return compute_world_seed(secret, f"{self.id}\n{scenario.id}\n{index}\n{own}")
 
 
-def _start(scenario: Scenario, place: int, varied: Mapping[str, float], seed: int) -> Pose:
+def _compute_start_pose(scenario: Scenario, place: int, varied: Mapping[str, float], seed: int) -> Pose:
     """Return the pose with this number, with the swept offsets and the trial's jitter applied."""
     offsets = [varied.get(name, 0.0) for name in ("offset_x", "offset_y", "heading")]
-    return _moved(scenario, scenario.poses[place], seed, "start jitter", offsets)
+    return _apply_offsets(scenario, scenario.poses[place], seed, "start jitter", offsets)
 
 
-def _moved(scenario: Scenario, pose: Pose, seed: int, chance: str, by: Sequence[float] = (0.0, 0.0, 0.0)) -> Pose:
+def _apply_offsets(
+    scenario: Scenario, pose: Pose, seed: int, chance: str, by: Sequence[float] = (0.0, 0.0, 0.0)
+) -> Pose:
     """Return the pose with offsets and with the jitter drawn from this random stream."""
     offsets = list(by)
     if any(scenario.start_jitter):
-        stream = Stream(seed, chance)
+        stream = RandomStream(seed, chance)
         for axis, most in enumerate(scenario.start_jitter):
             offsets[axis] += stream.between(-most, most, 0, axis)
     return Pose(pose.x + offsets[0], pose.y + offsets[1], pose.heading + offsets[2])

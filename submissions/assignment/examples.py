@@ -17,11 +17,11 @@ from pydantic import BeforeValidator, Field, ValidationError
 
 from sim.errors import UsageError
 from sim.recording import Verdict
-from submissions.assignment.folder import assignment_folder
+from submissions.assignment.folder import locate_assignment_folder
 from submissions.assignment.problems import AssignmentProblems, Problems, find_lines
-from submissions.assignment.reader import find_assignment, parse
-from submissions.assignment.schema import Slug, problem_of
-from submissions.bundle import read_submission, submission_of
+from submissions.assignment.reader import find_assignment, parse_toml
+from submissions.assignment.schema import Slug, describe_problem
+from submissions.bundle import build_submission, read_submission
 from submissions.raw_files import RawFiles, read_folder
 from submissions.strict_table import StrictTable
 from submissions.submission import Submission
@@ -33,7 +33,7 @@ EXPECTED = "expected.toml"
 _Marks = Annotated[Decimal, BeforeValidator(str)]
 
 
-class Expectation(StrictTable):
+class ExpectedResult(StrictTable):
     """Expected result of an example. ``loses`` lists exactly the ids of the criteria without full marks.
 
     ``earns`` gives the marks of single criteria by id.
@@ -56,45 +56,45 @@ class OriginalMeasure(StrictTable):
     explained: str = ""  # reason for a larger deviation
 
 
-class Expected(StrictTable):
+class ExpectedResults(StrictTable):
     """The file ``expected.toml``: a table for each example, and the values measured in the original."""
 
-    examples: dict[str, Expectation]
+    examples: dict[str, ExpectedResult]
     original: tuple[OriginalMeasure, ...] = ()
 
 
-def examples(assignment: str) -> Path:
+def locate_examples(assignment: str) -> Path:
     """Return the folder with the example submissions of an assignment.
 
     Raises:
         UsageError: There are no examples.
     """
-    folder = assignment_folder(assignment) / EXAMPLES
+    folder = locate_assignment_folder(assignment) / EXAMPLES
     if not folder.is_dir():
         raise UsageError(f"There are no examples for {assignment!r}, expected the folder {folder}.")
     return folder
 
 
-def expected(assignment: str) -> Expected:
+def read_expected(assignment: str) -> ExpectedResults:
     """Read the expected results of an assignment's examples; empty without the file.
 
     Raises:
         AssignmentProblems: The file cannot be used. The error lists all mistakes.
     """
-    path = assignment_folder(assignment) / EXPECTED
+    path = locate_assignment_folder(assignment) / EXPECTED
     if not path.is_file():
-        return Expected(examples={})
+        return ExpectedResults(examples={})
     where = f"{path.parent.name}/{path.name}"
     try:
-        text, document = parse(path.read_bytes(), where)
+        text, document = parse_toml(path.read_bytes(), where)
         original = document.pop("original", [])
-        return Expected.model_validate({"examples": document, "original": original})
+        return ExpectedResults.model_validate({"examples": document, "original": original})
     except ValidationError as error:
         problems = Problems(where, find_lines(text))
         for details in error.errors(include_url=False):
             part, which, *rest = (*details["loc"], "", "")
-            schema, place = (OriginalMeasure, (part, which)) if part == "original" else (Expectation, (which,))
-            problem = problem_of(schema, {**details, "loc": tuple(each for each in rest if each != "")})
+            schema, place = (OriginalMeasure, (part, which)) if part == "original" else (ExpectedResult, (which,))
+            problem = describe_problem(schema, {**details, "loc": tuple(each for each in rest if each != "")})
             problems.add((*place, *problem.path), problem.sentence)
         raise AssignmentProblems(problems.sorted()) from error
 
@@ -107,16 +107,16 @@ def read_example(assignment: str, name: str) -> Submission:
         AssignmentProblems: As for ``expected``.
     """
     asked = find_assignment(assignment).parts
-    folder = examples(assignment)
-    wanted = expected(assignment).examples.get(name)
+    folder = locate_examples(assignment)
+    wanted = read_expected(assignment).examples.get(name)
     if wanted is None or not wanted.like:
         return read_submission(folder / name, asked=asked)
     shared, own = read_folder(folder / wanted.like), read_folder(folder / name)
     files = RawFiles({**shared.files, **own.files}, (*shared.notes, *own.notes))
-    return submission_of(files, name, name, EXAMPLES, asked)
+    return build_submission(files, name, name, EXAMPLES, asked)
 
 
-def add_expected(assignment: str, new: Mapping[str, Expectation]) -> Path:
+def add_expected(assignment: str, new: Mapping[str, ExpectedResult]) -> Path:
     """Append a table for each of these examples to ``expected.toml``, and create the file if necessary.
 
     The existing text does not change.
@@ -124,32 +124,32 @@ def add_expected(assignment: str, new: Mapping[str, Expectation]) -> Path:
     Raises:
         UsageError: An example has a table already.
     """
-    known = expected(assignment).examples
+    known = read_expected(assignment).examples
     again = [name for name in new if name in known]
     if again:
         raise UsageError(f"{again[0]} has a table in {EXPECTED} already, expected an example without one.")
-    path = assignment_folder(assignment) / EXPECTED
+    path = locate_assignment_folder(assignment) / EXPECTED
     before = path.read_text(encoding="utf-8").rstrip() if path.is_file() else ""
-    tables = [_table(name, wanted) for name, wanted in new.items()]
+    tables = [_format_table(name, wanted) for name, wanted in new.items()]
     path.write_text("\n\n".join(filter(None, (before, *tables))) + "\n", encoding="utf-8")
     return path
 
 
-def _table(name: str, wanted: Expectation) -> str:
-    lines = [f"[{_key(name)}]", f'marks = "{wanted.marks}"']
+def _format_table(name: str, wanted: ExpectedResult) -> str:
+    lines = [f"[{_format_key(name)}]", f'marks = "{wanted.marks}"']
     if wanted.verdict is not Verdict.FINISHED:
         lines.append(f'verdict = "{wanted.verdict}"')
-    lines.append(f"loses = [{', '.join(map(_quoted, wanted.loses or ()))}]")
+    lines.append(f"loses = [{', '.join(map(_quote_text, wanted.loses or ()))}]")
     if wanted.earns:
-        earned = ", ".join(f'{_key(each)} = "{marks}"' for each, marks in wanted.earns.items())
+        earned = ", ".join(f'{_format_key(each)} = "{marks}"' for each, marks in wanted.earns.items())
         lines.append(f"earns = {{ {earned} }}")
     return "\n".join(lines)
 
 
-def _key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _quoted(name)
+def _format_key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _quote_text(name)
 
 
-def _quoted(text: str) -> str:
+def _quote_text(text: str) -> str:
     # TOML basic strings have the same escapes as JSON strings.
     return json.dumps(text, ensure_ascii=False)

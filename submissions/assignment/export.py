@@ -14,16 +14,16 @@ from importlib import resources
 from pathlib import Path
 
 from sim.errors import UsageError
-from submissions.assignment.folder import FILE_NAME, assignment_folder
-from submissions.assignment.folder_files import files_below
-from submissions.assignment.reader import ASIDE, read_assignment
-from submissions.assignment.task_sheet import TaskSheet, task_sheet
+from submissions.assignment.folder import FILE_NAME, locate_assignment_folder
+from submissions.assignment.folder_files import walk_files
+from submissions.assignment.reader import NON_GRADING_FILES, read_assignment
+from submissions.assignment.task_sheet import TaskSheet, build_task_sheet
 
 _ID_LINE = re.compile(r'^id = "[^"]*"', re.MULTILINE)
 _SLUG = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}")
 
 
-def write_new(folder: Path, like: str | None = None) -> None:
+def create_assignment(folder: Path, like: str | None = None) -> None:
     """Create ``folder`` from the commented template, or from the assignment ``like``, with a new id.
 
     Raises:
@@ -34,22 +34,22 @@ def write_new(folder: Path, like: str | None = None) -> None:
         raise UsageError(
             f'"{name}" cannot be the id of an assignment, expected small letters, digits, - and _, such as my-task'
         )
-    source = assignment_folder(like) if like is not None else _template()
+    source = locate_assignment_folder(like) if like is not None else _locate_template()
     read_assignment(source)
-    files = _files(source)
+    files = _read_files(source)
     text = files[FILE_NAME].decode("utf-8")
-    _write(folder, {**files, FILE_NAME: _ID_LINE.sub(f'id = "{name}"', text, count=1).encode()})
+    _write_files(folder, {**files, FILE_NAME: _ID_LINE.sub(f'id = "{name}"', text, count=1).encode()})
 
 
-def export_whole(assignment: str, target: Path) -> int:
+def export_all(assignment: str, target: Path) -> int:
     """Write the whole folder of the assignment, with examples, and return the number of files.
 
     Raises:
         UsageError: The folder cannot be written.
     """
-    source = assignment_folder(assignment)
+    source = locate_assignment_folder(assignment)
     read_assignment(source)
-    return _write(target, _files(source))
+    return _write_files(target, _read_files(source))
 
 
 def export_for_grading(assignment: str, target: Path) -> int:
@@ -58,9 +58,12 @@ def export_for_grading(assignment: str, target: Path) -> int:
     Raises:
         UsageError: The folder cannot be written.
     """
-    source = assignment_folder(assignment)
+    source = locate_assignment_folder(assignment)
     read_assignment(source)
-    return _write(target, {name: data for name, data in _files(source).items() if name.split("/")[0] not in ASIDE})
+    return _write_files(
+        target,
+        {name: data for name, data in _read_files(source).items() if name.split("/")[0] not in NON_GRADING_FILES},
+    )
 
 
 def export_for_students(assignment: str, target: Path) -> int:
@@ -71,15 +74,15 @@ def export_for_students(assignment: str, target: Path) -> int:
     Raises:
         UsageError: The folder cannot be written.
     """
-    source = assignment_folder(assignment)
+    source = locate_assignment_folder(assignment)
     found = read_assignment(source)
     prefix = "starter/"
-    starter = {name.removeprefix(prefix): data for name, data in _files(source).items() if name.startswith(prefix)}
-    sheet = task_sheet(found)
-    return _write(target, {**sheet.given, **starter, "README.md": _task(sheet).encode()})
+    starter = {name.removeprefix(prefix): data for name, data in _read_files(source).items() if name.startswith(prefix)}
+    sheet = build_task_sheet(found)
+    return _write_files(target, {**sheet.given, **starter, "README.md": _render_task(sheet).encode()})
 
 
-def _task(sheet: TaskSheet) -> str:
+def _render_task(sheet: TaskSheet) -> str:
     """Return the task in Markdown."""
     lines = [f"# {sheet.title}", ""]
     if sheet.description:
@@ -91,16 +94,16 @@ def _task(sheet: TaskSheet) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _template() -> Path:
+def _locate_template() -> Path:
     return Path(str(resources.files("submissions"))) / "template"
 
 
-def _files(folder: Path) -> Mapping[str, bytes]:
+def _read_files(folder: Path) -> Mapping[str, bytes]:
     """Return all files in the folder."""
-    return {"/".join(parts): path.read_bytes() for parts, path in files_below(folder)}
+    return {"/".join(parts): path.read_bytes() for parts, path in walk_files(folder)}
 
 
-def _write(target: Path, files: Mapping[str, bytes]) -> int:
+def _write_files(target: Path, files: Mapping[str, bytes]) -> int:
     """Write all files or none: write them beside ``target``, then rename."""
     if target.exists() or target.is_symlink():
         raise UsageError(f"{target} exists already, expected a new folder or .zip")

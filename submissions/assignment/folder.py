@@ -10,19 +10,19 @@ from importlib import resources
 from pathlib import Path
 
 from sim.errors import UsageError
-from submissions.nearest import did_you_mean
+from submissions.suggestions import suggest_name
 
 FILE_NAME = "assignment.toml"
 #: The example that must get full marks.
 REFERENCE = "reference"
 
 
-def catalogue() -> tuple[str, ...]:
+def list_catalogue_ids() -> tuple[str, ...]:
     """Return the ids of the packaged assignments, sorted."""
-    return tuple(sorted(folder.name for folder in _catalogue_folder().iterdir() if (folder / FILE_NAME).is_file()))
+    return tuple(sorted(folder.name for folder in _locate_catalogue().iterdir() if (folder / FILE_NAME).is_file()))
 
 
-def assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
+def locate_assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
     """Return the folder of the catalogue assignment with this id, or this folder itself.
 
     Raises:
@@ -30,7 +30,7 @@ def assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
     """
     name = os.fspath(name_or_path)
     path = Path(name)
-    own = _catalogue_folder() / name
+    own = _locate_catalogue() / name
     if path.name == name and (own / FILE_NAME).is_file():
         return own
     if path.name == FILE_NAME and path.is_file():
@@ -39,9 +39,9 @@ def assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
         return path
     if path.is_file():
         raise UsageError(f"{name} is a file, expected an id of the catalogue or a folder with {FILE_NAME} in it")
-    hint = did_you_mean(name, catalogue()) or "; robomark assignments list shows the catalogue"
+    hint = suggest_name(name, list_catalogue_ids()) or "; robomark assignments list shows the catalogue"
     raise UsageError(f"There is no assignment {name!r}, expected an id of the catalogue or a folder{hint}")
 
 
-def _catalogue_folder() -> Path:
+def _locate_catalogue() -> Path:
     return Path(str(resources.files("submissions"))) / "catalogue"

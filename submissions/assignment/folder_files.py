@@ -11,7 +11,7 @@ from pathlib import Path
 from submissions.assignment.problems import AssignmentProblems
 
 
-def files_below(folder: Path) -> Iterator[tuple[tuple[str, ...], Path]]:
+def walk_files(folder: Path) -> Iterator[tuple[tuple[str, ...], Path]]:
     """Yield the parts of the name and the path of each file in an assignment's folder, sorted.
 
     Dot files and Python's caches are omitted.

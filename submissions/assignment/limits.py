@@ -24,7 +24,7 @@ class Limits:
     all_sleep: float = 20.0  # seconds of real time in which processes are idle, after half a second for each
     all_output_mb: int = 64  # of stored data: texts, messages, images, calls
 
-    def all_cpu_of(self, trials: int) -> float:
+    def compute_total_cpu(self, trials: int) -> float:
         """Return the CPU seconds for ``trials`` trials together."""
         return self.all_cpu if self.all_cpu is not None else 10 * (self.program_cpu + self.responder_cpu) + trials
 

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from sim.errors import UsageError
 from sim.recording import Pose
 from submissions.assignment.problems import Path as Place
-from submissions.assignment.problems import Problems, list_of_tables
+from submissions.assignment.problems import Problems, filter_tables
 from submissions.assignment.schema import PartsTable, ScenarioTable, WorldTable
 from submissions.source_text import decode_source
 
@@ -22,7 +22,7 @@ SAME = "same"
 _MOST = 8
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
 #: Names that a responder already uses, or that reports use with another meaning.
-_TAKEN = frozenset({"robot", "program", "responder", "bridge", "host", "assignment", "msg", "eds"})
+_RESERVED_NAMES = frozenset({"robot", "program", "responder", "bridge", "host", "assignment", "msg", "eds"})
 
 
 def read_agents(
@@ -39,7 +39,7 @@ def read_agents(
     sources: dict[str, str] = {}
     for name, who in sorted(table.items()):
         place = ("agents", name)
-        if not _NAME.fullmatch(name) or name in _TAKEN or keyword.iskeyword(name) or hasattr(builtins, name):
+        if not _NAME.fullmatch(name) or name in _RESERVED_NAMES or keyword.iskeyword(name) or hasattr(builtins, name):
             problems.add(place, f'"{name[:60]}" cannot be the name of an agent, expected one like parser or logger')
         elif who != "student" and (not isinstance(who, str) or who not in files or not who.endswith(".py")):
             shown = f'"{who[:60]}"' if isinstance(who, str) else "no text"
@@ -47,7 +47,7 @@ def read_agents(
         else:
             givers[name] = who
             if who != "student":
-                sources |= _source(who, files, place, problems)
+                sources |= _read_source(who, files, place, problems)
     return givers, sources
 
 
@@ -62,7 +62,7 @@ def _check_parts(table: Mapping[str, object], parts: PartsTable, problems: Probl
         )
 
 
-def _source(name: str, files: Mapping[str, bytes], place: tuple[str, str], problems: Problems) -> dict[str, str]:
+def _read_source(name: str, files: Mapping[str, bytes], place: tuple[str, str], problems: Problems) -> dict[str, str]:
     try:
         return {name: decode_source(files[name], name).text}
     except UsageError as error:
@@ -72,7 +72,7 @@ def _source(name: str, files: Mapping[str, bytes], place: tuple[str, str], probl
 
 def check_robots(document: Mapping[str, object], world: WorldTable, parts: PartsTable, problems: Problems) -> None:
     """Report missing programs or start poses of a robot, and settings for a robot that does not exist."""
-    scenarios = list(list_of_tables(document.get("scenario")))
+    scenarios = list(filter_tables(document.get("scenario")))
     linked = world.robots == 2 and parts.responder == "none"
     for number, raw in enumerate(scenarios):
         channel = raw.get("channel")
@@ -100,7 +100,7 @@ def check_robots(document: Mapping[str, object], world: WorldTable, parts: Parts
             problems.add(("scenario", number), "second_poses is missing, expected where the second robot starts")
 
 
-def second_poses_of(table: ScenarioTable, poses: int, place: Place, problems: Problems) -> tuple[Pose, ...]:
+def build_second_poses(table: ScenarioTable, poses: int, place: Place, problems: Problems) -> tuple[Pose, ...]:
     """Return the second robot's start pose for each pose of the first. A single pose applies to all."""
     found = tuple(Pose(*pose) for pose in table.second_poses)
     if len(found) == 1:

@@ -30,11 +30,11 @@ def find_lines(text: str) -> Mapping[Path, int]:
     """Return line numbers, from 1, by path: ``("scenario", 0, "poses", 2)`` is the third pose of the first scenario."""
     scanner = _Scanner(text)
     with contextlib.suppress(IndexError):  # If the text ends too early, the lines found so far are returned.
-        scanner.document()
+        scanner.scan_document()
     return scanner.lines
 
 
-def line_of(lines: Mapping[Path, int], path: Path) -> int:
+def find_nearest_line(lines: Mapping[Path, int], path: Path) -> int:
     """Return the line of the path, or of its nearest parent with a known line."""
     while path and path not in lines:
         path = path[:-1]
@@ -49,25 +49,25 @@ class _Scanner:
         self.lines: dict[Path, int] = {}
         self._tables_in: dict[Path, int] = {}  # number of [[tables]] found in each array
 
-    def document(self) -> None:
+    def scan_document(self) -> None:
         table: Path = ()
         while self._skip_blank():
             if self._text.startswith("[[", self._at):
                 self._at += 2
-                place = self._resolve(self._key())
+                place = self._resolve(self._scan_key())
                 number = self._tables_in.get(place, 0)
                 self._tables_in[place] = number + 1
-                self._note(place)
+                self._record_line(place)
                 table = (*place, number)
-                self._note(table)
-                self._to_end_of_line()
+                self._record_line(table)
+                self._skip_line()
             elif self._text[self._at] == "[":
                 self._at += 1
-                table = self._resolve(self._key())
-                self._note(table)
-                self._to_end_of_line()
+                table = self._resolve(self._scan_key())
+                self._record_line(table)
+                self._skip_line()
             else:
-                self._pair(table)
+                self._scan_pair(table)
 
     def _resolve(self, key: list[str]) -> Path:
         """Return the path of a header. Keys in an array of tables refer to its last table."""
@@ -78,22 +78,22 @@ class _Scanner:
                 path = (*path, self._tables_in[path] - 1)
         return (*path, key[-1])
 
-    def _pair(self, table: Path) -> None:
+    def _scan_pair(self, table: Path) -> None:
         start = self._at
-        path: Path = (*table, *self._key())
+        path: Path = (*table, *self._scan_key())
         for length in range(len(table) + 1, len(path) + 1):
-            self._note(path[:length], start)
+            self._record_line(path[:length], start)
         self._skip(_SPACE)
         self._at += 1  # the equals sign
-        self._value(path)
+        self._scan_value(path)
 
-    def _key(self) -> list[str]:
+    def _scan_key(self) -> list[str]:
         parts = []
         while True:
             self._skip(_SPACE)
             start = self._at
             if self._text[self._at] in "\"'":
-                self._string()
+                self._scan_string()
                 parts.append(str(read_toml(f"key = {self._text[start : self._at]}")["key"]))
             else:
                 while self._text[self._at] not in " \t.=]\n":
@@ -104,31 +104,31 @@ class _Scanner:
                 return parts
             self._at += 1
 
-    def _value(self, path: Path) -> None:
+    def _scan_value(self, path: Path) -> None:
         self._skip(_SPACE)
         character = self._text[self._at]
         if character in "\"'":
-            self._string()
+            self._scan_string()
         elif character == "[":
             self._at += 1
             number = 0
             while self._skip_blank() and self._text[self._at] != "]":
-                self._note((*path, number))
-                self._value((*path, number))
+                self._record_line((*path, number))
+                self._scan_value((*path, number))
                 number += 1
                 self._skip_comma()
             self._at += 1
         elif character == "{":
             self._at += 1
             while self._skip_blank() and self._text[self._at] != "}":
-                self._pair(path)
+                self._scan_pair(path)
                 self._skip_comma()
             self._at += 1
         else:
             while self._text[self._at] not in ",]}#\n":
                 self._at += 1
 
-    def _string(self) -> None:
+    def _scan_string(self) -> None:
         quote = self._text[self._at]
         marks = quote * 3 if self._text.startswith(quote * 3, self._at) else quote
         self._at += len(marks)
@@ -155,15 +155,15 @@ class _Scanner:
             if self._text[self._at] in _BLANK:
                 self._at += 1
             elif self._text[self._at] == "#":
-                self._to_end_of_line()
+                self._skip_line()
             else:
                 return True
         return False
 
-    def _to_end_of_line(self) -> None:
+    def _skip_line(self) -> None:
         self._at = self._text.index("\n", self._at)
 
-    def _note(self, path: Path, at: int | None = None) -> None:
+    def _record_line(self, path: Path, at: int | None = None) -> None:
         at = self._at if at is None else at
         self.lines.setdefault(path, bisect_right(self._line_starts, at))
 
@@ -193,7 +193,7 @@ class Problems:
         Raises:
             AssignmentProblems: The number of mistakes exceeds its limit. A file can have one in every key.
         """
-        self.found.append((line_of(self.lines, path), sentence))
+        self.found.append((find_nearest_line(self.lines, path), sentence))
         if len(self.found) > _MOST:
             raise AssignmentProblems((*self.sorted(), f"{self.where}:1: may have more mistakes; checking stopped here"))
 
@@ -202,7 +202,7 @@ class Problems:
         return tuple(f"{self.where}:{line}: {sentence}" for line, sentence in sorted(dict.fromkeys(self.found)))
 
 
-def checked_table(schema: type[T], table: object, place: Path, problems: Problems) -> T | None:
+def check_table(schema: type[T], table: object, place: Path, problems: Problems) -> T | None:
     """Validate a table with the schema. Add mistakes to ``problems`` and return None if there are any."""
     result = read_table(schema, table)
     if isinstance(result, schema):
@@ -212,27 +212,29 @@ def checked_table(schema: type[T], table: object, place: Path, problems: Problem
     return None
 
 
-def tables_of(document: Mapping[str, object], key: str, problems: Problems) -> list[dict[str, Any]]:
+def read_tables(document: Mapping[str, object], key: str, problems: Problems) -> list[dict[str, Any]]:
     """Return the tables of a list that must not be empty."""
     value = document.get(key)
     if value is None or value == []:
         problems.add((), f"there is no [[{key}]], expected at least one")
     elif not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
         problems.add((key,), f"{key} is not a list of tables, expected [[{key}]] before each")
-    return list_of_tables(value)
+    return filter_tables(value)
 
 
-def list_of_tables(value: object) -> list[dict[str, Any]]:
+def filter_tables(value: object) -> list[dict[str, Any]]:
     """Return the tables in a value of any type."""
     return [item for item in value if isinstance(item, dict)] if isinstance(value, list) else []
 
 
-def texts_in(value: object) -> list[str]:
+def filter_texts(value: object) -> list[str]:
     """Return the texts in a value of any type."""
     return [item for item in value if isinstance(item, str)] if isinstance(value, list) else []
 
 
-def no_double(raw: Mapping[str, object], seen: dict[str, int], place: Path, kind: str, problems: Problems) -> None:
+def check_unique_id(
+    raw: Mapping[str, object], seen: dict[str, int], place: Path, kind: str, problems: Problems
+) -> None:
     """Report an id that an earlier table of this kind already has."""
     name = raw.get("id")
     if not isinstance(name, str):

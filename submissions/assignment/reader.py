@@ -12,17 +12,17 @@ from pathlib import Path
 from types import MappingProxyType
 
 from sim.errors import UsageError
+from sim.readers.reader_errors import UnreadableDataError
 from sim.readers.toml_text import TOMLDecodeError, read_toml
-from sim.readers.unreadable import Unreadable
 from submissions.assignment.assignment_parts import build_assignment
 from submissions.assignment.definition import Assignment
-from submissions.assignment.folder import FILE_NAME, assignment_folder, catalogue
-from submissions.assignment.folder_files import files_below
+from submissions.assignment.folder import FILE_NAME, list_catalogue_ids, locate_assignment_folder
+from submissions.assignment.folder_files import walk_files
 from submissions.assignment.problems import AssignmentProblems, Problems, find_lines
-from submissions.nearest import did_you_mean
+from submissions.suggestions import suggest_name
 
 #: Files in an assignment's folder that do not affect marks.
-ASIDE = ("starter", "examples", "expected.toml")
+NON_GRADING_FILES = ("starter", "examples", "expected.toml")
 _MAX_FOLDER_BYTES = 128 * 1024 * 1024
 _MAX_TOML_BYTES = 1024 * 1024
 _SYNTAX = re.compile(r"^(?P<what>.*?) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)$")
@@ -46,7 +46,7 @@ def find_assignment(name_or_path: str | os.PathLike[str]) -> Assignment:
         UsageError: Neither exists.
         AssignmentProblems: The assignment cannot be used.
     """
-    return read_assignment(assignment_folder(name_or_path))
+    return read_assignment(locate_assignment_folder(name_or_path))
 
 
 def find_in_catalogue(name: str) -> Assignment:
@@ -55,9 +55,9 @@ def find_in_catalogue(name: str) -> Assignment:
     Raises:
         UsageError: The catalogue has no such assignment.
     """
-    ids = catalogue()
+    ids = list_catalogue_ids()
     if name not in ids:
-        hint = did_you_mean(name, ids) or "; robomark assignments list shows the catalogue"
+        hint = suggest_name(name, ids) or "; robomark assignments list shows the catalogue"
         raise UsageError(f"There is no assignment {name!r} in the catalogue, expected one of its ids{hint}.")
     return find_assignment(name)
 
@@ -74,8 +74,8 @@ def read_assignment(folder: Path) -> Assignment:
         raise AssignmentProblems((f"{folder}: does not exist, expected a folder with {FILE_NAME} in it",))
     if not (folder / FILE_NAME).is_file():
         raise AssignmentProblems((f"{folder}: has no {FILE_NAME} in it, expected one",))
-    files = _folder_files(folder)
-    text, document = parse(files[FILE_NAME], where)
+    files = _read_folder_files(folder)
+    text, document = parse_toml(files[FILE_NAME], where)
     problems = Problems(where, find_lines(text))
     assignment = build_assignment(document, files, problems)
     if assignment is None or problems.found:
@@ -83,7 +83,7 @@ def read_assignment(folder: Path) -> Assignment:
     return assignment
 
 
-def parse(data: bytes, where: str) -> tuple[str, dict[str, object]]:
+def parse_toml(data: bytes, where: str) -> tuple[str, dict[str, object]]:
     """Return the text of a TOML file and its content.
 
     Raises:
@@ -99,12 +99,12 @@ def parse(data: bytes, where: str) -> tuple[str, dict[str, object]]:
     try:
         return text, read_toml(text)
     except TOMLDecodeError as error:
-        raise AssignmentProblems((_syntax_problem(str(error), where, text),)) from None
-    except Unreadable as error:
+        raise AssignmentProblems((_describe_syntax_error(str(error), where, text),)) from None
+    except UnreadableDataError as error:
         raise AssignmentProblems((f"{where}:1: {error}, expected ordinary TOML",)) from None
 
 
-def _syntax_problem(message: str, where: str, text: str) -> str:
+def _describe_syntax_error(message: str, where: str, text: str) -> str:
     match = _SYNTAX.match(message)
     what = match["what"] if match else message
     if match and match["line"]:
@@ -115,12 +115,12 @@ def _syntax_problem(message: str, where: str, text: str) -> str:
     return f"{where}:{line}: {what[:1].lower()}{what[1:]}{column}, expected TOML{hint}"
 
 
-def _folder_files(folder: Path) -> Mapping[str, bytes]:
+def _read_folder_files(folder: Path) -> Mapping[str, bytes]:
     """Return the files that decide the marks, by path in the folder."""
     files: dict[str, bytes] = {}
     size = 0
-    for parts, path in files_below(folder):
-        if parts[0] in ASIDE:
+    for parts, path in walk_files(folder):
+        if parts[0] in NON_GRADING_FILES:
             continue
         size += path.stat().st_size
         if size > _MAX_FOLDER_BYTES:

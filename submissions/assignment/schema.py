@@ -19,8 +19,8 @@ from sim.floors import HEIGHT, OBSTACLE_PRESETS, WIDTH
 from sim.motion import Rectangle
 from sim.robot import ROBOTS
 from submissions.assignment.limits import DEFAULT_LIMITS
-from submissions.nearest import did_you_mean, listed
 from submissions.strict_table import Entries, StrictTable
+from submissions.suggestions import join_with_or, suggest_name
 from submissions.sweep import CONDITIONS
 
 T = TypeVar("T", bound=BaseModel)
@@ -59,26 +59,26 @@ class WorldTable(StrictTable):
 
     @field_validator("sheet", mode="before")
     @classmethod
-    def _which_sheet(cls, value: object) -> object:
+    def _check_sheet(cls, value: object) -> object:
         if value in ("fixed", "per-seed") or (type(value) is int and 0 <= value < 1 << 63):
             return value
         raise ValueError('is not a digit sheet, expected "fixed", "per-seed" or a whole number from 0')
 
     @field_validator("obstacles", mode="before")
     @classmethod
-    def _preset(cls, value: object) -> object:
+    def _expand_preset(cls, value: object) -> object:
         if not isinstance(value, str):
             return _as_tuples(value)
         if value not in OBSTACLE_PRESETS:
-            known = f"{listed(OBSTACLE_PRESETS)} or a list of [x, y, width, height]"
-            raise ValueError(f'is "{value[:60]}", expected {known}{did_you_mean(value, OBSTACLE_PRESETS)}')
+            known = f"{join_with_or(OBSTACLE_PRESETS)} or a list of [x, y, width, height]"
+            raise ValueError(f'is "{value[:60]}", expected {known}{suggest_name(value, OBSTACLE_PRESETS)}')
         return OBSTACLE_PRESETS[value]
 
     @field_validator("robot")
     @classmethod
-    def _known_robot(cls, value: str) -> str:
+    def _check_robot(cls, value: str) -> str:
         if value not in ROBOTS:
-            raise ValueError(f'is "{value[:60]}", expected {listed(ROBOTS)}{did_you_mean(value, ROBOTS)}')
+            raise ValueError(f'is "{value[:60]}", expected {join_with_or(ROBOTS)}{suggest_name(value, ROBOTS)}')
         return value
 
 
@@ -92,7 +92,7 @@ class PartsTable(StrictTable):
 
     @field_validator("cell", mode="before")
     @classmethod
-    def _which_cell(cls, value: object) -> object:
+    def _check_cell(cls, value: object) -> object:
         tagged = isinstance(value, str) and value.startswith("tag:") and value.removeprefix("tag:").strip()
         if value == "last" or tagged or (type(value) is int and 1 <= value <= 1000):
             return value
@@ -116,7 +116,7 @@ class ChannelTable(StrictTable):
     corruption: float = Field(default=0.0, ge=0, le=1)
 
     @model_validator(mode="after")
-    def _reaches(self) -> Self:
+    def _check_link(self) -> Self:
         needless = self.model_fields_set & {"beacon", "range", "facing", "blocked_by"}
         if self.link == "cable" and needless:
             raise ValueError(f'has {min(needless)} and no link that it limits, expected link = "infrared" beside it')
@@ -142,11 +142,11 @@ class SweepTable(StrictTable):
 
     @field_validator("*")
     @classmethod
-    def _within(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+    def _sort_levels(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
         about = CONDITIONS[str(info.field_name)]
         if len(set(value)) < len(value):
             raise ValueError("has a level twice, expected each once")
-        return tuple(sorted(_in_range(value, about.most, about.least)))
+        return tuple(sorted(_check_range(value, about.most, about.least)))
 
 
 class ScenarioTable(StrictTable):
@@ -170,32 +170,32 @@ class ScenarioTable(StrictTable):
 
     @field_validator("poses", "second_poses", mode="before")
     @classmethod
-    def _list_of_poses(cls, value: object) -> object:
+    def _check_poses(cls, value: object) -> object:
         if isinstance(value, list) and value and all(isinstance(entry, int | float) for entry in value):
             raise ValueError("is a single pose, expected a list of them: [[x, y, heading], ...]")
         return _as_tuples(value)
 
     @field_validator("light_noise", "motor_noise", mode="before")
     @classmethod
-    def _one_or_many(cls, value: object) -> object:
+    def _as_levels(cls, value: object) -> object:
         if isinstance(value, str | bool):
-            raise ValueError(f"is {_short(value)}, expected a number or a list of numbers")
+            raise ValueError(f"is {_format_short(value)}, expected a number or a list of numbers")
         return (value,) if isinstance(value, int | float) else _as_tuples(value)
 
     @field_validator("start_jitter")
     @classmethod
-    def _jitter_range(cls, value: tuple[float, float, float]) -> tuple[float, ...]:
-        return _in_range(value, 100)
+    def _check_jitter(cls, value: tuple[float, float, float]) -> tuple[float, ...]:
+        return _check_range(value, 100)
 
     @field_validator("light_noise")
     @classmethod
-    def _light_range(cls, value: tuple[float, ...]) -> tuple[float, ...]:
-        return _in_range(value, 128)
+    def _check_light_noise(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        return _check_range(value, 128)
 
     @field_validator("motor_noise")
     @classmethod
-    def _motor_range(cls, value: tuple[float, ...]) -> tuple[float, ...]:
-        return _in_range(value, 500)
+    def _check_motor_noise(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        return _check_range(value, 500)
 
 
 class TrainingTable(StrictTable):
@@ -231,14 +231,14 @@ def read_table(schema: type[T], table: object) -> T | list[TableProblem]:
     """Validate a table with the schema. Return the model, or a list of all mistakes."""
     try:
         # Pydantic's JSON mode is strict about types, but accepts a list for a tuple.
-        return schema.model_validate_json(json.dumps(table, default=_foreign), strict=True)
+        return schema.model_validate_json(json.dumps(table, default=_encode_foreign_value), strict=True)
     except ValidationError as error:
         found = error.errors(include_url=False)[:_MOST_PROBLEMS]
         places = [details["loc"] for details in found]
-        return [problem_of(schema, details) for details in found if not _follows(details, places)]
+        return [describe_problem(schema, details) for details in found if not _is_consequence(details, places)]
 
 
-def _follows(details: ErrorDetails, places: list[tuple[str | int, ...]]) -> bool:
+def _is_consequence(details: ErrorDetails, places: list[tuple[str | int, ...]]) -> bool:
     """Return whether a list counts as too short only because its entries were rejected."""
     place = details["loc"]
     return details["type"] == "too_short" and any(
@@ -250,14 +250,14 @@ def _as_tuples(value: object) -> object:
     return tuple(_as_tuples(item) for item in value) if isinstance(value, list) else value
 
 
-def _in_range(values: tuple[float, ...], most: float, least: float = 0) -> tuple[float, ...]:
+def _check_range(values: tuple[float, ...], most: float, least: float = 0) -> tuple[float, ...]:
     for value in values:
         if not least <= value <= most:
             raise ValueError(f"has {value:g} in it, expected numbers from {least:g} to {most:g}")
     return values
 
 
-def _foreign(value: object) -> dict[str, str]:
+def _encode_foreign_value(value: object) -> dict[str, str]:
     """Convert dates and times, which no key accepts, to a table that no key accepts either."""
     return {"date": str(value)}
 
@@ -284,70 +284,74 @@ _TYPES: Mapping[str, str] = {
 }
 
 
-def problem_of(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
+def describe_problem(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
     """Convert a pydantic error to a sentence and its path in the table."""
     path = tuple(part for part in details["loc"])
     name = str(path[-1]) if path else ""
     context: Mapping[str, Any] = details.get("ctx", {})
     kind = details["type"]
     if kind == "extra_forbidden":
-        return TableProblem(path, _unknown_key(schema, path))
+        return TableProblem(path, _describe_unknown_key(schema, path))
     if kind == "missing":
         if isinstance(path[-1], int):
-            sentence = f"{_called(path[:-1])} has too few numbers{_shape(schema, path)}"
+            sentence = f"{_format_path(path[:-1])} has too few numbers{_describe_entries(schema, path)}"
             return TableProblem(path[:-1], sentence)
         return TableProblem(path[:-1], f"{name} is missing, expected {name} = ...")
     if kind in ("value_error", "assertion_error"):
         sentence = details["msg"].partition(", ")[2]
-        return TableProblem(path or _key_in(sentence, details["input"]), f"{_called(path)} {sentence}")
-    value = _short(details["input"])
+        return TableProblem(path or _find_key(sentence, details["input"]), f"{_format_path(path)} {sentence}")
+    value = _format_short(details["input"])
     if kind in _TYPES:
-        return TableProblem(path, f"{_called(path)} is {value}, expected {_TYPES[kind]}")
+        return TableProblem(path, f"{_format_path(path)} is {value}, expected {_TYPES[kind]}")
     if kind == "literal_error":
         choices = str(context.get("expected", ""))
-        hint = did_you_mean(str(details["input"]), re.findall("'(.*?)'", choices))
+        hint = suggest_name(str(details["input"]), re.findall("'(.*?)'", choices))
         choices = choices.replace("'", '"')
-        return TableProblem(path, f"{_called(path)} is {value}, expected {choices}{hint}")
+        return TableProblem(path, f"{_format_path(path)} is {value}, expected {choices}{hint}")
     bounds = {"greater_than": ("gt", "more than"), "greater_than_equal": ("ge", "at least")}
     bounds |= {"less_than": ("lt", "less than"), "less_than_equal": ("le", "at most")}
     if kind in bounds:
         key, words = bounds[kind]
-        return TableProblem(path, f"{_called(path)} is {value}, expected {words} {context[key]:g}")
+        return TableProblem(path, f"{_format_path(path)} is {value}, expected {words} {context[key]:g}")
     if kind == "decimal_max_places":
-        return TableProblem(path, f"{_called(path)} is {value}, expected at most two decimal places")
+        return TableProblem(path, f"{_format_path(path)} is {value}, expected at most two decimal places")
     if kind == "too_short":
-        return TableProblem(path, f"{_called(path)} has too few entries, expected at least {context['min_length']}")
+        return TableProblem(
+            path, f"{_format_path(path)} has too few entries, expected at least {context['min_length']}"
+        )
     if kind == "too_long":
-        return TableProblem(path, f"{_called(path)} has too many numbers{_shape(schema, path)}")
+        return TableProblem(path, f"{_format_path(path)} has too many numbers{_describe_entries(schema, path)}")
     if kind == "string_too_long":
-        return TableProblem(path, f"{_called(path)} is too long, expected at most {context['max_length']} characters")
-    return TableProblem(path, f"{_called(path)} is {value}, but {details['msg'][:1].lower()}{details['msg'][1:]}")
+        return TableProblem(
+            path, f"{_format_path(path)} is too long, expected at most {context['max_length']} characters"
+        )
+    return TableProblem(path, f"{_format_path(path)} is {value}, but {details['msg'][:1].lower()}{details['msg'][1:]}")
 
 
-def _key_in(sentence: str, table: object) -> tuple[str, ...]:
+def _find_key(sentence: str, table: object) -> tuple[str, ...]:
     """Return the key that a sentence about the whole table mentions, to locate its line; empty if it mentions none."""
     words = re.findall(r"\w+", sentence.partition(", expected")[0])
     return tuple([word for word in words if isinstance(table, dict) and word in table][:1])
 
 
-def _unknown_key(schema: type[BaseModel], path: tuple[str | int, ...]) -> str:
+def _describe_unknown_key(schema: type[BaseModel], path: tuple[str | int, ...]) -> str:
     for part in path[:-1]:
-        field = _fields(schema).get(str(part))
-        schema = (_table_in(field.annotation) if field else None) or schema
-    known = list(_fields(schema))
+        field = _collect_fields(schema).get(str(part))
+        schema = (_find_table_schema(field.annotation) if field else None) or schema
+    known = list(_collect_fields(schema))
     name = str(path[-1])
-    hint = did_you_mean(name, known)
-    return f'"{name[:60]}" is not a key of this table, expected {listed(known)}{hint}'
+    hint = suggest_name(name, known)
+    return f'"{name[:60]}" is not a key of this table, expected {join_with_or(known)}{hint}'
 
 
-def _table_in(annotation: object) -> type[BaseModel] | None:
+def _find_table_schema(annotation: object) -> type[BaseModel] | None:
     """Return the schema of the tables that a key accepts, single or in a list."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
-    return next((found for part in get_args(annotation) if (found := _table_in(part))), None)
+    return next((found for part in get_args(annotation) if (found := _find_table_schema(part))), None)
 
 
-def _called(path: tuple[str | int, ...]) -> str:
+def _format_path(path: tuple[str | int, ...]) -> str:
     """Return the path as text: ``poses[2]``, ``channel.delay``."""
     words = ""
     for part in path:
@@ -355,31 +359,31 @@ def _called(path: tuple[str | int, ...]) -> str:
     return words or "this table"
 
 
-def _shape(schema: type[BaseModel], path: tuple[str | int, ...]) -> str:
+def _describe_entries(schema: type[BaseModel], path: tuple[str | int, ...]) -> str:
     """Describe the entries of a list of fixed length, from the type of its key."""
     shape = None
     for key in path:
-        field = _fields(schema).get(str(key))
+        field = _collect_fields(schema).get(str(key))
         if field is not None:
-            shape = next((each for each in field.metadata if isinstance(each, Entries)), None) or _shape_in(
+            shape = next((each for each in field.metadata if isinstance(each, Entries)), None) or _find_entries(
                 field.annotation
             )
-            schema = _table_in(field.annotation) or schema
+            schema = _find_table_schema(field.annotation) or schema
     return f", expected {shape.words}" if shape else ", expected another number of them"
 
 
-def _shape_in(annotation: object) -> Entries | None:
+def _find_entries(annotation: object) -> Entries | None:
     if isinstance(annotation, Entries):
         return annotation
-    return next((found for part in get_args(annotation) if (found := _shape_in(part))), None)
+    return next((found for part in get_args(annotation) if (found := _find_entries(part))), None)
 
 
-def _fields(schema: type[BaseModel]) -> dict[str, FieldInfo]:
+def _collect_fields(schema: type[BaseModel]) -> dict[str, FieldInfo]:
     return {field.alias or name: field for name, field in schema.model_fields.items()}
 
 
-def _short(value: object) -> str:
-    if isinstance(value, dict) and value.keys() == _foreign("").keys():
+def _format_short(value: object) -> str:
+    if isinstance(value, dict) and value.keys() == _encode_foreign_value("").keys():
         return str(value["date"])
     text = json.dumps(value, default=str, ensure_ascii=False)
     return text if len(text) <= 60 else text[:57] + "..."

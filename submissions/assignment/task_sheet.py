@@ -33,7 +33,7 @@ class TaskSheet:
     given: Mapping[str, bytes]  # names and contents
 
 
-def task_sheet(assignment: Assignment) -> TaskSheet:
+def build_task_sheet(assignment: Assignment) -> TaskSheet:
     """Return the task sheet. Criteria that are not visible contribute only to ``more_marks``."""
     shown = tuple((each.title, each.marks) for each in assignment.criteria if each.visibility == "visible")
     marks = sum((marks for _, marks in shown), Decimal(0))
@@ -43,7 +43,7 @@ def task_sheet(assignment: Assignment) -> TaskSheet:
         assignment.title,
         assignment.section,
         assignment.description.strip(),
-        _asked(assignment),
+        _list_required_files(assignment),
         assignment.training is None and assignment.world.robots == 1,
         shown,
         marks,
@@ -55,7 +55,7 @@ def task_sheet(assignment: Assignment) -> TaskSheet:
     )
 
 
-def _asked(assignment: Assignment) -> tuple[str, ...]:
+def _list_required_files(assignment: Assignment) -> tuple[str, ...]:
     parts = assignment.parts
     files = {PART_FILES["program"]: parts.program, SECOND_PROGRAM: parts.second_program}
     files |= {PART_FILES["responder"]: parts.responder}

@@ -11,7 +11,7 @@ from typing import Annotated
 
 from sim.errors import UsageError
 from sim.readers.csv_text import read_rows
-from sim.readers.unreadable import Unreadable
+from sim.readers.reader_errors import UnreadableDataError
 from submissions.strict_table import Entries
 
 #: x and y in mm, and the label.
@@ -26,12 +26,12 @@ def read_places(name: str, files: Mapping[str, bytes]) -> tuple[LabelledPlace, .
     Raises:
         UsageError: The file or a row cannot be used. The message has the line.
     """
-    rows = _rows(name, files, "places", "x, y, label")
+    rows = _read_csv_rows(name, files, "places", "x, y, label")
     if len(rows) > _MOST_PLACES:
         raise UsageError(f"{name} has {len(rows)} rows, expected at most {_MOST_PLACES}")
     first = 1 if rows and [cell.strip().casefold() for cell in rows[0]] == ["x", "y", "label"] else 0
     places = tuple(
-        _place(row, f"{name}:{number}") for number, row in enumerate(rows, start=1) if number > first and any(row)
+        _parse_place(row, f"{name}:{number}") for number, row in enumerate(rows, start=1) if number > first and any(row)
     )
     if not places:
         raise UsageError(f"{name} has no places, expected rows of x, y, label")
@@ -44,7 +44,7 @@ def read_table(name: str, files: Mapping[str, bytes]) -> tuple[tuple[str, ...], 
     Raises:
         UsageError: The file or a row cannot be used. The message has the line.
     """
-    headings, *rows = _rows(name, files, "table", "an answer and arguments") or [[]]
+    headings, *rows = _read_csv_rows(name, files, "table", "an answer and arguments") or [[]]
     kept = [(number, row) for number, row in enumerate(rows, start=2) if any(row)]
     if not kept or len(kept) > _MOST_CALLS:
         raise UsageError(f"{name} has {len(kept)} rows, expected headings and 1 to {_MOST_CALLS} rows")
@@ -54,7 +54,7 @@ def read_table(name: str, files: Mapping[str, bytes]) -> tuple[tuple[str, ...], 
     return tuple(tuple(row) for _, row in kept)
 
 
-def _rows(name: str, files: Mapping[str, bytes], key: str, columns: str) -> list[list[str]]:
+def _read_csv_rows(name: str, files: Mapping[str, bytes], key: str, columns: str) -> list[list[str]]:
     if name not in files:
         raise UsageError(f'{key} is "{name[:60]}", expected a CSV file of {columns} beside this file')
     try:
@@ -63,11 +63,11 @@ def _rows(name: str, files: Mapping[str, bytes], key: str, columns: str) -> list
         raise UsageError(f"{name} is not UTF-8, expected a CSV file saved as UTF-8") from None
     try:
         return read_rows(text)
-    except Unreadable as error:
+    except UnreadableDataError as error:
         raise UsageError(f"{name} cannot be read: {error}, expected rows of {columns}") from None
 
 
-def _place(row: Sequence[str], where: str) -> LabelledPlace:
+def _parse_place(row: Sequence[str], where: str) -> LabelledPlace:
     try:
         x, y, label = (cell.strip() for cell in row)
         place = float(x), float(y), label

@@ -36,25 +36,25 @@ from submissions.criteria.common import Criterion
 __all__ = ["SCHEMAS", "AnyCriterion", "Criterion"]
 
 
-def _schemas(of: type[Criterion] = Criterion) -> Iterator[tuple[str, type[Criterion]]]:
+def _collect_schemas(of: type[Criterion] = Criterion) -> Iterator[tuple[str, type[Criterion]]]:
     for schema in of.__subclasses__():
         # Classes without ``check`` are shared bases.
         yield from ((name, schema) for name in get_args(schema.model_fields["check"].annotation))
-        yield from _schemas(schema)
+        yield from _collect_schemas(schema)
 
 
 for _family in iter_modules(__path__):
     import_module(f"{__name__}.{_family.name}")
 
 #: The schema for each value of ``check``.
-SCHEMAS: Mapping[str, type[Criterion]] = MappingProxyType(dict(sorted(_schemas())))
+SCHEMAS: Mapping[str, type[Criterion]] = MappingProxyType(dict(sorted(_collect_schemas())))
 
 
-def _of_its_kind(value: object) -> object:
+def _validate_by_check(value: object) -> object:
     if isinstance(value, dict) and value.get("check") in SCHEMAS:
         return SCHEMAS[value["check"]].model_validate(value)
     return value
 
 
 #: Any criterion, selected by its ``check``; also used to read criteria back from a store.
-AnyCriterion = Annotated[Criterion, BeforeValidator(_of_its_kind)]
+AnyCriterion = Annotated[Criterion, BeforeValidator(_validate_by_check)]

@@ -28,7 +28,7 @@ class Classification(Recognition):
     steps: tuple[Annotated[tuple[float, float], Entries("[accuracy, marks]")], ...] = ()
 
     @model_validator(mode="after")
-    def _steps_fit(self) -> Self:
+    def _check_steps(self) -> Self:
         if not self.steps:
             return self
         if self.at_least is not None or self.over == "all":

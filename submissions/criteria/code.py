@@ -13,7 +13,14 @@ from pydantic import Field, field_validator, model_validator
 
 from sim.errors import UsageError
 from submissions.assignment.truth_file import read_table
-from submissions.criteria.common import HOLDS_ANSWERS, Criterion, Misfit, Surroundings, TextOrTexts, Texts
+from submissions.criteria.common import (
+    HOLDS_ANSWERS,
+    AssignmentContext,
+    Criterion,
+    TextOrTexts,
+    Texts,
+    UnmetRequirement,
+)
 from submissions.magics import Flags, parse_magic
 from submissions.strict_table import StrictTable
 
@@ -72,16 +79,16 @@ class SourceRules(Criterion):
 
     @field_validator("flags")
     @classmethod
-    def _known_flags(cls, value: Texts) -> Texts:
+    def _check_flags(cls, value: Texts) -> Texts:
         try:
-            flags_in(value)
+            parse_flag_texts(value)
         except UsageError as error:
             raise ValueError(f"cannot be read: {str(error).removeprefix('line 1: ')}") from None
         return value
 
     @field_validator("in_loop")
     @classmethod
-    def _calls(cls, value: Texts) -> Texts:
+    def _check_calls(cls, value: Texts) -> Texts:
         if not all(text.endswith("()") for text in value):
             raise ValueError('has an entry that is not a call, expected calls like "say()"')
         return value
@@ -92,12 +99,12 @@ class SourceRules(Criterion):
         names = (text.removeprefix(IMPORT).strip() for text in self.avoids if text.startswith(IMPORT))
         return tuple(name for name in names if all(part.isidentifier() for part in name.split(".")))
 
-    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield a problem if the part whose source is analysed does not exist."""
-        yield from _without("part", self.part, around)
+        yield from _find_missing_part("part", self.part, around)
 
     @model_validator(mode="after")
-    def _fits(self) -> Self:
+    def _check_options(self) -> Self:
         if not (self.uses or self.avoids or self.in_loop or self.defines or self.flags):
             raise ValueError("has no condition, expected uses, avoids, in_loop, defines or flags")
         if self.flags and self.part != "program":
@@ -119,7 +126,7 @@ class ExpectedCall(StrictTable):
     hidden: bool = False
 
     @model_validator(mode="after")
-    def _expects_something(self) -> Self:
+    def _check_expectation(self) -> Self:
         # A function that does nothing returns None, so a call without an expected value would always pass.
         if "returns" not in self.model_fields_set and not self.one_of:
             raise ValueError("has a call without returns or one_of, expected the result of the function")
@@ -160,28 +167,28 @@ class Functions(Criterion):
         """The part whose functions are called."""
         return frozenset({"responder"})
 
-    def completed(self, around: Surroundings) -> Self:
+    def complete_from(self, around: AssignmentContext) -> Self:
         """Return the criterion with a call for each row of its table."""
         if not self.table:
             return self
         if self.calls:
-            raise Misfit("table", "needs calls or a table, expected one of them")
+            raise UnmetRequirement("table", "needs calls or a table, expected one of them")
         try:
             rows = read_table(self.table, around.files)
         except UsageError as error:
-            raise Misfit("table", str(error)) from None
+            raise UnmetRequirement("table", str(error)) from None
         calls = tuple(
             ExpectedCall(arguments=tuple(arguments), returns=int(answer) if answer.isdecimal() else answer, hidden=True)
             for answer, *arguments in rows
         )
         return self.model_copy(update={"calls": calls})
 
-    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield a problem if there is no responder."""
-        yield from _without("check", "responder", around)
+        yield from _find_missing_part("check", "responder", around)
 
     @model_validator(mode="after")
-    def _fits(self) -> Self:
+    def _check_options(self) -> Self:
         if not self.calls and not self.table:
             raise ValueError("needs calls or a table, expected one of them")
         if any(before.hidden and not after.hidden for before, after in pairwise(self.calls)):
@@ -220,13 +227,13 @@ class PythonCheck(Criterion):
         """The file with ``check``."""
         return (self.file,)
 
-    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield a problem if the file is not beside the assignment."""
         if self.file not in around.files:
-            yield Misfit("file", f'file is "{self.file[:60]}", expected a .py file beside this file')
+            yield UnmetRequirement("file", f'file is "{self.file[:60]}", expected a .py file beside this file')
 
 
-def flags_in(texts: Texts) -> Flags:
+def parse_flag_texts(texts: Texts) -> Flags:
     """Parse these texts as flags.
 
     Raises:
@@ -235,6 +242,6 @@ def flags_in(texts: Texts) -> Flags:
     return parse_magic("%%sim_magic_preloaded " + " ".join(texts))
 
 
-def _without(key: str, part: str, around: Surroundings) -> Iterator[Misfit]:
+def _find_missing_part(key: str, part: str, around: AssignmentContext) -> Iterator[UnmetRequirement]:
     if part in around.without:
-        yield Misfit(key, f'{key} looks at the {part}, but parts has {part} = "none", expected one')
+        yield UnmetRequirement(key, f'{key} looks at the {part}, but parts has {part} = "none", expected one')

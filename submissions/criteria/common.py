@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from submissions.assignment.definition import Scenario
 
 
-def one_or_many(value: object) -> object:
+def as_tuple(value: object) -> object:
     """Return a list with one entry for a single text."""
     if isinstance(value, str):
         return (value,)
     return tuple(value) if isinstance(value, list) else value
 
 
-def _not_blank(value: Texts) -> Texts:
+def _check_not_blank(value: Texts) -> Texts:
     if not all(text.strip() for text in value):
         raise ValueError("has an empty text in it, which every text contains, expected something to look for")
     return value
@@ -38,16 +38,16 @@ Texts = tuple[str, ...]
 #: Marks a list that would ask for nothing if it were empty. An explicit empty list is an error.
 NOT_EMPTY = "not empty"
 #: Rejects a text that every text contains.
-NotBlank = AfterValidator(_not_blank)
+NotBlank = AfterValidator(_check_not_blank)
 SomeTexts = Annotated[Texts, NOT_EMPTY]
-TextOrTexts = Annotated[Texts, BeforeValidator(one_or_many)]
+TextOrTexts = Annotated[Texts, BeforeValidator(as_tuple)]
 SomeTextOrTexts = Annotated[TextOrTexts, NOT_EMPTY]
 #: Marks a key that may name a file beside the assignment. Students must not read this file.
 HOLDS_ANSWERS = "holds answers"
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
+class AssignmentContext:
     """The parts of an assignment around a criterion, as far as they could be read."""
 
     scenarios: Sequence[Scenario] = ()
@@ -59,14 +59,14 @@ class Surroundings:
     aliases: Mapping[str, Texts] = field(default_factory=dict)
     criteria: Sequence[Criterion] = ()
 
-    def looked_at_by(self, criterion: Criterion) -> Iterator[Scenario]:
+    def find_scenarios(self, criterion: Criterion) -> Iterator[Scenario]:
         """Return the scenarios of the criterion."""
         for scenario in self.scenarios:
             if not criterion.scenarios or scenario.id in criterion.scenarios:
                 yield scenario
 
 
-class Misfit(UsageError):
+class UnmetRequirement(UsageError):
     """A requirement of a criterion that the assignment does not meet: the key and the problem."""
 
     def __init__(self, key: str, sentence: str) -> None:
@@ -117,7 +117,7 @@ class Criterion(StrictTable):
         """The id of the criterion that must be judged first."""
         return None
 
-    def measures_a(self, name: str) -> bool:
+    def can_measure(self, name: str) -> bool:
         """Return whether it measures a value with this name."""
         known = (re.escape(each).replace(r"\#", r"[1-9]\d*").replace(r"\.\.\.", r".+") for each in self.measures)
         return any(re.fullmatch(each, name) for each in known)
@@ -127,7 +127,7 @@ class Criterion(StrictTable):
         """The files beside the assignment that run during judging."""
         return ()
 
-    def completed(self, around: Surroundings) -> Self:
+    def complete_from(self, around: AssignmentContext) -> Self:
         """Return the criterion completed with data from the rest of the assignment.
 
         Raises:
@@ -135,12 +135,12 @@ class Criterion(StrictTable):
         """
         return self
 
-    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield all requirements that the assignment does not meet."""
         yield from ()
 
 
-class AmongMany(Criterion):
+class CriterionWithStrays(Criterion):
     """Base class of criteria that look for items among everything a program prints, says, sends or logs.
 
     A program that outputs every possible item would also output the expected ones. Therefore extra items count as

@@ -63,7 +63,7 @@ class Drawing(Criterion):
         return self.angle if isinstance(self.angle, tuple) else (self.angle,) * len(self.legs_of_each)
 
     @model_validator(mode="after")
-    def _fits(self) -> Self:
+    def _check_options(self) -> Self:
         if isinstance(self.legs, tuple) and self.figures not in (1, len(self.legs)):
             raise ValueError(f"has {len(self.legs)} numbers in legs, expected one for each of {self.figures} figures")
         if isinstance(self.angle, tuple) and len(self.angle) != self.figure_count:

@@ -37,7 +37,7 @@ class SinceEvent(StrictTable):
     seconds: Range | None = None
 
     @model_validator(mode="after")
-    def _asks_something(self) -> Self:
+    def _check_has_condition(self) -> Self:
         if self.moved is None and self.seconds is None:
             raise ValueError("has no condition, expected moved = [least, most] in mm, seconds = [least, most] or both")
         return self
@@ -63,7 +63,7 @@ class EndPose(Criterion):
     since: SinceEvent | None = None
 
     @model_validator(mode="after")
-    def _fits(self) -> Self:
+    def _check_options(self) -> Self:
         if (self.x is None) != (self.y is None):
             raise ValueError("has one of x and y, expected both")
         asked = (self.x, self.heading, self.zone, self.areas or None, self.since)

@@ -27,30 +27,30 @@ _PART = re.compile(r"\\.|\[\^?\]?(?:\\.|[^\]\\])*\]|\{,(?=\d+\})", re.DOTALL)
 _ESCAPE = re.compile(r"\\.", re.DOTALL)
 
 
-def usable(pattern: str) -> str:
+def check_pattern(pattern: str) -> str:
     """Return the pattern unchanged if it can be used.
 
     Raises:
         ValueError: The pattern cannot be used. The message has the problem and the expected form.
     """
-    _compiled(pattern, False)
+    _compile_pattern(pattern, False)
     return pattern
 
 
-def found_in(text: str, pattern: str, ignore_case: bool) -> bool:
+def has_match(text: str, pattern: str, ignore_case: bool) -> bool:
     """Return whether the pattern matches anywhere in the text. ``$`` matches the end, or before a final line feed."""
-    compiled, data = _compiled(pattern, ignore_case), text.encode("utf-8", "replace")
+    compiled, data = _compile_pattern(pattern, ignore_case), text.encode("utf-8", "replace")
     return any(compiled.search(each) is not None for each in {data, data.removesuffix(b"\n")})
 
 
 @functools.lru_cache(maxsize=256)
-def _compiled(pattern: str, ignore_case: bool) -> Any:
+def _compile_pattern(pattern: str, ignore_case: bool) -> Any:
     options = re2.Options()
     options.case_sensitive = not ignore_case
     options.never_capture = True
     options.log_errors = False
     try:
-        return re2.compile(_PART.sub(lambda part: _translated(part[0]), pattern), options)
+        return re2.compile(_PART.sub(lambda part: _translate_part(part[0]), pattern), options)
     except (re2.error, ValueError) as error:
         reason = error.args[0].decode("utf-8", "replace") if isinstance(error, re2.error) else str(error)
         raise ValueError(
@@ -59,7 +59,7 @@ def _compiled(pattern: str, ignore_case: bool) -> Any:
         ) from None
 
 
-def _translated(part: str) -> str:
+def _translate_part(part: str) -> str:
     if not part.startswith("["):
         return _OUTSIDE.get(part, part)
     negated = next((each for each in _ESCAPE.findall(part) if each in (r"\W", r"\S")), None)

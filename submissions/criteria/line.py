@@ -36,7 +36,7 @@ class Follows(Criterion):
     of: Part = "robot"
 
     @model_validator(mode="after")
-    def _fits(self) -> Self:
+    def _check_options(self) -> Self:
         if self.at_most is not None and self.at_most < self.within:
             raise ValueError("has an at_most below its within, expected at_most >= within")
         return self
@@ -59,7 +59,7 @@ class Laps(Criterion):
     seconds: Range | None = None
 
     @model_validator(mode="after")
-    def _fits(self) -> Self:
+    def _check_options(self) -> Self:
         if not self.line.is_closed:
             raise ValueError("has a line with two ends, expected a closed one (closed = true)")
         if self.start_line[:2] == self.start_line[2:]:

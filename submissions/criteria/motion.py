@@ -14,7 +14,7 @@ from submissions.criteria.places import Range
 from submissions.strict_table import StrictTable
 
 
-class AskedMotion(StrictTable):
+class MotionConditions(StrictTable):
     """Conditions on a move. Each is [least, most]; all given conditions must hold.
 
     ``forward`` and ``sideways`` (to the left) are the displacement in mm in the frame of the robot's pose at the
@@ -30,27 +30,27 @@ class AskedMotion(StrictTable):
     seconds: Range | None = None
 
     @property
-    def asks(self) -> bool:
+    def has_motion_conditions(self) -> bool:
         """Return whether any condition is given."""
         given = (self.forward, self.sideways, self.distance, self.turn, self.turn_size, self.seconds)
         return any(value is not None for value in given)
 
 
-class NamedMotion(AskedMotion):
+class NamedMotion(MotionConditions):
     """A move in a list of moves; feedback uses its ``name``."""
 
     name: str = Field(default="", max_length=80)
 
     @model_validator(mode="after")
-    def _asks_something(self) -> Self:
-        if not self.asks:
+    def _check_has_condition(self) -> Self:
+        if not self.has_motion_conditions:
             raise ValueError(
                 "has no condition, expected one of forward, sideways, distance, turn, turn_size and seconds"
             )
         return self
 
 
-class Displacement(AskedMotion, Criterion):
+class Displacement(MotionConditions, Criterion):
     """Displacement of the whole run: the end pose relative to the start pose.
 
     In addition to the conditions on a move, ``left_wheel`` and ``right_wheel`` are [least, most] of the final wheel
@@ -72,9 +72,9 @@ class Displacement(AskedMotion, Criterion):
     agrees_with_wheels: float | None = Field(default=None, gt=0, le=1)
 
     @model_validator(mode="after")
-    def _asks_something(self) -> Self:
+    def _check_has_condition(self) -> Self:
         wheels = (self.left_wheel, self.right_wheel, self.agrees_with_wheels)
-        if not self.asks and all(value is None for value in wheels):
+        if not self.has_motion_conditions and all(value is None for value in wheels):
             raise ValueError(
                 "has no condition, expected one of forward, sideways, distance, turn, turn_size, seconds, left_wheel, "
                 "right_wheel and agrees_with_wheels"
@@ -119,7 +119,7 @@ class Excursions(Criterion):
 
     @field_validator("heights")
     @classmethod
-    def _positive(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+    def _check_positive(cls, value: tuple[float, ...]) -> tuple[float, ...]:
         if any(height <= 0 for height in value):
             raise ValueError("has a height that is not above 0, expected proportions like [1, 2, 1]")
         return value

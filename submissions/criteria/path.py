@@ -29,7 +29,7 @@ class Visits(Criterion):
     of: Part = "robot"
 
     @model_validator(mode="after")
-    def _enough(self) -> Self:
+    def _check_visit_count(self) -> Self:
         if self.at_least is not None and self.at_least > len(self.places):
             raise ValueError(f"has at_least = {self.at_least} of {len(self.places)} places, expected as many or fewer")
         return self

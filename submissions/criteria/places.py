@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from sim.floors.centrelines import centrelines
+from sim.floors.centrelines import load_centrelines
 from submissions.strict_table import Entries, StrictTable
 
 #: The measured point: the middle of the axle, the pen's drawing, or a light sensor.
@@ -20,22 +20,22 @@ Part = Literal["robot", "pen", "left_light", "right_light"]
 Point = Annotated[tuple[float, float], Entries("[x, y]")]
 
 
-def _ordered(value: tuple[float, float]) -> tuple[float, float]:
+def _check_range(value: tuple[float, float]) -> tuple[float, float]:
     if value[0] > value[1]:
         raise ValueError("is an empty range, expected [least, most]")
     return value
 
 
-def _with_room(zone: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+def _check_zone(zone: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
     if not (zone[0] < zone[2] and zone[1] < zone[3]):
         raise ValueError("is empty, expected [left, bottom, right, top]")
     return zone
 
 
 #: Minimum and maximum, both inclusive. At least one value must fit.
-Range = Annotated[tuple[float, float], AfterValidator(_ordered), Entries("[least, most]")]
+Range = Annotated[tuple[float, float], AfterValidator(_check_range), Entries("[least, most]")]
 #: In mm; the area must not be empty.
-Zone = Annotated[tuple[float, float, float, float], AfterValidator(_with_room), Entries("[left, bottom, right, top]")]
+Zone = Annotated[tuple[float, float, float, float], AfterValidator(_check_zone), Entries("[left, bottom, right, top]")]
 
 
 class Area(StrictTable):
@@ -52,7 +52,7 @@ class Area(StrictTable):
     outside: bool = False
 
     @model_validator(mode="after")
-    def _one_shape(self) -> Self:
+    def _check_one_shape(self) -> Self:
         if sum(shape is not None for shape in (self.rectangle, self.circle, self.polygon, self.bar)) != 1:
             raise ValueError("is not an area, expected one of rectangle, circle, polygon and bar")
         if self.rectangle is not None:
@@ -69,9 +69,9 @@ class Area(StrictTable):
 
     def __str__(self) -> str:
         """Return ``the red circle``, ``the outside of the red circle``, or the shape with its dimensions."""
-        return f"the outside of {self._shape()}" if self.outside else self._shape()
+        return f"the outside of {self._describe_shape()}" if self.outside else self._describe_shape()
 
-    def _shape(self) -> str:
+    def _describe_shape(self) -> str:
         if self.name:
             return self.name
         if self.rectangle is not None:
@@ -109,14 +109,14 @@ class LineToFollow(StrictTable):
 
     @field_validator("on")
     @classmethod
-    def _known(cls, value: str | None) -> str | None:
-        if value is not None and value not in centrelines():
-            names = ", ".join(f'"{name}"' for name in centrelines())
+    def _check_known(cls, value: str | None) -> str | None:
+        if value is not None and value not in load_centrelines():
+            names = ", ".join(f'"{name}"' for name in load_centrelines())
             raise ValueError(f"names no line of a floor, expected one of {names}")
         return value
 
     @model_validator(mode="after")
-    def _one_kind(self) -> Self:
+    def _check_one_kind(self) -> Self:
         if sum(kind is not None for kind in (self.on, self.points, self.ellipse)) != 1:
             raise ValueError("is not a line, expected one of on, points and ellipse")
         if not 0 < abs(self.arc[1] - self.arc[0]) <= 360:
@@ -130,7 +130,7 @@ class LineToFollow(StrictTable):
     def corners(self) -> tuple[Point, ...]:
         """The corners of the line; a closed line repeats its first corner at the end."""
         if self.on is not None:
-            return centrelines()[self.on]
+            return load_centrelines()[self.on]
         if self.points is not None:
             return (*self.points, self.points[0]) if self.closed else self.points
         x, y, across, up = self.ellipse or (0.0, 0.0, 0.0, 0.0)

@@ -29,7 +29,7 @@ class Closest(Criterion):
     first_turn: Literal["towards", "away"] | None = None
 
     @model_validator(mode="after")
-    def _asks_something(self) -> Self:
+    def _check_has_condition(self) -> Self:
         if self.distance is None and self.than_straight is None and self.first_turn is None:
             raise ValueError("has no condition, expected one of distance, than_straight and first_turn")
         return self
@@ -55,7 +55,7 @@ class Circuits(Criterion):
     corners: int | None = Field(default=None, ge=1)
 
     @model_validator(mode="after")
-    def _whole_round(self) -> Self:
+    def _check_whole_rounds(self) -> Self:
         if (self.gyro is not None or self.corners is not None) and self.times[0] < 1:
             raise ValueError("looks at whole rounds with gyro or corners, expected times to begin at 1 or above")
         return self

@@ -13,7 +13,14 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from sim.errors import UsageError
 from submissions.assignment.truth_file import LabelledPlace, read_places
-from submissions.criteria.common import HOLDS_ANSWERS, NOT_EMPTY, Criterion, Misfit, Surroundings, TextOrTexts
+from submissions.criteria.common import (
+    HOLDS_ANSWERS,
+    NOT_EMPTY,
+    AssignmentContext,
+    Criterion,
+    TextOrTexts,
+    UnmetRequirement,
+)
 
 #: Grey level of a patch.
 Grey = Annotated[int, Field(ge=0, le=255)]
@@ -71,7 +78,7 @@ class Recognition(Criterion):
 
     @field_validator("truth", mode="plain")
     @classmethod
-    def _label_or_list(cls, value: object) -> object:
+    def _parse_truth(cls, value: object) -> object:
         if value in ("label", "grey", "places"):
             return value
         if isinstance(value, list | tuple) and value and all(isinstance(label, str) and label for label in value):
@@ -83,7 +90,7 @@ class Recognition(Criterion):
 
     @field_validator("over")
     @classmethod
-    def _pooled(cls, value: str, info: ValidationInfo) -> str:
+    def _check_over(cls, value: str, info: ValidationInfo) -> str:
         if value not in ("share", "all"):
             raise ValueError('is for criteria judged trial by trial, expected "share" or "all"')
         return value
@@ -93,23 +100,23 @@ class Recognition(Criterion):
         """True: the classifications are answers of a responder."""
         return True
 
-    def completed(self, around: Surroundings) -> Self:
+    def complete_from(self, around: AssignmentContext) -> Self:
         """Return the criterion with the assignment's aliases, and with the rows of its places file in ``places``."""
         update: dict[str, object] = {"aliases": {**around.aliases, **self.aliases}}
         if isinstance(self.places, str):
             try:
                 update["places"] = read_places(self.places, around.files)
             except UsageError as error:
-                raise Misfit("places", str(error)) from None
+                raise UnmetRequirement("places", str(error)) from None
         return self.model_copy(update=update)
 
-    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield problems with the truth: no labels on the floor, no label patches, or no truth for a pose."""
         ground = around.ground
         if isinstance(self.truth, tuple):
-            for scenario in around.looked_at_by(self):
+            for scenario in around.find_scenarios(self):
                 if len(self.truth) != len(scenario.poses):
-                    yield Misfit(
+                    yield UnmetRequirement(
                         "truth",
                         f"truth has {len(self.truth)} labels for the {len(scenario.poses)} poses of scenario "
                         f'"{scenario.id}", expected one label for each pose',
@@ -118,19 +125,19 @@ class Recognition(Criterion):
             return
         elif self.truth != "places" and ground is not None and not ground.labels:
             greys = ' greys = "shapes", "digits" or { label = grey level } beside it,' if self.truth == "grey" else ""
-            yield Misfit(
+            yield UnmetRequirement(
                 "truth",
                 f'truth is "{self.truth}", but {ground.name} has no labels, '
                 f"expected{greys} a list with one label for each pose, or places",
             )
         elif self.truth == "grey" and ground is not None and not ground.label_patches:
-            yield Misfit(
+            yield UnmetRequirement(
                 "truth",
                 'truth is "grey", but the world has labels = false, expected truth = "label" or label patches',
             )
 
     @model_validator(mode="after")
-    def _fits(self) -> Self:
+    def _check_options(self) -> Self:
         if (self.truth == "places") != bool(self.places):
             raise ValueError('needs truth = "places" and places together, expected both or neither')
         if self.greys and self.truth != "grey":

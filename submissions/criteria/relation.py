@@ -48,7 +48,7 @@ class Relation(Criterion):
     changes: float = Field(default=0.0, ge=0)
 
     @model_validator(mode="after")
-    def _two_series(self) -> Self:
+    def _check_two_series(self) -> Self:
         if self.of == self.to:
             raise ValueError("has the same series in of and to, expected two")
         return self

@@ -10,12 +10,12 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.asking import BetweenAgents
+from submissions.criteria.agent_pairs import AgentPairCriterion
 from submissions.criteria.common import SomeTextOrTexts, SomeTexts, Texts
 from submissions.criteria.texts import TextConditions
 
 
-class Replies(BetweenAgents, TextConditions):
+class Replies(AgentPairCriterion, TextConditions):
     """The responder's answers, whether or not they arrived in time.
 
     ``expect`` maps a text of the robot to its answer. Each text must have been sent and answered as given. An answer
@@ -49,7 +49,7 @@ class Replies(BetweenAgents, TextConditions):
         return () if self.agents else tuple(self.expect)
 
     @model_validator(mode="after")
-    def _fits(self) -> Self:
+    def _check_options(self) -> Self:
         if self.value is not None and self.path is None:
             raise ValueError('has value without path, expected path = "message" or the like beside it')
         if self.expect and (self.to or self.to_starts_with or self.has_conditions or self.value is not None):
@@ -58,13 +58,13 @@ class Replies(BetweenAgents, TextConditions):
             raise ValueError(
                 "has in_order beside other conditions, expected in_order alone (with path and ignore_case)"
             )
-        right = [answer for each in self.expect.values() for answer in right_answers(each)]
+        right = [answer for each in self.expect.values() for answer in list_allowed_answers(each)]
         if self.path is None and not self.agents and any(not isinstance(answer, str) for answer in right):
             raise ValueError("has an answer in expect that is not a text, expected texts, or path beside them")
         return self
 
 
-def right_answers(expected: object) -> Sequence[object]:
+def list_allowed_answers(expected: object) -> Sequence[object]:
     """Return the answers that an entry of ``expect`` allows: the list in ``one_of``, or the entry itself."""
     if isinstance(expected, dict) and expected.keys() == {"one_of"} and isinstance(expected["one_of"], list):
         return expected["one_of"]

@@ -10,7 +10,14 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, field_serializer, field_validator
 
-from submissions.criteria.common import AmongMany, Misfit, NotBlank, Surroundings, TextOrTexts, Texts
+from submissions.criteria.common import (
+    AssignmentContext,
+    CriterionWithStrays,
+    NotBlank,
+    TextOrTexts,
+    Texts,
+    UnmetRequirement,
+)
 from submissions.criteria.places import Zone
 from submissions.strict_table import StrictTable
 
@@ -18,7 +25,7 @@ Source = Literal["print", "speech", "either"]
 _MOST_FOR_LABELS = 0.49  # less than half of the distance between the numbers of two labels
 
 
-class Reports(AmongMany):
+class Reports(CriterionWithStrays):
     """Numbers and words in the output match the pose.
 
     ``expected`` has a list for each pose of the scenario, or one list for all poses. The entries, numbers or texts,
@@ -59,28 +66,28 @@ class Reports(AmongMany):
 
     @field_validator("expected", mode="plain")
     @classmethod
-    def _rows(cls, value: object) -> object:
+    def _parse_expected(cls, value: object) -> object:
         if value == "label":
             return value
         rows = value if isinstance(value, list | tuple) else ()
-        if rows and all(isinstance(row, list | tuple) and row and all(map(_entry, row)) for row in rows):
+        if rows and all(isinstance(row, list | tuple) and row and all(map(_is_entry, row)) for row in rows):
             return tuple(tuple(row) for row in rows)
         raise ValueError('is neither "label" nor a list of lists, expected [[100, "white"], ...], one for each pose')
 
-    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield a problem for each scenario whose number of poses differs from the number of lists."""
         if self.expected == "label" or len(self.expected) == 1:
             return
-        for scenario in around.looked_at_by(self):
+        for scenario in around.find_scenarios(self):
             if len(self.expected) != len(scenario.poses):
-                yield Misfit(
+                yield UnmetRequirement(
                     "expected",
                     f"expected has {len(self.expected)} lists for the {len(scenario.poses)} poses of scenario "
                     f'"{scenario.id}", expected one list for each pose, or one for all',
                 )
 
     @field_serializer("expected")
-    def _plain_rows(
+    def _serialise_rows(
         self, value: Literal["label"] | tuple[tuple[float | str, ...], ...]
     ) -> str | list[list[int | float | str]]:
         # Pydantic's validation does not accept the integers or the nesting.
@@ -94,7 +101,7 @@ class EventAt(StrictTable):
     zone: Zone
 
 
-class Events(AmongMany):
+class Events(CriterionWithStrays):
     """Each text is said or printed, in this order, while the sensor is in its zone.
 
     ``events`` are tables ``{ text = "1", zone = [left, bottom, right, top] }``. Texts match whole words anywhere in the
@@ -110,7 +117,7 @@ class Events(AmongMany):
     margin: float = Field(default=0.0, ge=0)
 
 
-def _entry(value: object) -> bool:
+def _is_entry(value: object) -> bool:
     if isinstance(value, str):
         return any(c.isalnum() for c in value)
     return isinstance(value, int | float) and not isinstance(value, bool)

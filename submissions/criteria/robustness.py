@@ -10,7 +10,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import Misfit, Surroundings
+from submissions.criteria.common import AssignmentContext, UnmetRequirement
 from submissions.criteria.recognition import Recognition
 from submissions.sweep import Condition
 
@@ -32,18 +32,18 @@ class Robustness(Recognition):
     marks_from: Literal["area", "falls_below"] = "area"
     level: float | None = Field(default=None, gt=0, le=1)
 
-    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield the problems of recognition, and a problem if no scenario has a sweep over the condition."""
-        yield from super().misfits(around)
-        if not any(scenario.varies(self.along) for scenario in around.looked_at_by(self)):
-            yield Misfit(
+        yield from super().find_unmet_requirements(around)
+        if not any(scenario.varies(self.along) for scenario in around.find_scenarios(self)):
+            yield UnmetRequirement(
                 "along",
                 f'along is "{self.along}", but no scenario of the criterion is swept over it, '
                 f"expected [scenario.sweep] with {self.along} = [...]",
             )
 
     @model_validator(mode="after")
-    def _level_fits(self) -> Self:
+    def _check_level(self) -> Self:
         if (self.level is not None) != (self.marks_from == "falls_below"):
             raise ValueError('needs level with marks_from = "falls_below", and only there, expected both or neither')
         return self

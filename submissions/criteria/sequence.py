@@ -9,10 +9,10 @@ from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from submissions.criteria.common import AmongMany, Texts, one_or_many
+from submissions.criteria.common import CriterionWithStrays, Texts, as_tuple
 
 
-class WordSequence(AmongMany):
+class WordSequence(CriterionWithStrays):
     """Words in a given order, in any number of spoken or printed texts.
 
     Comparison with ``words`` ignores case and punctuation. A nested list gives alternatives: ``["T", ["M", "em"],
@@ -31,19 +31,19 @@ class WordSequence(AmongMany):
 
     @field_validator("words", mode="before")
     @classmethod
-    def _alternatives(cls, value: Any) -> Any:
-        return tuple(one_or_many(word) for word in value) if isinstance(value, list | tuple) else value
+    def _parse_alternatives(cls, value: Any) -> Any:
+        return tuple(as_tuple(word) for word in value) if isinstance(value, list | tuple) else value
 
     @field_validator("words")
     @classmethod
-    def _some_word(cls, value: tuple[Texts, ...]) -> tuple[Texts, ...]:
+    def _check_words(cls, value: tuple[Texts, ...]) -> tuple[Texts, ...]:
         for words in value:
             if not words or not all(any(c.isalnum() for c in word) for word in words):
                 raise ValueError("has an entry without a letter or digit, expected words to look for")
         return value
 
     @model_validator(mode="after")
-    def _waits_for_speech(self) -> Self:
+    def _check_waits(self) -> Self:
         if self.waits and self.source != "speech":
             raise ValueError('has waits with source = "print", expected it with speech')
         return self

@@ -40,7 +40,7 @@ class StopOn(Criterion):
     off_floor: bool = False
 
     @model_validator(mode="after")
-    def _fits(self) -> Self:
+    def _check_options(self) -> Self:
         if self.reflected is None and self.rgb is None and self.zone is None and self.near is None:
             raise ValueError("has no condition, expected reflected, rgb, zone or near")
         return self

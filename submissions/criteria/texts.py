@@ -9,9 +9,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from submissions.criteria.asking import BetweenAgents
-from submissions.criteria.common import AmongMany, Criterion, NotBlank, SomeTextOrTexts, SomeTexts
-from submissions.criteria.expressions import usable
+from submissions.criteria.agent_pairs import AgentPairCriterion
+from submissions.criteria.common import Criterion, CriterionWithStrays, NotBlank, SomeTextOrTexts, SomeTexts
+from submissions.criteria.expressions import check_pattern
 
 
 class TextConditions(Criterion):
@@ -26,8 +26,8 @@ class TextConditions(Criterion):
 
     @field_validator("matches")
     @classmethod
-    def _usable(cls, value: str | None) -> str | None:
-        return None if value is None else usable(value)
+    def _check_matches(cls, value: str | None) -> str | None:
+        return None if value is None else check_pattern(value)
 
     @property
     def has_conditions(self) -> bool:
@@ -35,7 +35,7 @@ class TextConditions(Criterion):
         return bool(self.equals or self.starts_with or self.contains or self.among or self.matches is not None)
 
 
-class TextSequence(TextConditions, AmongMany):
+class TextSequence(TextConditions, CriterionWithStrays):
     """Number and order of the texts that count.
 
     Without a number, at least one text is required. With ``in_order``, the listed texts must occur in that order among
@@ -52,9 +52,9 @@ class TextSequence(TextConditions, AmongMany):
     exactly: int | None = Field(default=None, ge=0)
 
     @model_validator(mode="after")
-    def _asks_something(self) -> Self:
+    def _check_has_condition(self) -> Self:
         counted = (self.at_least, self.at_most, self.exactly) != (None, None, None)
-        if not (self.has_conditions or self.in_order or counted or self._asks_more()):
+        if not (self.has_conditions or self.in_order or counted or self._has_other_conditions()):
             raise ValueError(
                 "has no condition, expected one of equals, contains, starts_with, matches, among, in_order, "
                 "at_least, at_most, exactly"
@@ -79,12 +79,12 @@ class TextSequence(TextConditions, AmongMany):
         if self.compare == "matches":
             for pattern in self.in_order:
                 try:
-                    usable(pattern)
+                    check_pattern(pattern)
                 except ValueError as error:
                     raise ValueError(f'has "{pattern}" in in_order, which {error}') from None
         return self
 
-    def _asks_more(self) -> bool:
+    def _has_other_conditions(self) -> bool:
         return False
 
 
@@ -109,7 +109,7 @@ class Says(TextSequence):
     check: Literal["says"]
 
 
-class Messages(BetweenAgents, TextSequence):
+class Messages(AgentPairCriterion, TextSequence):
     """The texts that the robot sends to the responder, such as ``PY::0``; images are sent as ``IMG_DATA::...``.
 
     With ``json = true``, the robot's queue counts instead: all valid answers that began with ``JSON::`` and arrived
@@ -129,10 +129,10 @@ class Messages(BetweenAgents, TextSequence):
         return self.json_queue or self.queue_grows
 
     @model_validator(mode="after")
-    def _path_needs_json(self) -> Self:
+    def _check_path(self) -> Self:
         if self.path is not None and not self.json_queue:
             raise ValueError("has path without json, expected json = true beside it")
         return self
 
-    def _asks_more(self) -> bool:
+    def _has_other_conditions(self) -> bool:
         return self.queue_grows

@@ -11,10 +11,10 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from submissions.criteria.common import Criterion, Misfit, Surroundings, Texts
+from submissions.criteria.common import AssignmentContext, Criterion, Texts, UnmetRequirement
 from submissions.criteria.places import Range
-from submissions.nearest import did_you_mean, listed
 from submissions.strict_table import Entries
+from submissions.suggestions import join_with_or, suggest_name
 
 
 class Timing(Criterion):
@@ -50,24 +50,26 @@ class Ranking(Criterion):
         """The criterion whose value is ranked."""
         return self.of
 
-    def misfits(self, around: Surroundings) -> Iterator[Misfit]:
+    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield a problem if the ranked criterion does not exist, needs another's result, or lacks the value."""
         # A criterion that needs another's result is judged too late to be ranked.
         others = {each.id: each for each in around.criteria if each.result_needed is None}
         if self.of not in others:
-            hint = did_you_mean(self.of, others)
-            yield Misfit("of", f'of is "{self.of[:60]}", expected the id of another criterion{hint}')
-        elif not others[self.of].measures_a(self.measure):
+            hint = suggest_name(self.of, others)
+            yield UnmetRequirement("of", f'of is "{self.of[:60]}", expected the id of another criterion{hint}')
+        elif not others[self.of].can_measure(self.measure):
             known = others[self.of].measures
-            figures = f"one of {listed(known)}{did_you_mean(self.measure, known)}" if known else "one that has figures"
-            yield Misfit(
+            figures = (
+                f"one of {join_with_or(known)}{suggest_name(self.measure, known)}" if known else "one that has figures"
+            )
+            yield UnmetRequirement(
                 "measure",
                 f'measure is "{self.measure}", which "{self.of}" ({others[self.of].check}) does not measure, '
                 f"expected {figures}",
             )
 
     @model_validator(mode="after")
-    def _ordered(self) -> Self:
+    def _check_step_order(self) -> Self:
         for better, worse in pairwise(self.steps):
             if (better[0] >= worse[0]) != self.highest or better[1] <= worse[1]:
                 raise ValueError("has steps out of order, expected the best first, each worth less than the one before")

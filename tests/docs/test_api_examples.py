@@ -8,7 +8,7 @@ from pathlib import Path
 
 from paths import ROOT
 from service.operations.scopes import SCOPES
-from service.webhook_sender import signature
+from service.webhook_sender import sign_body
 from web import web_in
 
 DOCUMENT = (ROOT / "docs" / "api.md").read_text()
@@ -40,8 +40,8 @@ def test_the_signature_is_checked_as_shown() -> None:
     exec(source, names)
     is_ours = names["is_ours"]
     assert callable(is_ours)
-    assert is_ours("secret", signature("secret", 1762000000, b"{}"), b"{}")
-    assert not is_ours("secret", signature("other", 1762000000, b"{}"), b"{}")
+    assert is_ours("secret", sign_body("secret", 1762000000, b"{}"), b"{}")
+    assert not is_ours("secret", sign_body("other", 1762000000, b"{}"), b"{}")
 
 
 def test_every_scope_is_told() -> None:

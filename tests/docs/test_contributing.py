@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from paths import ROOT
-from service.store.revision import newest_revision
+from service.store.revision import find_newest_revision
 
 ROOMS = ("sim", "models", "responders", "submissions", "service")
 DIFFS = dict(
@@ -28,36 +28,36 @@ from service.grading.judging import ending
 assert ending.judge_ends_facing.schema is SCHEMAS["ends_facing"]
 """,
     "floor": """
-from sim.floors import floor, names
-assert "Cross" in names()
-assert (floor("Cross").pixels[571, 5] == 0).all() and (floor("Cross").pixels[5, 5] == 255).all()
+from sim.floors import build_floor, list_floor_names
+assert "Cross" in list_floor_names()
+assert (build_floor("Cross").pixels[571, 5] == 0).all() and (build_floor("Cross").pixels[5, 5] == 255).all()
 """,
     "output format": """
 from service.reports.formats import FORMATS
 assert FORMATS["markdown"].suffix == ".md" and FORMATS["markdown"].document is not None
 """,
     "sensor": """
-from responders.code import Code
+from responders.source_file import SourceFile
 from responders.trial_spec import ProgramSpec, TrialSpec
 from responders.channel import Channel
 from responders.sandbox.running_child import ChildLimits
 from service.grading.trial_runner import TrialRunner
-from sim.floors import floor
+from sim.floors import build_floor
 from sim.recording import Pose
-from sim.robot import robot
+from sim.robot import get_robot
 from sim.world import Noise
 text = "from ev3dev2.sensor.lego import CompassSensor\\nprint(CompassSensor(INPUT_4).bearing)"
-program = ProgramSpec(Code("robot.py", text), "preloaded", ChildLimits(2, 128 << 20), 1000)
-spec = TrialSpec(program=program, responder=None, collaborative=False, floor=floor("Empty_Map"),
-                 robot=robot("Default_Robot"), pose=Pose(500, 500, 30), noise=Noise(), channel=Channel(),
+program = ProgramSpec(SourceFile("robot.py", text), "preloaded", ChildLimits(2, 128 << 20), 1000)
+spec = TrialSpec(program=program, responder=None, collaborative=False, floor=build_floor("Empty_Map"),
+                 robot=get_robot("Default_Robot"), pose=Pose(500, 500, 30), noise=Noise(), channel=Channel(),
                  seconds=5, seed=1, child_seed=1)
 with TrialRunner() as runner:
     recording = runner.run(spec)
 assert [line.text for line in recording.printed] == ["60"], recording.faults
 """,
     "model family": """
-from models.tasks import tasks
-assert "square" in tasks()
+from models.tasks import load_tasks
+assert "square" in load_tasks()
 """,
     "page, a route, a command": """
 import os, tempfile
@@ -90,15 +90,15 @@ from alembic import command
 from service.settings import Settings
 from service.store import recorded_schema
 from service.store.engine import open_engine, open_store
-from service.store.migrate import configuration, migrate
+from service.store.migrate import build_alembic_config, apply_migrations
 from service.store.web_tables import METADATA
 assert "batch_note" in METADATA.tables
 recorded_schema.write_schema()
 engine = open_engine(f"sqlite:///{tempfile.mkdtemp()}/new.db")
 with engine.begin() as connection:
-    migrate(connection)
+    apply_migrations(connection)
 with engine.begin() as connection:
-    command.check(configuration(connection))
+    command.check(build_alembic_config(connection))
 """,
     "setting": """
 import os
@@ -141,5 +141,5 @@ def test_an_example_can_be_added_so(added: str, tmp_path: Path) -> None:
 
 def _renumbered(diff: str) -> str:
     """Return the diff with its migration after the newest one in the tree."""
-    newest = newest_revision()
+    newest = find_newest_revision()
     return diff.replace(_NEXT, f"{int(newest) + 1:04d}").replace(_NEWEST, newest)

@@ -18,13 +18,13 @@ from builders import asked_already
 from command import robomark
 from notebook_builder import MESSAGING
 from paths import ROOT
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grader import grade
 from service.reports.formats import FORMATS
 from service.settings import Settings
 from sim.floors import OBSTACLE_PRESETS
 from sim.robot import ROBOTS
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
 from submissions.assignment.schema import (
     ChannelTable,
@@ -36,10 +36,10 @@ from submissions.assignment.schema import (
     read_table,
 )
 from submissions.criteria import SCHEMAS
-from submissions.criteria.common import AmongMany
+from submissions.criteria.common import CriterionWithStrays
 from submissions.submission import Submission
 
-EXAMPLE = examples("shape-recognition") / "reference"
+EXAMPLE = locate_examples("shape-recognition") / "reference"
 DOCUMENTS = sorted((ROOT / "docs").glob("*.md"))
 #: The section of each kind of criterion.
 SECTIONS = dict(
@@ -115,7 +115,7 @@ def _download_from_moodle(folder: Path) -> None:
 def test_the_pair_for_students_gets_full_marks() -> None:
     files = dict(files_shown(ROOT / "docs" / "students.md"))
     assert files.keys() == {"robot.py", "responder.py"}
-    robot, responder = (Code(name, files[name]) for name in ("robot.py", "responder.py"))
+    robot, responder = (SourceFile(name, files[name]) for name in ("robot.py", "responder.py"))
     grade_given = grade(Submission("ada", robot, responder), find_assignment("shape-recognition"))
     assert (grade_given.marks, grade_given.verdict) == (12, "finished")
 
@@ -176,7 +176,9 @@ def test_every_kind_that_looks_among_much_is_named_with_its_strays() -> None:
     text = re.search(r"^## Naming everything.*?(?=^## )", (ROOT / "docs" / "criteria.md").read_text(), re.M | re.S)
     assert text is not None
     assert [
-        kind for kind, schema in SCHEMAS.items() if issubclass(schema, AmongMany) and f"`{kind}`" not in text[0]
+        kind
+        for kind, schema in SCHEMAS.items()
+        if issubclass(schema, CriterionWithStrays) and f"`{kind}`" not in text[0]
     ] == []
 
 
@@ -184,7 +186,7 @@ def test_every_kind_that_looks_among_much_is_named_with_its_strays() -> None:
 def test_every_setting_of_a_criterion_is_explained(kind: str) -> None:
     text = SECTIONS[kind] + "".join(SECTIONS[other] for other in SHARES.get(kind, ()))
     fields = SCHEMAS[kind].model_fields.items()
-    settings = {field.alias or name for name, field in fields if name not in AmongMany.model_fields}
+    settings = {field.alias or name for name, field in fields if name not in CriterionWithStrays.model_fields}
     assert not {name for name in settings - {"check"} if not re.search(rf"\b{name}\b", text)}
 
 

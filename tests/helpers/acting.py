@@ -7,13 +7,13 @@ from pathlib import Path
 
 from builders import settings_in
 from service.operations import batches, exports, regrades
-from service.operations.batches import Controlled, Retried
+from service.operations.batches import BatchControlResult, RetryCounts
 from service.operations.context import Actor, Service
 from service.operations.exports import Download, ExportRequest
-from service.operations.regrades import Published, Regraded
+from service.operations.regrades import PublicationCounts, RegradeBatch
 from service.store.engine import Store
 from service.store.models import Batch, Enrolment, Job
-from service.store.states import Lane
+from service.store.states import JobQueue
 from submissions.assignment.definition import Assignment
 
 
@@ -23,11 +23,11 @@ class Notices:
 
     sent: list[tuple[str, int]] = field(default_factory=list)
 
-    def grade(self, lane: Lane, count: int = 1) -> None:
+    def grade(self, lane: JobQueue, count: int = 1) -> None:
         if count > 0:
             self.sent.append((lane.value, count))
 
-    def try_out(self, count: int = 1) -> None:
+    def notify_test_runs(self, count: int = 1) -> None:
         self.sent.append(("tryouts", count))
 
     def plot(self, count: int = 1) -> None:
@@ -42,28 +42,28 @@ def machine(name: str = "staff") -> Actor:
     return Actor(name, operator=True)
 
 
-def pause(store: Store, batch_id: str, actor: str = "staff") -> Controlled:
+def pause(store: Store, batch_id: str, actor: str = "staff") -> BatchControlResult:
     return batches.pause(service_on(store), machine(actor), _course(store, batch_id), batch_id)
 
 
-def resume(store: Store, batch_id: str, actor: str = "staff") -> Controlled:
+def resume(store: Store, batch_id: str, actor: str = "staff") -> BatchControlResult:
     return batches.resume(service_on(store), machine(actor), _course(store, batch_id), batch_id)
 
 
-def cancel(store: Store, batch_id: str, actor: str = "staff") -> Controlled:
+def cancel(store: Store, batch_id: str, actor: str = "staff") -> BatchControlResult:
     return batches.cancel(service_on(store), machine(actor), _course(store, batch_id), batch_id)
 
 
-def retry(store: Store, batch_id: str | None, actor: str = "staff") -> Retried:
+def retry(store: Store, batch_id: str | None, actor: str = "staff") -> RetryCounts:
     return batches.retry_dead(service_on(store), machine(actor), batch_id)
 
 
-def publish(store: Store, batch_id: str, actor: str = "staff", *, anyway: bool = False) -> Published:
+def publish(store: Store, batch_id: str, actor: str = "staff", *, anyway: bool = False) -> PublicationCounts:
     course_id = _course(store, batch_id)
     return regrades.publish(service_on(store), machine(actor), course_id, batch_id, anyway=anyway)
 
 
-def publish_one(store: Store, job_id: str, actor: str = "staff", *, anyway: bool = False) -> Published:
+def publish_one(store: Store, job_id: str, actor: str = "staff", *, anyway: bool = False) -> PublicationCounts:
     course_id = _course_of_job(store, job_id)
     return regrades.publish_one(service_on(store), machine(actor), course_id, job_id, anyway=anyway)
 
@@ -75,7 +75,7 @@ def regrade(
     *,
     max_attempts: int = 3,
     actor: str = "staff",
-) -> Regraded:
+) -> RegradeBatch:
     service, course_id = service_on(store, max_attempts), _course(store, batch_id)
     return regrades.regrade_batch(service, machine(actor), course_id, batch_id, assignment or "")
 

@@ -34,12 +34,12 @@ from attacks import (
 from filter_machine import listed
 from responders import wire
 from responders.sandbox import manager
-from responders.sandbox.child_ends import KilledFromOutside
+from responders.sandbox.child_exit import KilledFromOutside
 from responders.sandbox.inside import lockdown
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped
 from responders.sandbox.running_child import ChildLimits, LibrariesNeeded, ServedChild
-from responders.sandbox.zygote import NONE, Isolation, Role
+from responders.sandbox.zygote import NO_ISOLATION, ChildRole, Isolation
 from sim.recording import TICK, Verdict
 
 GROUPS = (files, file_changes, metadata, processes, signals, programs, network, kernel, memory)
@@ -60,7 +60,7 @@ SETTINGS = {
     "full": Isolation(bubblewrap=False),
     "full-1": Isolation(landlock=1, bubblewrap=False),
     "bubblewrap": Isolation(),
-    "none": NONE,
+    "none": NO_ISOLATION,
     "landlock": Isolation(seccomp=False, doorkeeper=False, bubblewrap=False),
     "landlock-1": Isolation(landlock=1, seccomp=False, doorkeeper=False, bubblewrap=False),
     "seccomp": Isolation(landlock=0, doorkeeper=False, bubblewrap=False),
@@ -266,9 +266,9 @@ def scrambled(*secrets: str) -> list[str]:
     return [bytes(byte ^ 0x5A for byte in secret.encode()).hex() for secret in secrets]
 
 
-def run(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any]) -> str:
+def run(sandboxes: Sandboxes, role: ChildRole, attack: Attack, targets: dict[str, Any]) -> str:
     """Run an attack in a new folder and return its result: ``LEAK ...``, or how it was blocked."""
-    with sandboxes.private_folder() as folder:
+    with sandboxes.open_private_folder() as folder:
         said, stop = run_text(sandboxes, role, attack_text(attack, targets), folder)
     leaks = [line for line in said if line.startswith("LEAK")]
     if leaks:
@@ -280,7 +280,7 @@ def run(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any
     return stop.message if stop is not None else "\n".join(said)
 
 
-def remembered(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any]) -> str:
+def remembered(sandboxes: Sandboxes, role: ChildRole, attack: Attack, targets: dict[str, Any]) -> str:
     """Run a two-part attack and return its result: ``LEAK ...`` if the second half read all the bits of the first."""
     found: list[int] = []
     for turn, bit in enumerate(_BITS):
@@ -293,13 +293,15 @@ def remembered(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[s
     return f"LEAK {found}" if apart else f"blocked {found}"
 
 
-def _one_bit(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str, Any], turn: int, bit: int) -> str:
+def _one_bit(
+    sandboxes: Sandboxes, role: ChildRole, attack: Attack, targets: dict[str, Any], turn: int, bit: int
+) -> str:
     """Return the output of the second half, or that of the first half if it failed."""
     leave, find = (
         f"tools.tell(lambda: group.{call})" for call in (f"{attack.name}({turn}, {bit})", f"{attack.name}.find({turn})")
     )
     with contextlib.ExitStack() as first:
-        folder = first.enter_context(sandboxes.private_folder())
+        folder = first.enter_context(sandboxes.open_private_folder())
         child = first.enter_context(_running(sandboxes, role, _text(leave, attack, targets), folder))
         said, stop = _heard(child, role, "ready ")
         if any(line.startswith("blocked") for line in said) or (attack.at_once and not said):
@@ -308,19 +310,19 @@ def _one_bit(sandboxes: Sandboxes, role: Role, attack: Attack, targets: dict[str
             targets = targets | {"other": int(said[-1].removeprefix("ready "))}
         else:
             first.close()
-        with sandboxes.private_folder() as folder:
+        with sandboxes.open_private_folder() as folder:
             said, stop = run_text(sandboxes, role, _text(find, attack, targets), folder)
     return said[-1] if said else f"blocked {stop}"
 
 
-def run_text(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> tuple[list[str], ChildStopped | None]:
+def run_text(sandboxes: Sandboxes, role: ChildRole, text: str, folder: Path) -> tuple[list[str], ChildStopped | None]:
     """Run a student's file; return the texts it printed, and how it was stopped, if it was."""
     with _running(sandboxes, role, text, folder) as child:
         return _heard(child, role)
 
 
 @contextlib.contextmanager
-def _running(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> Iterator[ServedChild]:
+def _running(sandboxes: Sandboxes, role: ChildRole, text: str, folder: Path) -> Iterator[ServedChild]:
     child = sandboxes.spawn(role, LIMITS, folder)
     try:
         job = {"name": f"{role}.py", "text": text, "seed": 1}
@@ -337,7 +339,7 @@ def _running(sandboxes: Sandboxes, role: Role, text: str, folder: Path) -> Itera
         child.close()
 
 
-def _heard(child: ServedChild, role: Role, until: str | None = None) -> tuple[list[str], ChildStopped | None]:
+def _heard(child: ServedChild, role: ChildRole, until: str | None = None) -> tuple[list[str], ChildStopped | None]:
     """Return the texts that a child prints, up to its end or to a text that begins with ``until``."""
     said: list[str] = []
     try:

@@ -13,16 +13,16 @@ from typing import Any
 
 from sqlalchemy import text, update
 
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grade import Grade
-from service.queue.right_answers import right_answer
+from service.queue.self_test_record import open_self_test_record
 from service.settings import Settings
-from service.store.batches.intake import Accepted, accept
+from service.store.batches.intake import AcceptedSubmission, accept_submission
 from service.store.engine import Store, open_store
 from service.store.grades import recordings
-from service.store.installation import secret_of
+from service.store.installation import load_secret
 from service.store.models import SchemaCompatibility
-from service.store.states import Lane
+from service.store.states import JobQueue
 from sim.recording import Recording
 from submissions.assignment.definition import Assignment
 from submissions.assignment.reader import find_assignment
@@ -71,7 +71,7 @@ def asked_already(home: Path) -> Path:
     """
     run = home / "run"
     run.mkdir(mode=0o700, parents=True)
-    right_answer(run).note()
+    open_self_test_record(run).note()
     return home
 
 
@@ -81,7 +81,7 @@ def _migrated() -> tuple[bytes, bytes]:
     with TemporaryDirectory() as folder:
         settings = settings_in(Path(folder))
         with open_store(settings) as store:
-            secret = secret_of(store)
+            secret = load_secret(store)
         return (settings.home / "robomark.db").read_bytes(), secret.text.encode()
 
 
@@ -93,13 +93,15 @@ def grading_request(
     student: str = "ada", program: str = PROGRAM, assignment: Assignment | None = None
 ) -> GradingRequest:
     """Return a small submission for the echo assignment."""
-    responder = Code("responder.py", "def responder(msg):\n    return msg\n")
-    submission = Submission(student, Code("robot.py", program), responder)
+    responder = SourceFile("responder.py", "def responder(msg):\n    return msg\n")
+    submission = Submission(student, SourceFile("robot.py", program), responder)
     return GradingRequest(submission, assignment or echo(), f"{student}.zip")
 
 
-def accept_one(store: Store, student: str = "ada", *, lane: Lane = Lane.INTERACTIVE, max_attempts: int = 3) -> Accepted:
-    return accept(store, grading_request(student), lane=lane, max_attempts=max_attempts)
+def accept_one(
+    store: Store, student: str = "ada", *, lane: JobQueue = JobQueue.INTERACTIVE, max_attempts: int = 3
+) -> AcceptedSubmission:
+    return accept_submission(store, grading_request(student), lane=lane, max_attempts=max_attempts)
 
 
 def comparable(grade: Grade) -> tuple[Grade, list[bytes]]:

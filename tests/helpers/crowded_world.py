@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, insert, inspect, select
 from sqlalchemy.orm import Session
 
-from service.store.ids import new_id
+from service.store.ids import generate_id
 from service.store.models import (
     Artifact,
     AssignmentVersion,
@@ -65,14 +65,14 @@ class _Copies:
         self._rows_of_jobs: dict[type[Base], list[dict[str, Any]]] = {
             kind: [] for kind in (TrialRow, CriterionResultRow, Artifact)
         }
-        self._regrade = self._copy(Batch, Batch.id == self._batch_id, id=new_id(), regrade_of=self._batch_id)
+        self._regrade = self._copy(Batch, Batch.id == self._batch_id, id=generate_id(), regrade_of=self._batch_id)
 
     def add_one_of_each(self, number: int) -> None:
         ada = self._world.ada.enrolment_id
         student, unlucky = (self._enrol(1, f"{who}-{number}") for who in ("student", "unlucky"))
         self._grade(ada, self._batch_id, 2 + number, number)
         self._grade(student, self._batch_id, 1, number)
-        self._grade(student, self._copy(Batch, Batch.id == self._batch_id, id=new_id()), 2, number)
+        self._grade(student, self._copy(Batch, Batch.id == self._batch_id, id=generate_id()), 2, number)
         failed: dict[str, Any] = {"state": JobState.DEAD, "error": "the disk is full", "marks": None, "verdict": None}
         self._submit(unlucky, self._batch_id, 1, **failed)
         self._open_task(f"task-{number}")
@@ -100,12 +100,12 @@ class _Copies:
             batch_id=batch_id,
             attempt=attempt,
             assignment=assignment or self._assignment,
-            sha256=new_id(),
+            sha256=generate_id(),
         )
         return submission_id, self._job(enrolment_id, batch_id, submission_id=submission_id, **job)
 
     def _job(self, enrolment_id: int, batch_id: str | None, **changes: Any) -> str:
-        of_job = {"id": new_id(), "enrolment_id": enrolment_id, "batch_id": batch_id}
+        of_job = {"id": generate_id(), "enrolment_id": enrolment_id, "batch_id": batch_id}
         job_id: str = self._copy(Job, Job.id == self._job_id, **of_job, **changes)
         for kind, rows in self._rows_of_jobs.items():
             rows += [
@@ -122,9 +122,9 @@ class _Copies:
         """Add an assignment that Ada has submitted to, with a policy and an extension."""
         ada = self._world.ada.enrolment_id
         version = self._copy(
-            AssignmentVersion, AssignmentVersion.id == 1, assignment=task, title=task.title(), sha256=new_id()
+            AssignmentVersion, AssignmentVersion.id == 1, assignment=task, title=task.title(), sha256=generate_id()
         )
-        batch_id = self._copy(Batch, Batch.id == self._batch_id, id=new_id())
+        batch_id = self._copy(Batch, Batch.id == self._batch_id, id=generate_id())
         opened = {"assignment_version_id": version, "opened_at": _AT, "batch_id": batch_id, "names_hidden": True}
         self._add(OpenAssignment, course_id=1, assignment=task, **opened)
         self._add(Policy, course_id=1, assignment=task, due_at=_AT + timedelta(days=1), attempts=9)
@@ -151,13 +151,15 @@ class _Copies:
         self._add(LtiPlatform, name=f"platform {number}", client_id="client", created_at=_AT, **urls)
         worker = {"host": "here", "concurrency": 1, "grader_version": "1", "sandbox": "Landlock"}
         self._add(Heartbeat, worker=f"worker-{number}", started_at=_AT, seen_at=_AT, **worker)
-        hook = new_id()
+        hook = generate_id()
         self._add(Webhook, id=hook, course_id=1, url=address, secret="", created_at=_AT)
-        self._add(Delivery, id=new_id(), webhook_id=hook, event="grade.finished", payload={}, made_at=_AT, due_at=_AT)
+        self._add(
+            Delivery, id=generate_id(), webhook_id=hook, event="grade.finished", payload={}, made_at=_AT, due_at=_AT
+        )
         self._add(Comment, submission_id=1, text=f"Comment {number}.", actor="grace", made_at=_AT)
         for member in (self._world.ada, self._world.grace):
             lasting = {"kind": CredentialKind.SESSION, "created_at": _AT, "expires_at": _AT + timedelta(days=1)}
-            self._add(Credential, id=new_id(), person_id=member.person_id, sha256=new_id(), **lasting)
+            self._add(Credential, id=generate_id(), person_id=member.person_id, sha256=generate_id(), **lasting)
 
     def _copy(self, kind: type[Base], which: ColumnElement[bool], **changes: Any) -> Any:
         """Copy the selected row, which is cached for each table. Return the key of the copy."""

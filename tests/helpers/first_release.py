@@ -15,7 +15,7 @@ from sqlalchemy import Column, Engine, Integer, MetaData, Table, create_engine, 
 from paths import DATA
 from service.store.columns import SafeText
 from service.store.engine import open_engine
-from service.store.migrate import configuration
+from service.store.migrate import build_alembic_config
 from service.store.web_tables import METADATA
 
 #: The file and the revision of each database.
@@ -49,7 +49,7 @@ def _lay(url: str, folder: Path, sql: str, revision: str) -> Engine:
 
 def _copy(file: Path, engine: Engine, revision: str) -> None:
     with engine.begin() as connection:
-        command.upgrade(configuration(connection), revision)
+        command.upgrade(build_alembic_config(connection), revision)
     source = create_engine(f"sqlite:///{file}")
     names = set(inspect(source).get_table_names())
     with source.connect() as old, engine.begin() as new:

@@ -18,7 +18,7 @@ from service.store.queue import jobs
 from service.store.queue.jobs import Claim
 
 HANGS = "hangs"
-_finish_from_cache = jobs.finish_from_cache
+_finish_from_cache = jobs.finish_job_from_cache
 
 
 def _hang_or_finish_from_cache(store: Store, claim: Claim) -> bool:
@@ -36,7 +36,7 @@ def _hang_or_finish_from_cache(store: Store, claim: Claim) -> bool:
 # A spawned pool child loads the main module under another name. A test that imports this module is not affected.
 if __name__ in ("__main__", "__mp_main__"):
     celery_app.GRACE_SECONDS = (1, 2)
-    jobs.finish_from_cache = _hang_or_finish_from_cache
+    jobs.finish_job_from_cache = _hang_or_finish_from_cache
 
 if __name__ == "__main__":
     raise SystemExit(run_worker(load_settings()))

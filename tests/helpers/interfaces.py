@@ -21,7 +21,7 @@ from typer.exceptions import TyperException
 
 from acting import Notices
 from service.command_line import load_command
-from service.commands import operating
+from service.commands import installation
 from service.store.ids import ALPHABET, LENGTH
 from service.web.rate_limits import RateLimits
 from sim.errors import RobomarkError
@@ -184,7 +184,7 @@ def installation_in(
     notices = Notices()
     with pytest.MonkeyPatch.context() as patch, web_in(folder / "home") as web:
         patch.setenv("ROBOMARK_HOME", str(web.settings.home))
-        patch.setattr(operating, "_LateNotifier", lambda _settings, _store: notices)
+        patch.setattr(installation, "_LazyNotifier", lambda _settings, _store: notices)
         context = web.app.state.context
         web.app.state.context = replace(context, service=replace(context.service, notifier=notices))
         made = members(web)

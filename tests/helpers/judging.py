@@ -9,7 +9,7 @@ import numpy as np
 
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.judging.judge import judge
-from sim.recording import Line, Message, Pose, Recording, Ticks, Verdict
+from sim.recording import Message, Pose, Recording, Ticks, TimedText, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.criteria import SCHEMAS, Criterion
 
@@ -52,9 +52,9 @@ def talk(*exchanges: tuple[str, str | None], arrives: bool = True) -> tuple[Mess
     return tuple(messages)
 
 
-def lines(*texts: str) -> tuple[Line, ...]:
+def lines(*texts: str) -> tuple[TimedText, ...]:
     """Return one line per second."""
-    return tuple(Line(float(t), text) for t, text in enumerate(texts))
+    return tuple(TimedText(float(t), text) for t, text in enumerate(texts))
 
 
 def judged(

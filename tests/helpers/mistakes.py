@@ -13,11 +13,11 @@ from typing import Any
 from notebook_builder import document
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.reports.cause import diagnose
-from service.reports.view import student_view
+from service.reports.diagnosis import diagnose
+from service.reports.view import build_student_view
 from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 
@@ -45,7 +45,7 @@ def write_submission(case: Mapping[str, Any], folder: Path) -> Path:
     own.mkdir()
     for name, content in case.get("beside", {}).items():
         (own / name).write_text(content, "utf-8")
-    reference = examples(case["assignment"]) / "reference"
+    reference = locate_examples(case["assignment"]) / "reference"
     for part in sorted({*_PARTS, *(file.name for file in reference.glob("*.py"))}):
         change = case.get(part, {})
         text = _changed(case["assignment"], part, change)
@@ -62,14 +62,14 @@ def first_screen(case: Mapping[str, Any], folder: Path, runner: TrialRunner) -> 
     except UsageError as refusal:
         return str(refusal)
     graded = grade(submission, asked, runner=runner)
-    told = diagnose(student_view(graded).grade, submission)
+    told = diagnose(build_student_view(graded).grade, submission)
     return f"{told.cause}\n{told.next_step}"
 
 
 def _changed(assignment: str, part: str, change: Mapping[str, Any]) -> str:
     if "text" in change:
         return str(change["text"])
-    reference = examples(assignment) / "reference" / part
+    reference = locate_examples(assignment) / "reference" / part
     text = reference.read_text("utf-8") if reference.exists() else ""
     edits = [(change["from"], change["to"])] if "from" in change else change.get("edits", [])
     for before, after in edits:

@@ -20,9 +20,9 @@ import sklearn.base
 from sklearn.linear_model import LogisticRegression
 from sklearn.neural_network import MLPClassifier, MLPRegressor
 
-from models import weights_bytes
+from models import load_weights
 from models.families.shapes import TASK
-from models.perceptrons import read
+from models.perceptrons import load_perceptron
 from paths import DATA
 
 FOLDER = DATA / "model_submissions"
@@ -156,7 +156,7 @@ def _convolution() -> bytes:
 
 def grading_requests() -> dict[str, dict[str, bytes]]:
     """Return every folder by name, with its files and their bytes."""
-    network = read(weights_bytes("shapes"))
+    network = load_perceptron(load_weights("shapes"))
 
     def brings(data: bytes, ask: str = KIT, load: str = FROM_JOBLIB) -> dict[str, bytes]:
         file = load.split(chr(34))[1]

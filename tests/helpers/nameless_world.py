@@ -17,8 +17,8 @@ from builders import PROGRAM, echo, grading_request
 from service.grading.grade import CriterionResult, Grade
 from service.store.batches import intake
 from service.store.courses import open_assignments, policies
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.policies import PolicyLimits
-from service.store.courses.versions import freeze
 from service.store.grades import appeals, comments, overrides, results
 from service.store.models import Enrolment, Job, SubmissionRow
 from service.store.people import webhooks
@@ -27,7 +27,7 @@ from service.store.people.students import Students
 from service.store.queue import jobs
 from service.store.states import JobState
 from submissions.grading_request import GradingRequest
-from submissions.student_identity import Refusal, Student
+from submissions.student_identity import RejectedSubmission, Student
 from web import COURSE, Web
 
 ASSIGNMENT = "echo-responder"
@@ -56,20 +56,20 @@ def make_nameless_course(web: Web) -> NamelessCourse:
     with web.store.transaction() as session:
         Students(session, 1).enrol(_person(IDLE), datetime.now(UTC))
         for assignment in (echo(), replace(echo(), id=NAMED)):
-            open_assignments.prepare(session, 1, freeze(assignment))
+            open_assignments.prepare_assignment(session, 1, freeze_assignment(assignment))
             open_assignments.open_for_students(session, 1, assignment.id)
         open_assignments.hide_names(session, 1, ASSIGNMENT, True)
         policies.set_policy(session, 1, ASSIGNMENT, PolicyLimits(None, 0, 2, 0.0))
-        webhooks.create(session, 1, "https://hooks.example.org/", ["grade.finished", "appeal.opened"])
-        web_batch = open_assignments.find(session, 1, ASSIGNMENT).batch_id
+        webhooks.create_webhook(session, 1, "https://hooks.example.org/", ["grade.finished", "appeal.opened"])
+        web_batch = open_assignments.load_course_assignment(session, 1, ASSIGNMENT).batch_id
     *most, last = STUDENTS
-    refusal = Refusal("zed.docx", "holds no robot program", Student("zed-refused"))
+    refusal = RejectedSubmission("zed.docx", "holds no robot program", Student("zed-refused"))
     asked = [_request(who) for who in most]
     batch = intake.accept_batch(web.store, "week one", asked, (refusal,), course=COURSE, max_attempts=3)
     _grade_all(web)
     for number, who in enumerate((last, most[0], last, last)):
         request = _request(who, f"{PROGRAM}# {number}\n")
-        intake.accept(web.store, request, max_attempts=3, batch_id=web_batch, most_bytes=10**6)
+        intake.accept_submission(web.store, request, max_attempts=3, batch_id=web_batch, most_bytes=10**6)
     asked = [
         replace(_request(who, f"{PROGRAM}# with names\n"), assignment=replace(echo(), id=NAMED))
         for who in (*STUDENTS, IDLE)
@@ -82,8 +82,8 @@ def make_nameless_course(web: Web) -> NamelessCourse:
     with web.store.transaction() as session:
         _mark_by_hand(session, graded[0][0], graded[1][0])
         for _, submission_id in reversed(graded):
-            appeal = appeals.ask(session, submission_id, "Please look again.")
-        appeals.answer(session, 1, appeal, "It is right.", "grace")
+            appeal = appeals.open_appeal(session, submission_id, "Please look again.")
+        appeals.answer_appeal(session, 1, appeal, "It is right.", "grace")
     acting.publish_one(web.store, graded[-1][0], actor="grace")
     return NamelessCourse(grace, _values(web, str(appeal)))
 
@@ -114,7 +114,7 @@ def _person(who: str) -> Student:
 
 def _request(who: str, program: str = PROGRAM) -> GradingRequest:
     own = f"{program}# {(*STUDENTS, IDLE).index(who)}\n"
-    return replace(grading_request(who, own), whose=_person(who))
+    return replace(grading_request(who, own), listed_student=_person(who))
 
 
 def _graded(web: Web, batch_id: str) -> list[tuple[str, int]]:
@@ -127,8 +127,8 @@ def _graded(web: Web, batch_id: str) -> list[tuple[str, int]]:
 def _mark_by_hand(session: Session, one: str, other: str) -> None:
     (criterion,) = (each.id for each in _grade(1).criteria[:1])
     overrides.set_marks(session, one, criterion, Decimal(1), "It is right.", "grace")
-    overrides.excuse(session, other, criterion, "The task was unclear.", "grace")
-    comments.comment(session, one, "", "Well done.", "grace")
+    overrides.excuse_criterion(session, other, criterion, "The task was unclear.", "grace")
+    comments.add_comment(session, one, "", "Well done.", "grace")
 
 
 def _values(web: Web, appeal: str) -> dict[str, tuple[str, ...]]:
@@ -154,13 +154,15 @@ def _values(web: Web, appeal: str) -> dict[str, tuple[str, ...]]:
 def _grade_all(web: Web, dead: int = 0) -> None:
     """Grade the waiting jobs in random order with different marks. The first ``dead`` jobs fail."""
     for number in itertools.count():
-        claim = jobs.claim(web.store, "worker", 60)
+        claim = jobs.claim_job(web.store, "worker", 60)
         if claim is None:
             return
         if number < dead:
-            jobs.give_up(web.store, claim, "the disk is full")
+            jobs.give_up_job(web.store, claim, "the disk is full")
         else:
-            jobs.finish(web.store, claim, results.prepare(_grade(number)), datetime.now(UTC) + timedelta(0, number))
+            jobs.finish_job(
+                web.store, claim, results.prepare_grade(_grade(number)), datetime.now(UTC) + timedelta(0, number)
+            )
 
 
 def _grade(number: int) -> Grade:

@@ -15,7 +15,7 @@ import numpy as np
 
 from report_builders import line_follower_grade, line_follower_recording
 from service.grading.grade import Grade, TrialResult
-from sim.recording import COLUMNS, Image, Line, Pose, Recording, Ticks
+from sim.recording import COLUMNS, Image, Pose, Recording, Ticks, TimedText
 
 #: Texts in a replay's data and in a grade that do not come from students.
 _NO_TEXTS = {
@@ -97,7 +97,7 @@ def parting_grade(after: int = 90) -> Grade:
             for each in COLUMNS
         }
         end = Pose(*(float(columns[name][-1]) for name in ("x", "y", "heading")))
-        said = (Line(0.5, "off I go"), Line(3.5, "straight on"), Line(11.5, "there"))
+        said = (TimedText(0.5, "off I go"), TimedText(3.5, "straight on"), TimedText(11.5, "there"))
         ticks = Ticks(**columns)
         return replace(
             trial, recording=replace(recording, ticks=ticks, end=end, end_t=12.0, printed=(), spoken=said, touches=())

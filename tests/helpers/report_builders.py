@@ -13,7 +13,7 @@ from decimal import Decimal
 
 import numpy as np
 
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grade import (
     Accuracy,
     AccuracyCurve,
@@ -24,21 +24,21 @@ from service.grading.grade import (
     Grade,
     Level,
     Prediction,
-    Shown,
     TrialResult,
+    VisibleFeedback,
 )
 from service.reports.rows import TableRow
-from sim.floors import floor
+from sim.floors import build_floor
 from sim.recording import (
     Call,
-    Datum,
+    DatalogEntry,
     Fault,
     Image,
-    Line,
     Message,
     Pose,
     Recording,
     Ticks,
+    TimedText,
     Touch,
     Verdict,
 )
@@ -69,7 +69,7 @@ def row_of(grade: Grade) -> TableRow[Grade]:
 
 def line_follower_recording(count: int = 300, background: str = "Lollipop", start: Pose | None = None) -> Recording:
     """Return a robot that follows the left edge of a black line for ``count`` ticks, and speaks and prints."""
-    plan = floor(background)
+    plan = build_floor(background)
     pose = start or plan.default_pose
     x, y, heading = pose.x, pose.y, pose.heading
     rows: list[tuple[float, ...]] = []
@@ -105,9 +105,9 @@ def line_follower_recording(count: int = 300, background: str = "Lollipop", star
         ticks=ticks,
         verdict=Verdict.TIME_LIMIT,
         sha256=_hash(f"line {background} {count}"),
-        printed=tuple(Line(t, f"Light_left: {200 - 20 * t:.0f} {t}") for t in range(math.ceil(count / 30))),
-        spoken=(Line(0.5, "off we go"), Line(count / 30 - 0.5, "still on the line")),
-        datalog=tuple(Datum(float(t), "Light_left", 200.0 - t, float(t)) for t in range(math.ceil(count / 30))),
+        printed=tuple(TimedText(t, f"Light_left: {200 - 20 * t:.0f} {t}") for t in range(math.ceil(count / 30))),
+        spoken=(TimedText(0.5, "off we go"), TimedText(count / 30 - 0.5, "still on the line")),
+        datalog=tuple(DatalogEntry(float(t), "Light_left", 200.0 - t, float(t)) for t in range(math.ceil(count / 30))),
         image_log=(("left", ",".join(["255"] * 1600), 30),),
         pen=((30, True), (200, False)),
     )
@@ -237,8 +237,8 @@ def astray_grade() -> Grade:
 def faulty_submission() -> Submission:
     return Submission(
         "s1234567",
-        program=Code("robot.py", "import time\nfor i in range(3):\n    print(1 / (i - i))\n    time.sleep(1)\n"),
-        responder=Code("responder.py", "def echo_responder(msg_object):\n    return pasrer(msg_object)\n"),
+        program=SourceFile("robot.py", "import time\nfor i in range(3):\n    print(1 / (i - i))\n    time.sleep(1)\n"),
+        responder=SourceFile("responder.py", "def echo_responder(msg_object):\n    return pasrer(msg_object)\n"),
     )
 
 
@@ -255,7 +255,9 @@ def hidden_grade() -> Grade:
     accuracy = grade.accuracy
     assert accuracy is not None
     of_four = replace(accuracy, n=4, value=1.0, confusion=tuple((name, name, 1) for name in SHAPES[:4]))
-    told = tuple(replace(result, shown=Shown(f"VISIBLE: {result.title}", of_four)) for result in grade.criteria)
+    told = tuple(
+        replace(result, shown=VisibleFeedback(f"VISIBLE: {result.title}", of_four)) for result in grade.criteria
+    )
     return replace(grade, trials=trials, criteria=(*told, secret))
 
 
@@ -267,8 +269,8 @@ def hostile_grade() -> Grade:
     poisoned = replace(
         recording,
         verdict=Verdict.PROGRAM_ERROR,
-        printed=(Line(0.1, HOSTILE), Line(0.2, endless), *(Line(0.3, f"line {i}") for i in range(3000))),
-        spoken=(Line(0.1, HOSTILE), Line(0.2, "a" + "\u0301" * 5000)),
+        printed=(TimedText(0.1, HOSTILE), TimedText(0.2, endless), *(TimedText(0.3, f"line {i}") for i in range(3000))),
+        spoken=(TimedText(0.1, HOSTILE), TimedText(0.2, "a" + "\u0301" * 5000)),
         messages=tuple(
             message
             for index in range(0, 60, 2)
@@ -298,7 +300,7 @@ def hostile_grade() -> Grade:
 
 def _shape_trial(index: int, wrong: int) -> TrialResult:
     pose = Pose(200.0 + 80 * index, 900.0, 0.0)
-    pixels = floor("Simple_Shapes").pixels
+    pixels = build_floor("Simple_Shapes").pixels
     left, right = (_rgba(_sensor(pixels, pose, side)) for side in (-20, 20))
     answer = "diamond" if index == wrong else SHAPES[index]
     image = Image(0.0, 0, pose, left, right, 0, SHAPES[index])
@@ -326,8 +328,9 @@ def _shape_trial(index: int, wrong: int) -> TrialResult:
         ticks=ticks,
         verdict=Verdict.FINISHED,
         sha256=_hash(f"shape {index}"),
-        printed=(Line(0.0, "IMG_DATA"), Line(0.13, "JSON::" + text), Line(1.0, "{'messages': [" + text + "]}")),
-        spoken=(Line(1.0, f"Is that a {answer}"),),
+        printed=(TimedText(0.0, "IMG_DATA"), TimedText(0.13, "JSON::" + text), TimedText(1.0,
+            "{'messages': [" + text + "]}")),
+        spoken=(TimedText(1.0, f"Is that a {answer}"),),
         messages=(
             Message(0.0, "robot", "IMG_DATA::" + json.dumps({"left": csv, "right": csv}), 0.0),
             Message(0.0, "responder", "JSON::" + text, 4 / 30, 0),

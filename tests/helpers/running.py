@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from responders.channel import Channel
-from responders.code import Code
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.source_file import SourceFile
 from responders.trial_spec import AgentSpec, PartnerSpec, Preamble, ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.trial_runner import TrialRunner
-from sim.floors import floor
+from sim.floors import build_floor
 from sim.motion import COURSE_PHYSICS, Physics, Rectangle
 from sim.recording import TICK, Pose, Recording
-from sim.robot import robot
+from sim.robot import get_robot
 from sim.world import Noise
 
 PROGRAM_LIMITS = ChildLimits(2.0, 128 << 20)
@@ -22,7 +22,7 @@ RESPONDER_LIMITS = ChildLimits(3.0, 512 << 20)
 
 def agent_spec(name: str, text: str, files: Mapping[str, bytes] | None, output_bytes: int) -> AgentSpec:
     """Return a student's agent."""
-    return AgentSpec(Code(f"{name}.py", text), files or {}, RESPONDER_LIMITS, output_bytes)
+    return AgentSpec(SourceFile(f"{name}.py", text), files or {}, RESPONDER_LIMITS, output_bytes)
 
 
 def run_program(
@@ -55,21 +55,21 @@ def run_program(
 
     ``given`` says whether the assignment provides the second program.
     """
-    ground = floor(background)
+    ground = build_floor(background)
     partner = None
     if second is not None:
         program_of_second = ProgramSpec(
-            Code("robot2.py", second), preamble, program_limits or PROGRAM_LIMITS, output_bytes
+            SourceFile("robot2.py", second), preamble, program_limits or PROGRAM_LIMITS, output_bytes
         )
         partner = PartnerSpec(program_of_second, second_start, given=given)
     spec = TrialSpec(
-        program=ProgramSpec(Code("robot.py", program), preamble, program_limits or PROGRAM_LIMITS, output_bytes),
+        program=ProgramSpec(SourceFile("robot.py", program), preamble, program_limits or PROGRAM_LIMITS, output_bytes),
         responder=None
         if responder is None
-        else ResponderSpec(Code("responder.py", responder), files or {}, RESPONDER_LIMITS, output_bytes),
+        else ResponderSpec(SourceFile("responder.py", responder), files or {}, RESPONDER_LIMITS, output_bytes),
         collaborative=responder is not None or second is not None,
         floor=ground,
-        robot=robot(robot_name),
+        robot=get_robot(robot_name),
         pose=start or ground.default_pose,
         noise=noise,
         channel=channel,

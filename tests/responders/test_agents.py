@@ -11,7 +11,7 @@ import running
 from hostile import FIND_WIRE, flood, forged
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
-from responders.sandbox.zygote import Role
+from responders.sandbox.zygote import ChildRole
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Recording, Verdict
@@ -354,7 +354,7 @@ def test_no_process_is_started_for_an_assignment_without_agents(
     spawned: list[str] = []
     spawn = runner._sandboxes.spawn
 
-    def noted(role: Role, *rest: Any, **named: Any) -> Any:
+    def noted(role: ChildRole, *rest: Any, **named: Any) -> Any:
         spawned.append(role)
         return spawn(role, *rest, **named)
 

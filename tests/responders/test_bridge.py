@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from responders.bridge import worded
-from responders.channel import Channel, ChannelOfTrial
+from responders.bridge import format_reading
+from responders.channel import Channel, TrialChannel
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.zygote import NONE
+from responders.sandbox.zygote import NO_ISOLATION
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import SECOND, Verdict
@@ -153,16 +153,16 @@ def test_names_are_looked_up_when_a_message_comes_and_the_calls_are_noted(runner
 
 
 def test_a_lossy_channel_loses_its_share_and_the_same_texts_every_time() -> None:
-    line, again = (ChannelOfTrial(Channel(loss=0.3, duplication=0.2), 5) for _ in range(2))
-    copies = [line.copies(number) for number in range(2000)]
-    assert copies == [again.copies(number) for number in range(2000)]
+    line, again = (TrialChannel(Channel(loss=0.3, duplication=0.2), 5) for _ in range(2))
+    copies = [line.count_copies(number) for number in range(2000)]
+    assert copies == [again.count_copies(number) for number in range(2000)]
     assert copies.count(0) / 2000 == pytest.approx(0.3, abs=0.04)
     assert copies.count(2) / 2000 == pytest.approx(0.7 * 0.2, abs=0.04)
 
 
 def test_reordering_lets_later_answers_overtake() -> None:
-    line = ChannelOfTrial(Channel(delay=0.1, reordering=0.3), 5)
-    arrivals = [line.arrivals(number, 0, number * SECOND // 10, 0)[0] for number in range(100)]
+    line = TrialChannel(Channel(delay=0.1, reordering=0.3), 5)
+    arrivals = [line.compute_arrivals(number, 0, number * SECOND // 10, 0)[0] for number in range(100)]
     assert arrivals != sorted(arrivals)
     assert sorted(arrivals)[0] >= SECOND // 10
 
@@ -184,7 +184,7 @@ def test_the_logfile_is_read_and_nothing_else(runner: TrialRunner) -> None:
 
 @pytest.mark.parametrize("trick", ["os.symlink('/etc/passwd', 'logger.txt')", "os.mkfifo('logger.txt')"])
 def test_a_logfile_that_is_no_file_is_not_read_even_without_sandbox(trick: str) -> None:
-    with TrialRunner(Sandboxes(NONE)) as unenclosed:
+    with TrialRunner(Sandboxes(NO_ISOLATION)) as unenclosed:
         recording = run_program(
             unenclosed, "print('PY::1')", responder=f"import os\n{trick}\ndef responder(m): return 'ok'\n"
         )
@@ -196,4 +196,4 @@ def test_a_logfile_that_is_no_file_is_not_read_even_without_sandbox(trick: str) 
     "reading", [2550.0, [0.0, -0.0], [-0.0, -0.0, -0.0], [93.77] * 3, [93.77, 93.77, 94.0], [1 / 3, 1 / 3], [-1.5, 2.0]]
 )
 def test_what_a_program_reads_stands_in_the_chain_as_python_writes_it(reading: float | list[float]) -> None:
-    assert worded(reading) == repr(reading)
+    assert format_reading(reading) == repr(reading)

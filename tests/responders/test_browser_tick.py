@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from responders.code import Code
+from responders.source_file import SourceFile
 from running import run_program
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from service.store.grades.recordings import from_bytes, to_bytes
-from sim.recorded import seconds_at, ticks_until
 from sim.recording import BROWSER_TICK, TICK, Pose, Recording, Verdict
+from sim.recording_values import count_ticks_until, tick_to_seconds
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.submission import Submission
 
@@ -69,7 +69,7 @@ def run_until(runner: TrialRunner, reads: int, deed: str, tick: int, seconds: fl
 def test_a_stored_recording_keeps_its_tick(runner: TrialRunner) -> None:
     recording = from_bytes(to_bytes(run(runner, DRIVE)))
     assert recording.ticks.length == BROWSER_TICK
-    assert [ticks_until(recording, seconds_at(recording, tick)) for tick in range(201)] == list(range(201))
+    assert [count_ticks_until(recording, tick_to_seconds(recording, tick)) for tick in range(201)] == list(range(201))
 
 
 def test_an_assignment_may_want_it(runner: TrialRunner) -> None:
@@ -78,7 +78,7 @@ def test_an_assignment_may_want_it(runner: TrialRunner) -> None:
     for world in (WorldSpec(), WorldSpec(tick="browser")):
         asked = Assignment("a", "A", world, Parts("student", "none"), (scenario,), ())
         submission = Submission(
-            "ada", program=Code("robot.py", "import time\ntank_drive.on(50, 50)\ntime.sleep(6.6)\n")
+            "ada", program=SourceFile("robot.py", "import time\ntank_drive.on(50, 50)\ntime.sleep(6.6)\n")
         )
         ends.append(grade(submission, asked, runner=runner).trials[0].recording.end.x)
     assert ends[1] - ends[0] == pytest.approx(2 * 525 / 30 * np.pi * 56 / 360)

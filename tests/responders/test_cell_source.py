@@ -6,7 +6,7 @@ import ast
 
 import pytest
 
-from responders.sandbox.inside.cell_source import cell_magic, expanded, python_source
+from responders.sandbox.inside.cell_source import convert_to_python, expand_line, parse_cell_magic
 
 MAGIC = "get_ipython().run_line_magic"
 
@@ -30,7 +30,7 @@ MAGIC = "get_ipython().run_line_magic"
     ],
 )
 def test_lines_that_become_calls(cell: str, python: str) -> None:
-    assert python_source(cell) == python
+    assert convert_to_python(cell) == python
     assert python.count("\n") == cell.count("\n")
     ast.parse(python.strip())
 
@@ -50,20 +50,20 @@ def test_lines_that_become_calls(cell: str, python: str) -> None:
     ],
 )
 def test_python_stays_as_it_is(cell: str) -> None:
-    assert python_source(cell) == cell
+    assert convert_to_python(cell) == cell
 
 
 def test_a_magic_for_the_whole_cell() -> None:
-    magic = cell_magic("\n# mine\n%%sim_magic_preloaded -b Loop\nprint(1)\n")
+    magic = parse_cell_magic("\n# mine\n%%sim_magic_preloaded -b Loop\nprint(1)\n")
     assert magic is not None
     assert (magic.name, magic.line, magic.body, magic.number) == ("sim_magic_preloaded", "-b Loop", "print(1)\n", 3)
-    assert cell_magic("x = 1\n%%bash\n") is None
-    assert cell_magic("%cat x") is None
+    assert parse_cell_magic("x = 1\n%%bash\n") is None
+    assert parse_cell_magic("%cat x") is None
 
 
 def test_names_and_expressions_in_a_line() -> None:
     names = {"x": 5, "pose": type("P", (), {"y": 7})}
-    assert expanded("-x $x -y {x * 2} -a $pose.y", names) == "-x 5 -y 10 -a 7"
-    assert expanded("{x:03d} {{x}} $$x", names) == "005 {x} $x"
+    assert expand_line("-x $x -y {x * 2} -a $pose.y", names) == "-x 5 -y 10 -a 7"
+    assert expand_line("{x:03d} {{x}} $$x", names) == "005 {x} $x"
     for broken in ("-x $nobody", "{1 / 0}", "{x", "}"):
-        assert expanded(broken, names) == broken
+        assert expand_line(broken, names) == broken

@@ -10,7 +10,7 @@ from responders.channel import Channel
 from responders.conversation import Answer, Conversation
 from responders.link import Cable
 from sim.recording import SECOND, TICK, Fault, Verdict
-from sim.world import Chain
+from sim.world import HashChain
 
 pytestmark = pytest.mark.fast
 
@@ -18,13 +18,13 @@ DELAY = SECOND // 10
 
 
 def conversation(**channel: Any) -> Conversation:
-    return Conversation(Channel(**channel), 5, Chain(), Cable())
+    return Conversation(Channel(**channel), 5, HashChain(), Cable())
 
 
 def exchange(talk: Conversation, answer: Answer, now: int = 0) -> None:
     sent = talk.send("PY::x", now)
     for copy in range(sent.copies):
-        talk.answer(sent, copy, answer)
+        talk.record_answer(sent, copy, answer)
 
 
 def test_an_answer_arrives_after_the_delay_and_what_the_responder_slept() -> None:
@@ -82,7 +82,7 @@ def test_copies_and_losses_are_the_channels() -> None:
 def test_the_chain_tells_deliveries_apart() -> None:
     hashes = set()
     for until in (0, SECOND):
-        chain = Chain()
+        chain = HashChain()
         talk = Conversation(Channel(), 5, chain, Cable())
         exchange(talk, Answer("JSON::1", entry="1"))
         talk.deliver(until)
@@ -99,7 +99,7 @@ def test_the_chain_tells_deliveries_apart() -> None:
 )
 def test_what_chance_does_over_a_cable_never_changes(channel: dict[str, Any], digest: str) -> None:
     """Otherwise, recordings made before the second kind of link would get other hashes."""
-    chain = Chain()
+    chain = HashChain()
     talk = Conversation(Channel(**channel), 5, chain, Cable())
     for number in range(200):
         exchange(talk, Answer(f"JSON::{number}", entry=str(number)), number * SECOND // 4)

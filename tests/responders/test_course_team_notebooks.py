@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
-from models import weights_bytes
+from models import load_weights
 from notebook_builder import NOTEBOOKS
 from responders.notebook_executor import ExecutedNotebook
-from service.grading.standalone import RunOptions, run_notebook
+from service.grading.standalone_runs import RunOptions, run_notebook
 from service.grading.trial_runner import TrialRunner
 from submissions.notebook import read_notebook
 
@@ -30,7 +30,7 @@ def expected_of(folder: Path) -> dict[str, Any]:
 def executed(folder: Path, seconds: float, runner: TrialRunner) -> ExecutedNotebook:
     read = read_notebook((folder / f"{folder.name}.ipynb").read_bytes(), f"{folder.name}.ipynb")
     files = {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix == ".py"}
-    files[_NETWORK] = weights_bytes("shapes")
+    files[_NETWORK] = load_weights("shapes")
     return run_notebook(read.notebook, files, RunOptions(seconds=seconds), runner)
 
 

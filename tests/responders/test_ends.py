@@ -16,19 +16,19 @@ from typing import Any
 
 import pytest
 
-from benchmarks.harness.process_tree import children
+from benchmarks.harness.process_tree import find_children
 from command import COMMAND
 from hostile import FIND_WIRE, forged, packed
 from processes import until
 from responders.bridge import Bridge
-from responders.code import Code
 from responders.conversation import Conversation
 from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobLimits, JobMeter
+from responders.source_file import SourceFile
 from running import run_program
 from service.grading.grader import grade
-from service.grading.slots import Slots
+from service.grading.grader_locks import GraderLocks
 from service.grading.trial_runner import TrialRunner
 from sim.errors import Cancelled, HostError
 from sim.recording import Verdict
@@ -81,8 +81,8 @@ class _Killer:
         self._killed: set[int] = set()
 
     def __call__(self) -> None:
-        zygotes = (zygote for doorkeeper in children(os.getpid()) for zygote in children(doorkeeper))
-        for child in (child for zygote in zygotes for child in children(zygote)):
+        zygotes = (zygote for doorkeeper in find_children(os.getpid()) for zygote in find_children(doorkeeper))
+        for child in (child for zygote in zygotes for child in find_children(zygote)):
             if self.left and child not in self._killed:
                 self._killed.add(child)
                 self.left -= 1
@@ -121,13 +121,13 @@ def test_a_child_that_is_killed_whenever_it_runs_alone_is_to_blame(plain_runner:
 
 
 def test_whoever_runs_alone_waits_for_the_others_and_lets_nobody_begin(tmp_path: Path) -> None:
-    slots = Slots(tmp_path)
+    slots = GraderLocks(tmp_path)
     other = """
 import sys, time
 from pathlib import Path
-from service.grading.slots import Slots
+from service.grading.grader_locks import GraderLocks
 folder = Path(sys.argv[1])
-with getattr(Slots(folder), sys.argv[2])(lambda: None):
+with getattr(GraderLocks(folder), sys.argv[2])(lambda: None):
     (folder / sys.argv[3]).touch()
     sys.stdin.read()
 (folder / (sys.argv[3] + " ended")).touch()
@@ -137,10 +137,10 @@ with getattr(Slots(folder), sys.argv[2])(lambda: None):
         arguments = [sys.executable, "-c", other, str(tmp_path), how, name]
         return subprocess.Popen(arguments, stdin=subprocess.PIPE, text=True)
 
-    beside = start("beside_others", "beside")
+    beside = start("shared_lock", "beside")
     until((tmp_path / "beside").exists)
-    with slots.beside_others(lambda: None):
-        alone = start("alone", "alone")
+    with slots.shared_lock(lambda: None):
+        alone = start("exclusive_lock", "alone")
         beside.communicate("")
         assert not (tmp_path / "alone").exists()
     until((tmp_path / "alone").exists)
@@ -151,10 +151,10 @@ with getattr(Slots(folder), sys.argv[2])(lambda: None):
         if len(heartbeats) == 3:
             raise Cancelled("the lease is lost")
 
-    with pytest.raises(Cancelled), slots.beside_others(count):
+    with pytest.raises(Cancelled), slots.shared_lock(count):
         raise AssertionError
     alone.communicate("")
-    with slots.beside_others(lambda: None):
+    with slots.shared_lock(lambda: None):
         pass
 
 
@@ -167,10 +167,10 @@ def _raising(error: Exception) -> Callable[..., Any]:
 
 #: Code of ours that may raise an exception while it handles a child's data, and a program that reaches it.
 _STUMBLES = [
-    pytest.param(Bridge, "_act", "left_motor = tank_drive.on(5, 5)", None, id="a frame of the program's"),
+    pytest.param(Bridge, "_execute_actions", "left_motor = tank_drive.on(5, 5)", None, id="a frame of the program's"),
     pytest.param(Bridge, "_say", "from ev3dev2.sound import Sound\nSound().speak('x')", None, id="an utterance"),
     pytest.param(Bridge, "_print", "print('x')", None, id="a line"),
-    pytest.param(ResponderProcess, "_answer", "print('PY::x')", ECHO, id="an answer"),
+    pytest.param(ResponderProcess, "_parse_answer", "print('PY::x')", ECHO, id="an answer"),
     pytest.param(Conversation, "deliver", "from time import sleep\nprint('PY::x')\nsleep(1)", ECHO, id="a delivery"),
 ]
 
@@ -261,13 +261,13 @@ def test_a_responder_sleeps_at_the_expense_of_all_trials(responder: str, runner:
 
 def test_a_grade_has_what_its_trials_cost_and_is_compared_without(runner: TrialRunner) -> None:
     asked = find_assignment("echo-responder")
-    program = Code("robot.py", f"{NAP}print('PY::x')\n")
-    submission = Submission("ada", program, Code("responder.py", ECHO))
+    program = SourceFile("robot.py", f"{NAP}print('PY::x')\n")
+    submission = Submission("ada", program, SourceFile("responder.py", ECHO))
     first, second = (grade(submission, asked, runner=runner) for _ in range(2))
     cost = first.cost
     assert cost is not None
     assert cost.spent is not None
-    assert cost.limits.cpu_seconds == asked.limits.all_cpu_of(len(first.trials))
+    assert cost.limits.cpu_seconds == asked.limits.compute_total_cpu(len(first.trials))
     assert cost.limits.sleep_seconds == asked.limits.all_sleep
     # The sleep, minus the free half second of each process.
     assert 0.3 * len(first.trials) < cost.spent.sleep_seconds < cost.limits.sleep_seconds

@@ -23,19 +23,19 @@ from hypothesis import strategies as st
 from responders import wire
 from responders.bridge import Bridge
 from responders.channel import Channel
-from responders.code import Code
 from responders.notebook_executor import PlannedRun, execute_notebook
 from responders.notebook_process import NotebookSpec
-from responders.responder_process import Collected, ResponderProcess
+from responders.responder_process import LoggedData, ResponderProcess
 from responders.sandbox import running_child
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import Child, ChildLimits
+from responders.source_file import SourceFile
 from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec
 from sim.arena import Arena
 from sim.camera import Cameras
-from sim.floors import floor
+from sim.floors import build_floor
 from sim.recording import Recording
-from sim.robot import robot
+from sim.robot import get_robot
 from sim.world import Noise
 
 BUDGET = 60_000
@@ -184,24 +184,24 @@ class _Sandboxes:
         return self._children.pop(0)
 
     @contextmanager
-    def private_folder(self) -> Iterator[Path]:
+    def open_private_folder(self) -> Iterator[Path]:
         yield self._folder
 
 
 @pytest.fixture(scope="module")
 def ground() -> Iterator[tuple[Arena, Any]]:
     cameras, arena = Cameras(), Arena(())
-    yield arena, cameras.camera(floor("Empty_Map").pixels)
+    yield arena, cameras.open_camera(build_floor("Empty_Map").pixels)
     arena.close()
     cameras.close()
 
 
 def _spec() -> TrialSpec:
-    program = ProgramSpec(Code("robot.py", ""), "none", LIMITS, 1 << 40)
-    ground = floor("Empty_Map")
+    program = ProgramSpec(SourceFile("robot.py", ""), "none", LIMITS, 1 << 40)
+    ground = build_floor("Empty_Map")
     noise, channel = Noise(), Channel()
     return TrialSpec(
-        program, None, True, ground, robot("Default_Robot"), ground.default_pose, noise, channel, SECONDS, 1, 1
+        program, None, True, ground, get_robot("Default_Robot"), ground.default_pose, noise, channel, SECONDS, 1, 1
     )
 
 
@@ -225,10 +225,12 @@ def test_of_a_responder(frames: list[bytes], tmp_path_factory: pytest.TempPathFa
     meter = JobMeter(JobLimits(kept_bytes=BUDGET))
     folder = tmp_path_factory.mktemp("folder")
     with _child([b'{"do":"ready","error":null}', *frames], folder, meter) as child:
-        spec = ResponderSpec(Code("responder.py", ""), {}, LIMITS, 1 << 40)
+        spec = ResponderSpec(SourceFile("responder.py", ""), {}, LIMITS, 1 << 40)
         responder = ResponderProcess(spec, _Sandboxes(folder, child), folder, 1, meter)  # type: ignore[arg-type]
         faults = [responder.load()]
-        faults += [responder.answer("PY::x", n, n, Collected()).fault for n in range(len(frames)) if responder.alive]
+        faults += [
+            responder.answer("PY::x", n, n, LoggedData()).fault for n in range(len(frames)) if responder.is_alive
+        ]
     assert not any(fault.staff for fault in faults if fault is not None), faults
     assert len(pickle.dumps((responder.output, responder.calls, responder.notes, faults))) < 2 * BUDGET
 
@@ -236,16 +238,16 @@ def test_of_a_responder(frames: list[bytes], tmp_path_factory: pytest.TempPathFa
 class _NoRuns:
     """A notebook environment in which no call starts a robot."""
 
-    def standing(self) -> PlannedRun:
+    def plan_standstill(self) -> PlannedRun:
         return PlannedRun(_spec())
 
-    def call(self, call: object) -> PlannedRun:
+    def plan_call(self, call: object) -> PlannedRun:
         return PlannedRun(notes=("noted",))
 
-    def ran(self, recording: Recording) -> None:
+    def record_run(self, recording: Recording) -> None:
         raise AssertionError
 
-    def last(self) -> PlannedRun:
+    def plan_last_run(self) -> PlannedRun:
         return PlannedRun()
 
 

@@ -11,11 +11,11 @@ from notebook_builder import notebook
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.reports.faults import fault_groups
+from service.reports.faults import group_faults
 from sim.recording import Fault, Verdict
 from submissions.assignment.reader import read_assignment
 from submissions.bundle import read_submission
-from submissions.source_text import modules_of
+from submissions.source_text import find_modules
 
 TOML = """
 id = "talk"
@@ -112,7 +112,7 @@ def test_a_fault_in_such_a_file_has_its_name_and_line(tmp_path: Path, runner: Tr
     assert (fault.verdict, fault.file) == (verdict, "helper.py")
     assert line is None or fault.place == f"line {line} of helper.py"
     submission = read_submission(tmp_path / "ada")
-    group = fault_groups(result, submission)[0]
+    group = group_faults(result, submission)[0]
     assert group.where == f"Robot program, line {fault.line} of helper.py"
     assert [row.text for row in group.excerpt if row.marked] == [helper.split("\n")[(fault.line or 0) - 1]]
     if how == "what is refused":
@@ -222,4 +222,4 @@ def test_a_text_can_import_what_it_names_on_a_line_with_an_import(text: str) -> 
         "latin.py": b"caf\xe9 = 1",
         "other.py": b"",
     }
-    assert modules_of(text, files.get).keys() == IMPORTS[text]
+    assert find_modules(text, files.get).keys() == IMPORTS[text]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from sklearn.neural_network import MLPClassifier
 
-from models import weights_bytes
+from models import load_weights
 from paths import DATA, ROOT
 from sim import floors
 
@@ -57,7 +57,7 @@ def kit(monkeypatch: pytest.MonkeyPatch) -> Iterator[Kit]:
 
 def raw(column: int, row: int) -> str:
     """Return the numbers of a 20 x 20 sensor with its upper left pixel at (column, row), as the robot sends them."""
-    window = floors.floor("Simple_Shapes").pixels[row : row + 20, column : column + 20]
+    window = floors.build_floor("Simple_Shapes").pixels[row : row + 20, column : column + 20]
     rows, columns = np.mgrid[0:20, 0:20]
     seen = (rows - 10) ** 2 + (columns - 10) ** 2 < 100
     rgb = np.where(seen[:, :, None], window, np.array([245, 226, 225]))
@@ -354,7 +354,7 @@ def test_the_packaged_network_names_every_shape(kit: Kit, tmp_path: Path) -> Non
     import joblib
 
     file = tmp_path / "mlp_shapes_14x14.joblib"
-    file.write_bytes(weights_bytes("shapes"))
+    file.write_bytes(load_weights("shapes"))
     network = joblib.load(file)
     frame = log_shapes(kit)
     answers = [
@@ -424,7 +424,7 @@ def test_a_tensorflow_lite_network_comes_with_its_details_and_labels(
 @pytest.mark.parametrize(("file", "least"), [("digits.tflite", 50), ("digits-quantized.tflite", 49)])
 def test_tensorflow_lite_networks_read_digits_that_the_sensor_sees(kit: Kit, file: str, least: int) -> None:
     network = kit.views.cnn_load(LITE / file, LITE / "labels.txt")
-    sheet = floors.floor("MNIST_Digits", seed=101)
+    sheet = floors.build_floor("MNIST_Digits", seed=101)
     right = 0
     for number, label in enumerate(sheet.labels[:55]):
         row, column = divmod(number, 20)

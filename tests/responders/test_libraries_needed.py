@@ -7,12 +7,12 @@ import json
 import pytest
 
 import responders.trial_spec
-from responders.code import Code
 from responders.function_calls import FunctionCall
-from responders.libraries_needed import may_need_libraries, notebook_source
-from responders.sandbox.inside.libraries import BESIDE
+from responders.libraries_needed import build_notebook_source, may_need_libraries
+from responders.sandbox.inside.libraries import STANDARD_MODULES
 from responders.sandbox.running_child import ChildLimits
-from responders.sandbox.zygote import Role
+from responders.sandbox.zygote import ChildRole
+from responders.source_file import SourceFile
 from responders.trial_spec import ResponderSpec
 from running import run_program
 from service.grading.trial_runner import TrialRunner
@@ -67,7 +67,7 @@ FORGED = b'{"n":1,"do":"libraries"}\n'
 LOADED = f"""
 import importlib, warnings, sys
 def names():
-    return {{name: sorted(dir(importlib.import_module(name))) for name in {BESIDE!r}}}
+    return {{name: sorted(dir(importlib.import_module(name))) for name in {STANDARD_MODULES!r}}}
 def settings():
     return [sys.getrecursionlimit(), sys.flags.hash_randomization, sys.getswitchinterval()]
 def of_any_warning():
@@ -96,9 +96,9 @@ def test_the_files_beside_it_count(files: dict[str, bytes]) -> None:
 
 def test_the_robots_of_a_notebook_do_not_count() -> None:
     cells = ("%%sim_magic_preloaded\nimport numpy", "%sim_magic -R\nimport json", "%load_ext nbev3devsim", "a = 1")
-    assert not may_need_libraries(notebook_source(cells), {})
-    assert may_need_libraries(notebook_source((*cells, "%sim_magic {a}")), {})
-    assert may_need_libraries(notebook_source((*cells, "%%capture\nimport numpy")), {})
+    assert not may_need_libraries(build_notebook_source(cells), {})
+    assert may_need_libraries(build_notebook_source((*cells, "%sim_magic {a}")), {})
+    assert may_need_libraries(build_notebook_source((*cells, "%%capture\nimport numpy")), {})
 
 
 def test_what_is_loaded_beside_libraries_is_the_same(runner: TrialRunner, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,7 +106,7 @@ def test_what_is_loaded_beside_libraries_is_the_same(runner: TrialRunner, monkey
 
     def told(needed: bool) -> list[object]:
         monkeypatch.setattr(responders.trial_spec, "may_need_libraries", lambda *_: needed)
-        called = runner.call(_spec(LOADED), calls, 1)
+        called = runner.call_functions(_spec(LOADED), calls, 1)
         return [each.value for each in called.returned]
 
     without = told(False)
@@ -136,7 +136,7 @@ def test_so_it_is_in_a_robot_program(runner: TrialRunner) -> None:
 
 
 @pytest.mark.parametrize(("role", "text"), [("responder", "pass"), ("responder with libraries", "import numpy")])
-def test_who_has_libraries_asks_for_none(role: Role, text: str, runner: TrialRunner) -> None:
+def test_who_has_libraries_asks_for_none(role: ChildRole, text: str, runner: TrialRunner) -> None:
     asks = f"{text}\nimport os\nos.write(3, {FORGED!r})\ndef responder(text): return text"
     assert _spec(asks).role == role
     recording = _with_responder(runner, asks)
@@ -145,7 +145,7 @@ def test_who_has_libraries_asks_for_none(role: Role, text: str, runner: TrialRun
 
 
 def _spec(text: str) -> ResponderSpec:
-    return ResponderSpec(Code("responder.py", text), FILES, ChildLimits(10, 512 << 20), 100_000)
+    return ResponderSpec(SourceFile("responder.py", text), FILES, ChildLimits(10, 512 << 20), 100_000)
 
 
 def _with_responder(runner: TrialRunner, text: str) -> Recording:

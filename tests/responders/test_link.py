@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from responders.channel import Channel, ChannelOfTrial
+from responders.channel import Channel, TrialChannel
 from responders.conversation import Answer, Conversation
 from responders.link import Cable, InfraredLink
 from running import run_program
@@ -19,9 +19,9 @@ from service.store.grades.recordings import from_bytes, to_bytes
 from sim.arena import Arena
 from sim.bullet import Client, pb
 from sim.camera import HEIGHT, WIDTH
-from sim.motion import Rectangle, add_block, walls
+from sim.motion import Rectangle, add_block, build_walls
 from sim.recording import SECOND, Pose
-from sim.world import Chain
+from sim.world import HashChain
 
 BEACON = (1200.0, 600.0)
 POST: Rectangle = (1000, 500, 40, 200)  # between the beacon and the area to its left
@@ -37,7 +37,7 @@ def arena() -> Iterator[Arena]:
 
 def fate(arena: Arena, pose: Pose, **changes: Any) -> str:
     link = InfraredLink(Channel(**INFRARED | changes), arena, lambda: pose, lambda: BEACON)
-    return link.contact().lost or "arrives"
+    return link.measure_contact().lost or "arrives"
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def by_hand(pose: Pose) -> str:
     bearing = math.degrees(math.atan2(away.imag, away.real))
     if min((bearing - pose.heading) % 360, (pose.heading - bearing) % 360) > 45:
         return "facing away"
-    boxes = (POST, *walls().values())
+    boxes = (POST, *build_walls().values())
     return "blocked" if any(crosses((pose.x, pose.y), BEACON, box) for box in boxes) else "arrives"
 
 
@@ -136,7 +136,7 @@ def test_the_link_is_the_rule_written_by_hand(arena: Arena, x: float, y: float, 
 @pytest.fixture(scope="module")
 def blocks() -> Iterator[Client]:
     with Client() as client:
-        for box in (POST, *walls().values()):
+        for box in (POST, *build_walls().values()):
             add_block(box, client)
         yield client
 
@@ -149,7 +149,7 @@ def grown(box: Rectangle, by: float) -> Rectangle:
 def test_what_blocks_is_what_a_ray_of_bullets_hits(arena: Arena, blocks: Client, x: float, y: float) -> None:
     """In a separate world with whole blocks, a ray misses its entry point by up to 0.7 mm; our world uses sheets."""
     assume(not crosses((x, y), (x, y), grown(POST, 0.1)))
-    hits = {any(crosses((x, y), BEACON, grown(box, by)) for box in (POST, *walls().values())) for by in (-1, 1)}
+    hits = {any(crosses((x, y), BEACON, grown(box, by)) for box in (POST, *build_walls().values())) for by in (-1, 1)}
     assume(len(hits) == 1)
     heading = math.degrees(math.atan2(BEACON[1] - y, BEACON[0] - x))
     start, end = ([x / 1000, y / 1000, 0.02], [BEACON[0] / 1000, BEACON[1] / 1000, 0.02])
@@ -160,17 +160,17 @@ def test_what_blocks_is_what_a_ray_of_bullets_hits(arena: Arena, blocks: Client,
 def test_the_other_end_may_move(arena: Arena) -> None:
     places = iter([(1200.0, 600.0), (100.0, 600.0)])
     link = InfraredLink(Channel(**INFRARED), arena, lambda: Pose(1200, 300, 90), lambda: next(places))
-    assert [link.contact().lost, link.contact().lost] == ["", "out of range"]
+    assert [link.measure_contact().lost, link.measure_contact().lost] == ["", "out of range"]
 
 
 def test_a_text_and_its_answer_are_lost_by_where_the_robot_is_when_they_cross(arena: Arena) -> None:
     pose = Pose(1200, 300, 90)
     channel = Channel(**INFRARED)
-    talk = Conversation(channel, 1, Chain(), InfraredLink(channel, arena, lambda: pose, lambda: BEACON))
+    talk = Conversation(channel, 1, HashChain(), InfraredLink(channel, arena, lambda: pose, lambda: BEACON))
     for number, turned in enumerate((80, -80, 90)):
         sent = talk.send(f"PY::{number}", number * SECOND)
         for copy in range(sent.copies):
-            talk.answer(sent, copy, Answer(f"JSON::{number}", entry=str(number)))
+            talk.record_answer(sent, copy, Answer(f"JSON::{number}", entry=str(number)))
         pose = Pose(1200, 300, turned)
         assert talk.deliver((number + 1) * SECOND) == (["0"] if number == 0 else [])
     first, back, second, lost_back, third = talk.messages
@@ -201,9 +201,9 @@ def test_the_recording_says_of_each_text_why_it_was_lost(runner: TrialRunner) ->
 
 
 def test_corruption_changes_letters_and_digits_after_the_prefix() -> None:
-    line = ChannelOfTrial(Channel(corruption=0.3), 5)
-    arrived = [line.corrupted("PY::message 12", number) for number in range(2000)]
-    assert arrived == [line.corrupted("PY::message 12", number) for number in range(2000)]
+    line = TrialChannel(Channel(corruption=0.3), 5)
+    arrived = [line.corrupt_text("PY::message 12", number) for number in range(2000)]
+    assert arrived == [line.corrupt_text("PY::message 12", number) for number in range(2000)]
     changed = [text for text in arrived if text is not None]
     assert len(changed) / 2000 == pytest.approx(0.3, abs=0.04)
     for text in changed:
@@ -214,16 +214,16 @@ def test_corruption_changes_letters_and_digits_after_the_prefix() -> None:
 
 @pytest.mark.parametrize("text", ["", "PY::", "PY::!?", "PY::é"])
 def test_what_has_no_letter_or_digit_cannot_be_corrupted(text: str) -> None:
-    assert ChannelOfTrial(Channel(corruption=1), 5).corrupted(text, 0) is None
+    assert TrialChannel(Channel(corruption=1), 5).corrupt_text(text, 0) is None
 
 
 def test_what_is_corrupted_arrives_so_and_joins_the_queue_only_if_it_is_still_json() -> None:
-    talk = Conversation(Channel(corruption=1), 5, Chain(), Cable())
+    talk = Conversation(Channel(corruption=1), 5, HashChain(), Cable())
     sent = talk.send("PY::7", 0)
     assert sent.text != "PY::7"
     assert talk.messages[0].received == sent.text
-    talk.answer(sent, 0, Answer("JSON::[10]", entry="[10]"))
-    talk.answer(sent, 0, Answer("JSON::true", entry="true"))
+    talk.record_answer(sent, 0, Answer("JSON::[10]", entry="[10]"))
+    talk.record_answer(sent, 0, Answer("JSON::true", entry="true"))
     (entry,) = talk.deliver(SECOND)
     assert entry != "[10]"
     assert talk.messages[1].received == f"JSON::{entry}"

@@ -13,12 +13,12 @@ import pytest
 import running
 from floods import CALL, ECHO, FLOODS, Flood, long
 from hostile import flood
-from responders.code import Code
 from responders.function_calls import FunctionCall
 from responders.notebook_executor import ExecutedNotebook, PlannedRun
 from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.source_file import SourceFile
 from responders.trial_spec import ResponderSpec
 from rows import quick_first
 from running import run_program
@@ -75,9 +75,9 @@ def test_a_flood_of_a_notebook_ends_at_the_budget(frame: str, runner: TrialRunne
 
 def test_a_flood_while_functions_are_called_ends_at_the_budget(runner: TrialRunner) -> None:
     meter = JobMeter(JobLimits(kept_bytes=BUDGET))
-    code = Code("responder.py", f"def f(): return {'x' * 50_000!r}")
+    code = SourceFile("responder.py", f"def f(): return {'x' * 50_000!r}")
     module = ResponderSpec(code, {}, running.RESPONDER_LIMITS, 1 << 30)
-    called = runner.call(module, [FunctionCall("f")] * 200, 1, meter)
+    called = runner.call_functions(module, [FunctionCall("f")] * 200, 1, meter)
     faults = [returned.fault for returned in called.returned if returned.fault is not None]
     assert faults[0].verdict is Verdict.OUTPUT_LIMIT
     assert _held(called.returned) < 2 * BUDGET
@@ -108,16 +108,16 @@ def test_what_honest_programs_send_in_thousands_costs_nothing(runner: TrialRunne
 class _NoRuns:
     """A notebook environment in which no call starts a robot."""
 
-    def call(self, call: object) -> PlannedRun:
+    def plan_call(self, call: object) -> PlannedRun:
         return PlannedRun()
 
-    def standing(self) -> PlannedRun:
+    def plan_standstill(self) -> PlannedRun:
         raise AssertionError
 
-    def ran(self, recording: Recording) -> None:
+    def record_run(self, recording: Recording) -> None:
         raise AssertionError
 
-    def last(self) -> PlannedRun:
+    def plan_last_run(self) -> PlannedRun:
         return PlannedRun()
 
 

@@ -11,7 +11,7 @@ from graded_notebooks import PROGRAM, RESPONDER, answers, assignment, graded, re
 from notebook_builder import notebook
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.reports.faults import fault_groups
+from service.reports.faults import group_faults
 from sim.recording import Verdict
 from submissions.assignment.reader import read_assignment
 from submissions.bundle import read_submission
@@ -146,7 +146,7 @@ def test_a_responder_that_fails_is_told_by_cell_and_line_with_the_lines_around(
     (fault,) = result.trials[0].recording.faults
     assert (fault.message, fault.place) == ("NameError: name 'codemap' is not defined", "cell 1, line 5")
     submission = read_submission(tmp_path / "ada.ipynb")
-    (group,) = fault_groups(result, submission)
+    (group,) = group_faults(result, submission)
     assert group.where == "Responder (ada.ipynb), cell 1, line 5"
     assert [line.text for line in group.excerpt if line.marked] == ["    return codemap[text]"]
 

@@ -14,7 +14,7 @@ import pytest
 
 from command import robomark
 from graded_notebooks import PROGRAM, RESPONDER, answers, assignment, graded, recorded, spoken, two_programs
-from models import weights_bytes
+from models import load_weights
 from notebook_builder import MESSAGING, MESSAGING_SCRIPT, notebook
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
@@ -24,7 +24,7 @@ from submissions.assignment.definition import Parts
 from submissions.assignment.problems import AssignmentProblems
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import fit_parts, read_submission
-from submissions.packed import pack_submission, unpack_submission
+from submissions.stored_submission import pack_submission, unpack_submission
 
 
 @pytest.fixture(params=["ipynb", "py"])
@@ -33,7 +33,7 @@ def messaging(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     folder = tmp_path / "ada"
     folder.mkdir()
     shutil.copy(MESSAGING if request.param == "ipynb" else MESSAGING_SCRIPT, folder / f"messaging.{request.param}")
-    (folder / "mlp_shapes_14x14.joblib").write_bytes(weights_bytes("shapes"))
+    (folder / "mlp_shapes_14x14.joblib").write_bytes(load_weights("shapes"))
     return folder
 
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from responders import packed
-from responders.packed import MotorCommand, Place, Read, Wait
-from responders.wire import MOST, MOST_UNITS, WireError
+from responders import packets
+from responders.packets import LineChange, MotorCommand, SensorRead, Wait
+from responders.wire import MAX_FRAME_BYTES, MAX_UNITS, WireError
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import SENSORS, Pose
@@ -25,9 +25,9 @@ def _packet(*acts: Raw, number: int = 7) -> bytes:
 
 def test_acts_come_in_order_with_the_number_of_their_packet() -> None:
     data = _packet((0, 1, 0, 0, 2.0), (2, 0, 1, 3, -25.5), (2, 1, 0, 2, 0.0), (1, 0, 0, 0, 100_000.0))
-    assert packed.read_header(data) == (len(data), 7)
-    assert packed.acts_of(data) == [
-        (Read("right"), 2),
+    assert packets.read_header(data) == (len(data), 7)
+    assert packets.unpack_actions(data) == [
+        (SensorRead("right"), 2),
         (MotorCommand("outB", "speed_sp", "run-forever"), -25.5),
         (MotorCommand("outC", "", "reset"), 0),
         (Wait(), 100_000),
@@ -48,7 +48,7 @@ def test_acts_come_in_order_with_the_number_of_their_packet() -> None:
         (1, 0, 0, 0, 0.5),
         (1, 0, 0, 0, math.inf),
         (1, 0, 0, 0, math.nan),
-        (1, 0, 0, 0, 2.0 * MOST_UNITS),
+        (1, 0, 0, 0, 2.0 * MAX_UNITS),
         (1, 1, 0, 0, 1.0),
         (2, 2, 1, 0, 1.0),
         (2, 0, 5, 0, 1.0),
@@ -65,30 +65,30 @@ def test_acts_come_in_order_with_the_number_of_their_packet() -> None:
 )
 def test_an_act_that_no_honest_program_does_is_refused(act: Raw) -> None:
     with pytest.raises(WireError):
-        packed.acts_of(_packet((0, 0, 0, 0, 1.0), act))
+        packets.unpack_actions(_packet((0, 0, 0, 0, 1.0), act))
 
 
-@pytest.mark.parametrize("count", [0, MOST // 12 + 1, 65_535])
+@pytest.mark.parametrize("count", [0, MAX_FRAME_BYTES // 12 + 1, 65_535])
 def test_a_packet_is_neither_empty_nor_longer_than_a_line_may_be(count: int) -> None:
     with pytest.raises(WireError, match=f"a packet of {count} acts"):
-        packed.read_header(struct.pack("<BxHxxxxQ", 0, count, 0))
+        packets.read_header(struct.pack("<BxHxxxxQ", 0, count, 0))
 
 
 @given(st.binary(min_size=12, max_size=240).map(lambda data: data[: len(data) // 12 * 12]))
 def test_any_bytes_are_acts_or_refused(data: bytes) -> None:
     try:
-        acts = packed.acts_of(bytes(16) + data)
+        acts = packets.unpack_actions(bytes(16) + data)
     except WireError:
         return
     for act in acts:
         match act:
-            case Read(what), times:
+            case SensorRead(what), times:
                 assert (what in SENSORS, times in (1, 2)) == (True, True)
             case Wait(), units:
-                assert (units % 1, 0 <= units <= MOST_UNITS) == (0, True)
+                assert (units % 1, 0 <= units <= MAX_UNITS) == (0, True)
             case MotorCommand(port, _, _), value:
                 assert (port in ("outB", "outC"), math.isfinite(value)) == (True, True)
-            case Place(), lines:
+            case LineChange(), lines:
                 assert (lines % 1, 0 <= lines <= 2**40) == (0, True)
             case _:
                 pytest.fail(f"no act: {act}")

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from models import weights_bytes
+from models import load_weights
 from responders import library
-from responders.code import Code
+from responders.source_file import SourceFile
 from running import run_program
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
@@ -22,8 +22,8 @@ from submissions.assignment.reader import read_assignment
 from submissions.submission import Submission
 
 NETWORK = {
-    "mlp_shapes_14x14.joblib": weights_bytes("shapes"),
-    "mlp_digits_14x14.joblib": weights_bytes("digits"),
+    "mlp_shapes_14x14.joblib": load_weights("shapes"),
+    "mlp_digits_14x14.joblib": load_weights("digits"),
 }
 
 SAY = """
@@ -186,7 +186,7 @@ def test_an_assignment_gives_one_by_its_name(tmp_path: Path, name: str) -> None:
 
 def test_a_given_one_answers_the_students_program(tmp_path: Path, runner: TrialRunner) -> None:
     (tmp_path / "assignment.toml").write_text(GIVES.format(name="echo_responder.py"))
-    program = Code("robot.py", "import time\nprint('PY::[1, 2]')\ntime.sleep(1)")
+    program = SourceFile("robot.py", "import time\nprint('PY::[1, 2]')\ntime.sleep(1)")
     result = grade(Submission("ada", program), read_assignment(tmp_path), runner=runner)
     assert answers(result.trials[0].recording) == ["Python saw >> [1, 2] << that..."]
 

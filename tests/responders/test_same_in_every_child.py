@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import graded_notebooks
-from responders.code import Code
 from responders.function_calls import FunctionCall
 from responders.sandbox.running_child import ChildLimits
+from responders.source_file import SourceFile
 from responders.training import TrainingSpec
 from responders.trial_spec import ResponderSpec
 from running import run_program
@@ -76,13 +76,15 @@ def _notebook(runner: TrialRunner, folder: Path) -> str:
 
 
 def _function(runner: TrialRunner, _: Path) -> str:
-    module = ResponderSpec(Code("responder.py", TOLD), {}, LIMITS, 100_000)
-    return str(runner.call(module, [FunctionCall("told")], seed=1).returned[0].value)
+    module = ResponderSpec(SourceFile("responder.py", TOLD), {}, LIMITS, 100_000)
+    return str(runner.call_functions(module, [FunctionCall("told")], seed=1).returned[0].value)
 
 
 def _training(runner: TrialRunner, _: Path) -> str:
     model = "class Model:\n    def predict(self, rows): return ['a'] * len(rows)\n"
-    code = Code("responder.py", f"{TOLD}{model}def train(images, labels):\n    print(told())\n    return Model()\n")
+    code = SourceFile(
+        "responder.py", f"{TOLD}{model}def train(images, labels):\n    print(told())\n    return Model()\n"
+    )
     images = np.zeros((2, 14, 14), np.uint8)
     spec = TrainingSpec(code, {}, "train", images, ["a", "b"], [images], LIMITS, 100_000, 1)
     return runner.train(spec)[0].output
@@ -97,7 +99,7 @@ def _check(runner: TrialRunner, folder: Path) -> str:
     parts = []
     for part, start in ((0, 0), (0, 400), (1, 0), (1, 400)):
         (folder / "check.py").write_text(TOLD + says.replace("PART", str(part)).replace("START", str(start)))
-        submission = Submission("ada", Code("robot.py", "say('x')"))
+        submission = Submission("ada", SourceFile("robot.py", "say('x')"))
         parts.append(grade(submission, read_assignment(folder), runner=runner).criteria[0].evidence[0].message)
     return repr([parts[:2], parts[2:]])
 

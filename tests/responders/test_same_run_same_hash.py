@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from models import weights_bytes
+from models import load_weights
 from paths import HELPERS
 from responders.channel import Channel
 from running import run_program
@@ -19,7 +19,7 @@ from service.grading.trial_runner import TrialRunner
 from sim.motion import Physics
 from sim.recording import Pose, Verdict
 from sim.world import Noise
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 
 FOLLOWER = """
 while True:
@@ -65,7 +65,7 @@ def responder(text):
     answer = agent(text)
     return f"{answer} {logger(answer)} {random.random()}"
 """
-RESPONDER = examples("shape-recognition") / "seed" / "responder.py"
+RESPONDER = locate_examples("shape-recognition") / "seed" / "responder.py"
 
 
 CALL_ROUND = """
@@ -123,7 +123,7 @@ def chain(name: str, runner: TrialRunner) -> str:
             background="Simple_Shapes",
             noise=Noise(light=10),
             responder=RESPONDER.read_text(),
-            files={"mlp_shapes_14x14.joblib": weights_bytes("shapes")},
+            files={"mlp_shapes_14x14.joblib": load_weights("shapes")},
         )
         assert recording.verdict is Verdict.FINISHED
         assert sum(message.sender == "responder" for message in recording.messages) == 20

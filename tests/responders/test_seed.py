@@ -22,26 +22,26 @@ from __future__ import annotations
 
 import pytest
 
-from models import weights_bytes
+from models import load_weights
 from notebook_builder import MESSAGING
 from responders import library
 from responders.channel import Channel
 from responders.notebook_executor import ExecutedNotebook
 from running import run_program
-from service.grading.standalone import RunOptions, run_notebook
+from service.grading.standalone_runs import RunOptions, run_notebook
 from service.grading.trial_runner import TrialRunner
+from service.reports.plots.diagram_differences import compare_with_recording, describe_differences
+from service.reports.plots.diagram_drawing import draw_diagram
 from service.reports.plots.diagram_parts import Highlights
-from service.reports.plots.difference import differences, in_words
-from service.reports.plots.drawn_diagrams import draw_diagram
-from service.reports.plots.talk import talks
+from service.reports.plots.message_counts import count_messages
 from sim.recording import LossReason, Pose, Recording, Verdict
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 from submissions.diagram import Diagram
-from submissions.diagram_cells import diagrams_in
-from submissions.magics import setup, split_program
+from submissions.diagram_cells import read_diagrams
+from submissions.magics import apply_flags, split_program
 from submissions.notebook import read_notebook
 
-NETWORK = {"mlp_shapes_14x14.joblib": weights_bytes("shapes")}
+NETWORK = {"mlp_shapes_14x14.joblib": load_weights("shapes")}
 SHAPES = (
     "square",
     "right facing triangle",
@@ -51,7 +51,7 @@ SHAPES = (
     "diamond",
 )
 NOTEBOOK = read_notebook(MESSAGING.read_bytes(), MESSAGING.name).notebook
-DIAGRAMS = {cell.cell: cell.diagram for cell in diagrams_in(NOTEBOOK).cells}
+DIAGRAMS = {cell.cell: cell.diagram for cell in read_diagrams(NOTEBOOK).cells}
 
 
 @pytest.fixture(scope="module")
@@ -76,20 +76,20 @@ def calls(recording: Recording) -> list[tuple[str, str]]:
 
 
 def compared(diagram: Diagram, recording: Recording) -> str:
-    found = differences(diagram, talks(recording))
+    found = compare_with_recording(diagram, count_messages(recording))
     assert found is not None
-    return in_words(found)
+    return describe_differences(found)
 
 
 def driven(runner: TrialRunner, start: Pose, responder: str = "") -> Recording:
     """Run the last program of the notebook from another start, with its own responder or another one."""
-    folder = examples("shape-recognition") / "seed"
+    folder = locate_examples("shape-recognition") / "seed"
     flags, text = split_program((folder / "robot.py").read_text())
     return run_program(
         runner,
         text,
         start,
-        background=setup(flags).background,
+        background=apply_flags(flags).background,
         responder=responder or (folder / "responder.py").read_text(),
         files=NETWORK,
     )
@@ -220,7 +220,7 @@ def test_11_messages_are_lost_out_of_range_or_facing_the_wrong_way(
     runner: TrialRunner, start: Pose, lost: LossReason
 ) -> None:
     """The echo's own program and responder, over an infrared link to a beacon at (1500, 300)."""
-    folder = examples("echo-responder") / "seed"
+    folder = locate_examples("echo-responder") / "seed"
     _, text = split_program((folder / "robot.py").read_text())
     channel = Channel(link="infrared", beacon=(1500, 300), range=600, facing=90)
     recording = run_program(
@@ -233,10 +233,10 @@ def test_11_messages_are_lost_out_of_range_or_facing_the_wrong_way(
 
 def test_12_a_convolutional_network_in_place_of_the_perceptron(runner: TrialRunner) -> None:
     """The image parser's own message, classified by both kinds of network."""
-    folder = examples("mlp-against-cnn") / "reference"
+    folder = locate_examples("mlp-against-cnn") / "reference"
     networks = {
-        "mlp_digits_14x14.joblib": weights_bytes("digits"),
-        "cnn_digits_14x14.onnx": weights_bytes("digits-cnn"),
+        "mlp_digits_14x14.joblib": load_weights("digits"),
+        "cnn_digits_14x14.onnx": load_weights("digits-cnn"),
     }
     recording = run_program(
         runner,

@@ -21,8 +21,8 @@ import numpy as np
 import pytest
 
 from model_submissions_maker import FOLDER, TRACE, grading_requests
-from models import weights_bytes
-from models.perceptrons import read
+from models import load_weights
+from models.perceptrons import load_perceptron
 from paths import DATA, ROOT
 from running import run_program
 from service.grading.grade import Grade
@@ -249,7 +249,7 @@ def test_a_bad_file_of_weights_is_refused_with_a_sentence(
 def test_plain_weights_answer_as_the_network_that_they_come_from(
     tmp_path: Path, weights: ModuleType, activation: str
 ) -> None:
-    network = read(weights_bytes("shapes"))
+    network = load_perceptron(load_weights("shapes"))
     network.activation = activation
     weights.save_weights(network, tmp_path / "model.npz")
     loaded = weights.load_weights(tmp_path / "model.npz")

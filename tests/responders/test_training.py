@@ -9,17 +9,17 @@ from typing import Any
 
 import pytest
 
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.judging.collecting import pairs
+from service.grading.judging.collecting import collect_pairs
 from service.grading.trial_runner import TrialRunner
-from service.reports.verdict_sentences import accuracy_words
-from service.reports.view import student_view
+from service.reports.verdict_sentences import describe_accuracy
+from service.reports.view import build_student_view
 from sim.errors import UsageError
 from sim.recording import Recording, Verdict
 from submissions.assignment.definition import Assignment
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 from submissions.submission import Cell, Notebook, Submission
@@ -54,12 +54,12 @@ def training() -> Assignment:
 
 
 def trained(runner: TrialRunner, asked: Assignment, text: str) -> Grade:
-    return grade(Submission("s", None, Code("responder.py", text)), asked, runner=runner)
+    return grade(Submission("s", None, SourceFile("responder.py", text)), asked, runner=runner)
 
 
 def test_training_without_images_says_that_there_are_none(runner: TrialRunner, training: Assignment) -> None:
     own = replace(training, parts=replace(training.parts, program="student"))
-    submission = Submission("s", Code("robot.py", "print('nothing')"), Code("responder.py", NEAREST))
+    submission = Submission("s", SourceFile("robot.py", "print('nothing')"), SourceFile("responder.py", NEAREST))
     result = grade(submission, own, runner=runner)
     fault = result.trials[-1].recording.faults[0]
     assert fault.message == "the robot collected no images, so there is nothing to train on"
@@ -74,10 +74,10 @@ def test_the_accuracy_of_a_grade_is_that_of_the_marked_images(runner: TrialRunne
     result = trained(runner, replace(asked, scenarios=kept, criteria=criteria), NEAREST)
     assert result.recognition is not None
     assert (result.recognition.id, result.accuracy) == ("unseen", result.criteria[1].accuracy)
-    shown = student_view(result).grade
+    shown = build_student_view(result).grade
     assert shown.recognition is not None
-    assert (shown.recognition.id, "for practice (not marked)" in accuracy_words(shown)) == ("practice", True)
-    assert "practice" not in accuracy_words(result)
+    assert (shown.recognition.id, "for practice (not marked)" in describe_accuracy(shown)) == ("practice", True)
+    assert "practice" not in describe_accuracy(result)
 
 
 def test_a_model_is_trained_on_some_trials_and_marked_on_the_others(runner: TrialRunner, training: Assignment) -> None:
@@ -168,15 +168,15 @@ def test_a_notebook_is_no_function_that_trains(runner: TrialRunner, training: As
 
 def collected(runner: TrialRunner, name: str) -> Recording:
     asked = find_assignment("collect-shapes")
-    submission = read_submission(examples("collect-shapes") / name, asked=asked.parts)
+    submission = read_submission(locate_examples("collect-shapes") / name, asked=asked.parts)
     return grade(submission, asked, runner=runner).trials[0].recording
 
 
 def test_pairs_of_the_log_know_what_they_show(runner: TrialRunner) -> None:
     recording = collected(runner, "reference")
-    found = pairs(recording, "log")
+    found = collect_pairs(recording, "log")
     assert len(found) * 2 == len(recording.image_log)
-    assert pairs(recording, "sent") == []
+    assert collect_pairs(recording, "sent") == []
     usable = Counter(pair.label for pair in found if pair.label is not None)
     assert len(usable) == 6
     # A patch that can be decoded is correct, or the sensor is beside the shape.
@@ -191,5 +191,5 @@ def test_pairs_of_the_log_know_what_they_show(runner: TrialRunner) -> None:
 def test_what_is_asked_of_training_data(runner: TrialRunner, changes: dict[str, Any], marks: int) -> None:
     asked = find_assignment("collect-shapes")
     criterion = asked.criteria[1].model_copy(update={"each": 1, "marks": 4, "over": "share", **changes})
-    submission = read_submission(examples("collect-shapes") / "reference", asked=asked.parts)
+    submission = read_submission(locate_examples("collect-shapes") / "reference", asked=asked.parts)
     assert grade(submission, replace(asked, criteria=(criterion,)), runner=runner).marks == marks

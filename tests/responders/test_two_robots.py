@@ -14,8 +14,8 @@ from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.errors import Cancelled
 from sim.motion import Physics
-from sim.recorded import faults_of, verdict_of
 from sim.recording import Message, Pose, Recording, Verdict
+from sim.recording_values import collect_faults, decide_verdict
 from sim.world import World
 
 LEFT, RIGHT = Pose(500, 500, 0), Pose(1500, 500, 180)
@@ -251,7 +251,7 @@ def test_one_that_goes_wrong_does_not_stop_the_other(runner: TrialRunner, text: 
     assert good.end_t == pytest.approx(2.1, abs=0.05)
     assert bad.verdict in VERDICTS[text]
     assert {fault.who for fault in bad.faults} == {"second program" if second else "program"}
-    assert verdict_of(both[0]) is bad.verdict
+    assert decide_verdict(both[0]) is bad.verdict
 
 
 @pytest.mark.parametrize(
@@ -262,9 +262,9 @@ def test_when_both_go_wrong_both_are_told_and_the_earliest_counts(runner: TrialR
     both = run_both(runner, first, second, seconds=5, program_limits=SHORT)
     for text, recording in zip((first, second), both, strict=True):
         assert recording.verdict in VERDICTS[text]
-    told = faults_of(both[0])
+    told = collect_faults(both[0])
     assert [fault.t for fault in told] == sorted(fault.t for fault in told)
-    assert verdict_of(both[0]) is told[0].verdict
+    assert decide_verdict(both[0]) is told[0].verdict
 
 
 def test_two_that_wait_for_each_other_for_ever_end_when_the_time_is_up(runner: TrialRunner) -> None:
@@ -301,7 +301,7 @@ def test_a_given_program_may_run_on_and_has_the_same_chance_for_all(runner: Tria
         run_both(runner, text, text, seconds=3, given=True, child_seed=seed) for seed in (1, 2)
     )
     assert partner.faults == ()
-    assert (partner.end_t, verdict_of(first)) == (3, Verdict.TIME_LIMIT)
+    assert (partner.end_t, decide_verdict(first)) == (3, Verdict.TIME_LIMIT)
     assert printed(partner) == printed(others)
     assert printed(first) != printed(other)
 

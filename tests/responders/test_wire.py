@@ -25,7 +25,7 @@ UNTIL = b'{"do":"until","port":"outB","state":"still","timeout":%b}'
 @given(st.binary(max_size=300))
 def test_any_bytes_are_read_or_refused(data: bytes) -> None:
     try:
-        frame = wire.parse(data, wire.ROBOT)
+        frame = wire.parse_frame(data, wire.ROBOT)
     except wire.WireError:
         return
     assert frame["do"] in wire.ROBOT
@@ -38,7 +38,7 @@ def test_a_frame_has_the_fields_of_its_kind_and_no_others(
     schema, do = kind
     required, optional = schema[do]
     try:
-        frame = wire.parse(json.dumps({"do": do, **fields}).encode(), schema)
+        frame = wire.parse_frame(json.dumps({"do": do, **fields}).encode(), schema)
     except wire.WireError:
         return
     assert required.keys() <= frame.keys() - {"do"} <= required.keys() | optional.keys()
@@ -70,18 +70,18 @@ def test_a_frame_has_the_fields_of_its_kind_and_no_others(
         b'{"do":"stuck","line":1,"file":"../robot.py"}',
         b'{"do":"stuck","line":1,"file":"' + b"x" * 200 + b'.py"}',
         b"[" * 60_000,
-        b'{"do":"print","text":"' + b"x" * wire.MOST + b'"}',
+        b'{"do":"print","text":"' + b"x" * wire.MAX_FRAME_BYTES + b'"}',
         UNTIL % (b"9" * 5000),
     ],
     ids=lambda line: repr(line[:40]),
 )
 def test_a_frame_that_no_honest_child_sends_is_refused(line: bytes) -> None:
     with pytest.raises(wire.WireError):
-        wire.parse(line, wire.ROBOT)
+        wire.parse_frame(line, wire.ROBOT)
 
 
 def test_a_lone_surrogate_becomes_a_character_that_can_be_stored() -> None:
-    assert wire.parse(rb'{"do":"print","text":"a\ud800b"}', wire.ROBOT)["text"] == "a?b"
+    assert wire.parse_frame(rb'{"do":"print","text":"a\ud800b"}', wire.ROBOT)["text"] == "a?b"
 
 
 @pytest.mark.parametrize(
@@ -101,11 +101,11 @@ def test_a_lone_surrogate_becomes_a_character_that_can_be_stored() -> None:
 )
 def test_a_line_begins_with_its_number(line: bytes) -> None:
     with pytest.raises(wire.WireError, match="without its number"):
-        wire.unnumbered(line)
+        wire.split_number(line)
 
 
 def test_a_second_number_is_a_field_too_many() -> None:
-    number, frame = wire.unnumbered(b'{"n":7,"n":8,"do":"until_said"}')
+    number, frame = wire.split_number(b'{"n":7,"n":8,"do":"until_said"}')
     assert number == 7
     with pytest.raises(wire.WireError):
-        wire.parse(frame, wire.ROBOT)
+        wire.parse_frame(frame, wire.ROBOT)

@@ -14,7 +14,7 @@ import pytest
 import robomark
 from command import robomark as command
 from paths import ROOT
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 
 DOCUMENT = (ROOT / "docs" / "python.md").read_text()
 SCRIPTS = re.findall(r"```python\n(.*?)```", DOCUMENT, re.DOTALL)
@@ -25,7 +25,7 @@ PROGRAM = "%%sim_magic_preloaded -b Simple_Shapes\ntank_drive.on_for_seconds(50,
 def folder(tmp_path: Path) -> Path:
     """Return a folder with the input of the documented scripts."""
     for name in ("reference", "flawed"):
-        shutil.copytree(examples("echo-responder") / name, tmp_path / "my-work" / name)
+        shutil.copytree(locate_examples("echo-responder") / name, tmp_path / "my-work" / name)
     (tmp_path / "robot.py").write_text(PROGRAM)
     done = command("run", tmp_path / "robot.py", "--replay", tmp_path / "my-report.html")
     assert done.returncode == 0, done.stderr

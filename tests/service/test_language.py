@@ -7,20 +7,20 @@ from pathlib import Path
 
 import pytest
 
-from service.language import SOURCE, languages
-from service.message_catalogue import catalogue_file, messages, update
+from service.language import SOURCE_LANGUAGE, list_languages
+from service.message_catalogue import extract_messages, locate_catalogue, update_catalogue
 from web import submit, web_in
 
-OTHERS = [code for code in languages() if code != SOURCE]
+OTHERS = [code for code in list_languages() if code != SOURCE_LANGUAGE]
 _PLACES = re.compile(r"%\(\w+\)[sd]|<[^>]+>")
 
 
 @pytest.mark.parametrize("code", OTHERS)
 def test_a_catalogue_has_all_that_pages_say(code: str) -> None:
-    catalogue = update(code)
-    said = {str(message.id) for message in messages() if message.id}
+    catalogue = update_catalogue(code)
+    said = {str(message.id) for message in extract_messages() if message.id}
     kept = {str(message.id): message.string for message in catalogue if message.id}
-    assert said == set(kept), f"python -m service.message_catalogue brings {catalogue_file(code).name} up to date"
+    assert said == set(kept), f"python -m service.message_catalogue brings {locate_catalogue(code).name} up to date"
     missing = [text for text, translated in kept.items() if not translated or not all(translated)]
     assert missing == []
     for message in catalogue:

@@ -10,8 +10,8 @@ from threading import Event, Thread
 
 import pytest
 
-from service import outside
-from service.outside import ALL_OTHERS, NO_OTHERS, NotReached, ask, is_public
+from service import outgoing_requests
+from service.outgoing_requests import ALL_NETWORKS, NO_NETWORKS, RequestFailure, is_public, send_request
 
 
 @contextmanager
@@ -30,8 +30,10 @@ def answering(answer: bytes) -> Iterator[str]:
         yield f"http://127.0.0.1:{listening.getsockname()[1]}/"
 
 
-def get(url: str, others: outside.Networks = ALL_OTHERS, most_bytes: int = 0) -> outside.OutsideAnswer:
-    return ask(url, method="GET", body=None, headers={}, others=others, most_bytes=most_bytes)
+def get(
+    url: str, others: outgoing_requests.Networks = ALL_NETWORKS, most_bytes: int = 0
+) -> outgoing_requests.HttpResponse:
+    return send_request(url, method="GET", body=None, headers={}, others=others, most_bytes=most_bytes)
 
 
 def test_what_is_answered_is_read_as_far_as_it_is_asked_for() -> None:
@@ -44,15 +46,15 @@ def test_what_is_answered_is_read_as_far_as_it_is_asked_for() -> None:
 
 def test_a_network_may_be_reached_that_is_named() -> None:
     with answering(b"HTTP/1.1 204 No Content\r\n\r\n") as url:
-        for others in (NO_OTHERS, (ip_network("10.0.0.0/8"), ip_network("::/0"))):
-            with pytest.raises(NotReached, match="public address"):
+        for others in (NO_NETWORKS, (ip_network("10.0.0.0/8"), ip_network("::/0"))):
+            with pytest.raises(RequestFailure, match="public address"):
                 get(url, others)
         assert get(url, (ip_network("127.0.0.0/8"),)).status == 204
 
 
 @pytest.mark.parametrize("url", ["ftp://x/", "http://", "file:///etc/passwd", "http://[", "http://x:99999999/", "x"])
 def test_what_is_no_address_of_the_web_is_not_asked(url: str) -> None:
-    with pytest.raises(NotReached):
+    with pytest.raises(RequestFailure):
         get(url)
 
 
@@ -62,8 +64,8 @@ def test_a_name_that_resolves_to_both_is_refused(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(socket, "getaddrinfo", resolve)
     others = (ip_network("192.168.0.0/16"),)
-    with pytest.raises(NotReached, match="public address"):
-        ask("http://two.example.org/", method="POST", body=b"", headers={}, others=others)
+    with pytest.raises(RequestFailure, match="public address"):
+        send_request("http://two.example.org/", method="POST", body=b"", headers={}, others=others)
 
 
 @pytest.mark.parametrize(
@@ -117,14 +119,14 @@ def test_a_name_inside_is_told_from_none_at_all_by_nobody(monkeypatch: pytest.Mo
     monkeypatch.setattr(socket, "getaddrinfo", resolve)
     told = set()
     for host in ("nowhere.example.org", "intranet.example.org"):
-        with pytest.raises(NotReached) as error:
-            get(f"http://{host}/", NO_OTHERS)
+        with pytest.raises(RequestFailure) as error:
+            get(f"http://{host}/", NO_NETWORKS)
         told.add((type(error.value), str(error.value).replace(host, "")))
     assert len(told) == 1
 
 
 def test_who_answers_no_http_or_a_byte_at_a_time_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outside, "SECONDS", 0.3)
+    monkeypatch.setattr(outgoing_requests, "TIMEOUT_SECONDS", 0.3)
     with socket.create_server(("127.0.0.1", 0)) as listening:
         url = f"http://127.0.0.1:{listening.getsockname()[1]}/"
 
@@ -142,7 +144,7 @@ def test_who_answers_no_http_or_a_byte_at_a_time_is_cut_off(monkeypatch: pytest.
         ended = Event()
         thread = Thread(target=answer, daemon=True)
         thread.start()
-        with pytest.raises(NotReached, match="did not answer"):
-            ask(url, method="POST", body=b"{}", headers={}, others=ALL_OTHERS)
+        with pytest.raises(RequestFailure, match="did not answer"):
+            send_request(url, method="POST", body=b"{}", headers={}, others=ALL_NETWORKS)
         ended.set()
         thread.join()

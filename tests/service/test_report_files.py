@@ -23,7 +23,7 @@ from service.store.courses import policies
 from service.store.courses.policies import PolicyLimits
 from service.store.engine import Store, now
 from service.store.grades import results
-from service.store.people.students import course_of
+from service.store.people.students import ensure_course
 from service.store.queue import jobs
 from sim.errors import UsageError
 
@@ -31,21 +31,21 @@ from sim.errors import UsageError
 def stored(store: Store, student: str, program: int, grade: Grade) -> tuple[JobLine, str]:
     """Store the grade for a student's submission; return its job and its batch."""
     taken = accept_batch(store, "class", [grading_request(student, f"print({program})\n")], [], max_attempts=3)
-    claim = jobs.claim(store, "worker", 60)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish(store, claim, results.prepare(grade), datetime.now(UTC))
+    jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
     return line_of(store, taken.jobs[0].job_id), taken.id
 
 
 def line_of(store: Store, job_id: str) -> JobLine:
     with store.reading() as session:
-        return batches.job_line(session, job_id)
+        return batches.load_job_line(session, job_id)
 
 
 def replay_over(store: Store, line: JobLine, over: JobLine, folder: Path) -> dict[str, object]:
     """Return the other trial beside the first one, in the replay of one grade compared with another."""
     with store.reading() as session:
-        grade = results.load(session, line.id)
+        grade = results.load_grade(session, line.id)
     write_grade_replay(store, line, grade, folder / "replay.json", over)
     return dict(json.loads((folder / "replay.json").read_text())["trials"][0]["over"])
 
@@ -54,10 +54,10 @@ def test_a_student_watches_an_earlier_attempt_in_a_report_and_in_a_replay(store:
     before, _ = stored(store, "ada", 1, parting_grade())
     line, _ = stored(store, "ada", 2, build.line_follower_grade())
     with store.reading() as session:
-        assert batches.job_before(session, line.id) == before.id
+        assert batches.find_previous_job(session, line.id) == before.id
         with pytest.raises(UsageError, match="comes before"):
-            batches.job_before(session, before.id)
-        grade = results.load(session, line.id)
+            batches.find_previous_job(session, before.id)
+        grade = results.load_grade(session, line.id)
     told = replay_over(store, line, before, tmp_path)
     assert (told["name"], told["parted"]) == ("attempt 1", pytest.approx(94 / 30))
     report = write_report(store, line, grade, tmp_path, "ada", before)
@@ -82,14 +82,14 @@ def test_the_reference_is_shown_once_the_grade_is_published_and_other_students_n
 
 def test_what_is_for_staff_is_shown_over_nothing_that_a_student_reads(store: Store, tmp_path: Path) -> None:
     with store.transaction() as session:
-        policies.set_policy(session, course_of(session, "default", now(session)), "", PolicyLimits(attempts=1))
+        policies.set_policy(session, ensure_course(session, "default", now(session)), "", PolicyLimits(attempts=1))
     first, batch = stored(store, "ada", 1, build.line_follower_grade())
     proposal = acting.regrade(store, batch, None, max_attempts=1, actor="staff")
-    claim = jobs.claim(store, "worker", 60)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish(store, claim, results.prepare(parting_grade()), datetime.now(UTC))
+    jobs.finish_job(store, claim, results.prepare_grade(parting_grade()), datetime.now(UTC))
     with store.reading() as session:
-        (proposed,) = batches.job_lines(session, proposal.batch_id)
+        (proposed,) = batches.load_job_lines(session, proposal.batch_id)
     with pytest.raises(UsageError, match="not published"):
         replay_over(store, first, proposed, tmp_path)
     over_the_limit = replace(first, staff_only="attempt 2, allowed: 1")
@@ -101,7 +101,7 @@ def test_what_is_for_staff_is_shown_over_nothing_that_a_student_reads(store: Sto
 def test_a_film_is_of_a_trial_that_may_be_shown(store: Store, tmp_path: Path) -> None:
     line, _ = stored(store, "ada", 1, build.hidden_grade())
     with store.reading() as session:
-        grade = results.load(session, line.id)
+        grade = results.load_grade(session, line.id)
     write_grade_film(store, line, grade, tmp_path / "film.gif", None)
     with Image.open(tmp_path / "film.gif") as image:
         assert image.format == "GIF"

@@ -14,15 +14,15 @@ from sqlalchemy.exc import OperationalError
 import report_builders
 from builders import accept_one, grading_request, upgraded_by_newer_release
 from service import doctor
-from service.doctor import examine, examine_service
+from service.doctor import examine_machine, examine_service
 from service.settings import Settings
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, now
 from service.store.grades import plots, results
 from service.store.models import Batch, Job, SchemaCompatibility
-from service.store.queue import jobs, metrics, tryouts, workers
+from service.store.queue import jobs, metrics, test_runs, workers
 from service.store.queue.workers import WorkerDescription
-from service.store.revision import SchemaState, newest_revision
+from service.store.revision import SchemaState, find_newest_revision
 from service.store.states import BatchState
 from service.version import GRADER_VERSION
 
@@ -37,13 +37,13 @@ def test_a_queue_that_stands_still_is_not_well(
     service_settings: Settings, store: Store, minutes: int, is_begun: bool, well: bool
 ) -> None:
     assert _queue(service_settings, store) == (True, "0 queued")
-    workers.beat(store, WorkerDescription("worker", "host", 1, "0", "all of it"))
+    workers.record_heartbeat(store, WorkerDescription("worker", "host", 1, "0", "all of it"))
     accept_one(store, "ada")
     accept_one(store, "bob")
     with store.transaction() as session:
         session.execute(update(Job).values(queued_at=now(session) - timedelta(minutes=minutes)))
     if is_begun:
-        assert jobs.claim(store, "worker", 60) is not None
+        assert jobs.claim_job(store, "worker", 60) is not None
     found, sentence = _queue(service_settings, store)
     assert found is well
     assert ("start no jobs" in sentence) is not well
@@ -53,12 +53,12 @@ def test_a_queue_that_stands_still_is_not_well(
 def test_a_backlog_between_two_jobs_is_well(
     service_settings: Settings, store: Store, ended_seconds_ago: int, well: bool
 ) -> None:
-    workers.beat(store, WorkerDescription("worker", "host", 1, "0", "all of it"))
+    workers.record_heartbeat(store, WorkerDescription("worker", "host", 1, "0", "all of it"))
     accept_one(store, "ada")
     accept_one(store, "bob")
-    claim = jobs.claim(store, "worker", 60)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
     with store.transaction() as session:
         at = now(session)
         session.execute(update(Job).values(queued_at=at - timedelta(minutes=10)))
@@ -71,9 +71,9 @@ def test_a_backlog_between_two_jobs_is_well(
 @pytest.mark.parametrize(
     ("revision", "oldest_compatible", "advice"),
     [
-        ("0001", newest_revision(), "robomark db upgrade"),
+        ("0001", find_newest_revision(), "robomark db upgrade"),
         ("9999", "9998", "install the newer release and restart"),
-        ("9999", newest_revision(), None),
+        ("9999", find_newest_revision(), None),
     ],
 )
 def test_the_advice_fits_the_direction(
@@ -83,7 +83,7 @@ def test_the_advice_fits_the_direction(
         session.execute(text("UPDATE alembic_version SET version_num = :revision"), {"revision": revision})
         session.execute(update(SchemaCompatibility).values(oldest_compatible=oldest_compatible))
     of_service = examine_service(service_settings.with_broker("redis://127.0.0.1:1/0"), store)
-    for found in (*examine(service_settings), *of_service):
+    for found in (*examine_machine(service_settings), *of_service):
         if found.what == "database":
             assert found.well is (advice is None)
             assert (advice or revision) in found.sentence
@@ -102,14 +102,14 @@ def test_the_advice_fits_the_direction(
     ],
 )
 def test_the_time_left_counts_the_share_of_others(waiting: dict[int, dict[str | None, int]], before: int) -> None:
-    assert metrics._graded_before_its_end(waiting, "ours") == before
+    assert metrics._count_jobs_before_end(waiting, "ours") == before
 
 
 def test_the_time_left_is_longer_while_others_wait(store: Store) -> None:
     ours = accept_batch(store, "ours", [grading_request(name) for name in ("ada", "bob", "cyd")], [], max_attempts=3)
-    claim = jobs.claim(store, "worker", 60)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
     with store.transaction() as session:
         session.execute(
             update(Job).where(Job.id == claim.job_id).values(started_at=now(session) - timedelta(minutes=1))
@@ -117,7 +117,7 @@ def test_the_time_left_is_longer_while_others_wait(store: Store) -> None:
 
     def left() -> float:
         with store.reading() as session:
-            found = metrics.pace(session, ours.id)
+            found = metrics.estimate_pace(session, ours.id)
         assert found is not None
         return found.left.total_seconds()
 
@@ -140,7 +140,7 @@ def test_a_full_disk_is_named(
     def fail(_engine: object) -> SchemaState:
         raise OperationalError("SELECT 1", {}, cause)
 
-    monkeypatch.setattr(doctor, "schema_state", fail)
+    monkeypatch.setattr(doctor, "load_schema_state", fail)
     of_service = examine_service(service_settings.with_broker("redis://127.0.0.1:1/0"), store)
     (found,) = [each for each in of_service if each.what == "database"]
     assert not found.well
@@ -148,32 +148,32 @@ def test_a_full_disk_is_named(
 
 
 def test_the_clock_of_a_file_is_not_compared_with_itself(service_settings: Settings, store: Store) -> None:
-    (found,) = [each for each in examine(service_settings) if each.what == "clock"]
+    (found,) = [each for each in examine_machine(service_settings) if each.what == "clock"]
     assert ("a local file" in found.sentence) is (store.engine.dialect.name == "sqlite")
 
 
 def test_nothing_is_claimed_from_tables_that_need_newer_code(store: Store) -> None:
     claims: dict[str, Callable[[], object]] = {
-        "job": lambda: jobs.claim(store, "worker", 60),
-        "tryout": lambda: tryouts.claim(store, 60),
-        "plots": lambda: plots.claim(store, 60),
+        "job": lambda: jobs.claim_job(store, "worker", 60),
+        "tryout": lambda: test_runs.claim_test_run(store, 60),
+        "plots": lambda: plots.claim_plots(store, 60),
     }
-    prepared = results.prepare(report_builders.faulty_grade())
+    prepared = results.prepare_grade(report_builders.faulty_grade())
     for student in ("ada", "bob", "eve"):
         accept_one(store, student)
-    finished, running = jobs.claim(store, "worker", 60), jobs.claim(store, "worker", 60)
+    finished, running = jobs.claim_job(store, "worker", 60), jobs.claim_job(store, "worker", 60)
     assert finished is not None
     assert running is not None
-    jobs.finish(store, finished, prepared, datetime.now(UTC))
+    jobs.finish_job(store, finished, prepared, datetime.now(UTC))
     with store.transaction() as session:
         job = session.get_one(Job, running.job_id)
-        tryouts.ask(session, job.enrolment_id, job.assignment_version_id, b"")
+        test_runs.queue_test_run(session, job.enrolment_id, job.assignment_version_id, b"")
     upgraded_by_newer_release(store, "9998")
     assert [name for name, take in claims.items() if take() is not None] == []
     # Running jobs are finished.
-    jobs.heartbeat(store, running, 60, 0.5)
-    jobs.finish(store, running, prepared, datetime.now(UTC))
-    upgraded_by_newer_release(store, newest_revision())
+    jobs.renew_lease(store, running, 60, 0.5)
+    jobs.finish_job(store, running, prepared, datetime.now(UTC))
+    upgraded_by_newer_release(store, find_newest_revision())
     assert [name for name, take in claims.items() if take() is not None] == list(claims)
 
 
@@ -184,10 +184,10 @@ def test_workers_that_must_be_restarted_are_named(
     service_settings: Settings, store: Store, problems: list[str], well: bool
 ) -> None:
     for number, problem in enumerate(problems):
-        workers.beat(store, WorkerDescription(f"worker-{number}", "host", 1, "0", "all of it", problem))
+        workers.record_heartbeat(store, WorkerDescription(f"worker-{number}", "host", 1, "0", "all of it", problem))
     of_service = examine_service(service_settings.with_broker("redis://127.0.0.1:1/0"), store)
     (ready,) = [each for each in of_service if each.what == "workers"]
-    (here,) = [each for each in examine(service_settings) if each.what == "workers"]
+    (here,) = [each for each in examine_machine(service_settings) if each.what == "workers"]
     assert (ready.well, here.well) == (well, not any(problems))
     for found in (ready, here):
         assert ("restart it" in found.sentence) is any(problems)

@@ -11,21 +11,21 @@ import pytest
 
 from builders import echo, grading_request
 from service.grading.trial_runner import TrialRunner
-from service.queue.trying import try_next
+from service.queue.test_run_job import run_next_test
 from service.settings import Settings
-from service.store.courses.versions import freeze, keep
+from service.store.courses.assignment_versions import freeze_assignment, store_version
 from service.store.engine import Store, now
-from service.store.people.students import Students, course_of
-from service.store.queue import tryouts
-from service.store.queue.tryouts import TryoutLine
-from service.store.states import TryoutState
-from service.trying import LONGEST_SECONDS, tryout_assignment
+from service.store.people.students import Students, ensure_course
+from service.store.queue import test_runs
+from service.store.queue.test_runs import StudentTestRun
+from service.store.states import RunState
+from service.test_runs import LONGEST_SECONDS, build_single_trial_assignment
 from sim.errors import HostError
 from submissions.assignment.definition import Assignment, Scenario, Visibility
 from submissions.assignment.limits import Limits
 from submissions.assignment.reader import find_assignment
-from submissions.packed import pack_submission
 from submissions.seeds import Secret
+from submissions.stored_submission import pack_submission
 from submissions.student_identity import Student
 
 HIDDEN = "hidden-place"
@@ -44,29 +44,29 @@ def _with_hidden(asked: Assignment) -> Assignment:
 
 def _tried(
     store: Store, runner: TrialRunner, program: str, asked: Assignment | None = None, *, alone: bool = False
-) -> TryoutLine:
+) -> StudentTestRun:
     """Return the student's view of a test run after a worker was notified; with ``alone``, without a responder."""
     submission = grading_request("ada", program).submission
     packed = pack_submission(replace(submission, responder=None) if alone else submission)
-    frozen = freeze(asked or _with_hidden(echo()))
+    frozen = freeze_assignment(asked or _with_hidden(echo()))
     with store.transaction() as session:
         at = now(session)
-        ada = Students(session, course_of(session, "default", at)).enrol(Student("ada"), at)
-        made = tryouts.ask(session, ada, keep(session, frozen, at), packed)
-    try_next(store, Settings(), runner)
+        ada = Students(session, ensure_course(session, "default", at)).enrol(Student("ada"), at)
+        made = test_runs.queue_test_run(session, ada, store_version(session, frozen, at), packed)
+    run_next_test(store, Settings(), runner)
     with store.reading() as session:
-        line = tryouts.line(session, ada, made)
+        line = test_runs.find_student_run(session, ada, made)
     assert line is not None
     return line
 
 
 def test_nothing_of_the_trial_is_secret() -> None:
-    once = tryout_assignment(_with_hidden(echo()))
+    once = build_single_trial_assignment(_with_hidden(echo()))
     assert once is not None
     assert [each.id for each in once.scenarios] == [echo().scenarios[0].id]
     assert HIDDEN not in repr(once)
     assert "do not tell" not in repr(once)
-    other = tryout_assignment(replace(_with_hidden(echo()), secret="another"))
+    other = build_single_trial_assignment(replace(_with_hidden(echo()), secret="another"))
     assert other is not None
     assert list(once.trials()) == list(other.trials())
     assert [trial.seed for trial in once.trials()] != [trial.seed for trial in echo().trials(Secret("installation's"))]
@@ -75,13 +75,13 @@ def test_nothing_of_the_trial_is_secret() -> None:
 def test_it_is_one_short_trial_of_many() -> None:
     asked = find_assignment("shape-recognition")
     assert len(list(asked.trials())) > 1
-    once = tryout_assignment(replace(asked, limits=Limits(program_cpu=60, responder_cpu=60, all_cpu=600)))
+    once = build_single_trial_assignment(replace(asked, limits=Limits(program_cpu=60, responder_cpu=60, all_cpu=600)))
     assert once is not None
     (trial,) = once.trials()
     assert trial.pose == asked.scenarios[0].poses[0]
     assert trial.scenario.seconds <= LONGEST_SECONDS
     assert (once.limits.program_cpu, once.limits.all_cpu) < (5, 20)
-    small = tryout_assignment(replace(asked, limits=Limits(program_cpu=0.5)))
+    small = build_single_trial_assignment(replace(asked, limits=Limits(program_cpu=0.5)))
     assert small is not None
     assert small.limits.program_cpu == 0.5
 
@@ -89,25 +89,25 @@ def test_it_is_one_short_trial_of_many() -> None:
 @pytest.mark.parametrize("hidden", ["hidden", "after_published"])
 def test_where_students_see_no_robot_there_is_nothing_to_try(hidden: Visibility) -> None:
     scenarios: tuple[Scenario, ...] = tuple(replace(each, visibility=hidden) for each in echo().scenarios)
-    assert tryout_assignment(replace(echo(), scenarios=scenarios)) is None
-    assert tryout_assignment(find_assignment("train-a-recogniser")) is None
+    assert build_single_trial_assignment(replace(echo(), scenarios=scenarios)) is None
+    assert build_single_trial_assignment(find_assignment("train-a-recogniser")) is None
 
 
 def test_what_it_said_and_where_it_failed_is_told_and_played(store: Store, runner: TrialRunner) -> None:
     line = _tried(store, runner, "print('PY::hello')\nimport time\ntime.sleep(1)\nprint(undefined)\n")
-    assert (line.state, line.error) == (TryoutState.DONE, "")
+    assert (line.state, line.error) == (RunState.DONE, "")
     assert [text for _, text in line.words["lines"]] == ["PY::hello", "(answer) PY::hello"]
     assert line.words["faults"][0]["message"] == "NameError: name 'undefined' is not defined"
     assert line.words["failed"] == "#trial=1&t=1.000"
     with store.reading() as session:
-        replay = json.loads(zlib.decompress(tryouts.replay_of(session, line.id) or b""))
+        replay = json.loads(zlib.decompress(test_runs.load_replay(session, line.id) or b""))
     assert len(replay["trials"]) == 1
     assert HIDDEN not in json.dumps(replay)
 
 
 def test_endless_output_and_endless_loops_end(store: Store, runner: TrialRunner) -> None:
     line = _tried(store, runner, "import time\nwhile True:\n    print('x' * 1000)\n    time.sleep(0.01)\n")
-    assert line.state is TryoutState.DONE
+    assert line.state is RunState.DONE
     assert len(json.dumps(line.words)) < 400_000
     assert line.words["more_lines"] > 0
 
@@ -125,12 +125,12 @@ def test_a_fault_of_ours_is_no_verdict(store: Store, runner: TrialRunner, monkey
     def broken(*_: object, **__: object) -> None:
         raise HostError("the disk /dev/secret is full")
 
-    monkeypatch.setattr("service.queue.trying.run_tryout", broken)
+    monkeypatch.setattr("service.queue.test_run_job.execute_test_run", broken)
     line = _tried(store, runner, "print(1)\n")
-    assert line.state is TryoutState.QUEUED
-    assert not try_next(store, Settings(), runner)
+    assert line.state is RunState.QUEUED
+    assert not run_next_test(store, Settings(), runner)
     with store.reading() as session:
-        again = tryouts.line(session, 1, line.id)
+        again = test_runs.find_student_run(session, 1, line.id)
     assert again is not None
-    assert again.state is TryoutState.FAILED
+    assert again.state is RunState.FAILED
     assert "secret" not in again.error

@@ -36,7 +36,7 @@ def imported(folder: Path) -> Iterator[str]:
 
 
 def test_the_hash_names_every_library_that_deciding_code_imports() -> None:
-    names = {name for room in version._DECIDING for name in imported(ROOT / room)}
+    names = {name for room in version._GRADER_FOLDERS for name in imported(ROOT / room)}
     known = packages_distributions()
     third_party = {name for name in names if name not in sys.stdlib_module_names and name in known}
     needed = {known[name][0].lower().replace("_", "-") for name in third_party - set(HARMLESS)} - {"robomark"}
@@ -44,11 +44,13 @@ def test_the_hash_names_every_library_that_deciding_code_imports() -> None:
 
 
 def test_another_version_of_any_of_them_is_another_grader(monkeypatch: pytest.MonkeyPatch) -> None:
-    version.grader_sha256.cache_clear()
-    before = version.grader_sha256()
-    own = version._version
+    version.hash_grader.cache_clear()
+    before = version.hash_grader()
+    own = version._find_version
     for changed in version._DISTRIBUTIONS:
-        version.grader_sha256.cache_clear()
-        monkeypatch.setattr(version, "_version", lambda name, changed=changed: "0" if name == changed else own(name))
-        assert version.grader_sha256() != before
-    version.grader_sha256.cache_clear()
+        version.hash_grader.cache_clear()
+        monkeypatch.setattr(
+            version, "_find_version", lambda name, changed=changed: "0" if name == changed else own(name)
+        )
+        assert version.hash_grader() != before
+    version.hash_grader.cache_clear()

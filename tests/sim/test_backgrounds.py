@@ -58,15 +58,15 @@ def sensor_mean(floor: str, pose: tuple[float, float, float], sideways: float) -
     column = math.trunc(cosine * sideways - sine * 30 + x - 10)
     row = math.trunc(-(sine * sideways + cosine * 30) + (1143 - y) - 10)
     rows, columns = np.mgrid[0:20, 0:20]
-    window = floors.floor(floor).pixels[row : row + 20, column : column + 20]
+    window = floors.build_floor(floor).pixels[row : row + 20, column : column + 20]
     mean: NDArray[np.float64] = window[(rows - 10) ** 2 + (columns - 10) ** 2 < 100].mean(axis=0)
     return mean
 
 
-@pytest.mark.parametrize("name", floors.names())
+@pytest.mark.parametrize("name", floors.list_floor_names())
 def test_drawn_bit_for_bit(name: str) -> None:
     check_sum = (ORIGINAL | OWN)[name]
-    assert hashlib.sha256(floors.floor(name).pixels.tobytes()).hexdigest().startswith(check_sum)
+    assert hashlib.sha256(floors.build_floor(name).pixels.tobytes()).hexdigest().startswith(check_sum)
 
 
 @pytest.mark.parametrize(
@@ -117,11 +117,11 @@ def test_light_sensors_read_what_they_read_in_the_original(
     ],
 )
 def test_colour_at_a_place(name: str, column: int, row: int, colour: tuple[int, int, int]) -> None:
-    assert tuple(floors.floor(name).pixels[row, column]) == colour
+    assert tuple(floors.build_floor(name).pixels[row, column]) == colour
 
 
 def test_lines_of_the_line_following_test_are_twenty_wide_and_start_where_the_robot_does() -> None:
-    floor = floors.floor("Line_Following_Test")
+    floor = floors.build_floor("Line_Following_Test")
     darkness = 1 - floor.pixels[1090, :, 0] / 255.0
     starts = [141, 440, 771, 1076, 1453, 1820, 2137]
     for start in starts:
@@ -132,20 +132,20 @@ def test_lines_of_the_line_following_test_are_twenty_wide_and_start_where_the_ro
     assert floor.default_pose.x == 141
 
 
-@pytest.mark.parametrize("name", floors.names())
+@pytest.mark.parametrize("name", floors.list_floor_names())
 def test_every_floor_is_whole_and_cannot_be_changed(name: str) -> None:
-    floor = floors.floor(name)
+    floor = floors.build_floor(name)
     assert floor.pixels.shape == (1143, 2362, 3)
     assert floor.pixels.dtype == np.uint8
     assert not floor.pixels.flags.writeable
     assert 0 <= floor.default_pose.x <= 2362
     assert 0 <= floor.default_pose.y <= 1143
-    assert floor is floors.floor(name)
+    assert floor is floors.build_floor(name)
 
 
 def test_default_poses_are_the_originals_where_they_are_odd() -> None:
-    assert floors.floor("Lollipop").default_pose.heading == -180
-    assert floors.floor("Square").default_pose.heading == -90
+    assert floors.build_floor("Lollipop").default_pose.heading == -180
+    assert floors.build_floor("Square").default_pose.heading == -90
 
 
 @pytest.mark.parametrize(
@@ -156,14 +156,14 @@ def test_default_poses_are_the_originals_where_they_are_odd() -> None:
     ],
 )
 def test_labels_say_what_the_left_sensor_sees_from_the_course_poses(y: int, shapes: tuple[str, ...]) -> None:
-    floor = floors.floor("Simple_Shapes")
-    assert [floor.label_at(230 + 80 * column, y + 20) for column in range(len(shapes))] == list(shapes)
-    assert floor.label_at(230 + 40, y + 20) is None
-    assert floor.label_at(230, y - 20) is None
+    floor = floors.build_floor("Simple_Shapes")
+    assert [floor.find_label(230 + 80 * column, y + 20) for column in range(len(shapes))] == list(shapes)
+    assert floor.find_label(230 + 40, y + 20) is None
+    assert floor.find_label(230, y - 20) is None
 
 
 def test_each_label_lies_over_its_shape() -> None:
-    floor = floors.floor("Simple_Shapes")
+    floor = floors.build_floor("Simple_Shapes")
     for label in floor.labels:
         top, left = 1143 - int(label.y + label.height), int(label.x)
         view = floor.pixels[top : top + 20, left : left + 20, 0]
@@ -171,13 +171,13 @@ def test_each_label_lies_over_its_shape() -> None:
 
 
 def test_without_labels_only_the_grey_patches_are_missing() -> None:
-    with_labels = floors.floor("Simple_Shapes").pixels
-    without = floors.floor("Simple_Shapes", labels=False).pixels
+    with_labels = floors.build_floor("Simple_Shapes").pixels
+    without = floors.build_floor("Simple_Shapes", labels=False).pixels
     rows, columns = np.nonzero((with_labels != without).any(axis=2))
     assert (rows.min(), rows.max(), columns.min(), columns.max()) == (251, 275, 221, 639)
     assert (without[240:300] == 255).all()
     assert np.unique(without).tolist() == [0, 255]
-    assert floors.floor("Simple_Shapes", labels=False).labels == floors.floor("Simple_Shapes").labels
+    assert floors.build_floor("Simple_Shapes", labels=False).labels == floors.build_floor("Simple_Shapes").labels
     assert [int(with_labels[263, 231 + 80 * k, 0]) for k in range(6)] == [0, 42, 85, 127, 170, 212]
 
 
@@ -186,7 +186,7 @@ def test_without_labels_only_the_grey_patches_are_missing() -> None:
 )
 def test_an_unknown_name_is_refused_with_the_nearest(wrong: str, near: str) -> None:
     with pytest.raises(UsageError, match=near):
-        floors.floor(wrong)
+        floors.build_floor(wrong)
 
 
 def image_bytes(size: tuple[int, int], form: str = "PNG", mode: str = "RGB") -> bytes:
@@ -207,11 +207,11 @@ def image_bytes(size: tuple[int, int], form: str = "PNG", mode: str = "RGB") -> 
 )
 def test_a_bad_image_is_refused(data: bytes, complaint: str) -> None:
     with pytest.raises(UsageError, match=complaint):
-        floors.floor_from_image("mat", data)
+        floors.build_floor_from_image("mat", data)
 
 
 def test_an_own_image_becomes_a_floor_and_shows_white_where_it_is_clear() -> None:
-    floor = floors.floor_from_image("mat", image_bytes((2362, 1143), mode="RGBA"))
+    floor = floors.build_floor_from_image("mat", image_bytes((2362, 1143), mode="RGBA"))
     assert (floor.pixels == 255).all()
     assert not floor.pixels.flags.writeable
-    assert floors.floor_from_image("mat", image_bytes((2362, 1143), "JPEG")).pixels.max() <= 2
+    assert floors.build_floor_from_image("mat", image_bytes((2362, 1143), "JPEG")).pixels.max() <= 2

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.camera import HEIGHT, WIDTH, BulletCamera, CachedCamera, sensor_mask
-from sim.floors import floor
+from sim.camera import HEIGHT, WIDTH, BulletCamera, CachedCamera, build_sensor_mask
+from sim.floors import build_floor
 
 MARGIN = 400
 
@@ -15,7 +15,7 @@ MARGIN = 400
 def pixels(request: pytest.FixtureRequest) -> np.ndarray:
     if request.param == "noise":
         return np.random.default_rng(7).integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8)
-    return floor(request.param).pixels
+    return build_floor(request.param).pixels
 
 
 def places(count: int) -> list[tuple[int, int, int]]:
@@ -31,10 +31,10 @@ def test_no_pixel_differs_over_a_thousand_places(pixels: np.ndarray) -> None:
     try:
         for column, row, side in places(1000):
             printed = padded[row + MARGIN : row + MARGIN + side, column + MARGIN : column + MARGIN + side]
-            assert np.array_equal(reference.window(column, row, side), printed), (column, row, side)
-            assert np.array_equal(cached.window(column, row, side), printed), (column, row, side)
-            sums = tuple(printed[sensor_mask(side)].sum(axis=0, dtype=np.int64).tolist())
-            assert cached.sums(column, row, side) == sums == reference.sums(column, row, side)
+            assert np.array_equal(reference.render_window(column, row, side), printed), (column, row, side)
+            assert np.array_equal(cached.render_window(column, row, side), printed), (column, row, side)
+            sums = tuple(printed[build_sensor_mask(side)].sum(axis=0, dtype=np.int64).tolist())
+            assert cached.measure_sums(column, row, side) == sums == reference.measure_sums(column, row, side)
     finally:
         reference.close()
         cached.close()
@@ -42,7 +42,7 @@ def test_no_pixel_differs_over_a_thousand_places(pixels: np.ndarray) -> None:
 
 @pytest.mark.parametrize(("side", "pixels"), [(10, 69), (20, 305), (30, 697)])
 def test_the_window_is_round_and_leaves_out_row_and_column_0(side: int, pixels: int) -> None:
-    mask = sensor_mask(side)
+    mask = build_sensor_mask(side)
     assert not mask[0].any()
     assert not mask[:, 0].any()
     assert mask.sum() == pixels
@@ -56,6 +56,6 @@ def test_a_robot_that_stays_sees_the_same_without_the_whole_floor(pixels: np.nda
         for x in range(place[0] - 60, place[0] + 60, 15):
             for y in range(place[1] - 60, place[1] + 60, 15):
                 printed = padded[y + MARGIN : y + MARGIN + 20, x + MARGIN : x + MARGIN + 20]
-                assert np.array_equal(camera.window(x, y, 20), printed), (x, y)
+                assert np.array_equal(camera.render_window(x, y, 20), printed), (x, y)
     finally:
         camera.close()

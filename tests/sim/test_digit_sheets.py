@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from notebook_builder import notebook
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.reports.plots.drawn import draw_all
+from service.reports.plots.grade_plots import draw_all_plots
 from service.store.grades.recordings import from_bytes, to_bytes
-from sim.floors import floor, label_names
+from sim.floors import build_floor, list_label_names
 from sim.recording import SENSOR_SIDE, Image
 from submissions.assignment.definition import Assignment
 from submissions.assignment.problems import AssignmentProblems
@@ -43,7 +43,7 @@ marks = 1
 check = "classification"
 truth = "label"
 """
-LOOK = Submission("ada", Code("robot.py", 'import time\nprint("IMG_DATA")\ntime.sleep(1)\n'))
+LOOK = Submission("ada", SourceFile("robot.py", 'import time\nprint("IMG_DATA")\ntime.sleep(1)\n'))
 
 
 def assignment(folder: Path, sheet: str, labels: str = "false") -> Assignment:
@@ -64,7 +64,7 @@ def shown(image: Image) -> bytes:
 
 def on_sheet(seed: int) -> bytes:
     """Return the digit under the left sensor of a robot at (400, 50, 90) on sheet ``seed``."""
-    return floor("MNIST_Digits", seed=seed).pixels[56 + 1000 : 70 + 1000, 73 + 300 : 87 + 300, 0].tobytes()
+    return build_floor("MNIST_Digits", seed=seed).pixels[56 + 1000 : 70 + 1000, 73 + 300 : 87 + 300, 0].tobytes()
 
 
 @pytest.mark.parametrize(("sheet", "seed"), [('"fixed"', 0), ("7", 7)])
@@ -78,11 +78,11 @@ def test_every_trial_has_a_sheet_of_its_own_and_the_truth_follows(tmp_path: Path
     for trial in result.trials:
         image = trial.recording.images[0]
         assert shown(image) == on_sheet(trial.seed)
-        ground = floor("MNIST_Digits", seed=trial.seed)
-        assert image.truth == ground.label_at(380, 80)
+        ground = build_floor("MNIST_Digits", seed=trial.seed)
+        assert image.truth == ground.find_label(380, 80)
     assert len({shown(trial.recording.images[0]) for trial in result.trials}) == 2
     assert result.accuracy is not None
-    assert result.accuracy.labels == label_names("MNIST_Digits") == tuple("0123456789")
+    assert result.accuracy.labels == list_label_names("MNIST_Digits") == tuple("0123456789")
 
 
 @pytest.mark.long
@@ -98,7 +98,7 @@ def test_a_report_draws_the_sheet_that_lay_there_with_its_patches_or_without(
     images = set()
     for change in ({}, {"sheet": 0}, {"label_patches": True}):
         trial = replace(bare.trials[0], recording=replace(moved, **change))
-        drawn = draw_all(replace(bare, criteria=(), trials=(trial,)))
+        drawn = draw_all_plots(replace(bare, criteria=(), trials=(trial,)))
         images.add(next(drawn[name] for name in drawn if name.startswith("path")))
     assert len(images) == 3
 

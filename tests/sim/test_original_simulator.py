@@ -12,10 +12,10 @@ from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.arena import Arena
 from sim.camera import CachedCamera
-from sim.floors import floor
+from sim.floors import build_floor
 from sim.recording import Pose
-from sim.robot import robot
-from sim.world import Chain, Noise, World
+from sim.robot import get_robot
+from sim.world import HashChain, Noise, World
 
 pytestmark = pytest.mark.fast
 
@@ -38,10 +38,10 @@ def test_drive(runner: TrialRunner, row: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("row", GOLDEN["light"], ids=lambda row: f"{row['background']} {row['pose']}")
 def test_light_sensors(row: dict[str, Any]) -> None:
-    ground = floor(row["background"])
+    ground = build_floor(row["background"])
     arena, camera = Arena(), CachedCamera(ground.pixels)
     try:
-        world = World(robot("Default_Robot"), arena, camera, Pose(*row["pose"]), Noise(), 0, Chain())
+        world = World(get_robot("Default_Robot"), arena, camera, Pose(*row["pose"]), Noise(), 0, HashChain())
         for means, expected in ((world.left_means, row["left"]), (world.right_means, row["right"])):
             assert means == pytest.approx(expected, abs=row.get("tolerance", 0.0001))
     finally:
@@ -56,6 +56,6 @@ def test_ultrasonic(row: dict[str, Any]) -> None:
     arena = Arena(tuple(tuple(box) for box in row.get("obstacles", [])))
     try:
         x, y, heading = row["pose"]
-        assert arena.distance(x, y, math.radians(heading), 20) == row["distance"]
+        assert arena.measure_distance(x, y, math.radians(heading), 20) == row["distance"]
     finally:
         arena.close()

@@ -16,7 +16,7 @@ from sim.arena import Arena
 from sim.motion import FreeMotion, Physics, SolidMotion
 from sim.recording import Pose
 from sim.rigid_wheels import RigidWheels
-from sim.robot import Robot, robot
+from sim.robot import Robot, get_robot
 
 SOLID, WHEELS, BOTH = Physics(solid=True), Physics(drive="wheels"), Physics(solid=True, drive="wheels")
 POST = (900.0, 500.0, 200.0, 200.0)
@@ -36,11 +36,11 @@ for left, right, seconds in [(30, 40, 2), (40, 10, 1.5), (-20, 20, 1), (35, 35, 
 @pytest.mark.parametrize("speed", [2.0, 9.5, 16.7])
 @pytest.mark.parametrize("start", [2250.0, 2251.3, 2257.7])
 def test_a_wall_holds_the_body_at_any_speed(start: float, speed: float) -> None:
-    motion = SolidMotion(robot("Default_Robot"), ())
+    motion = SolidMotion(get_robot("Default_Robot"), ())
     x, y, heading = start, 500.0, 0.0
     reached = []
     for _ in range(90):
-        x, y, turned = motion.moved(x, y, heading, speed, speed)
+        x, y, turned = motion.compute_move(x, y, heading, speed, speed)
         heading += turned
         reached.append(x + 45)
     motion.close()
@@ -51,11 +51,11 @@ def test_a_wall_holds_the_body_at_any_speed(start: float, speed: float) -> None:
 
 @pytest.mark.parametrize(("facing", "ends_facing"), [(45, 0), (60, 0), (80, 82)])
 def test_an_oblique_robot_slides_along_the_wall_and_stays_out_of_it(facing: float, ends_facing: float) -> None:
-    motion = SolidMotion(robot("Default_Robot"), ())
+    motion = SolidMotion(get_robot("Default_Robot"), ())
     x, y, heading = 2150.0, 200.0, math.radians(facing)
     deepest = 0.0
     for _ in range(140):
-        x, y, turned = motion.moved(x, y, heading, 5, 5)
+        x, y, turned = motion.compute_move(x, y, heading, 5, 5)
         heading += turned
         corners = (x + a * math.cos(heading) - b * math.sin(heading) for a in (45, -120) for b in (100, -100))
         deepest = max(deepest, *corners)
@@ -115,7 +115,7 @@ def random_drive(seed: int) -> Iterator[tuple[float, float]]:
 @pytest.mark.parametrize("name", ["Default_Robot", "Small_Robot"])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_rigid_wheels_stay_within_a_fifth_of_a_percent_of_the_path(name: str, seed: int) -> None:
-    driven = robot(name)
+    driven = get_robot(name)
     rigid = RigidWheels(driven)
     rigid.place(300, 500, 0)
     real, ideal = follow(rigid, driven, seed), follow(FreeMotion(driven), driven, seed)
@@ -130,7 +130,7 @@ def follow(motion: FreeMotion | RigidWheels, driven: Robot, seed: int) -> list[t
     x, y, heading = 300.0, 500.0, 0.0
     places = [(x, y)]
     for left, right in random_drive(seed):
-        x, y, turned = motion.moved(x, y, heading, left * mm_per_tick, right * mm_per_tick)
+        x, y, turned = motion.compute_move(x, y, heading, left * mm_per_tick, right * mm_per_tick)
         heading += turned
         places.append((x, y))
     return places
@@ -145,7 +145,8 @@ def test_rigid_wheels_are_held_by_solid_walls_alone(runner: TrialRunner) -> None
 def test_an_arena_gives_each_physics_its_own_motion() -> None:
     arena = Arena((POST,))
     kinds = {
-        type(arena.motion(robot("Default_Robot"), physics, 100, 100, 0)) for physics in (Physics(), SOLID, WHEELS, BOTH)
+        type(arena.place_motion(get_robot("Default_Robot"), physics, 100, 100, 0))
+        for physics in (Physics(), SOLID, WHEELS, BOTH)
     }
     arena.close()
     assert kinds == {FreeMotion, SolidMotion, RigidWheels}

@@ -11,7 +11,7 @@ from sim.errors import AssignmentError, UsageError
 from submissions.assignment.definition import Parts
 from submissions.assignment.reader import read_assignment
 from submissions.bundle import read_submission
-from submissions.packed import pack_submission, unpack_submission
+from submissions.stored_submission import pack_submission, unpack_submission
 
 HEAD = """
 id = "a"
@@ -112,7 +112,7 @@ def test_the_files_of_agents_are_no_parts(names: tuple[str, str], tmp_path: Path
     assert submission.program is None
     assert submission.responder is not None
     assert submission.responder.text == RESPONDER
-    parser = submission.agent("parser")
+    parser = submission.find_agent_code("parser")
     assert parser is not None
     assert (parser.name, parser.text) == (names[1], PARSER)
     assert submission.files_without(ASKED.agents) == {}

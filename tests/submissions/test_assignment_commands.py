@@ -12,16 +12,16 @@ from command import robomark
 from service.grading.example_check import ComparedMeasure, check_examples
 from service.grading.trial_runner import TrialRunner
 from sim.errors import AssignmentError, UsageError
-from submissions.assignment.assignment_overview import overview
-from submissions.assignment.examples import Expectation, OriginalMeasure, add_expected, expected, read_example
-from submissions.assignment.export import export_for_students, export_whole, write_new
-from submissions.assignment.folder import assignment_folder, catalogue
+from submissions.assignment.assignment_overview import read_overview
+from submissions.assignment.examples import ExpectedResult, OriginalMeasure, add_expected, read_example, read_expected
+from submissions.assignment.export import create_assignment, export_all, export_for_students
+from submissions.assignment.folder import list_catalogue_ids, locate_assignment_folder
 from submissions.assignment.problems import AssignmentProblems
 from submissions.assignment.reader import find_assignment, read_assignment
 
 
 def test_a_new_assignment_is_in_order_and_its_reference_gets_full_marks(tmp_path: Path, runner: TrialRunner) -> None:
-    write_new(tmp_path / "my-task")
+    create_assignment(tmp_path / "my-task")
     checked = check_examples(str(tmp_path / "my-task"), runner=runner)
     assert checked.assignment.id == "my-task"
     assert [(example.name, example.problems) for example in checked.examples] == [
@@ -32,7 +32,7 @@ def test_a_new_assignment_is_in_order_and_its_reference_gets_full_marks(tmp_path
 
 
 def test_a_new_assignment_like_another_marks_like_it(tmp_path: Path, runner: TrialRunner) -> None:
-    write_new(tmp_path / "my-echo", "echo-responder")
+    create_assignment(tmp_path / "my-echo", "echo-responder")
     mine, theirs = read_assignment(tmp_path / "my-echo"), find_assignment("echo-responder")
     assert (mine.id, mine.criteria) == ("my-echo", theirs.criteria)
     assert check_examples(str(tmp_path / "my-echo"), runner=runner).problems == ()
@@ -63,13 +63,13 @@ def test_a_new_assignment_like_another_marks_like_it(tmp_path: Path, runner: Tri
     ],
 )
 def test_what_is_not_as_expected_is_said(change: str, problem: str, tmp_path: Path, runner: TrialRunner) -> None:
-    write_new(tmp_path / "task")
+    create_assignment(tmp_path / "task")
     (tmp_path / "task" / "expected.toml").write_text(change)
     assert any(each.startswith(problem) for each in check_examples(str(tmp_path / "task"), runner=runner).problems)
 
 
 def test_an_example_like_another_has_its_files_but_for_those_of_its_own(tmp_path: Path) -> None:
-    write_new(tmp_path / "task", "echo-responder")
+    create_assignment(tmp_path / "task", "echo-responder")
     (tmp_path / "task" / "expected.toml").write_text('[flawed]\nmarks = "1"\nlike = "reference"\n')
     own = tmp_path / "task" / "examples" / "flawed"
     (own / "robot.py").write_text("pass\n")
@@ -82,19 +82,19 @@ def test_an_example_like_another_has_its_files_but_for_those_of_its_own(tmp_path
 
 @pytest.mark.parametrize("text", ["[reference", '[a]\nmark = "6"\n', '[a]\nmarks = "many"\n', '[a]\nlike="../a"\n'])
 def test_expectations_that_cannot_be_read_are_refused(text: str, tmp_path: Path) -> None:
-    write_new(tmp_path / "task")
+    create_assignment(tmp_path / "task")
     (tmp_path / "task" / "expected.toml").write_text(text)
     with pytest.raises(AssignmentError, match=r"^task/expected\.toml:[12]: "):
-        expected(str(tmp_path / "task"))
+        read_expected(str(tmp_path / "task"))
 
 
 def test_all_mistakes_in_expectations_are_named_with_their_lines(tmp_path: Path) -> None:
-    write_new(tmp_path / "task")
+    create_assignment(tmp_path / "task")
     (tmp_path / "task" / "expected.toml").write_text(
         '[reference]\nmark = "6"\n[other]\nmarks = "many"\nverdict = "fine"\n[[original]]\nmeasure = "a"\nvalue = "x"\n'
     )
     with pytest.raises(AssignmentProblems) as refused:
-        expected(str(tmp_path / "task"))
+        read_expected(str(tmp_path / "task"))
     begins = ["1: marks is missing", '2: "mark" is not a key', "4: marks is ", "5: verdict is ", "8: value is "]
     assert len(refused.value.problems) == len(begins)
     for problem, begin in zip(refused.value.problems, begins, strict=True):
@@ -102,7 +102,7 @@ def test_all_mistakes_in_expectations_are_named_with_their_lines(tmp_path: Path)
 
 
 def test_the_check_of_a_reference_that_fails_says_with_what(tmp_path: Path, runner: TrialRunner) -> None:
-    write_new(tmp_path / "task")
+    create_assignment(tmp_path / "task")
     (tmp_path / "task" / "examples" / "reference" / "robot.py").write_text("tank_drvie.off()\n")
     problems = check_examples(str(tmp_path / "task"), runner=runner).problems
     assert any("NameError: name 'tank_drvie' is not defined (line 1)" in problem for problem in problems)
@@ -110,7 +110,7 @@ def test_the_check_of_a_reference_that_fails_says_with_what(tmp_path: Path, runn
 
 def test_an_assignment_whose_own_check_fails_on_an_example_is_not_in_order(tmp_path: Path, runner: TrialRunner) -> None:
     """Even if this costs no marks."""
-    write_new(tmp_path / "task")
+    create_assignment(tmp_path / "task")
     file = tmp_path / "task" / "assignment.toml"
     own = '\n[[criterion]]\nid = "own"\ntitle = "O"\nmarks = 0\ncheck = "python"\nfile = "check.py"\n'
     file.write_text(file.read_text() + own)
@@ -125,18 +125,18 @@ def test_an_assignment_whose_own_check_fails_on_an_example_is_not_in_order(tmp_p
 
 def test_ids_are_listed_whole_on_a_narrow_screen(tmp_path: Path) -> None:
     listed = robomark("assignments", "list").stdout
-    assert all(name in listed for name in catalogue())
+    assert all(name in listed for name in list_catalogue_ids())
 
 
 @pytest.mark.parametrize(
     ("value", "agrees"), [(100.0, True), (101.0, True), (99.0, True), (101.1, False), (None, False)]
 )
 def test_a_figure_agrees_within_a_hundredth(value: float | None, agrees: bool) -> None:
-    assert ComparedMeasure(OriginalMeasure(measure="side", value=100), value).agrees == agrees
+    assert ComparedMeasure(OriginalMeasure(measure="side", value=100), value).is_close == agrees
 
 
 def test_examples_and_starter_do_not_change_the_version(tmp_path: Path) -> None:
-    write_new(tmp_path / "task")
+    create_assignment(tmp_path / "task")
     version = read_assignment(tmp_path / "task").version
     (tmp_path / "task" / "starter" / "robot.py").write_text("pass\n")
     (tmp_path / "task" / "expected.toml").write_text("")
@@ -144,7 +144,7 @@ def test_examples_and_starter_do_not_change_the_version(tmp_path: Path) -> None:
 
 
 def test_students_get_the_task_the_starter_and_the_given_files_and_nothing_that_is_hidden(tmp_path: Path) -> None:
-    write_new(tmp_path / "task", "shape-recognition")
+    create_assignment(tmp_path / "task", "shape-recognition")
     path = tmp_path / "task" / "assignment.toml"
     path.write_text(
         path.read_text().replace('id = "shape-in-noise"\n', 'id = "shape-in-noise"\nvisibility = "hidden"\n')
@@ -160,7 +160,7 @@ def test_students_get_the_task_the_starter_and_the_given_files_and_nothing_that_
 
 
 def test_an_exported_assignment_is_the_same_assignment(tmp_path: Path) -> None:
-    export_whole("json-queue", tmp_path / "copy")
+    export_all("json-queue", tmp_path / "copy")
     assert read_assignment(tmp_path / "copy").version == find_assignment("json-queue").version
     assert (tmp_path / "copy" / "examples" / "reference" / "robot.py").is_file()
 
@@ -168,13 +168,13 @@ def test_an_exported_assignment_is_the_same_assignment(tmp_path: Path) -> None:
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
     (tmp_path / "task").mkdir()
     with pytest.raises(UsageError, match="exists already, expected a new folder"):
-        write_new(tmp_path / "task")
+        create_assignment(tmp_path / "task")
     with pytest.raises(UsageError, match="cannot be the id of an assignment"):
-        write_new(tmp_path / "My Task")
+        create_assignment(tmp_path / "My Task")
 
 
 def test_check_says_what_is_wrong_and_ends_with_two(tmp_path: Path) -> None:
-    write_new(tmp_path / "task")
+    create_assignment(tmp_path / "task")
     (tmp_path / "task" / "examples" / "reference" / "robot.py").write_text("say('red')\n")
     ended = robomark("assignments", "check", tmp_path / "task")
     assert ended.returncode == 2
@@ -189,7 +189,7 @@ def test_answers_that_most_poses_share_are_warned_of() -> None:
 
 
 def test_what_new_examples_got_is_noted_and_nothing_that_stands_there_is_changed(tmp_path: Path) -> None:
-    write_new(tmp_path / "task")
+    create_assignment(tmp_path / "task")
     file, old = tmp_path / "task" / "expected.toml", '# By hand.\n[stops-short]\nmarks = "3"\n'
     file.write_text(old)
     (tmp_path / "task" / "examples" / "says, nothing").mkdir()
@@ -198,7 +198,7 @@ def test_what_new_examples_got_is_noted_and_nothing_that_stands_there_is_changed
     assert noted.returncode == 0, noted.stderr
     assert "results of reference, says, nothing written; check that they are the expected ones" in noted.stdout
     assert file.read_text().startswith(old)
-    tables = expected(str(tmp_path / "task")).examples
+    tables = read_expected(str(tmp_path / "task")).examples
     assert tables["reference"].marks == 6
     assert tables["says, nothing"].marks == sum(tables["says, nothing"].earns.values()) + 1
     again = robomark("assignments", "check", tmp_path / "task", "--write-expected")
@@ -208,18 +208,18 @@ def test_what_new_examples_got_is_noted_and_nothing_that_stands_there_is_changed
 
 def test_marks_that_are_wrong_are_not_noted(tmp_path: Path, runner: TrialRunner) -> None:
     """A reference without full marks is a mistake, and the values in a table are never overwritten."""
-    write_new(tmp_path / "task")
+    create_assignment(tmp_path / "task")
     (tmp_path / "task" / "expected.toml").write_text('[stops-short]\nmarks = "1"\n')
     (tmp_path / "task" / "examples" / "reference" / "robot.py").write_text("say('red')\n")
     checked = check_examples(str(tmp_path / "task"), runner=runner)
-    assert (dict(checked.unwritten), len(checked.problems)) == ({}, 2)
+    assert (dict(checked.missing_expectations), len(checked.problems)) == ({}, 2)
     with pytest.raises(UsageError, match=r"stops-short has a table in expected\.toml already"):
-        add_expected(str(tmp_path / "task"), {"stops-short": Expectation(marks=Decimal(3))})
+        add_expected(str(tmp_path / "task"), {"stops-short": ExpectedResult(marks=Decimal(3))})
 
 
 def test_a_list_says_what_the_assignments_say() -> None:
-    for name in catalogue():
-        found, listed = find_assignment(name), overview(assignment_folder(name))
+    for name in list_catalogue_ids():
+        found, listed = find_assignment(name), read_overview(locate_assignment_folder(name))
         assert (listed.section, listed.id, listed.title) == (found.section, found.id, found.title)
         assert listed.sentence.removesuffix(" …") in " ".join(found.description.split())
         assert (listed.marks, listed.trials) == (found.max_marks, sum(1 for _ in found.trials())), name

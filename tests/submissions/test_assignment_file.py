@@ -16,8 +16,8 @@ from sim.errors import AssignmentError, UsageError
 from sim.floors import HEIGHT, WIDTH
 from sim.recording import Pose
 from submissions.assignment.assignment_parts import build_assignment
-from submissions.assignment.folder import assignment_folder, catalogue
-from submissions.assignment.problems import AssignmentProblems, Problems, find_lines, line_of
+from submissions.assignment.folder import list_catalogue_ids, locate_assignment_folder
+from submissions.assignment.problems import AssignmentProblems, Problems, find_lines, find_nearest_line
 from submissions.assignment.reader import find_assignment, read_assignment
 from submissions.criteria.classification import Classification
 from submissions.criteria.ending import Finishes
@@ -55,7 +55,7 @@ def problems(folder: Path, text: str) -> tuple[str, ...]:
     return error.value.problems
 
 
-@pytest.mark.parametrize("name", catalogue())
+@pytest.mark.parametrize("name", list_catalogue_ids())
 def test_catalogue_is_in_order(name: str) -> None:
     assignment = find_assignment(name)
     assert assignment.id == name
@@ -64,7 +64,7 @@ def test_catalogue_is_in_order(name: str) -> None:
     assert re.fullmatch("[0-9a-f]{64}", assignment.version)
     asked = {"robot.py": assignment.parts.program, "responder.py": assignment.parts.responder}
     asked["robot2.py"] = assignment.parts.second_program
-    starter = {path.name for path in (assignment_folder(name) / "starter").iterdir()}
+    starter = {path.name for path in (locate_assignment_folder(name) / "starter").iterdir()}
     assert {part for part, who in asked.items() if who == "student"} <= starter or starter == {"notebook.ipynb"}
 
 
@@ -438,8 +438,8 @@ t.u = 3
         ("o", 1, "s", 0, "t", "u"): 21,
     }
     assert {path: lines[path] for path in expected} == expected
-    assert line_of(lines, ("o", 1, "q", "missing")) == 18
-    assert line_of(lines, ("nowhere",)) == 1
+    assert find_nearest_line(lines, ("o", 1, "q", "missing")) == 18
+    assert find_nearest_line(lines, ("nowhere",)) == 1
 
 
 KEYS = st.sampled_from(

@@ -10,7 +10,7 @@ import pytest
 
 from service.commands.grading import read_with_assignment
 from sim.errors import UsageError
-from submissions.assignment.folder import assignment_folder
+from submissions.assignment.folder import locate_assignment_folder
 from submissions.batch_folder import read_batch
 
 PROGRAM = "print('hello')\n"
@@ -118,7 +118,7 @@ def test_a_submission_that_we_fail_on_is_the_only_one_that_is_refused(
 def test_a_submission_brings_no_assignment_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "class"
     _student(folder, "eve", toml='assignment = "eve"\n')
-    shutil.copytree(assignment_folder("echo-responder"), folder / "bait")
+    shutil.copytree(locate_assignment_folder("echo-responder"), folder / "bait")
     (folder / "eve" / "assignment.toml").write_bytes((folder / "bait" / "assignment.toml").read_bytes())
     monkeypatch.chdir(folder)
     with pytest.raises(UsageError, match="no assignment 'eve' in the catalogue"):

@@ -14,13 +14,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from responders.code import Code
+from responders.source_file import SourceFile
 from sim.errors import UsageError
 from submissions.assignment.definition import Parts
 from submissions.bundle import fit_parts, read_submission
-from submissions.names import shown_name
-from submissions.packed import pack_submission, unpack_submission
-from submissions.raw_files import MAX_FILE_BYTES, MAX_FILES, unzip
+from submissions.raw_files import MAX_FILE_BYTES, MAX_FILES, read_zip_bytes
+from submissions.stored_submission import pack_submission, unpack_submission
+from submissions.student_names import normalise_name
 from submissions.submission import Submission
 
 pytestmark = pytest.mark.fast
@@ -68,7 +68,7 @@ def test_folder_and_zip_with_or_without_top_folder_are_the_same_submission(tmp_p
     read = [read_submission(form) for form in forms]
     assert len({submission.sha256 for submission in read}) == 1
     assert [submission.student for submission in read] == ["a", "b", "c", "d", "e"]
-    assert read[0].program == Code("robot.py", PROGRAM)
+    assert read[0].program == SourceFile("robot.py", PROGRAM)
     assert dict(read[0].files) == {"net.joblib": b"\x80weights"}
     assert read[1].notes == ("The files were read from the folder week 5 in it.",)
 
@@ -111,28 +111,28 @@ def test_lone_file_without_assignment_goes_by_name_then_by_text(
 def test_lone_file_is_the_part_that_is_asked_for(tmp_path: Path) -> None:
     (tmp_path / "alice.py").write_text(PROGRAM)
     submission = read_submission(tmp_path / "alice.py", asked=Parts("robot.py", "student"))
-    assert submission.responder == Code("alice.py", PROGRAM)
+    assert submission.responder == SourceFile("alice.py", PROGRAM)
     assert submission.program is None
     assert submission.notes == ("alice.py was used as a responder.",)
 
 
 def test_two_files_of_any_name_are_told_apart(tmp_path: Path) -> None:
     submission = read_submission(folder(tmp_path / "x", {"mine.py": RESPONDER, "drive.py": PROGRAM}))
-    assert submission.program == Code("drive.py", PROGRAM)
-    assert submission.responder == Code("mine.py", RESPONDER)
+    assert submission.program == SourceFile("drive.py", PROGRAM)
+    assert submission.responder == SourceFile("mine.py", RESPONDER)
 
 
 def test_one_missing_part_of_two_is_named_and_the_other_taken(tmp_path: Path) -> None:
     path = folder(tmp_path / "bob", {"robot.py": PROGRAM, "my_responder.py": RESPONDER})
     submission = read_submission(path, asked=Parts())
-    assert (submission.program, submission.responder) == (Code("robot.py", PROGRAM), None)
+    assert (submission.program, submission.responder) == (SourceFile("robot.py", PROGRAM), None)
     assert submission.notes == (
         "There is no responder.py (other files: my_responder.py); criteria that need a responder get no marks.",
     )
     lone = tmp_path / "eve.py"
     lone.write_text(RESPONDER)
     submission = read_submission(lone, asked=Parts())
-    assert (submission.program, submission.responder) == (None, Code("eve.py", RESPONDER))
+    assert (submission.program, submission.responder) == (None, SourceFile("eve.py", RESPONDER))
     assert "There is no robot.py; criteria that need a robot program get no marks." in submission.notes
 
 
@@ -143,7 +143,7 @@ def test_without_any_part_that_is_asked_for_it_is_refused(tmp_path: Path) -> Non
 
 
 def test_part_that_the_assignment_gives_is_left_out_with_a_note() -> None:
-    submitted = Submission("a", Code("robot.py", PROGRAM), Code("responder.py", RESPONDER))
+    submitted = Submission("a", SourceFile("robot.py", PROGRAM), SourceFile("responder.py", RESPONDER))
     fitted = fit_parts(submitted, Parts("robot.py", "student"))
     assert fitted.program is None
     assert fitted.notes == ("robot.py was left out: the assignment does not need a robot program.",)
@@ -176,7 +176,7 @@ def test_submission_toml_that_cannot_be_used_is_refused(tmp_path: Path, meta: st
     ],
 )
 def test_student_names_are_cleaned(name: str, clean: str) -> None:
-    assert shown_name(name) == clean
+    assert normalise_name(name) == clean
 
 
 @pytest.mark.parametrize(
@@ -349,7 +349,7 @@ def test_no_broken_zip_raises_anything_but_a_sentence(data: st.DataObject) -> No
     for _ in range(data.draw(st.integers(1, 6))):
         broken[data.draw(st.integers(0, len(broken) - 1))] = data.draw(st.integers(0, 255))
     try:
-        unzip(bytes(broken), "x.zip")
+        read_zip_bytes(bytes(broken), "x.zip")
         sentence = "x.zip: "
     except UsageError as error:
         sentence = str(error)
@@ -358,13 +358,13 @@ def test_no_broken_zip_raises_anything_but_a_sentence(data: st.DataObject) -> No
 
 texts = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=60)
 names = st.from_regex(r"[a-z]{1,8}\.(joblib|txt|csv)", fullmatch=True)
-sources = st.none() | st.builds(Code, names.map(lambda name: name + ".py"), texts)
+sources = st.none() | st.builds(SourceFile, names.map(lambda name: name + ".py"), texts)
 
 
 @given(
     st.builds(
         Submission,
-        student=texts.map(shown_name),
+        student=texts.map(normalise_name),
         program=sources,
         responder=sources,
         files=st.dictionaries(names, st.binary(max_size=40), max_size=3),
@@ -382,10 +382,12 @@ def test_packing_is_exact_and_always_the_same(submission: Submission) -> None:
 
 def test_packed_submission_can_be_submitted(tmp_path: Path) -> None:
     (tmp_path / "kept.zip").write_bytes(
-        pack_submission(Submission("Zoë", Code("z.py", PROGRAM), Code("responder.py", RESPONDER), assignment="x"))
+        pack_submission(
+            Submission("Zoë", SourceFile("z.py", PROGRAM), SourceFile("responder.py", RESPONDER), assignment="x")
+        )
     )
     again = read_submission(tmp_path / "kept.zip")
-    assert (again.student, again.assignment, again.program) == ("kept", "x", Code("robot.py", PROGRAM))
+    assert (again.student, again.assignment, again.program) == ("kept", "x", SourceFile("robot.py", PROGRAM))
 
 
 def test_bytes_that_were_not_packed_here_are_refused() -> None:

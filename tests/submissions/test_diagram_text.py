@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from notebook_builder import MESSAGING
 from sim.errors import UsageError
 from submissions.diagram import Diagram, DiagramActor, DiagramArrow, DiagramKind, Divider
-from submissions.diagram_cells import MOST_DIAGRAMS, MOST_PARTS, diagrams_in
+from submissions.diagram_cells import MOST_DIAGRAMS, MOST_PARTS, read_diagrams
 from submissions.diagram_text import MAX_ACTORS, MAX_DEPTH, MAX_GROUPS, MAX_STEPS, read_diagram
 from submissions.diagram_tokens import MAX_CHARACTERS
 from submissions.notebook import read_notebook
@@ -223,7 +223,7 @@ def test_a_diagram_that_is_written_down_is_read_again(diagram: Diagram) -> None:
 
 
 def test_the_course_notebook_draws_four() -> None:
-    found = diagrams_in(read_notebook(MESSAGING.read_bytes(), "messaging.ipynb").notebook)
+    found = read_diagrams(read_notebook(MESSAGING.read_bytes(), "messaging.ipynb").notebook)
     assert found.problems == ()
     assert [(cell.cell, cell.diagram.kind) for cell in found.cells] == [
         (2, "blockdiag"),
@@ -250,19 +250,19 @@ def test_the_course_notebook_draws_four() -> None:
 def test_a_problem_names_the_cell_and_the_line_in_it() -> None:
     sources = ["x = 1", "# first\n\n%%seqdiag --size 3\na -> b\na @ b", "%%blockdiag\na -> b", "%%seqdiagram\nx"]
     cells = tuple(Cell(number, source) for number, source in enumerate(sources, 1))
-    found = diagrams_in(Notebook("n.ipynb", cells))
+    found = read_diagrams(Notebook("n.ipynb", cells))
     assert [cell.cell for cell in found.cells] == [3]
     assert len(found.problems) == 1
     assert found.problems[0].startswith("cell 2, line 5: '@' is not valid here")
     assert found.problems[0].endswith("; the diagram is not drawn")
-    assert diagrams_in(None).cells == ()
+    assert read_diagrams(None).cells == ()
 
 
 def test_diagrams_are_left_out_that_would_take_too_long_together() -> None:
     steps = "\n".join(f'a -> b [label="{"long " * 20}", note="{"note " * 20}"];' for _ in range(78))
     sources = [f"%%seqdiag\n{steps}"] * 20
     sources.insert(5, "%%seqdiag\na -> b")
-    found = diagrams_in(Notebook("n.ipynb", tuple(Cell(number, text) for number, text in enumerate(sources, 1))))
+    found = read_diagrams(Notebook("n.ipynb", tuple(Cell(number, text) for number, text in enumerate(sources, 1))))
     assert 80 <= sum(cell.diagram.parts for cell in found.cells) <= MOST_PARTS
     assert [cell.cell for cell in found.cells] == [1, 6]
     assert len(found.problems) == MOST_DIAGRAMS - 2 + 1
@@ -271,6 +271,6 @@ def test_diagrams_are_left_out_that_would_take_too_long_together() -> None:
 
 def test_of_very_many_diagrams_the_first_are_read() -> None:
     cells = tuple(Cell(number, "%%seqdiag\na -> b") for number in range(1, 200))
-    found = diagrams_in(Notebook("n.ipynb", cells))
+    found = read_diagrams(Notebook("n.ipynb", cells))
     assert len(found.cells) == MOST_DIAGRAMS
     assert found.problems == (f"cell {MOST_DIAGRAMS + 1}: of all diagrams only the first {MOST_DIAGRAMS} are drawn",)

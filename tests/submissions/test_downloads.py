@@ -10,7 +10,7 @@ import pytest
 
 from sim.errors import UsageError
 from submissions.batch_folder import BatchContents, read_batch
-from submissions.downloads import moodle_number
+from submissions.downloads import parse_moodle_number
 from submissions.student_identity import People, read_people
 from zips import zipped
 
@@ -84,7 +84,7 @@ def test_moodles_download_names_each_student_once(tmp_path: Path, shape: str, as
     contents = read_batch(path, ASSIGNMENT)
     assert refused(contents) == {}
     assert taken(contents) == {name: name for name in ("Ada Lovelace", "Alan Turing", "Mary-Ann O'Neil")}
-    numbers = sorted(moodle_number(request.source) for request in contents.grading_requests)
+    numbers = sorted(parse_moodle_number(request.source) for request in contents.grading_requests)
     assert numbers == ["500000", "500001", "500002"]
     assert all(request.submission.responder is not None for request in contents.grading_requests)
     known = read_batch(path, ASSIGNMENT, people(tmp_path))
@@ -256,7 +256,7 @@ def test_a_roster_says_who_everybody_is_in_any_order(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_tables_of_people_of_many_makes(tmp_path: Path, text: str, found: set[tuple[str, str, str]]) -> None:
-    listed = {each for several in people(tmp_path, text).called.values() for each in several}
+    listed = {each for several in people(tmp_path, text).by_name.values() for each in several}
     assert {(each.id, each.name, each.email) for each in listed} == found
 
 

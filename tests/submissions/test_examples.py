@@ -15,32 +15,32 @@ from service.grading import (
     hint_braces,
     hint_files,
     hint_formulas,
-    hint_repeats,
+    hint_logic,
+    hint_repetition,
     hint_signatures,
     hint_slips,
-    hint_steps,
     hint_structure,
     hint_thresholds,
     hint_timing,
-    hint_unused,
+    hint_values,
 )
 from service.grading.example_check import check_examples
 from service.grading.grade import CriterionResult, Grade, TrialResult
 from service.grading.grader import grade
-from service.grading.hint_clues import clues_of
-from service.grading.hints import Rule, accepted_differences, near_misses
+from service.grading.hint_clues import collect_clues
+from service.grading.hints import Rule, collect_accepted_differences, collect_near_misses
 from service.grading.run_plan import RunPlan
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
-from submissions.assignment.examples import Expectation, expected, read_example
-from submissions.assignment.folder import REFERENCE, catalogue
+from submissions.assignment.examples import ExpectedResult, read_example, read_expected
+from submissions.assignment.folder import REFERENCE, list_catalogue_ids
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 from submissions.criteria import Criterion
-from submissions.criteria.common import AmongMany
-from submissions.criteria.logged import Datalog
+from submissions.criteria.common import CriterionWithStrays
+from submissions.criteria.logs import Datalog
 from submissions.criteria.texts import TextSequence
-from submissions.packed import pack_submission, unpack_submission
+from submissions.stored_submission import pack_submission, unpack_submission
 from submissions.submission import Submission
 
 #: Their examples take four fifths of the total time: dozens of trials, minutes on the track, or training.
@@ -69,7 +69,9 @@ _LONG = frozenset(
         "train-a-recogniser",
     }
 )
-_ASSIGNMENTS = [pytest.param(name, marks=[pytest.mark.long] * (name in _LONG), id=name) for name in catalogue()]
+_ASSIGNMENTS = [
+    pytest.param(name, marks=[pytest.mark.long] * (name in _LONG), id=name) for name in list_catalogue_ids()
+]
 FOLDER = DATA / "failing_submissions"
 FAILING: Mapping[str, Mapping[str, Any]] = tomllib.loads((FOLDER / "expected.toml").read_text())
 
@@ -83,7 +85,7 @@ def grade_failing(name: str, runner: TrialRunner) -> Grade:
     return grade(read_submission(FOLDER / name, asked=asked.parts), asked, runner=runner)
 
 
-def assert_as_expected(result: Grade, wanted: Expectation) -> None:
+def assert_as_expected(result: Grade, wanted: ExpectedResult) -> None:
     told = "\n".join(criterion.message for criterion in result.criteria)
     assert (str(result.verdict), result.marks) == (wanted.verdict, wanted.marks), told
     for phrase in wanted.feedback:
@@ -97,14 +99,14 @@ def rules_that_prove() -> Iterator[Rule]:
         hint_braces,
         hint_files,
         hint_formulas,
-        hint_repeats,
+        hint_repetition,
         hint_signatures,
         hint_slips,
-        hint_steps,
+        hint_logic,
         hint_structure,
         hint_thresholds,
         hint_timing,
-        hint_unused,
+        hint_values,
     )
     for module in modules:
         yield from (each for name, each in vars(module).items() if name.startswith("of_"))
@@ -124,14 +126,14 @@ def test_every_example_is_marked_as_expected(
         _heartbeat: Callable[[], None],
     ) -> tuple[str, ...]:
         if all(result.marks >= result.max_marks for result in results):
-            clues = clues_of(submission, plan, trials, results)
-            alarms.extend((*near_misses(clues), *accepted_differences(clues)))
+            clues = collect_clues(submission, plan, trials, results)
+            alarms.extend((*collect_near_misses(clues), *collect_accepted_differences(clues)))
             alarms.extend(result.for_staff for result in results if "more than it shows" in result.for_staff)
             as_lost = replace(clues, lost=plan.assignment.criteria, results=tuple(results))
             alarms.extend(sentence for rule in rules_that_prove() for sentence in rule(as_lost))
         return ()
 
-    monkeypatch.setattr("service.grading.grader.hints_for", hints_whatever_the_marks)
+    monkeypatch.setattr("service.grading.grader.collect_hints", hints_whatever_the_marks)
     checked = check_examples(assignment, runner=runner)
     assert checked.problems == ()
     assert alarms == []
@@ -150,7 +152,7 @@ def test_failing_submission_gets_a_verdict_or_one_sentence(name: str, runner: Tr
             grade_failing(name, runner)
         assert str(refusal.value) == wanted["refused"]
     else:
-        assert_as_expected(grade_failing(name, runner), Expectation(**wanted))
+        assert_as_expected(grade_failing(name, runner), ExpectedResult(**wanted))
 
 
 def test_every_failing_submission_has_an_expectation() -> None:
@@ -195,7 +197,9 @@ def test_seed_names_all_six_shapes_and_says_so(runner: TrialRunner) -> None:
 
 def sought(criterion: Criterion) -> bool:
     """Return whether the criterion searches for a particular item, other than any item or the last text."""
-    if not isinstance(criterion, AmongMany) or (isinstance(criterion, Datalog) and criterion.measured is None):
+    if not isinstance(criterion, CriterionWithStrays) or (
+        isinstance(criterion, Datalog) and criterion.measured is None
+    ):
         return False
     if not isinstance(criterion, TextSequence):
         return True
@@ -203,9 +207,9 @@ def sought(criterion: Criterion) -> bool:
     return not (criterion.last or any_text)
 
 
-@pytest.mark.parametrize("assignment", catalogue())
+@pytest.mark.parametrize("assignment", list_catalogue_ids())
 def test_naming_everything_earns_less_than_a_third_of_each_criterion_that_looks_among_much(assignment: str) -> None:
     asked = [criterion for criterion in find_assignment(assignment).criteria if sought(criterion)]
     if asked:
-        earned = expected(assignment).examples["spray-and-pray"].earns
+        earned = read_expected(assignment).examples["spray-and-pray"].earns
         assert [each.id for each in asked if 3 * earned[each.id] >= each.marks] == []

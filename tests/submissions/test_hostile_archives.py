@@ -18,9 +18,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim.errors import UsageError
-from submissions import unzipping
+from submissions import archive_extraction
 from submissions.bundle import read_submission
-from submissions.raw_files import MAX_FILE_BYTES, MAX_TOTAL_BYTES, unzip
+from submissions.raw_files import MAX_FILE_BYTES, MAX_TOTAL_BYTES, read_zip_bytes
 
 _PLAIN = {"robot.py": b"print(1)\n", "responder.py": b"def responder(text): return text\n"}
 
@@ -201,7 +201,7 @@ def test_no_archive_of_any_making_raises_anything_else(
 def _unzipped(data: bytes) -> tuple[dict[str, bytes] | None, str]:
     """Return the files, or the reason for the refusal."""
     try:
-        return unzip(data, "x.zip").files, ""
+        return read_zip_bytes(data, "x.zip").files, ""
     except UsageError as error:
         return None, str(error)
 
@@ -215,5 +215,5 @@ def test_a_file_in_very_many_folders_is_refused(depth: int, tmp_path: Path) -> N
         written.writestr("ada/robot.py", "print(1)")
         written.writestr("/".join(["d"] * depth) + "/robot.py", "print(1)")
     with pytest.raises(UsageError, match="in more than 20 folders"):
-        unzipping.unzip(archive, folder, 100, 10**6)
+        archive_extraction.unzip(archive, folder, 100, 10**6)
     assert not (folder / "d").exists()

@@ -13,9 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.errors import UsageError
-from submissions.bundle import read_submission, submission_of
-from submissions.packed import pack_submission, unpack_submission
-from submissions.raw_files import MAX_FILE_BYTES, MAX_FILES, MAX_TOTAL_BYTES, SentFile, read_sent, unzip
+from submissions.bundle import build_submission, read_submission
+from submissions.raw_files import (
+    MAX_FILE_BYTES,
+    MAX_FILES,
+    MAX_TOTAL_BYTES,
+    UploadedFile,
+    read_uploaded,
+    read_zip_bytes,
+)
+from submissions.stored_submission import pack_submission, unpack_submission
 from submissions.submission import Submission
 
 PARTS = {"robot.py": b"print('hello')\n", "responder.py": b"def responder(msg):\n    return msg\n"}
@@ -35,12 +42,12 @@ def _of_zip(files: Mapping[str, bytes]) -> Submission:
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, data in files.items():
             archive.writestr(name, data)
-    return submission_of(unzip(buffer.getvalue(), "ada.zip"), "ada.zip", "ada", "")
+    return build_submission(read_zip_bytes(buffer.getvalue(), "ada.zip"), "ada.zip", "ada", "")
 
 
 def _sent(files: Mapping[str, bytes]) -> Submission:
-    raw = read_sent([SentFile(name, BytesIO(data)) for name, data in files.items()], "what was sent")
-    return submission_of(raw, "what was sent", "ada", "")
+    raw = read_uploaded([UploadedFile(name, BytesIO(data)) for name, data in files.items()], "what was sent")
+    return build_submission(raw, "what was sent", "ada", "")
 
 
 WAYS = {"folder": _of_folder, "zip": _of_zip, "sent": _sent}

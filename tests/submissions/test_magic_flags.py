@@ -6,7 +6,16 @@ import pytest
 
 from sim.errors import UsageError
 from sim.recording import Pose
-from submissions.magics import Flags, Setup, Simulator, parse_flags, parse_magic, setup, split_program, without_magic
+from submissions.magics import (
+    Flags,
+    SimulatorPage,
+    SimulatorSettings,
+    apply_flags,
+    comment_out_magic,
+    parse_flags,
+    parse_magic,
+    split_program,
+)
 
 pytestmark = pytest.mark.fast
 
@@ -70,7 +79,7 @@ POSES = [
 
 @pytest.mark.parametrize(("flags", "pose"), POSES)
 def test_pose(flags: str, pose: tuple[float, float, float]) -> None:
-    chosen = setup(parse_magic(f"%%sim_magic {flags}")).pose
+    chosen = apply_flags(parse_magic(f"%%sim_magic {flags}")).pose
     assert (chosen.x, chosen.y, chosen.heading) == pose
 
 
@@ -91,12 +100,12 @@ def test_pose(flags: str, pose: tuple[float, float, float]) -> None:
     ],
 )
 def test_a_flag_that_does_not_mean_what_it_says_is_pointed_out(flags: str, words: str) -> None:
-    assert any(words in note for note in setup(parse_magic(f"%%sim_magic {flags}")).notes)
+    assert any(words in note for note in apply_flags(parse_magic(f"%%sim_magic {flags}")).notes)
 
 
 def test_single_letters_stand_together_and_the_rest_is_read() -> None:
     flags = parse_magic("%%sim_magic_preloaded -pROHW --collab -N10 -o Wall")
-    chosen = setup(flags)
+    chosen = apply_flags(flags)
     assert chosen.pen_down
     assert chosen.collaborative
     assert chosen.light_noise == 10
@@ -126,7 +135,7 @@ def test_a_line_that_cannot_be_read_is_refused_in_one_sentence(line: str) -> Non
 
 def test_a_number_that_is_none_is_refused() -> None:
     with pytest.raises(UsageError, match="whole number between 0 and 2362"):
-        setup(parse_magic("%%sim_magic -x 10.5"))
+        apply_flags(parse_magic("%%sim_magic -x 10.5"))
 
 
 def test_the_magic_line_keeps_its_place_and_chooses_the_preamble() -> None:
@@ -153,7 +162,7 @@ def test_a_refused_line_is_named_by_its_number_and_is_none_of_the_program() -> N
     program = "\n%%sim_magic --nope\nprint(1)"
     with pytest.raises(UsageError, match=r"^line 2: there is no flag --nope"):
         split_program(program)
-    assert without_magic(program) == "\n#\nprint(1)"
+    assert comment_out_magic(program) == "\n#\nprint(1)"
 
 
 @pytest.mark.parametrize("line", ["%", "%%", "%% ", "%%\u00a0", "% %"])
@@ -167,9 +176,9 @@ def test_a_blank_between_the_percent_signs_is_what_is_told() -> None:
         split_program("% %sim_magic -b Loop\nprint(1)\n")
 
 
-def pages(*lines: str) -> list[Setup]:
+def pages(*lines: str) -> list[SimulatorSettings]:
     """Return the state of one simulator after each of several magics."""
-    simulator = Simulator()
+    simulator = SimulatorPage()
     return [simulator.apply(parse_flags("sim_magic", line)) for line in lines]
 
 
@@ -219,8 +228,8 @@ def test_a_program_below_wrappers_is_found_with_its_lines_in_their_places() -> N
 
 
 def test_a_robot_that_was_left_somewhere_stays_there_until_it_is_placed() -> None:
-    simulator = Simulator()
-    simulator.leave_at(Pose(321.5, 234.49, -45.25))
+    simulator = SimulatorPage()
+    simulator.set_pose(Pose(321.5, 234.49, -45.25))
     assert simulator.apply(Flags()).pose == Pose(321.5, 234.49, -45.25)
     # The sliders follow the robot in whole numbers. The slider of the angle does not follow.
     assert simulator.apply(parse_flags("sim_magic", "-y 5")).pose == Pose(322, 5, 0)

@@ -14,17 +14,17 @@ from sqlalchemy import insert, select, update
 
 from builders import grading_request
 from command import robomark
-from service.reports.written import file_stem, file_stems, refused_stems
+from service.reports.output_files import build_file_stem, build_file_stems, build_refused_stems
 from service.store.batches import intake
 from service.store.engine import Store, now
 from service.store.models import Enrolment, Job, Person, SubmissionRow
-from service.store.people.students import Students, course_of
+from service.store.people.students import Students, ensure_course
 from service.store.states import Role
 from sim.errors import UsageError
 from submissions.batch_folder import BatchContents, read_batch
 from submissions.bundle import read_submission
-from submissions.names import alike, forms, shown_name
 from submissions.student_identity import Student
+from submissions.student_names import compute_name_forms, find_look_alikes, normalise_name
 
 ASSIGNMENT = "echo-responder"
 RESPONDER = "def responder(msg):\n    return msg\n"
@@ -122,11 +122,12 @@ def test_nobody_takes_the_place_of_who_is_in_the_course(tmp_path: Path, store: S
     """Refused in a later batch, except spellings that normalise to the same name."""
     batches = [read_batch(_folder(tmp_path / str(number), name), ASSIGNMENT) for number, name in enumerate((ada, eve))]
     first, later = (
-        intake.accept_new(store, "b", each.grading_requests, each.refusals, max_attempts=3) for each in batches
+        intake.accept_new_submissions(store, "b", each.grading_requests, each.refusals, max_attempts=3)
+        for each in batches
     )
     assert first.batch is not None
     assert first.refused == ()
-    if shown_name(ada) == shown_name(eve) and eve == "Zoe\u0308":
+    if normalise_name(ada) == normalise_name(eve) and eve == "Zoe\u0308":
         assert later.batch is not None  # the same letters, written on any machine
         return
     assert later.batch is None
@@ -138,8 +139,8 @@ def test_nobody_takes_the_place_of_who_is_in_the_course(tmp_path: Path, store: S
 
 @PAIRS
 def test_files_of_alike_names_never_share_a_name(ada: str, eve: str) -> None:
-    if shown_name(ada) != shown_name(eve):
-        assert file_stem(shown_name(ada)) != file_stem(shown_name(eve))
+    if normalise_name(ada) != normalise_name(eve):
+        assert build_file_stem(normalise_name(ada)) != build_file_stem(normalise_name(eve))
 
 
 @pytest.mark.parametrize(
@@ -156,7 +157,7 @@ def test_files_of_alike_names_never_share_a_name(ada: str, eve: str) -> None:
     ],
 )
 def test_students_of_different_names_are_all_taken_in(tmp_path: Path, names: tuple[str, ...]) -> None:
-    assert alike(names) == {}
+    assert find_look_alikes(names) == {}
     checked = read_batch(_folder(tmp_path, *names), ASSIGNMENT)
     assert {each.submission.student for each in checked.grading_requests} == set(names)
     assert checked.refusals == ()
@@ -178,7 +179,7 @@ def test_a_folder_that_names_nobody_is_refused(tmp_path: Path, name: str) -> Non
     checked = read_batch(_folder(tmp_path, "ada", name), ASSIGNMENT)
     assert [each.submission.student for each in checked.grading_requests] == ["ada"]
     (sentence,) = _refused(checked)
-    assert f"a student's name of {len(shown_name(name))} characters" in sentence
+    assert f"a student's name of {len(normalise_name(name))} characters" in sentence
 
 
 @pytest.mark.parametrize("named", ["ada", "Ada ", "../ada", "\u0430da"])
@@ -219,9 +220,9 @@ def test_a_report_made_later_does_not_take_the_place_of_anothers(tmp_path: Path)
 
 
 def test_an_extension_is_for_one_who_can_be_told_from_others(store: Store) -> None:
-    intake.accept(store, grading_request("ada"), max_attempts=3)
+    intake.accept_submission(store, grading_request("ada"), max_attempts=3)
     with store.transaction() as session:
-        students = Students(session, course_of(session, "default", now(session)))
+        students = Students(session, ensure_course(session, "default", now(session)))
         known = students.enrol(Student("ada"), now(session))
         assert known == session.scalar(select(Enrolment.id))
         for name in (" ada", "Ada", "\u0430da", "\u200b"):
@@ -234,7 +235,7 @@ def test_an_extension_is_for_one_who_can_be_told_from_others(store: Store) -> No
 def test_who_was_first_written_with_a_blank_may_go_on_so_until_the_name_itself_comes(store: Store) -> None:
     with store.transaction() as session:
         at = now(session)
-        students = Students(session, course_of(session, "default", at))
+        students = Students(session, ensure_course(session, "default", at))
         known = students.enrol(Student("ada "), at)
         assert students.enrol(Student("ada "), at) == known
         assert students.enrol(Student("ada"), at) == known
@@ -245,7 +246,7 @@ def test_who_was_first_written_with_a_blank_may_go_on_so_until_the_name_itself_c
 def test_name_and_address_are_those_that_were_told_last(store: Store) -> None:
     with store.transaction() as session:
         at = now(session)
-        students = Students(session, course_of(session, "default", at))
+        students = Students(session, ensure_course(session, "default", at))
         known = students.enrol(Student("s1"), at)
         for told in (Student("s1", "Ada King", "ada@uni.example"), Student("s1", "Ada Lovelace"), Student("s1")):
             assert students.enrol(told, at) == known
@@ -256,51 +257,51 @@ def test_name_and_address_are_those_that_were_told_last(store: Store) -> None:
 def test_only_who_is_there_is_found(store: Store) -> None:
     with store.transaction() as session:
         at = now(session)
-        students = Students(session, course_of(session, "default", at))
+        students = Students(session, ensure_course(session, "default", at))
         known = students.enrol(Student("Ada Lovelace"), at)
-        assert students.find(" Ada  Lovelace") == known
+        assert students.load_enrolment(" Ada  Lovelace") == known
         with pytest.raises(UsageError, match='did you mean "Ada Lovelace"'):
-            students.find("Ada Lovelance")
+            students.load_enrolment("Ada Lovelance")
         with pytest.raises(UsageError, match="there is no student 'bob' in this course; to enrol a student"):
-            students.find("bob")
+            students.load_enrolment("bob")
 
 
 def test_students_of_an_older_database_go_on_under_their_names(store: Store) -> None:
     """Two students that today's rules would not distinguish, and one enrolled with blanks by an extension."""
     with store.transaction() as session:
         at = now(session)
-        course_id = course_of(session, "default", at)
+        course_id = ensure_course(session, "default", at)
         for number, name in enumerate(("Ada", "ada", " bob")):
             session.execute(insert(Person).values(id=number + 1, created_at=at))
             row = {"id": number + 1, "course_id": course_id, "person_id": number + 1, "student": name, "written": name}
             session.execute(insert(Enrolment).values(role=Role.STUDENT, **row))
     for name, expected in (("Ada", 1), ("ada", 2), ("bob", 3)):
-        accepted = intake.accept(store, grading_request(name), max_attempts=3)
+        accepted = intake.accept_submission(store, grading_request(name), max_attempts=3)
         assert (accepted.student, accepted.attempt) == (name, 1)
         with store.reading() as session:
             assert session.scalar(select(Job.enrolment_id).where(Job.id == accepted.job_id)) == expected
     with pytest.raises(UsageError, match="cannot be distinguished from"):
-        intake.accept(store, grading_request("ADA"), max_attempts=3)
+        intake.accept_submission(store, grading_request("ADA"), max_attempts=3)
 
 
 def test_an_older_hash_means_only_that_it_is_graded_again(store: Store) -> None:
     taken = grading_request("ada")
-    intake.accept_new(store, "b", [taken], (), max_attempts=3)
+    intake.accept_new_submissions(store, "b", [taken], (), max_attempts=3)
     with store.transaction() as session:
         session.execute(update(SubmissionRow).values(sha256="0" * 64))
-    again = intake.accept_new(store, "b", [taken], (), max_attempts=3)
+    again = intake.accept_new_submissions(store, "b", [taken], (), max_attempts=3)
     assert again.batch is not None
     assert [(job.attempt, job.staff_only) for job in again.batch.jobs] == [(2, "")]
-    assert intake.accept_new(store, "b", [taken], (), max_attempts=3).known != ()
+    assert intake.accept_new_submissions(store, "b", [taken], (), max_attempts=3).known != ()
 
 
 @given(st.text(max_size=30))
 @example("a\u0300 \u200d\u0301")
 @example("\u2000\u200d \u3164.")
 def test_there_is_one_normal_form(text: str) -> None:
-    name = shown_name(text)
-    assert shown_name(name) == name
-    assert name == "" or forms(name) == forms(text)
+    name = normalise_name(text)
+    assert normalise_name(name) == name
+    assert name == "" or compute_name_forms(name) == compute_name_forms(text)
     assert "\n" not in name
     assert name == name.strip()
 
@@ -314,9 +315,9 @@ NAMES = st.text(st.sampled_from("aA \u00e9-._~+/\\\u2764\u0431"), max_size=6) | 
 @example(["index", "Index", "", "report"])
 @example(["x" * 200, "x" * 201, "\U0001d54f" * 60])
 def test_files_of_different_names_have_different_names(names: list[str]) -> None:
-    stems = file_stems([(name, "json-queue") for name in names])
+    stems = build_file_stems([(name, "json-queue") for name in names])
     assert len(set(stems)) == len(names)
-    assert stems == [file_stem(name) for name in names]
+    assert stems == [build_file_stem(name) for name in names]
     for stem in stems:
         assert len(stem.encode()) < 200
         assert not set(stem) & set("/\\\0\n ")
@@ -326,17 +327,17 @@ def test_files_of_different_names_have_different_names(names: list[str]) -> None
 
 def test_a_student_with_several_assignments_has_a_file_for_each() -> None:
     graded = [("ada", "json-queue"), ("bob", "json-queue"), ("ada", "echo-responder")]
-    assert file_stems(graded) == ["ada+json-queue", "bob", "ada+echo-responder"]
-    assert file_stems(graded[::-1]) == file_stems(graded)[::-1]
+    assert build_file_stems(graded) == ["ada+json-queue", "bob", "ada+echo-responder"]
+    assert build_file_stems(graded[::-1]) == build_file_stems(graded)[::-1]
 
 
 def test_who_was_refused_together_has_a_file_each() -> None:
     refused = [("submission_1", "ada"), ("submission_1", "bob"), ("submission_2", "ada"), ("line 4: ada", "ada")]
-    assert len(set(refused_stems(refused))) == 4
-    assert refused_stems(refused)[2] == "submission_2+refused"
+    assert len(set(build_refused_stems(refused))) == 4
+    assert build_refused_stems(refused)[2] == "submission_2+refused"
 
 
 def test_files_in_an_index_of_a_batch_keep_their_students_names() -> None:
-    assert [file_stem(name) for name in ("Ada Lovelace", "Jean-Luc Picard", "Zo\u00eb", "1234_ada_")] == [
+    assert [build_file_stem(name) for name in ("Ada Lovelace", "Jean-Luc Picard", "Zo\u00eb", "1234_ada_")] == [
         "Ada-Lovelace", "Jean--Luc-Picard", "Zo\u00eb", "1234_ada_",
     ]  # fmt: skip

@@ -7,12 +7,12 @@ from types import FrameType
 
 import pytest
 
-from submissions.plain_cells import python_of
+from submissions.notebook_python import extract_python
 from submissions.submission import Cell, Notebook
 
 
 def _python(*sources: str) -> str:
-    return python_of(Notebook("a.ipynb", tuple(Cell(number, source) for number, source in enumerate(sources, 1))))
+    return extract_python(Notebook("a.ipynb", tuple(Cell(number, source) for number, source in enumerate(sources, 1))))
 
 
 @pytest.mark.parametrize(

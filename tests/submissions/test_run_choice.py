@@ -13,7 +13,7 @@ from sim.errors import UsageError
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import fit_parts, read_submission
 from submissions.marked_run import RunChoice, choose_run
-from submissions.packed import pack_submission, unpack_submission
+from submissions.stored_submission import pack_submission, unpack_submission
 from submissions.submission import Submission
 
 ANSWER = "def responder(text):\n    return text"

@@ -12,7 +12,7 @@ from sim.recording import Pose
 from submissions.assignment.definition import Assignment, Parts
 from submissions.assignment.reader import read_assignment
 from submissions.bundle import read_submission
-from submissions.packed import pack_submission, unpack_submission
+from submissions.stored_submission import pack_submission, unpack_submission
 
 HEAD = 'id = "a"\ntitle = "A"\n'
 WORLD = "[world]\nrobots = 2\n"

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from responders.code import Code
+from responders.source_file import SourceFile
 from submissions.submission import Cell, Notebook, Submission
 
 #: Pairs with different hashes. They were equal when names and lengths did not precede their content.
@@ -36,8 +36,8 @@ APART = {
         Submission("a", notebook=Notebook("eve.ipynb", (Cell(1, "x"),))),
     ),
     "programs of other names, which errors have": (
-        Submission("a", Code("ada.py", "1/0")),
-        Submission("a", Code("eve.py", "1/0")),
+        Submission("a", SourceFile("ada.py", "1/0")),
+        Submission("a", SourceFile("eve.py", "1/0")),
     ),
 }
 
@@ -75,7 +75,7 @@ def _read_back(data: bytes) -> list[list[bytes]]:
 TEXTS = st.text(st.characters(), max_size=12) | st.sampled_from(
     ["", "2 bytes\nab", "3 fields\n", "program", "file", "a:b", "\ud800", "\n", "1"]
 )
-SOURCES = st.none() | st.builds(Code, TEXTS, TEXTS)
+SOURCES = st.none() | st.builds(SourceFile, TEXTS, TEXTS)
 CELLS = st.builds(Cell, st.integers(1, 12), TEXTS, st.lists(TEXTS, max_size=3).map(tuple))
 SUBMISSIONS = st.builds(
     Submission,
@@ -92,13 +92,13 @@ def test_all_of_a_submission_but_its_student_can_be_read_back_from_what_is_hashe
     program = responder = notebook = None
     cells: list[Cell] = []
     files = {}
-    for kind, *fields in _read_back(b"".join(submission.hashed())):
+    for kind, *fields in _read_back(b"".join(submission.iterate_hash_data())):
         texts = [field.decode("utf-8", "surrogatepass") if kind != b"file" else "" for field in fields]
         match kind:
             case b"program":
-                program = Code(*texts)
+                program = SourceFile(*texts)
             case b"responder":
-                responder = Code(*texts)
+                responder = SourceFile(*texts)
             case b"notebook":
                 notebook = Notebook(texts[0], ())
             case b"cell":

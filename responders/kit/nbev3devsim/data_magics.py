@@ -55,19 +55,19 @@ def sim_bw_image_data(words: list[str]) -> Any:
     if "-r" in words or "--random" in words:
         index = random.randrange(len(df))
     else:
-        index = int(_value(words, "-i", "--index", "-1"))
-    crop = tuple(int(number) for number in _value(words, "-c", "--crop", "3,3,17,17").split(","))
+        index = int(_find_option(words, "-i", "--index", "-1"))
+    crop = tuple(int(number) for number in _find_option(words, "-c", "--crop", "3,3,17,17").split(","))
     whole = "-n" in words or "--nocrop" in words
-    threshold = int(_value(words, "-t", "--threshold", "127"))
+    threshold = int(_find_option(words, "-t", "--threshold", "127"))
     return generate_bw_image(df, index % max(len(df), 1), threshold=threshold, crop=None if whole else crop)
 
 
 def sim_image_pair(words: list[str]) -> Any:
     """The left and the right image of a logged pair: ``-p index``."""
-    return get_sensor_image_pair(roboSim.image_data(), int(_value(words, "-p", "--pair", "-1")))
+    return get_sensor_image_pair(roboSim.image_data(), int(_find_option(words, "-p", "--pair", "-1")))
 
 
-def _value(words: list[str], short: str, long: str, default: str) -> str:
+def _find_option(words: list[str], short: str, long: str, default: str) -> str:
     for place, word in enumerate(words):
         if word in (short, long) and place + 1 < len(words):
             return words[place + 1]

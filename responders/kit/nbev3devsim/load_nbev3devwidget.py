@@ -50,10 +50,10 @@ class RoboSim:
         import pandas as pd  # here alone: some assignments do without it
 
         return pd.DataFrame(
-            [self._row(entry, mode) for entry in self.raw_image_data], columns=["side", "vals", "clock"]
+            [self._parse_entry(entry, mode) for entry in self.raw_image_data], columns=["side", "vals", "clock"]
         )
 
-    def _row(self, entry: str, mode: str) -> tuple[str, ...]:
+    def _parse_entry(self, entry: str, mode: str) -> tuple[str, ...]:
         if (entry, mode) not in self._rows:
             side, values, clock = entry.split(" ")[:3]
             self._rows[entry, mode] = (side, str(self.process_raw_image_data(values, mode)), clock)

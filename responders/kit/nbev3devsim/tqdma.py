@@ -64,7 +64,7 @@ def trange(*args: int, **kwargs: Any) -> tqdm:
     return tqdm(range(*args), **kwargs)
 
 
-def _each_of(function: Any, *iterables: Iterable[Any], **_: Any) -> list[Any]:
+def _map_items(function: Any, *iterables: Iterable[Any], **_: Any) -> list[Any]:
     return list(map(function, *iterables))
 
 
@@ -73,5 +73,5 @@ tqdm_notebook = tqdma = tqdm
 BARS = {
     **dict.fromkeys(("tqdm", "tqdm_notebook"), tqdm),
     **dict.fromkeys(("trange", "tnrange"), trange),
-    **dict.fromkeys(("process_map", "thread_map"), _each_of),
+    **dict.fromkeys(("process_map", "thread_map"), _map_items),
 }

@@ -142,7 +142,7 @@ def quick_progress_tracked_training(
 
     With ``report`` it prints how the network names those last ones.
     """
-    rows = _rows(images_list, size, jiggled, use_signature, fill) if image_data else images_list
+    rows = _build_rows(images_list, size, jiggled, use_signature, fill) if image_data else images_list
     kept = len(rows) - (max(len(rows) // 10, 1) if test_limit is None else test_limit)
     MLP = progress_tracked_training(
         normalize(rows[:kept], axis=1),
@@ -158,7 +158,7 @@ def quick_progress_tracked_training(
     return MLP
 
 
-def _rows(images: Any, size: tuple[int, int] | None, jiggled: bool, use_signature: bool, fill: int) -> list[Any]:
+def _build_rows(images: Any, size: tuple[int, int] | None, jiggled: bool, use_signature: bool, fill: int) -> list[Any]:
     shown = [as_image(image) for image in images] if size is None else resized_images_pipeline(images, size)
     shown = [jiggle(image) for image in shown] if jiggled else shown
     if use_signature:
@@ -286,12 +286,12 @@ def reshape_data(img: Any, n_images: int = 3000, size: tuple[int, int] = (28, 28
     return images, rows, normalize(rows, norm="max", axis=1)
 
 
-def _shows_nothing(*_args: Any, **_kwargs: Any) -> None:
+def _show_nothing(*_args: Any, **_kwargs: Any) -> None:
     """Draws in a notebook; nothing here."""
 
 
-show_loss = preview_weights = multiply_image_by_weights = _shows_nothing
-prediction_class_chart = displayImageLabelPairFromArray = test_display = _shows_nothing
+show_loss = preview_weights = multiply_image_by_weights = _show_nothing
+prediction_class_chart = displayImageLabelPairFromArray = test_display = _show_nothing
 
 
 def cnn_load(
@@ -321,14 +321,14 @@ def cnn_load(
 
 def cnn_get_details(cnn: CNN, report: bool = False) -> Details | None:
     """Return input, output, whether inputs are floats, height and width; with ``report``, print only."""
-    details = _details(cnn)
+    details = _read_details(cnn)
     if not report:
         return details
     print(f"\nInput: {details[0]}\n\nOutput: {details[1]}\n")
     return None
 
 
-def _details(cnn: CNN) -> Details:
+def _read_details(cnn: CNN) -> Details:
     inputs, outputs = cnn[0].get_input_details(), cnn[0].get_output_details()
     _, height, width = inputs[0]["shape"][:3]
     return inputs, outputs, inputs[0]["dtype"] == np.float32, height, width
@@ -347,7 +347,7 @@ def cnn_test_with_image(
 ) -> NDArray[Any] | None:
     """Return the network's output for the resized image, with ``retval``. Prints the ``rank`` likeliest classes."""
     interpreter, labels = cnn
-    inputs, outputs, is_float, height, width = _details(cnn)
+    inputs, outputs, is_float, height, width = _read_details(cnn)
     shape, kind = inputs[0]["shape"], inputs[0]["dtype"]
     values = np.asarray(img.resize((width, height)))
     if values.size != np.prod(shape):

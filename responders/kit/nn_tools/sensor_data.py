@@ -238,7 +238,7 @@ def generate_signature(
     if not linear:
         return pd.DataFrame(rows)
     flat = [number for row in rows for number in row]
-    return _normalised([flat], "l2") if normalise else flat
+    return _normalise_rows([flat], "l2") if normalise else flat
 
 
 def get_image_from_state(
@@ -325,14 +325,14 @@ def get_image_features(image: Image.Image) -> list[int]:
 def get_images_features(images_list: Sequence[Image.Image], normalise: bool = True) -> Any:
     """One row of pixel values an image, of length 1 unless ``normalise`` is off."""
     rows = [get_image_features(image) for image in images_list]
-    return _normalised(rows, "l2") if normalise else rows
+    return _normalise_rows(rows, "l2") if normalise else rows
 
 
 def predict_from_image(MLP: Any, _image_image: Image.Image) -> Any:
-    return MLP.predict(_normalised([get_image_features(_image_image)], "max"))[0]
+    return MLP.predict(_normalise_rows([get_image_features(_image_image)], "max"))[0]
 
 
-def _normalised(rows: list[list[int]], norm: str) -> Any:
+def _normalise_rows(rows: list[list[int]], norm: str) -> Any:
     # Not before it is needed: some assignments do without scikit-learn.
     from sklearn.preprocessing import normalize
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 Numbers = NDArray[np.float64]
 
 
-def _logistic(values: Numbers) -> Numbers:
+def _compute_logistic(values: Numbers) -> Numbers:
     return np.asarray(0.5 * (1 + np.tanh(0.5 * values)))
 
 
@@ -26,7 +26,7 @@ _ACTIVATIONS: Mapping[str, Callable[[Numbers], Numbers]] = MappingProxyType(
     {
         "relu": lambda values: np.maximum(values, 0),
         "tanh": lambda values: np.asarray(np.tanh(values)),
-        "logistic": _logistic,
+        "logistic": _compute_logistic,
         "identity": lambda values: values,
     }
 )
@@ -44,10 +44,10 @@ class WeightsNetwork:
 
     def predict_proba(self, images: Any) -> Numbers:
         """How likely each class is, shape (images, classes); ``images`` has one row of numbers an image."""
-        values = _rows(images, self.n_features_in_, self._name)
+        values = _to_rows(images, self.n_features_in_, self._name)
         for coefs, intercepts in zip(self.coefs_[:-1], self.intercepts_[:-1], strict=True):
             values = _ACTIVATIONS[self.activation](values @ coefs + intercepts)
-        return _softmax(values @ self.coefs_[-1] + self.intercepts_[-1])
+        return _compute_softmax(values @ self.coefs_[-1] + self.intercepts_[-1])
 
     def predict(self, images: Any) -> NDArray[Any]:
         """The likeliest class of each image, shape (images,)."""
@@ -73,13 +73,13 @@ class OnnxNetwork:
 
     def predict_proba(self, images: Any) -> Numbers:
         """How likely each class is, shape (images, classes); scores that are no shares go through softmax."""
-        rows = _rows(images, self.n_features_in_, self._name).astype(np.float32)
+        rows = _to_rows(images, self.n_features_in_, self._name).astype(np.float32)
         output = self._session.run(self._outputs, {self._input: rows.reshape(-1, *self._shape)})[-1]
         scores = np.asarray(output, np.float64)
         if scores.ndim != 2 or len(scores) != len(rows):
             raise ValueError(f"{self._name} gave numbers of shape {scores.shape}; expected one row of classes an image")
         shares = scores.min() >= 0 and np.allclose(scores.sum(axis=1), 1, atol=1e-3)
-        return scores if shares else _softmax(scores)
+        return scores if shares else _compute_softmax(scores)
 
     def predict(self, images: Any) -> NDArray[Any]:
         """The likeliest class of each image: its number, or its name if ``classes`` were given."""
@@ -95,15 +95,15 @@ def load_weights(file: str | os.PathLike[str]) -> WeightsNetwork:
     Raises ValueError with a sentence for any other file, and never unpickles.
     """
     name = Path(file).name
-    arrays = _arrays(file, name)
+    arrays = _load_arrays(file, name)
     for wanted in ("coefs_0", "intercepts_0", "activation", "classes"):
         if wanted not in arrays:
             raise ValueError(f"{name} has no array called {wanted}; expected coefs_0, intercepts_0, coefs_1, ..., "
                              "activation and classes")  # fmt: skip
     layers = sum(key.startswith("coefs_") for key in arrays)
-    coefs = [_layer(arrays, f"coefs_{number}", name) for number in range(layers)]
-    intercepts = [_layer(arrays, f"intercepts_{number}", name) for number in range(layers)]
-    _check_chain(coefs, intercepts, name)
+    coefs = [_parse_layer(arrays, f"coefs_{number}", name) for number in range(layers)]
+    intercepts = [_parse_layer(arrays, f"intercepts_{number}", name) for number in range(layers)]
+    _check_layer_shapes(coefs, intercepts, name)
     activation = str(arrays["activation"])
     if activation not in _ACTIVATIONS:
         raise ValueError(f"{name} has the activation {activation[:40]!r}; expected one of {', '.join(_ACTIVATIONS)}")
@@ -151,7 +151,7 @@ def check_classifier(network: Any, inputs: int) -> None:
         raise TypeError(f"this model is a {kind}, which has no predict; expected a trained classifier")
     wanted = getattr(network, "n_features_in_", None)
     if isinstance(wanted, int | np.integer) and wanted != inputs:
-        raise ValueError(_other_size(int(wanted), inputs, "this model"))
+        raise ValueError(_describe_size_mismatch(int(wanted), inputs, "this model"))
 
 
 def _is_regressor(network: Any) -> bool:
@@ -165,7 +165,7 @@ def _is_regressor(network: Any) -> bool:
         return False
 
 
-def _arrays(file: str | os.PathLike[str], name: str) -> dict[str, NDArray[Any]]:
+def _load_arrays(file: str | os.PathLike[str], name: str) -> dict[str, NDArray[Any]]:
     try:
         with Path(file).open("rb") as stream, np.load(stream, allow_pickle=False) as packed:
             return {key: packed[key] for key in packed.files}
@@ -175,7 +175,7 @@ def _arrays(file: str | os.PathLike[str], name: str) -> dict[str, NDArray[Any]]:
         raise ValueError(f"{name} is no file of plain weights; expected arrays written by numpy.savez") from None
 
 
-def _layer(arrays: dict[str, NDArray[Any]], key: str, name: str) -> Numbers:
+def _parse_layer(arrays: dict[str, NDArray[Any]], key: str, name: str) -> Numbers:
     if key not in arrays:
         raise ValueError(f"{name} has no array called {key}; expected layers numbered from 0, each with its intercepts")
     if arrays[key].dtype.kind not in "fiu":
@@ -183,7 +183,7 @@ def _layer(arrays: dict[str, NDArray[Any]], key: str, name: str) -> Numbers:
     return np.asarray(arrays[key], np.float64)
 
 
-def _check_chain(coefs: list[Numbers], intercepts: list[Numbers], name: str) -> None:
+def _check_layer_shapes(coefs: list[Numbers], intercepts: list[Numbers], name: str) -> None:
     for number, (weights, offsets) in enumerate(zip(coefs, intercepts, strict=True)):
         if weights.ndim != 2 or offsets.shape != weights.shape[1:]:
             raise ValueError(
@@ -197,27 +197,28 @@ def _check_chain(coefs: list[Numbers], intercepts: list[Numbers], name: str) -> 
             )
 
 
-def _rows(images: Any, inputs: int, name: str) -> Numbers:
+def _to_rows(images: Any, inputs: int, name: str) -> Numbers:
     values = np.asarray(images, np.float64)
     if values.ndim == 0:
         raise ValueError(f"{name} was shown a number; expected a list of images, one row of numbers each")
     rows = values.reshape(1, -1) if values.ndim == 1 else values.reshape(len(values), -1)
     if rows.shape[1] != inputs:
-        raise ValueError(_other_size(inputs, rows.shape[1], name))
+        raise ValueError(_describe_size_mismatch(inputs, rows.shape[1], name))
     return np.asarray(rows)
 
 
-def _other_size(wanted: int, given: int, name: str) -> str:
+def _describe_size_mismatch(wanted: int, given: int, name: str) -> str:
     return (
-        f"{name} is for images of {_size(wanted)}, but was shown one of {_size(given)}: resize the image, or train anew"
+        f"{name} is for images of {_format_size(wanted)}, but was shown one of {_format_size(given)}: resize the "
+        "image, or train anew"
     )
 
 
-def _size(numbers: int) -> str:
+def _format_size(numbers: int) -> str:
     side = round(numbers**0.5)
     return f"{side} x {side} pixels ({numbers} numbers)" if side * side == numbers else f"{numbers} numbers"
 
 
-def _softmax(scores: Numbers) -> Numbers:
+def _compute_softmax(scores: Numbers) -> Numbers:
     powers = np.exp(scores - scores.max(axis=1, keepdims=True))
     return np.asarray(powers / powers.sum(axis=1, keepdims=True))

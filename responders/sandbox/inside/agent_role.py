@@ -11,7 +11,7 @@ import types
 from collections.abc import Callable
 from typing import Any
 
-from . import function_calls
+from . import call_results
 from .frames import Frame, Wire
 from .lockdown import Grants
 from .responder_role import ResponderRole
@@ -24,18 +24,18 @@ class AgentRole(ResponderRole):
         super().__init__(wire, grants, spec)
         self._own_name = spec["agent"]
 
-    def _serve(self) -> None:
+    def _serve_messages(self) -> None:
         while True:
             asked = self._wire.receive()
             self._units = max(self._units, asked["t"])
-            self._note_calls()
+            self._wrap_functions()
             self._stack, self._calls = [self._own_name], 0
-            self._wire.send(function_calls.value_frame(functools.partial(self._called, asked), self._files))
+            self._wire.send(call_results.build_result_frame(functools.partial(self._call_agent, asked), self._files))
 
-    def _called(self, asked: Frame) -> Any:
-        return self._find()(*json.loads(asked["arguments"]), **json.loads(asked["named"]))
+    def _call_agent(self, asked: Frame) -> Any:
+        return self._find_function()(*json.loads(asked["arguments"]), **json.loads(asked["named"]))
 
-    def _find(self) -> Callable[..., Any]:
+    def _find_function(self) -> Callable[..., Any]:
         """Return the agent's function: the one with its name, else the only ``*_<name>``, else the only function."""
         name = self._own_name
         own = self._namespace.get(name)

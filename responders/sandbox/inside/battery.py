@@ -21,10 +21,10 @@ from .frames import Wire
 from .lockdown import Grants
 
 _libc = ctypes.CDLL(None, use_errno=True)
-_SPACE = ctypes.create_string_buffer(256)
+_BUFFER = ctypes.create_string_buffer(256)
 
 
-def _system_call(number: int, *arguments: int) -> Callable[[], object]:
+def _build_system_call(number: int, *arguments: int) -> Callable[[], object]:
     """Return a function that makes a raw system call, which fails with a negative number."""
 
     def attempt() -> object:
@@ -35,14 +35,14 @@ def _system_call(number: int, *arguments: int) -> Callable[[], object]:
     return attempt
 
 
-def _thread() -> None:
+def _start_thread() -> None:
     try:
         threading.Thread(target=lambda: None).start()
     except RuntimeError as error:
         raise OSError(str(error)) from None
 
 
-def _random_hash() -> None:
+def _check_hash_seed() -> None:
     """Fail if texts are not hashed identically in every child, which is decided when the zygote starts."""
     if not sys.flags.hash_randomization:
         raise OSError("refused")
@@ -62,25 +62,25 @@ ATTEMPTS: dict[str, Callable[[], object]] = {
     "open a network socket": lambda: socket.socket(socket.AF_INET, socket.SOCK_DGRAM),
     "open a local socket": lambda: socket.socket(socket.AF_UNIX, socket.SOCK_STREAM),
     "fork": os.fork,
-    "start a thread": _thread,
+    "start a thread": _start_thread,
     "become another program": lambda: os.execv("/bin/true", ["true"]),
     "signal the parent": lambda: os.kill(os.getppid(), 0),
     "signal everybody": lambda: os.kill(-1, signal.SIGCONT),
-    "trace the parent": _system_call(101, 16, os.getppid(), 0, 0),
-    "read the parent's memory": _system_call(310, os.getppid(), 0, 0, 0, 0, 0),
-    "make a name space": _system_call(272, 0x10000000),
-    "set up an I/O ring": _system_call(425, 1, 0),
-    "load a filter program": _system_call(321, 0, 0, 0),
-    "make an anonymous file": _system_call(319, 0, 0),
+    "trace the parent": _build_system_call(101, 16, os.getppid(), 0, 0),
+    "read the parent's memory": _build_system_call(310, os.getppid(), 0, 0, 0, 0, 0),
+    "make a name space": _build_system_call(272, 0x10000000),
+    "set up an I/O ring": _build_system_call(425, 1, 0),
+    "load a filter program": _build_system_call(321, 0, 0, 0),
+    "make an anonymous file": _build_system_call(319, 0, 0),
     "change the limits": lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64)),
     "change a file's mode": lambda: os.chmod(os.devnull, 0o666),
     "make a pipe": os.pipe,
     "count what came from the disk": lambda: resource.getrusage(resource.RUSAGE_SELF),
-    "ask how much memory is free": _system_call(99, ctypes.addressof(_SPACE)),
+    "ask how much memory is free": _build_system_call(99, ctypes.addressof(_BUFFER)),
     "read the parent's limits": lambda: resource.prlimit(os.getppid(), resource.RLIMIT_NOFILE),
-    "draw the kernel's chance": _system_call(318, ctypes.addressof(_SPACE), 16, 0),
+    "draw the kernel's chance": _build_system_call(318, ctypes.addressof(_BUFFER), 16, 0),
     "open the kernel's chance": lambda: os.open("/dev/urandom", os.O_RDONLY),
-    "hash texts by chance": _random_hash,
+    "hash texts by chance": _check_hash_seed,
     "read the parent's clock": lambda: time.clock_gettime((~os.getppid() << 3) | 2),
 }
 

@@ -21,7 +21,7 @@ LINE_WRAPPERS = frozenset(("time", "timeit", "prun", "memit"))
 _OPTIONS = re.compile(r"(?:-[nrpl][ \t]*\d+[ \t]+|-s[ \t]+\w+[ \t]+|-\w+[ \t]+)*")
 _CELL_MAGIC = re.compile(r"%%(?P<name>[A-Za-z_]\w*)(?:[ \t]+(?P<line>.*))?\Z")
 _LINE_MAGIC = re.compile(r"%(?P<name>[A-Za-z_]\w*)(?:[ \t]+(?P<line>.*))?\Z")
-_ASSIGNED = re.compile(r"(?P<target>[A-Za-z_][\w.,\[\]'\" ]*=[ \t]*)(?P<rest>[%!].*)\Z")
+_ASSIGNMENT = re.compile(r"(?P<target>[A-Za-z_][\w.,\[\]'\" ]*=[ \t]*)(?P<rest>[%!].*)\Z")
 _QUESTION = re.compile(r"(?:\?{1,2}[\w.%]+|%{0,2}[A-Za-z_][\w.]*\?{1,2})\Z")
 _PACKAGES = re.compile(r"(?P<name>pip3?|conda|mamba)[ \t]+(?P<line>(?:install|uninstall|list|show|freeze)\b.*)\Z")
 _DOLLAR = re.compile(r"\$(?:(?P<escaped>\$[\w.]*)|(?P<name>[A-Za-z_][\w.]*))")
@@ -37,7 +37,7 @@ class CellMagic:
     number: int  # line number of the magic, from 1
 
 
-def cell_magic(source: str) -> CellMagic | None:
+def parse_cell_magic(source: str) -> CellMagic | None:
     """Return the cell magic if the first line, after blanks and comments, begins with ``%%``."""
     lines = source.split("\n")
     for place, line in enumerate(lines):
@@ -51,7 +51,7 @@ def cell_magic(source: str) -> CellMagic | None:
     return None
 
 
-def cell_magics(lines: Iterable[str]) -> Iterator[tuple[int, str]]:
+def list_cell_magics(lines: Iterable[str]) -> Iterator[tuple[int, str]]:
     """Yield the index and name of each cell magic at the start: the first one, and those that it wraps in turn."""
     for place, line in enumerate(lines):
         stripped = line.lstrip("\ufeff").strip()
@@ -63,15 +63,15 @@ def cell_magics(lines: Iterable[str]) -> Iterator[tuple[int, str]]:
         yield place, match["name"]
 
 
-def wrapped(line: str) -> str:
+def extract_wrapped_code(line: str) -> str:
     """Return the Python code in the line of a wrapping magic."""
-    return python_source(line[_OPTIONS.match(line).end() :])  # type: ignore[union-attr]
+    return convert_to_python(line[_OPTIONS.match(line).end() :])  # type: ignore[union-attr]
 
 
-def python_source(source: str) -> str:
+def convert_to_python(source: str) -> str:
     """Return the cell as Python with the same lines."""
     lines = source.lstrip("\ufeff").split("\n")
-    for place in list(_logical_starts(lines)):
+    for place in list(_list_statement_starts(lines)):
         line = lines[place]
         if not _may_be_special(line):
             continue
@@ -79,21 +79,21 @@ def python_source(source: str) -> str:
         while text.endswith("\\") and place + taken < len(lines):
             text = text[:-1] + " " + lines[place + taken].strip()
             taken += 1
-        rewritten = _rewritten(text)
+        rewritten = _rewrite_line(text)
         if rewritten is not None:
             lines[place : place + taken] = [rewritten] + [""] * (taken - 1)
     return "\n".join(lines)
 
 
-def expanded(line: str, names: Mapping[str, Any]) -> str:
+def expand_line(line: str, names: Mapping[str, Any]) -> str:
     """Return ``line`` with ``{expression}`` and ``$name`` replaced by their values, or unchanged if one fails."""
     try:
-        return "".join(_expanded(line, names))
+        return "".join(_expand_parts(line, names))
     except Exception:
         return line
 
 
-def expressions(line: str) -> Iterator[str]:
+def list_expressions(line: str) -> Iterator[str]:
     """Yield the expressions that ``expanded`` evaluates, as far as the line can be parsed."""
     try:
         for literal, expression, _, _ in string.Formatter().parse(line):
@@ -104,7 +104,7 @@ def expressions(line: str) -> Iterator[str]:
         return
 
 
-def _expanded(line: str, names: Mapping[str, Any]) -> Iterator[str]:
+def _expand_parts(line: str, names: Mapping[str, Any]) -> Iterator[str]:
     formatter = string.Formatter()
     for literal, expression, form, conversion in formatter.parse(line):
         yield _DOLLAR.sub(
@@ -118,31 +118,31 @@ def _expanded(line: str, names: Mapping[str, Any]) -> Iterator[str]:
 
 def _may_be_special(line: str) -> bool:
     stripped = line.strip()
-    return stripped.startswith(("%", "!", "?")) or stripped.endswith("?") or _looks_assigned(stripped)
+    return stripped.startswith(("%", "!", "?")) or stripped.endswith("?") or _has_special_form(stripped)
 
 
-def _looks_assigned(stripped: str) -> bool:
-    return _ASSIGNED.match(stripped) is not None or _PACKAGES.match(stripped) is not None
+def _has_special_form(stripped: str) -> bool:
+    return _ASSIGNMENT.match(stripped) is not None or _PACKAGES.match(stripped) is not None
 
 
-def _rewritten(text: str) -> str | None:
+def _rewrite_line(text: str) -> str | None:
     """Return the call for a line with a magic, or None for a line of Python."""
     stripped = text.strip()
     indent = text[: len(text) - len(text.lstrip())]
-    assigned = _ASSIGNED.match(stripped)
+    assigned = _ASSIGNMENT.match(stripped)
     if assigned is not None:
-        call = _call(assigned["rest"].strip(), captured=True)
+        call = _build_call(assigned["rest"].strip(), captured=True)
         return None if call is None else f"{indent}{assigned['target']}{call}"
     if _QUESTION.match(stripped):
         return f"{indent}get_ipython().run_line_magic('pinfo', {stripped.strip('?')!r})"
     packages = _PACKAGES.match(stripped)
     if packages is not None:
         return f"{indent}get_ipython().run_line_magic({packages['name']!r}, {packages['line']!r})"
-    call = _call(stripped, captured=False)
+    call = _build_call(stripped, captured=False)
     return None if call is None else indent + call
 
 
-def _call(text: str, captured: bool) -> str | None:
+def _build_call(text: str, captured: bool) -> str | None:
     if text.startswith("!!"):
         return f"get_ipython().getoutput({text[2:]!r})"
     if text.startswith("!"):
@@ -153,7 +153,7 @@ def _call(text: str, captured: bool) -> str | None:
     return f"get_ipython().run_line_magic({magic['name']!r}, {(magic['line'] or '').rstrip()!r})"
 
 
-class _State:
+class _ReaderState:
     """State of a reader of Python after a line: in a long string, in brackets, or after a backslash."""
 
     def __init__(self) -> None:
@@ -162,25 +162,25 @@ class _State:
         self.goes_on = False
 
     @property
-    def at_start(self) -> bool:
+    def is_at_start(self) -> bool:
         return not (self.quote or self.depth or self.goes_on)
 
 
 _TOKEN = re.compile(r"\\.|'''|\"\"\"|['\"#()\[\]{}]", re.DOTALL)
 
 
-def _logical_starts(lines: list[str]) -> Iterator[int]:
+def _list_statement_starts(lines: list[str]) -> Iterator[int]:
     """Yield the indices of the lines on which a statement may begin."""
-    state = _State()
+    state = _ReaderState()
     for place, line in enumerate(lines):
-        if state.at_start:
+        if state.is_at_start:
             yield place
             # The caller may have rewritten the line by now, which makes it a complete statement.
             line = lines[place]
-        _read(line, state)
+        _update_state(line, state)
 
 
-def _read(line: str, state: _State) -> None:
+def _update_state(line: str, state: _ReaderState) -> None:
     for match in _TOKEN.finditer(line):
         token = match[0]
         if state.quote:

@@ -26,11 +26,11 @@ _WRITING, _READING, _DOOR = 3, 4, 5
 #: User ids for children, one each. Nothing on a machine should belong to them.
 _USERS, _USERS_COUNT = 61_000, 4_000
 #: Signals that Python ignores from its start, to raise an error instead.
-_PYTHONS_OWN = frozenset((signal.SIGPIPE, signal.SIGXFSZ))
+_PYTHON_SIGNALS = frozenset((signal.SIGPIPE, signal.SIGXFSZ))
 
 
 @dataclass(frozen=True)
-class Prepared:
+class ChildSetup:
     """Values that a zygote computes once for all its children."""
 
     grants: lockdown.Grants
@@ -40,78 +40,78 @@ class Prepared:
     door: int  # descriptor for registering a child with the doorkeeper
 
 
-def changed_signals() -> tuple[int, ...]:
+def list_changed_signals() -> tuple[int, ...]:
     """Return the signals with a handling other than the default, except those that Python itself changes.
 
     A worker that a shell started in the background ignores some signals, and its forks would inherit that.
     """
-    numbers = signal.valid_signals() - _PYTHONS_OWN - {signal.SIGKILL, signal.SIGSTOP}
+    numbers = signal.valid_signals() - _PYTHON_SIGNALS - {signal.SIGKILL, signal.SIGSTOP}
     return tuple(int(number) for number in numbers if signal.getsignal(number) is not signal.SIG_DFL)
 
 
-def start(
-    spec: dict[str, Any], descriptors: list[int], role: Callable[[Wire, lockdown.Grants], None], prepared: Prepared
+def run_child(
+    spec: dict[str, Any], descriptors: list[int], role: Callable[[Wire, lockdown.Grants], None], prepared: ChildSetup
 ) -> None:
     """Run a child to its end; never returns.
 
     ``descriptors`` are the wire's two and, if the spec has a folder, the folder.
     """
     try:
-        lockdown.run_on(bytes.fromhex(spec["processors"]))
-        _own_session(prepared.changed_signals)
-        _first_to_go()
-        _descriptors([*descriptors[:2], prepared.door, *descriptors[2:]])
-        _limits(spec)
+        lockdown.pin_to_processors(bytes.fromhex(spec["processors"]))
+        _start_session(prepared.changed_signals)
+        _raise_oom_score()
+        _set_descriptors([*descriptors[:2], prepared.door, *descriptors[2:]])
+        _set_limits(spec)
         wire = Wire(_WRITING, _READING)
-        wire.send(_sandbox(spec, prepared))
+        wire.send(_activate_layers(spec, prepared))
         gc.enable()
         gc.collect()  # so that the collector runs at the same allocations in every child
-        role(wire, dataclasses.replace(prepared.grants, without=tuple(spec["without"])))
+        role(wire, dataclasses.replace(prepared.grants, excluded_modules=tuple(spec["without"])))
     finally:
         os._exit(0)
 
 
-def _own_session(changed: tuple[int, ...]) -> None:
+def _start_session(changed: tuple[int, ...]) -> None:
     os.setsid()
     for number in changed:
         signal.signal(number, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
 
 
-def _first_to_go() -> None:
+def _raise_oom_score() -> None:
     """Let the kernel kill this child before its zygote when memory runs out.
 
     The /proc files of a non-dumpable process, such as the zygote, belong to root. So this process is dumpable until it
     is locked down.
     """
-    lockdown.control(_PR_SET_DUMPABLE, 1)
+    lockdown.set_process_option(_PR_SET_DUMPABLE, 1)
     with contextlib.suppress(OSError):
         score = os.open("/proc/self/oom_score_adj", os.O_WRONLY)
         os.write(score, b"1000")
         os.close(score)
 
 
-def _own_user(spec: dict[str, Any], grants: lockdown.Grants) -> bool:
+def _switch_user(spec: dict[str, Any], grants: lockdown.Grants) -> bool:
     """As root, switch to a user without any files, if the interpreter is readable for that user."""
-    if not grants.open_to_others or not lockdown.may_change_user():
+    if not grants.open_to_others or not lockdown.can_change_user():
         return False
     user = _USERS + os.getpid() % _USERS_COUNT
     if spec["folder"]:
         for name in [".", *os.listdir()]:
             os.chown(name, user, user, follow_symlinks=False)
-    lockdown.become(user)
+    lockdown.switch_user(user)
     return True
 
 
-def _end_with(zygote: int) -> None:
+def _end_with_zygote(zygote: int) -> None:
     """End this process with the zygote. A change of user resets both settings, so call this afterwards."""
-    lockdown.control(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    lockdown.control(_PR_SET_DUMPABLE, 0)
+    lockdown.set_process_option(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    lockdown.set_process_option(_PR_SET_DUMPABLE, 0)
     if os.getppid() != zygote:
         os._exit(0)
 
 
-def _descriptors(descriptors: list[int]) -> None:
+def _set_descriptors(descriptors: list[int]) -> None:
     """Set descriptors 0 to 2 to the null device, then the wire and the door. Change to the folder.
 
     Descriptors for the rules stay open until the layers are active, and all others are closed.
@@ -123,11 +123,11 @@ def _descriptors(descriptors: list[int]) -> None:
     for fd, opened in zip((_WRITING, _READING, _DOOR), high, strict=False):
         os.dup2(opened, fd)
     os.chdir(high[3] if len(high) > 3 else "/")
-    os.closerange(_DOOR + 1, lockdown.ABOVE)
+    os.closerange(_DOOR + 1, lockdown.LOWEST_DESCRIPTOR)
     os.umask(0o077)
 
 
-def _limits(spec: dict[str, Any]) -> None:
+def _set_limits(spec: dict[str, Any]) -> None:
     """Limit the address space beyond the zygote's, CPU time as a backstop, file size, and descriptors."""
     with open("/proc/self/statm", "rb") as statm:
         mapped = int(statm.read().split()[0]) * resource.getpagesize()
@@ -144,26 +144,26 @@ def _limits(spec: dict[str, Any]) -> None:
     resource.setrlimit(resource.RLIMIT_SIGPENDING, (0, 0))
 
 
-def _sandbox(spec: dict[str, Any], prepared: Prepared) -> Frame:
+def _activate_layers(spec: dict[str, Any], prepared: ChildSetup) -> Frame:
     """Activate the layers in the spec, test each, and report them. No student code has run yet."""
     missing = None
     landlock, seccomp, own_user = 0, False, False
     without_doorkeeper: str | None = "it was not asked for"
-    memory = _own_memory()
+    memory = _open_memory()
     fixed_addresses = lockdown.has_fixed_addresses()
     try:
-        own_user = _own_user(spec, prepared.grants)
-        _end_with(prepared.zygote)
+        own_user = _switch_user(spec, prepared.grants)
+        _end_with_zygote(prepared.zygote)
         lockdown.drop_capabilities()
         lockdown.forbid_new_privileges()
         if spec["landlock"]:
-            landlock = _files(spec, prepared.rules)
+            landlock = _restrict_files(spec, prepared.rules)
         if spec["doorkeeper"]:
-            without_doorkeeper = _ask_about_paths(memory)
+            without_doorkeeper = _activate_doorkeeper(memory)
         if spec["seccomp"]:
             lockdown.restrict_system_calls()
-            _must_fail("seccomp", lambda: os.open("/", os.O_RDONLY | os.O_TRUNC))
-            _must_fail("seccomp", lambda: os.kill(os.getppid(), 0))
+            _check_refused("seccomp", lambda: os.open("/", os.O_RDONLY | os.O_TRUNC))
+            _check_refused("seccomp", lambda: os.kill(os.getppid(), 0))
             seccomp = True
     except lockdown.LayerMissing as layer:
         missing = str(layer)
@@ -180,39 +180,39 @@ def _sandbox(spec: dict[str, Any], prepared: Prepared) -> Frame:
     }
 
 
-def _own_memory() -> int | None:
+def _open_memory() -> int | None:
     """Return a descriptor of this process's memory. It can be opened only while the process is dumpable."""
     with contextlib.suppress(OSError):
         return os.open("/proc/self/mem", os.O_RDONLY)
     return None
 
 
-def _ask_about_paths(memory: int | None) -> str | None:
+def _activate_doorkeeper(memory: int | None) -> str | None:
     """Let the doorkeeper decide about every path. Return the reason if that fails, otherwise None."""
     if memory is None:
         return "/proc/self/mem cannot be opened"
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET, fileno=_DOOR) as door:
         try:
-            questions = lockdown.ask_about_paths()
+            questions = lockdown.install_path_filter()
         except lockdown.LayerMissing as layer:
             return str(layer)
-        doorkeeper.make_known(door, questions, memory)
+        doorkeeper.register_child(door, questions, memory)
         os.close(questions)
-    _must_fail("doorkeeper", lambda: os.stat("/etc/passwd"))
+    _check_refused("doorkeeper", lambda: os.stat("/etc/passwd"))
     return None
 
 
-def _files(spec: dict[str, Any], rules: tuple[bytes, ...]) -> int:
+def _restrict_files(spec: dict[str, Any], rules: tuple[bytes, ...]) -> int:
     if spec["folder"]:
         folder = os.open(".", os.O_PATH)
-        rules = *rules, lockdown.writing_rule(folder, spec["landlock"])
+        rules = *rules, lockdown.build_writing_rule(folder, spec["landlock"])
     version = lockdown.restrict_files(rules, spec["landlock"])
-    _must_fail("Landlock", lambda: os.open("/etc/passwd", os.O_RDONLY))
-    _must_fail("Landlock", lambda: os.listdir("/"))
+    _check_refused("Landlock", lambda: os.open("/etc/passwd", os.O_RDONLY))
+    _check_refused("Landlock", lambda: os.listdir("/"))
     return version
 
 
-def _must_fail(layer: str, attempt: Callable[[], object]) -> None:
+def _check_refused(layer: str, attempt: Callable[[], object]) -> None:
     try:
         attempt()
     except OSError:

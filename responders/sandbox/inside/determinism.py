@@ -83,11 +83,11 @@ def install_clock(now: Callable[[], int], sleep: Callable[[int], None]) -> None:
         today = moment(datetime.datetime)
         return cls(today.year, today.month, today.day)
 
-    _change(datetime.datetime, now=moment, utcnow=naive_moment, today=naive_moment)
-    _change(datetime.date, today=day)
+    _replace_methods(datetime.datetime, now=moment, utcnow=naive_moment, today=naive_moment)
+    _replace_methods(datetime.date, today=day)
 
 
-def _change(kind: type, **methods: Callable[..., Any]) -> None:
+def _replace_methods(kind: type, **methods: Callable[..., Any]) -> None:
     """Replace class methods of a built-in type. It remains the same type for imports, type checks and subclasses.
 
     Python refuses to set them, so they are written into its dictionary, which only the garbage collector returns.
@@ -99,15 +99,15 @@ def _change(kind: type, **methods: Callable[..., Any]) -> None:
     ctypes.pythonapi.PyType_Modified(ctypes.py_object(kind))
 
 
-_seed_with = random.Random.seed
+_real_seed = random.Random.seed
 
 
 def _seed(self: random.Random, a: Any = None, version: int = 2) -> None:
     """Seed a generator. Without a seed, Python would ask the kernel for one through a name that can't be replaced."""
-    _seed_with(self, int.from_bytes(os.urandom(32), "little") if a is None else a, version)
+    _real_seed(self, int.from_bytes(os.urandom(32), "little") if a is None else a, version)
 
 
-def install_chance(seed: int) -> None:
+def install_randomness(seed: int) -> None:
     """Seed ``random`` and numpy, and replace all system sources of randomness by draws from ``seed``."""
     drawn = 0
 

@@ -21,30 +21,30 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from . import lockdown
-from .system_calls import OPENS, PATHS
+from .system_calls import FLAG_ARGUMENTS, PATH_ARGUMENTS
 
 _RECEIVE, _SEND = 0xC0502100, 0xC0182101  # SECCOMP_IOCTL_NOTIF_RECV and _SEND
 _QUESTION = struct.Struct("=QIIiIQ6Q")  # id, pid, flags, number, architecture, instruction, arguments
 _ANSWER = struct.Struct("=QqiI")  # id, value, error, flags
-_GO_ON = 1
-_LONGEST = 4096
-_FROM_HERE = -100  # AT_FDCWD
+_CONTINUE = 1
+_LONGEST_PATH = 4096
+_CURRENT_FOLDER = -100  # AT_FDCWD
 _PR_SET_PDEATHSIG = 1
 #: Maximum number of files a child may create, including deleted ones, because inode numbers are visible to others.
 _MOST_FILES = 300
 
 
 @dataclass
-class _Guest:
+class _RegisteredChild:
     """A child: the descriptor of its requests, its memory, its folder, and how many files it has created."""
 
-    questions: int
+    requests: int
     memory: int
     folder: bytes
-    made: int = 0
+    created_files: int = 0
 
 
-def start(grants: lockdown.Grants, controls: Iterable[int]) -> socket.socket:
+def start_doorkeeper(grants: lockdown.Grants, controls: Iterable[int]) -> socket.socket:
     """Become the doorkeeper, and continue in a fork. Return the socket on which children register.
 
     When either of the two ends, so does the other. Only the fork keeps the descriptors ``controls``.
@@ -56,7 +56,7 @@ def start(grants: lockdown.Grants, controls: Iterable[int]) -> socket.socket:
             ours.close()
             for control in controls:
                 os.close(control)
-            _serve(theirs, _Known(grants))
+            _serve_requests(theirs, _KnownPaths(grants))
         finally:
             os._exit(0)
     theirs.close()
@@ -66,13 +66,13 @@ def start(grants: lockdown.Grants, controls: Iterable[int]) -> socket.socket:
     return ours
 
 
-def make_known(door: socket.socket, questions: int, memory: int) -> None:
+def register_child(door: socket.socket, questions: int, memory: int) -> None:
     """Register this child with the doorkeeper, which answers its requests from now on."""
     payload = array.array("i", [questions, memory])
     door.sendmsg([os.getcwdb()], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, payload)])
 
 
-class _Known:
+class _KnownPaths:
     """The paths that children may name, as written and with all links resolved."""
 
     def __init__(self, grants: lockdown.Grants) -> None:
@@ -80,7 +80,7 @@ class _Known:
         self._exactly = {os.fsencode(path) for path in grants.list_only}
         for known in (self._beneath, self._exactly):
             known |= {os.path.realpath(path) for path in known}
-        self._exactly |= {above for path in self._beneath | self._exactly for above in _above(path)}
+        self._exactly |= {above for path in self._beneath | self._exactly for above in _list_parent_folders(path)}
 
     def has(self, path: bytes, folder: bytes) -> bool:
         """Return whether a child in ``folder`` may name ``path`` and its target."""
@@ -92,45 +92,45 @@ class _Known:
         return self._has(itself, folder) and self._has(target, folder)
 
     def _has(self, path: bytes, folder: bytes) -> bool:
-        above = _above(path)
+        above = _list_parent_folders(path)
         if path in self._exactly or path in self._beneath or not self._beneath.isdisjoint(above):
             return True
         return folder != b"/" and folder in (path, *above)
 
 
-def _above(path: bytes) -> list[bytes]:
+def _list_parent_folders(path: bytes) -> list[bytes]:
     found = []
     while path != (path := os.path.dirname(path)):
         found.append(path)
     return found
 
 
-def _serve(door: socket.socket, known: _Known) -> None:
+def _serve_requests(door: socket.socket, known: _KnownPaths) -> None:
     """Answer requests until the zygote and its children have ended."""
     lockdown.forbid_new_privileges()
     with contextlib.suppress(lockdown.LayerMissing):
         # Not a version that restricts signals: the signal of its death must reach the zygote.
         lockdown.restrict_files((), 5)
-    guests: dict[int, _Guest] = {}
+    guests: dict[int, _RegisteredChild] = {}
     poll = select.epoll()
     poll.register(door.fileno(), select.EPOLLIN)
     while True:
         for fd, event in poll.poll():
             if fd == door.fileno():
-                guest = _new_guest(door)
-                guests[guest.questions] = guest
-                poll.register(guest.questions, select.EPOLLIN)
+                guest = _accept_child(door)
+                guests[guest.requests] = guest
+                poll.register(guest.requests, select.EPOLLIN)
             elif event & select.EPOLLIN:
                 with contextlib.suppress(OSError):  # the child may have ended
-                    _answer(guests[fd], known)
+                    _answer_request(guests[fd], known)
             else:
                 gone = guests.pop(fd)
-                os.close(gone.questions)
+                os.close(gone.requests)
                 os.close(gone.memory)
 
 
-def _new_guest(door: socket.socket) -> _Guest:
-    folder, ancillary, _, _ = door.recvmsg(_LONGEST, socket.CMSG_SPACE(2 * 4))
+def _accept_child(door: socket.socket) -> _RegisteredChild:
+    folder, ancillary, _, _ = door.recvmsg(_LONGEST_PATH, socket.CMSG_SPACE(2 * 4))
     if not folder:
         os.wait()
         os._exit(0)
@@ -138,34 +138,34 @@ def _new_guest(door: socket.socket) -> _Guest:
     for _, _, payload in ancillary:
         descriptors.frombytes(payload)
     questions, memory = descriptors
-    return _Guest(questions, memory, folder)
+    return _RegisteredChild(questions, memory, folder)
 
 
-def _answer(guest: _Guest, known: _Known) -> None:
+def _answer_request(guest: _RegisteredChild, known: _KnownPaths) -> None:
     """Answer one request. The child waits and has no other thread that could change the path meanwhile."""
     question = bytearray(_QUESTION.size)
-    fcntl.ioctl(guest.questions, _RECEIVE, question)
+    fcntl.ioctl(guest.requests, _RECEIVE, question)
     identity, _, _, number, _, _, *arguments = _QUESTION.unpack(question)
     try:
-        error = _refusal(guest, known, number, arguments)
+        error = _check_request(guest, known, number, arguments)
     except (OSError, OverflowError, ValueError):
         error = errno.EACCES
-    answer = _ANSWER.pack(identity, 0, -error, 0 if error else _GO_ON)
-    fcntl.ioctl(guest.questions, _SEND, answer)
+    answer = _ANSWER.pack(identity, 0, -error, 0 if error else _CONTINUE)
+    fcntl.ioctl(guest.requests, _SEND, answer)
 
 
-def _refusal(guest: _Guest, known: _Known, number: int, arguments: list[int]) -> int:
+def _check_request(guest: _RegisteredChild, known: _KnownPaths, number: int, arguments: list[int]) -> int:
     """Return an error number, or 0. A forbidden path appears missing, or can't be opened."""
-    for start, place in PATHS[number]:
-        path, end, _ = os.pread(guest.memory, _LONGEST, arguments[place]).partition(b"\0")
+    for start, place in PATH_ARGUMENTS[number]:
+        path, end, _ = os.pread(guest.memory, _LONGEST_PATH, arguments[place]).partition(b"\0")
         if not end:
             return errno.ENAMETOOLONG
-        from_here = start is None or ctypes.c_int(arguments[start]).value == _FROM_HERE
+        from_here = start is None or ctypes.c_int(arguments[start]).value == _CURRENT_FOLDER
         # A relative path from a descriptor that the child could open is allowed, except with a step up.
         known_by_opening = not from_here and not path.startswith(b"/")
         if b".." in path.split(b"/") if known_by_opening else not known.has(path, guest.folder):
-            return errno.EACCES if number in OPENS else errno.ENOENT
-    flags = arguments[OPENS[number]] if number in OPENS else 0
+            return errno.EACCES if number in FLAG_ARGUMENTS else errno.ENOENT
+    flags = arguments[FLAG_ARGUMENTS[number]] if number in FLAG_ARGUMENTS else 0
     if flags & os.O_CREAT and not os.path.lexists(os.path.join(guest.folder, path)):
-        guest.made += 1
-    return errno.EDQUOT if guest.made > _MOST_FILES else 0
+        guest.created_files += 1
+    return errno.EDQUOT if guest.created_files > _MOST_FILES else 0

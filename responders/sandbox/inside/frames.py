@@ -15,18 +15,18 @@ from typing import Any
 Frame = dict[str, Any]
 
 #: Maximum line length that the worker accepts, bytes.
-MOST = 65536
+MAX_FRAME_BYTES = 65536
 _LONGEST_NUMBER = 20
 #: Maximum bytes per character: for the first 65,536 code points, and for all.
 _WIDE, _WIDEST = 6, 12
 #: Texts up to this length are never cut.
-_SHORT = 100
+_NEVER_CUT_LENGTH = 100
 
 #: Header of a packet: zero, where a line begins with a brace, then the number of entries and the frame number.
 _HEADER = struct.Struct("<BxHxxxxQ")
 _MOST_ACTS = 2000
 #: Maximum bytes per read. Longer frames arrive in parts.
-_AT_ONCE = 8192
+_READ_BYTES = 8192
 
 _encode = json.JSONEncoder(separators=(",", ":"), ensure_ascii=True).encode
 
@@ -55,22 +55,22 @@ class Wire:
     def send_later(self, frame: Frame) -> None:
         """Send the frame with the next one that can't wait."""
         self._hold_acts()
-        self._held += self._line(frame)
-        if len(self._held) > MOST // 2:
+        self._held += self._encode_line(frame)
+        if len(self._held) > MAX_FRAME_BYTES // 2:
             self._write(b"")
 
     def send(self, frame: Frame) -> None:
         """Send the frame now, after the delayed ones."""
         self._hold_acts()
-        self._write(self._line(frame))
+        self._write(self._encode_line(frame))
 
-    def _line(self, frame: Frame) -> bytes:
+    def _encode_line(self, frame: Frame) -> bytes:
         """Return the numbered line of a frame. Texts that are too long for a line are cut."""
         number = self._sent
         self._sent += 1
         text = _encode(frame)
-        if len(text) > MOST - _LONGEST_NUMBER:
-            text = _encode(fitted(frame))
+        if len(text) > MAX_FRAME_BYTES - _LONGEST_NUMBER:
+            text = _encode(shorten_frame(frame))
         return b'{"n":%d,%s\n' % (number, text.encode("ascii")[1:])
 
     def _hold_acts(self) -> None:
@@ -91,68 +91,68 @@ class Wire:
     def receive(self) -> Frame:
         """Return the next frame. Ends the process if the worker is gone or other code has read from the pipe."""
         while not self._pending:
-            self._read()
+            self._read_bytes()
         if self._pending[0] == 0:
-            return self._receive_packed()
+            return self._receive_packet()
         while True:
             line, newline, rest = self._pending.partition(b"\n")
             if newline:
                 self._pending = rest
-                number = self._counted()  # increment even if deep recursion prevents decoding
+                number = self._count_received()  # increment even if deep recursion prevents decoding
                 frame: Frame = json.loads(line)
                 if frame.pop("n") != number:
                     os._exit(0)
                 return frame
-            self._read()
+            self._read_bytes()
 
-    def _receive_packed(self) -> Frame:
+    def _receive_packet(self) -> Frame:
         """Return a packet with the time and the sensor readings."""
         while len(self._pending) < _HEADER.size:
-            self._read()
+            self._read_bytes()
         _, count, number = _HEADER.unpack_from(self._pending)
-        numbers = _numbers(count)
+        numbers = _build_readings_struct(count)
         while len(self._pending) < numbers.size:
-            self._read()
+            self._read_bytes()
         units, *values = numbers.unpack_from(self._pending)
         self._pending = self._pending[numbers.size :]
-        if self._counted() != number:
+        if self._count_received() != number:
             os._exit(0)
         return {"t": units, "v": values}
 
-    def _counted(self) -> int:
+    def _count_received(self) -> int:
         number = self._received
         self._received += 1
         return number
 
-    def _read(self) -> None:
-        data = os.read(self._reading, _AT_ONCE)
+    def _read_bytes(self) -> None:
+        data = os.read(self._reading, _READ_BYTES)
         if not data:
             os._exit(0)
         self._pending += data
 
 
 @functools.cache
-def _numbers(count: int) -> struct.Struct:
+def _build_readings_struct(count: int) -> struct.Struct:
     """Return the struct of a readings packet without its header."""
     return struct.Struct(f"<{_HEADER.size}xq{count - 1}d")
 
 
-def fits(text: str) -> bool:
+def can_send_text(text: str) -> bool:
     """Return whether a frame can carry ``text``."""
     # Reserves space for the rest of the frame.
-    return len(text) * _WIDEST < MOST - 200 or len(_encode(text)) < MOST - 200
+    return len(text) * _WIDEST < MAX_FRAME_BYTES - 200 or len(_encode(text)) < MAX_FRAME_BYTES - 200
 
 
-def fitted(frame: Frame) -> Frame:
+def shorten_frame(frame: Frame) -> Frame:
     """Return ``frame`` with its long texts cut to the same length, so that it fits a line."""
-    texts = [value for value in _values(frame) if isinstance(value, str)]
-    long = sum(len(text) > _SHORT for text in texts)
-    space = MOST // max(long, 1) - _WIDEST * _SHORT * len(texts)
+    texts = [value for value in _list_values(frame) if isinstance(value, str)]
+    long = sum(len(text) > _NEVER_CUT_LENGTH for text in texts)
+    space = MAX_FRAME_BYTES // max(long, 1) - _WIDEST * _NEVER_CUT_LENGTH * len(texts)
 
     def cut(value: Any) -> Any:
         if isinstance(value, dict):
             return {name: each if name == "do" else cut(each) for name, each in value.items()}
-        if not isinstance(value, str) or len(value) <= _SHORT:
+        if not isinstance(value, str) or len(value) <= _NEVER_CUT_LENGTH:
             return value
         return clip(value, space // (_WIDEST if max(value) > "\uffff" else _WIDE))
 
@@ -160,10 +160,10 @@ def fitted(frame: Frame) -> Frame:
     return fitting
 
 
-def _values(frame: Frame) -> Iterator[Any]:
+def _list_values(frame: Frame) -> Iterator[Any]:
     for name, value in frame.items():
         if isinstance(value, dict):
-            yield from _values(value)
+            yield from _list_values(value)
         elif name != "do":
             yield value
 

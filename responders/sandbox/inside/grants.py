@@ -35,8 +35,8 @@ _PACKAGES = frozenset(
 _NOT_STANDARD = frozenset(
     {"site-packages", "dist-packages", "test", "idlelib", "ensurepip", "lib2to3", "tkinter", "turtledemo"}
 )
-_LIBRARIES = ("/lib64", "/usr/lib64", "/lib/x86_64-linux-gnu", "/usr/lib/x86_64-linux-gnu")
-_SYSTEM = (
+_LIBRARY_FOLDERS = ("/lib64", "/usr/lib64", "/lib/x86_64-linux-gnu", "/usr/lib/x86_64-linux-gnu")
+_SYSTEM_PATHS = (
     "/usr/share/zoneinfo",
     "/etc/localtime",
     "/dev/null",
@@ -45,41 +45,43 @@ _SYSTEM = (
 )
 
 
-def readable(roots: list[str], closed: tuple[str, ...] = ()) -> tuple[str, ...]:
+def list_readable_paths(roots: list[str], closed: tuple[str, ...] = ()) -> tuple[str, ...]:
     """Return the readable files and folders, except all that is ``closed``, even inside one of them."""
-    granted = {*roots, *_standard_library(), *_packages(), *_system_libraries(), *_SYSTEM}
-    return tuple({path for place in granted for path in _outside(place, {os.path.realpath(path) for path in closed})})
+    granted = {*roots, *_list_standard_library(), *_list_packages(), *_list_system_libraries(), *_SYSTEM_PATHS}
+    return tuple(
+        {path for place in granted for path in _exclude_closed(place, {os.path.realpath(path) for path in closed})}
+    )
 
 
-def listable(roots: list[str], closed: tuple[str, ...] = ()) -> tuple[str, ...]:
+def list_listable_folders(roots: list[str], closed: tuple[str, ...] = ()) -> tuple[str, ...]:
     """Return the folders that may be listed, as the import system does. Parents of closed paths are only listable."""
-    sites = _site_folders()
+    sites = _list_site_folders()
     tops = tuple(f"{folder}/" for folder in (*sites, *roots))
-    round_closed = {folder for path in closed for folder in _folders_above(path) if f"{folder}/".startswith(tops)}
+    round_closed = {folder for path in closed for folder in _list_parent_folders(path) if f"{folder}/".startswith(tops)}
     return tuple(sites | round_closed)
 
 
-def open_to_others(paths: tuple[str, ...]) -> bool:
+def is_open_to_others(paths: tuple[str, ...]) -> bool:
     """Return whether a user without privileges can read and reach those of ``paths`` that exist."""
     there = [path for path in paths if os.path.exists(path)]
     folders = {os.path.dirname(os.path.realpath(path)) for path in there}
     while more := {os.path.dirname(folder) for folder in folders} - folders:
         folders |= more
-    return all(_has(folder, 0o001) for folder in folders) and all(
-        _has(path, 0o005 if os.path.isdir(path) else 0o004) for path in there
+    return all(_has_mode_bits(folder, 0o001) for folder in folders) and all(
+        _has_mode_bits(path, 0o005 if os.path.isdir(path) else 0o004) for path in there
     )
 
 
-def _has(path: str, bits: int) -> bool:
+def _has_mode_bits(path: str, bits: int) -> bool:
     try:
         return os.stat(path).st_mode & bits == bits
     except OSError:
         return False
 
 
-def _system_libraries() -> Iterator[str]:
+def _list_system_libraries() -> Iterator[str]:
     """Yield the folders of system libraries; if Python's packages are below one, only the libraries in it."""
-    for folder in _LIBRARIES:
+    for folder in _LIBRARY_FOLDERS:
         names = os.listdir(folder) if os.path.isdir(folder) else []
         if not any(name.startswith("python") for name in names):
             yield folder
@@ -87,7 +89,7 @@ def _system_libraries() -> Iterator[str]:
             yield from (os.path.join(folder, name) for name in names if ".so" in name)
 
 
-def _standard_library() -> Iterator[str]:
+def _list_standard_library() -> Iterator[str]:
     for key in ("stdlib", "platstdlib"):
         folder = sysconfig.get_path(key)
         for name in os.listdir(folder):
@@ -95,30 +97,30 @@ def _standard_library() -> Iterator[str]:
                 yield os.path.join(folder, name)
 
 
-def _outside(place: str, closed: set[str]) -> Iterator[str]:
+def _exclude_closed(place: str, closed: set[str]) -> Iterator[str]:
     """Yield ``place``, or its entries that are not closed."""
     real = os.path.realpath(place)
     if real in closed:
         return
     if any(path.startswith(f"{real}/") for path in closed):
         for name in os.listdir(place):
-            yield from _outside(os.path.join(place, name), closed)
+            yield from _exclude_closed(os.path.join(place, name), closed)
     else:
         yield place
 
 
-def _folders_above(path: str) -> Iterator[str]:
+def _list_parent_folders(path: str) -> Iterator[str]:
     while (above := os.path.dirname(path)) != path:
         yield above
         path = above
 
 
-def _site_folders() -> set[str]:
+def _list_site_folders() -> set[str]:
     return {path for key in ("purelib", "platlib") if (path := sysconfig.get_path(key))}
 
 
-def _packages() -> Iterator[str]:
-    for folder in _site_folders():
+def _list_packages() -> Iterator[str]:
+    for folder in _list_site_folders():
         for name in os.listdir(folder):
             if name in _PACKAGES:
                 yield os.path.join(folder, name)

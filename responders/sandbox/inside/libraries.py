@@ -18,17 +18,17 @@ from .lockdown import Grants
 #: Import names.
 LIBRARIES = ("joblib", "numpy", "pandas", "PIL", "scipy", "sklearn")
 #: Modules that need them.
-_NEED_THEM = ("nn_tools", "onnxruntime", "ai_edge_litert")
+_DEPENDENT_MODULES = ("nn_tools", "onnxruntime", "ai_edge_litert")
 #: Standard modules that every responder's zygote imports before any fork, so that they are the same with and without
 #: libraries.
-BESIDE = (
+STANDARD_MODULES = (
     *("__future__", "abc", "ast", "base64", "bisect", "calendar", "collections", "collections.abc", "contextlib"),
     *("copy", "csv", "dataclasses", "datetime", "decimal", "enum", "fractions", "functools", "heapq", "io"),
     *("itertools", "json", "math", "numbers", "operator", "os", "os.path", "pprint", "random", "re", "statistics"),
     *("string", "struct", "sys", "textwrap", "time", "types", "typing"),
 )
 #: Names for messages.
-WORDS = "numpy, pandas, scikit-learn, joblib, Pillow and the course's modules"
+LIBRARY_DESCRIPTION = "numpy, pandas, scikit-learn, joblib, Pillow and the course's modules"
 _PRELOADED = (
     "joblib",
     "numpy",
@@ -55,32 +55,32 @@ def preload(without: list[str]) -> None:
         with contextlib.suppress(*missing):
             importlib.import_module(name)
     with contextlib.suppress(*missing):
-        _ask_the_machine()
+        _query_machine()
 
 
-def run_without(run: Callable[[Wire, Grants], None], wire: Wire, grants: Grants) -> None:
+def run_without_libraries(run: Callable[[Wire, Grants], None], wire: Wire, grants: Grants) -> None:
     """Call ``run`` without libraries. An import of one is reported to the worker and ends the process.
 
     Libraries loaded this late would use the student's memory and time, and other random draws.
     """
     # After the finder that refuses modules excluded by the assignment.
-    sys.meta_path.insert(1, _Stops(wire))
+    sys.meta_path.insert(1, _StoppingFinder(wire))
     run(wire, grants)
 
 
-class _Stops(MetaPathFinder):
+class _StoppingFinder(MetaPathFinder):
     def __init__(self, wire: Wire) -> None:
         self._wire = wire
 
     def find_spec(self, fullname: str, path: object, target: object = None) -> None:
-        if fullname.partition(".")[0] in (*LIBRARIES, *_NEED_THEM):
+        if fullname.partition(".")[0] in (*LIBRARIES, *_DEPENDENT_MODULES):
             try:
                 self._wire.send({"do": "libraries"})
             finally:
                 os._exit(0)
 
 
-def _ask_the_machine() -> None:
+def _query_machine() -> None:
     """Trigger scikit-learn's queries about libraries and processors while files can be opened: neighbours need them."""
     import joblib
     from sklearn.utils.parallel import _get_threadpool_controller

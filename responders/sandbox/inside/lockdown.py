@@ -16,7 +16,7 @@ import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from .system_calls import asking, program
+from .system_calls import build_path_filter, pack_filter
 
 _libc = ctypes.CDLL(None, use_errno=True)
 
@@ -38,8 +38,8 @@ _FILE_ONLY = _EXECUTE | _WRITE_FILE | _READ_FILE | _TRUNCATE
 #: All file rights in each version of Landlock's interface (linux/landlock.h).
 _FILE_RIGHTS = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1, 4: (1 << 15) - 1, 5: (1 << 16) - 1}
 _RULE = struct.Struct("=Qi")  # rights, and the descriptor that they apply to
-#: Lowest descriptor number for ``reading_rules``.
-ABOVE = 256
+#: Lowest descriptor number for ``build_reading_rules``.
+LOWEST_DESCRIPTOR = 256
 _NETWORK_RIGHTS = 0b11  # bind and connect TCP, from version 4
 _SCOPES = 0b11  # abstract sockets and signals, from version 6
 
@@ -55,21 +55,21 @@ class Grants:
     read: tuple[str, ...]
     list_only: tuple[str, ...] = ()
     open_to_others: bool = False  # whether an unprivileged user could read them
-    without: tuple[str, ...] = ()  # modules excluded by the assignment
+    excluded_modules: tuple[str, ...] = ()  # modules excluded by the assignment
 
 
-def landlock_version() -> int:
+def read_landlock_version() -> int:
     """Return the version of Landlock's interface, or 0 if it is missing or disabled."""
     version = _libc.syscall(_SYS_LANDLOCK_CREATE_RULESET, None, ctypes.c_size_t(0), ctypes.c_uint32(1))
     return max(int(version), 0)
 
 
-def control(option: int, value: int) -> None:
+def set_process_option(option: int, value: int) -> None:
     """Set an option of the process, see prctl(2)."""
     _libc.prctl(option, value, 0, 0, 0)
 
 
-def run_on(processors: bytes) -> None:
+def pin_to_processors(processors: bytes) -> None:
     """Restrict this process to some processors, given as a bit mask, see sched_setaffinity(2)."""
     _libc.sched_setaffinity(0, ctypes.c_size_t(len(processors)), processors)
 
@@ -83,16 +83,16 @@ def has_fixed_addresses() -> bool:
 def forbid_new_privileges() -> None:
     """Prevent set-uid programs from gaining privileges."""
     if _libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0:
-        raise LayerMissing(f"no_new_privs: {_last_error()}")
+        raise LayerMissing(f"no_new_privs: {_describe_last_error()}")
 
 
 def drop_capabilities() -> None:
     """Drop all capabilities. Root then can't mount, use raw sockets or reserve memory of the machine."""
     if _libc.syscall(_SYS_CAPSET, _CAPABILITIES, bytes(24)) != 0:
-        raise LayerMissing(f"capset: {_last_error()}")
+        raise LayerMissing(f"capset: {_describe_last_error()}")
 
 
-def may_change_user() -> bool:
+def can_change_user() -> bool:
     """Return whether this process can change its user while its parent can still kill it and delete its files."""
     sets = ctypes.create_string_buffer(24)
     if os.geteuid() != 0 or _libc.syscall(_SYS_CAPGET, _CAPABILITIES, sets) != 0:
@@ -101,7 +101,7 @@ def may_change_user() -> bool:
     return all(effective >> power & 1 for power in (_CHOWN, _DAC_OVERRIDE, _KILL, _SETGID, _SETUID))
 
 
-def become(user: int) -> None:
+def switch_user(user: int) -> None:
     """Switch to ``user``, with only its own group.
 
     Raises:
@@ -115,52 +115,52 @@ def become(user: int) -> None:
         raise LayerMissing(f"own user: {error.strerror}") from None
 
 
-def reading_rules(grants: Grants) -> tuple[bytes, ...]:
+def build_reading_rules(grants: Grants) -> tuple[bytes, ...]:
     """Return the Landlock rules for ``grants``. The files stay open, so that forks need not look them up again."""
     rights = {**dict.fromkeys(grants.read, _READ_FILE | _READ_DIR), **dict.fromkeys(grants.list_only, _READ_DIR)}
-    return tuple(rule for path, allowed in rights.items() for rule in _rules_for(path, allowed))
+    return tuple(rule for path, allowed in rights.items() for rule in _build_rules(path, allowed))
 
 
-def _rules_for(path: str, rights: int) -> Iterator[bytes]:
+def _build_rules(path: str, rights: int) -> Iterator[bytes]:
     with contextlib.suppress(FileNotFoundError):
         fd = os.open(path, os.O_PATH | os.O_CLOEXEC)
-        yield _RULE.pack(rights if os.path.isdir(path) else rights & _FILE_ONLY, _moved(fd))
+        yield _RULE.pack(rights if os.path.isdir(path) else rights & _FILE_ONLY, _move_descriptor(fd))
 
 
-def _moved(fd: int) -> int:
+def _move_descriptor(fd: int) -> int:
     """Return a duplicate of the descriptor, above the numbers that a child uses."""
     try:
-        return fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, ABOVE)
+        return fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, LOWEST_DESCRIPTOR)
     finally:
         os.close(fd)
 
 
-def writing_rule(folder: int, most: int = 99) -> bytes:
+def build_writing_rule(folder: int, most: int = 99) -> bytes:
     """Return the rule that allows writing in a flat folder, for Landlock up to version ``most``."""
     own = _READ_FILE | _READ_DIR | _WRITE_FILE | _MAKE_REG | _REMOVE_FILE | _TRUNCATE
-    return _RULE.pack(own & _file_rights(min(landlock_version(), most)), folder)
+    return _RULE.pack(own & _look_up_file_rights(min(read_landlock_version(), most)), folder)
 
 
 def restrict_files(rules: Iterable[bytes], most: int = 99) -> int:
     """Restrict this process to the files that ``rules`` allow. Return the Landlock version in use, up to ``most``."""
-    version = min(landlock_version(), most)
+    version = min(read_landlock_version(), most)
     if version < 1:
         raise LayerMissing(
             "Landlock: the kernel does not have it or it is switched off (needs 5.13 with landlock in lsm=)"
         )
-    ruleset = _create_ruleset(_file_rights(version), version)
+    ruleset = _create_ruleset(_look_up_file_rights(version), version)
     try:
         for rule in rules:
             if _libc.syscall(_SYS_LANDLOCK_ADD_RULE, ruleset, 1, rule, 0) != 0:
-                raise LayerMissing(f"Landlock: {_last_error()}")
+                raise LayerMissing(f"Landlock: {_describe_last_error()}")
         if _libc.syscall(_SYS_LANDLOCK_RESTRICT_SELF, ruleset, 0) != 0:
-            raise LayerMissing(f"Landlock: {_last_error()}")
+            raise LayerMissing(f"Landlock: {_describe_last_error()}")
     finally:
         os.close(ruleset)
     return version
 
 
-def _file_rights(version: int) -> int:
+def _look_up_file_rights(version: int) -> int:
     return _FILE_RIGHTS.get(min(version, 5), 0)
 
 
@@ -175,38 +175,40 @@ def _create_ruleset(rights: int, version: int) -> int:
             return int(ruleset)
         if ctypes.get_errno() != errno.EINVAL:
             break
-    raise LayerMissing(f"Landlock: {_last_error()}")
+    raise LayerMissing(f"Landlock: {_describe_last_error()}")
 
 
-def _last_error() -> str:
+def _describe_last_error() -> str:
     return os.strerror(ctypes.get_errno())
 
 
 def restrict_system_calls() -> None:
     """Install the seccomp filter on this process permanently."""
-    _install(program(os.getpid()), 0)
+    _install_filter(pack_filter(os.getpid()), 0)
 
 
-def ask_about_paths() -> int:
+def install_path_filter() -> int:
     """Let every system call with a path wait for a decision. Return the descriptor for the decisions.
 
     Raises:
         LayerMissing: If the kernel doesn't support it, or an outer process already decides for this one.
     """
     try:
-        return _install(asking(), _NEW_LISTENER | _ANSWERED_BEFORE_SIGNALS)
+        return _install_filter(build_path_filter(), _NEW_LISTENER | _ANSWERED_BEFORE_SIGNALS)
     except LayerMissing:
-        return _install(asking(), _NEW_LISTENER)
+        return _install_filter(build_path_filter(), _NEW_LISTENER)
 
 
-def _install(code: bytes, flags: int) -> int:
+def _install_filter(code: bytes, flags: int) -> int:
     buffer = ctypes.create_string_buffer(code, len(code))
     header = struct.pack("=H6xQ", len(code) // 8, ctypes.addressof(buffer))
     result = _libc.syscall(_SYS_SECCOMP, 1, flags, header)
     if result < 0:
-        raise LayerMissing(f"seccomp: {_last_error()}")
+        raise LayerMissing(f"seccomp: {_describe_last_error()}")
     return int(result)
 
 
 #: Version of the policy, a hash of what is allowed.
-POLICY = hashlib.sha256(repr((sorted(_FILE_RIGHTS.items()), program(0), asking())).encode()).hexdigest()[:8]
+POLICY = hashlib.sha256(repr((sorted(_FILE_RIGHTS.items()), pack_filter(0), build_path_filter())).encode()).hexdigest()[
+    :8
+]

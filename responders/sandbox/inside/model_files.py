@@ -44,7 +44,7 @@ def _preload_litert() -> None:
     litert.Interpreter = Interpreter
 
 
-def explain_joblib() -> None:
+def explain_joblib_errors() -> None:
     """Make errors of ``joblib.load`` name the file and the cause."""
     import joblib
     from joblib import numpy_pickle

@@ -14,13 +14,13 @@ from collections.abc import Callable
 from typing import Any
 
 from . import cell_source, own_modules, student_code
-from .frames import Frame, Wire, clip, fits
+from .frames import Frame, Wire, can_send_text, clip
 from .lockdown import Grants
 from .responder_role import ResponderRole
 from .shell import Shell
 
 _MOST_NOTES = 60
-_SHOWN = 2000
+_LONGEST_OUTPUT = 2000
 _ADDRESS = re.compile(r" at 0x[0-9A-Fa-f]+")
 
 
@@ -43,35 +43,35 @@ class NotebookRole(ResponderRole):
 
     def run(self) -> None:
         """Execute all cells, then answer until the worker closes the wire."""
-        from nbev3devsim import unseen
+        from nbev3devsim import placeholders
         from nbev3devsim.load_nbev3devwidget import roboSim
 
         self._prepare()
-        roboSim.look = self._look
-        unseen.install(self._shell)
+        roboSim.look = self._request_robot_state
+        placeholders.install(self._shell)
         self._namespace.update(In=[], Out={})
         # As in IPython, modules that a cell imports have these too.
-        builtins.display = unseen.display  # type: ignore[attr-defined]
+        builtins.display = placeholders.display  # type: ignore[attr-defined]
         builtins.get_ipython = lambda: self._shell  # type: ignore[attr-defined]
-        builtins.exit = builtins.quit = _leave  # type: ignore[assignment]
+        builtins.exit = builtins.quit = _exit_cell  # type: ignore[assignment]
         text = "".join(source + "\n" for source in self._spec["cells"])
         linecache.cache[self._name] = (len(text), None, text.splitlines(keepends=True), self._name)
         above = 0
         for place, source in enumerate(self._spec["cells"]):
-            self._wire.send({"do": "cell", "place": place, "answers": self._missing() is None})
-            error = self._execute(source, above)
+            self._wire.send({"do": "cell", "place": place, "answers": self._explain_missing_responder() is None})
+            error = self._execute_cell(source, above)
             if error is not None:
                 self._wire.send({"do": "raised", "error": error})
             above += source.count("\n") + 1
-        self._wire.send({"do": "executed", "missing": self._missing()})
-        self._fix_msg()
-        self._serve()
+        self._wire.send({"do": "executed", "missing": self._explain_missing_responder()})
+        self._note_own_msg()
+        self._serve_messages()
 
     def note(self, text: str) -> None:
         """Send a note to the worker, with the current line."""
         self._notes += 1
         if self._notes <= _MOST_NOTES:
-            self._wire.send({"do": "note", "text": clip(text, 300), **self._files.place(sys._getframe())})
+            self._wire.send({"do": "note", "text": clip(text, 300), **self._files.locate_frame(sys._getframe())})
 
     def expand(self, line: str) -> str:
         """Return a magic's line with ``{expression}`` and ``$name`` replaced, using the names of the cell."""
@@ -80,11 +80,11 @@ class NotebookRole(ResponderRole):
         frame = sys._getframe()
         while frame is not None and frame.f_code.co_filename != self._name:
             frame = frame.f_back  # type: ignore[assignment]
-        return cell_source.expanded(line, self._namespace | (frame.f_locals if frame is not None else {}))
+        return cell_source.expand_line(line, self._namespace | (frame.f_locals if frame is not None else {}))
 
     def run_line(self, text: str) -> Any:
         """Run code from the current line, as ``%time`` does. Return its value, if it has one."""
-        return self._evaluated(text, (self._files.line_in_main(sys._getframe()) or 1) - 1)
+        return self._evaluate(text, (self._files.find_main_line(sys._getframe()) or 1) - 1)
 
     def run_body(self, body: str) -> None:
         """Run the rest of a cell for its magic."""
@@ -92,13 +92,13 @@ class NotebookRole(ResponderRole):
 
     def run_file(self, name: str) -> None:
         """Run a Python file beside the notebook in the cells' namespace, as ``%run`` does."""
-        text = own_modules.in_folder(name.removesuffix(".py"))
+        text = own_modules.read_folder_module(name.removesuffix(".py"))
         if text is None:
             raise FileNotFoundError(f"there is no file {name} beside the notebook")
         self._files.imported.add(name)
         exec(student_code.compile_source(text, name), self._namespace)
 
-    def captured(self, work: Callable[[], None]) -> str:
+    def capture_output(self, work: Callable[[], None]) -> str:
         """Call ``work`` and return its output."""
         outer, self._captured = self._captured, []
         try:
@@ -114,27 +114,27 @@ class NotebookRole(ResponderRole):
         if self._robot_runs:
             self.note(f"%{name} was skipped: the robot is still running")
             return
-        if body is not None and not fits(body + arguments):
+        if body is not None and not can_send_text(body + arguments):
             self.note("the robot program was skipped: it is longer than about 60000 characters")
             return
-        self._fix_msg()
+        self._note_own_msg()
         self._robot_runs = True
         began = self._units
-        line = self._files.line_in_main(sys._getframe())
+        line = self._files.find_main_line(sys._getframe())
         self._wire.send(
             {
                 "do": "magic",
                 "name": name,
-                "arguments": clip(arguments, _SHOWN),
+                "arguments": clip(arguments, _LONGEST_OUTPUT),
                 "body": body,
                 "line": line,
-                "missing": self._missing(),
+                "missing": self._explain_missing_responder(),
             }
         )
         while True:
             frame = self._wire.receive()
             if frame["do"] == "message":
-                self._hear(frame, began)
+                self._answer_message(frame, began)
                 continue
             break
         self._robot_runs = False
@@ -142,29 +142,29 @@ class NotebookRole(ResponderRole):
         roboSim.collect(frame["data"], frame["images"])
         roboSim.robot_state = frame["state"] or {}
 
-    def _look(self) -> dict[str, Any]:
+    def _request_robot_state(self) -> dict[str, Any]:
         if self._robot_runs:
             return {}
         self._wire.send({"do": "state"})
         state: dict[str, Any] = self._wire.receive()["state"]
         return state
 
-    def _execute(self, source: str, above: int) -> Frame | None:
+    def _execute_cell(self, source: str, above: int) -> Frame | None:
         """Run one cell. ``above`` is the number of lines before it. Return the error that ended it, or None."""
         try:
             self._run_source(source, above)
         except BaseException as error:
             if isinstance(error, SystemExit) and error.code in (None, 0):
                 return None
-            return self._files.described(error)
+            return self._files.describe_error(error)
         return None
 
     def _run_source(self, source: str, above: int) -> None:
-        magic = cell_source.cell_magic(source)
+        magic = cell_source.parse_cell_magic(source)
         if magic is not None:
             self._call_cell_magic(magic, above)
         else:
-            self._run_cell(cell_source.python_source(source), above)
+            self._run_cell(cell_source.convert_to_python(source), above)
 
     def _call_cell_magic(self, magic: cell_source.CellMagic, above: int) -> None:
         self._body_above = above + magic.number
@@ -178,13 +178,13 @@ class NotebookRole(ResponderRole):
         exec(compile(tree, self._name, "exec", dont_inherit=True), names)
 
     def _run_cell(self, text: str, above: int) -> None:
-        value = self._evaluated(text, above)
+        value = self._evaluate(text, above)
         if value is not None and not text.rstrip().endswith(";"):
             self._namespace["_"] = value
             # Memory addresses are removed, because they differ between runs.
-            print(_ADDRESS.sub("", clip(repr(value), _SHOWN)))
+            print(_ADDRESS.sub("", clip(repr(value), _LONGEST_OUTPUT)))
 
-    def _evaluated(self, text: str, above: int) -> Any:
+    def _evaluate(self, text: str, above: int) -> Any:
         """Run the text and return the value of its last line, if it is an expression.
 
         ``above`` is the number of lines before it.
@@ -205,21 +205,21 @@ class NotebookRole(ResponderRole):
         ast.increment_lineno(shown, above)
         return eval(compile(shown, self._name, "eval", dont_inherit=True), self._namespace)
 
-    def _missing(self) -> str | None:
+    def _explain_missing_responder(self) -> str | None:
         """Return why there is no responder for the robot, or None if there is one."""
         try:
-            self._find()
+            self._find_function()
         except LookupError as error:
             return str(error)
         return None
 
-    def _fix_msg(self) -> None:
+    def _note_own_msg(self) -> None:
         """Note whether the notebook has its own global ``msg``. Otherwise ``msg`` is set to each text received."""
         mine = self._given_msg is not None and self._namespace.get("msg") == self._given_msg
         self._defines_msg = "msg" in self._namespace and not mine
 
-    def _answer(self, text: str) -> Frame:
-        frame = super()._answer(text)
+    def _answer_text(self, text: str) -> Frame:
+        frame = super()._answer_text(text)
         if not self._defines_msg:
             self._given_msg = text
         return frame
@@ -228,9 +228,9 @@ class NotebookRole(ResponderRole):
         if self._captured is None:
             super()._emit(text)
         else:
-            self._captured.append(self._files.without_folders(text))
+            self._captured.append(self._files.remove_folders(text))
 
 
-def _leave(code: object = None) -> None:
+def _exit_cell(code: object = None) -> None:
     """End the cell, as ``exit()`` does."""
     raise SystemExit(code)

@@ -9,16 +9,18 @@ import json
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from .frames import Wire, fits
-from .function_calls import as_json
+from .call_results import as_json
+from .frames import Wire, can_send_text
 
 
-def functions(names: Iterable[str], wire: Wire, waited: Callable[[int], None]) -> dict[str, Callable[..., Any]]:
+def build_agent_functions(
+    names: Iterable[str], wire: Wire, waited: Callable[[int], None]
+) -> dict[str, Callable[..., Any]]:
     """Return a function for each agent. ``waited`` is called with the time at which an answer arrives."""
-    return {name: _asking(name, wire, waited) for name in names}
+    return {name: _build_agent_function(name, wire, waited) for name in names}
 
 
-def _asking(name: str, wire: Wire, waited: Callable[[int], None]) -> Callable[..., Any]:
+def _build_agent_function(name: str, wire: Wire, waited: Callable[[int], None]) -> Callable[..., Any]:
     def ask(*arguments: Any, **named: Any) -> Any:
         listed, keyed = as_json(list(arguments)), as_json(named)
         if listed is None or keyed is None:
@@ -27,7 +29,7 @@ def _asking(name: str, wire: Wire, waited: Callable[[int], None]) -> Callable[..
                 f"{name} cannot be sent {' and '.join(kinds) or 'that'}: "
                 "a message holds what JSON has, which are texts, numbers, lists and dictionaries"
             )
-        if not fits(listed + keyed):
+        if not can_send_text(listed + keyed):
             length = len(listed) + len(keyed)
             raise ValueError(f"{name} cannot be sent {length} characters of JSON at once; the most is about 60000")
         wire.send({"do": "ask", "agent": name, "arguments": listed, "named": keyed})

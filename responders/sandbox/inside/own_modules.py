@@ -16,13 +16,15 @@ from importlib.machinery import ModuleSpec
 from types import CodeType, ModuleType
 from typing import Any
 
-from .libraries import WORDS
+from .libraries import LIBRARY_DESCRIPTION
 from .student_code import StudentFiles, is_module_file
 
-Source = Callable[[str], str | None]
+SourceFunction = Callable[[str], str | None]
 
 
-def install(source: Source, names: Iterable[str], files: StudentFiles, tell: Callable[[str], None]) -> None:
+def install_importer(
+    source: SourceFunction, names: Iterable[str], files: StudentFiles, tell: Callable[[str], None]
+) -> None:
     """Install an importer for modules that nothing else provides. ``source`` returns a module's text by name.
 
     ``tell(sentence)`` is called for each of ``names`` that another module hides.
@@ -30,15 +32,15 @@ def install(source: Source, names: Iterable[str], files: StudentFiles, tell: Cal
     for name in sorted(names):
         if _is_taken(name):
             tell(f"{name}.py is never imported: there is another module of that name, which comes first")
-    sys.meta_path.append(_OwnModules(source, files))
+    sys.meta_path.append(_OwnModuleFinder(source, files))
 
 
-def given(modules: Mapping[str, str]) -> Source:
+def build_source(modules: Mapping[str, str]) -> SourceFunction:
     """Return a source for these modules."""
     return modules.get
 
 
-def in_folder(name: str) -> str | None:
+def read_folder_module(name: str) -> str | None:
     """Return the current text of a module in the working folder, because cells can write modules too."""
     try:
         with open(f"{name}.py", "rb") as file:
@@ -47,7 +49,7 @@ def in_folder(name: str) -> str | None:
         return None
 
 
-def names_in_folder() -> list[str]:
+def list_folder_modules() -> list[str]:
     """Return the names of the modules in the working folder."""
     return [file.removesuffix(".py") for file in os.listdir() if is_module_file(file)]
 
@@ -60,7 +62,7 @@ def _is_taken(name: str) -> bool:
     return False
 
 
-def _importer() -> CodeType:
+def _find_importing_code() -> CodeType:
     """Return the code object with the import statement or call."""
     frame = sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename.startswith((__file__, "<frozen ")):
@@ -68,8 +70,8 @@ def _importer() -> CodeType:
     return frame.f_code
 
 
-class _OwnModules(MetaPathFinder, Loader):
-    def __init__(self, source: Source, files: StudentFiles) -> None:
+class _OwnModuleFinder(MetaPathFinder, Loader):
+    def __init__(self, source: SourceFunction, files: StudentFiles) -> None:
         self._source = source
         self._files = files
 
@@ -77,8 +79,8 @@ class _OwnModules(MetaPathFinder, Loader):
         if not fullname.isidentifier():
             return None
         text = self._source(fullname)
-        if text is None and self._files.has(_importer().co_filename):
-            raise ModuleNotFoundError(f"No module named {fullname!r}: {WORDS} are there", name=fullname)
+        if text is None and self._files.has(_find_importing_code().co_filename):
+            raise ModuleNotFoundError(f"No module named {fullname!r}: {LIBRARY_DESCRIPTION} are there", name=fullname)
         if text is None:
             return None
         file = f"{fullname}.py"

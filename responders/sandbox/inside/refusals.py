@@ -10,16 +10,16 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from . import withheld
+from . import excluded_modules
 from .lockdown import Grants
 from .student_code import StudentFiles
 
 NETWORK = "programs here may not open network connections"
 PROGRAMS = "programs here may not start other programs"
 FILES = "programs here may only open files in their own folder"
-_MOST_TOLD = 20
+_MAX_REPORTS = 20
 
-_SENTENCES = {
+_MESSAGES = {
     "socket.__new__": NETWORK,
     "socket.connect": NETWORK,
     "socket.bind": NETWORK,
@@ -35,7 +35,7 @@ _SENTENCES = {
 }
 
 
-def install(grants: Grants, student: StudentFiles, tell: Callable[[str], None]) -> None:
+def install_refusals(grants: Grants, student: StudentFiles, tell: Callable[[str], None]) -> None:
     """Install the errors. ``tell(sentence)`` is called for the first few, inside the refused call."""
     here = os.getcwd()
     own = (here,) if here != "/" else ()
@@ -45,9 +45,9 @@ def install(grants: Grants, student: StudentFiles, tell: Callable[[str], None]) 
     told: set[tuple[str, str | None, int | None]] = set()
 
     def note(sentence: str) -> None:
-        place = student.place(sys._getframe())
+        place = student.locate_frame(sys._getframe())
         once = (sentence, place["file"], place["line"])
-        if once not in told and len(told) < _MOST_TOLD:
+        if once not in told and len(told) < _MAX_REPORTS:
             told.add(once)
             tell(sentence)
 
@@ -56,7 +56,7 @@ def install(grants: Grants, student: StudentFiles, tell: Callable[[str], None]) 
         return PermissionError(1, sentence)
 
     def hook(event: str, args: tuple[Any, ...]) -> None:
-        sentence = _SENTENCES.get(event)
+        sentence = _MESSAGES.get(event)
         if sentence is not None:
             raise refuse(sentence)
         if event == "open" and isinstance(args[0], str) and args[0].startswith("/"):
@@ -68,6 +68,6 @@ def install(grants: Grants, student: StudentFiles, tell: Callable[[str], None]) 
                 raise PermissionError(1, FILES)
 
     sys.addaudithook(hook)
-    if grants.without:
+    if grants.excluded_modules:
         ours = (os.path.dirname(__file__), "<preamble>")
-        withheld.put_away(grants.without, (*grants.read, *libraries, *ours), note)
+        excluded_modules.hide_modules(grants.excluded_modules, (*grants.read, *libraries, *ours), note)

@@ -14,13 +14,13 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
-from . import determinism, function_calls, model_files, other_agents, own_modules, refusals, student_code
-from .frames import Frame, Wire, clip, fits
+from . import call_results, determinism, model_files, other_agents, own_modules, refusals, student_code
+from .frames import Frame, Wire, can_send_text, clip
 from .lockdown import Grants
 from .statement_watch import StatementWatch
 
-_NOTED = ("parser", "agent", "logger")
-_FUNCTIONS = (types.FunctionType, types.MethodType, types.BuiltinFunctionType, functools.partial)
+_RECORDED_NAMES = ("parser", "agent", "logger")
+_FUNCTION_TYPES = (types.FunctionType, types.MethodType, types.BuiltinFunctionType, functools.partial)
 
 
 class ResponderRole:
@@ -45,36 +45,40 @@ class ResponderRole:
     def run(self) -> None:
         """Load the module, then answer until the worker closes the wire."""
         self._prepare()
-        self._wire.send({"do": "ready", "error": self._load(self._spec["text"])})
-        self._serve()
+        self._wire.send({"do": "ready", "error": self._load_module(self._spec["text"])})
+        self._serve_messages()
 
     def _prepare(self) -> None:
         """Prepare for student code: output, clock, randomness, and an empty module."""
         from nbev3devsim.load_nbev3devwidget import eds, roboSim
 
-        signal.signal(signal.SIGXCPU, self._busy)
+        signal.signal(signal.SIGXCPU, self._report_busy)
         student_code.install_output(self._emit)
-        student_code.install_warnings(self._refused)
+        student_code.install_warnings(self._report_refusal)
         determinism.install_clock(lambda: self._units, self._sleep)
-        determinism.install_chance(self._spec["seed"])
-        refusals.install(self._grants, self._files, self._refused)
-        model_files.install_version_notes(self._refused)
-        own_modules.install(own_modules.in_folder, own_modules.names_in_folder(), self._files, self._refused)
+        determinism.install_randomness(self._spec["seed"])
+        refusals.install_refusals(self._grants, self._files, self._report_refusal)
+        model_files.install_version_notes(self._report_refusal)
+        own_modules.install_importer(
+            own_modules.read_folder_module, own_modules.list_folder_modules(), self._files, self._report_refusal
+        )
         module = types.ModuleType("__main__")
         sys.modules["__main__"] = module
         self._namespace = module.__dict__
         self._namespace.update(roboSim=roboSim, eds=eds)
-        self._namespace.update(other_agents.functions(self._spec.get("agents", ()), self._wire, self._waited))
+        self._namespace.update(
+            other_agents.build_agent_functions(self._spec.get("agents", ()), self._wire, self._advance_time)
+        )
 
-    def _serve(self) -> None:
+    def _serve_messages(self) -> None:
         while True:
             message = self._wire.receive()
             if message["do"] == "call":
-                self._wire.send(function_calls.returned(self._namespace, self._files, message))
+                self._wire.send(call_results.call_function(self._namespace, self._files, message))
             else:
-                self._hear(message, 0)
+                self._answer_message(message, 0)
 
-    def _hear(self, message: Frame, began: int) -> None:
+    def _answer_message(self, message: Frame, began: int) -> None:
         """Answer one message of the run that began at ``began``. The message contains the robot's new log entries."""
         from nbev3devsim.load_nbev3devwidget import roboSim
 
@@ -82,20 +86,20 @@ class ResponderRole:
         roboSim.collect(message.get("data", []), message.get("images", []))
         if "sender" in message and not self._defines_sender:
             self._namespace["sender"] = message["sender"]
-        self._wire.send(self._answer(message["text"]))
+        self._wire.send(self._answer_text(message["text"]))
 
-    def _load(self, text: str) -> Frame | None:
+    def _load_module(self, text: str) -> Frame | None:
         """Run the module. Return its error, also if it has no responder, or None."""
         try:
             self._files.execute(text, self._name, self._namespace)
-            if self._function != function_calls.NO_RESPONDER:
-                self._find()
+            if self._function != call_results.NO_RESPONDER:
+                self._find_function()
         except BaseException as error:
-            return self._files.described(error)
+            return self._files.describe_error(error)
         self._defines_msg, self._defines_sender = "msg" in self._namespace, "sender" in self._namespace
         return None
 
-    def _find(self) -> Callable[[str], Any]:
+    def _find_function(self) -> Callable[[str], Any]:
         """Return the requested function, else ``roboSim.pyresponder``, ``responder``, or the only ``*_responder``."""
         from nbev3devsim.load_nbev3devwidget import roboSim
 
@@ -125,37 +129,41 @@ class ResponderRole:
             "there is no responder: define a function called responder, or assign one to roboSim.pyresponder"
         )
 
-    def _answer(self, text: str) -> Frame:
+    def _answer_text(self, text: str) -> Frame:
         if not self._defines_msg:
             self._namespace["msg"] = text
-        self._note_calls()
+        self._wrap_functions()
         self._stack, self._calls = ["responder"], 0
         try:
-            answer = self._find()(text)
+            answer = self._find_function()(text)
         except BaseException as error:
-            return {"do": "answer", "kind": "error", "error": self._files.described(error)}
+            return {"do": "answer", "kind": "error", "error": self._files.describe_error(error)}
         if not isinstance(answer, str):
             return {"do": "answer", "kind": "other", "type": type(answer).__name__}
-        if not fits(answer):
+        if not can_send_text(answer):
             return {"do": "answer", "kind": "long", "length": len(answer)}
         return {"do": "answer", "kind": "text", "text": str(answer)}
 
-    def _note_calls(self) -> None:
+    def _wrap_functions(self) -> None:
         """Wrap the current parser, agent and logger, and ``predict`` of every bound network, to record calls."""
         for name, value in list(self._namespace.items()):
-            if name in _NOTED:
+            if name in _RECORDED_NAMES:
                 # Callable objects may have state that a wrapping function would lose.
-                if name != self._own_name and isinstance(value, _FUNCTIONS) and not hasattr(value, "_robomark_noted"):
-                    self._namespace[name] = self._noted(name, value)
+                if (
+                    name != self._own_name
+                    and isinstance(value, _FUNCTION_TYPES)
+                    and not hasattr(value, "_robomark_noted")
+                ):
+                    self._namespace[name] = self._wrap_function(name, value)
                 continue
             predict = getattr(value, "predict", None) if not isinstance(value, type | types.ModuleType) else None
             if callable(predict) and not hasattr(predict, "_robomark_noted"):
                 try:
-                    value.predict = self._noted(name, predict)
+                    value.predict = self._wrap_function(name, predict)
                 except Exception:
                     continue
 
-    def _noted(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    def _wrap_function(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(function)
         def call(*args: Any, **kwargs: Any) -> Any:
             caller, depth = self._stack[-1] if self._stack else "responder", len(self._stack)
@@ -166,13 +174,13 @@ class ResponderRole:
             finally:
                 if self._stack:
                     self._stack.pop()
-                self._report(depth, caller, name, args, result)
+                self._report_call(depth, caller, name, args, result)
             return result
 
         call._robomark_noted = True  # type: ignore[attr-defined]
         return call
 
-    def _report(self, depth: int, caller: str, callee: str, args: tuple[Any, ...], result: Any) -> None:
+    def _report_call(self, depth: int, caller: str, callee: str, args: tuple[Any, ...], result: Any) -> None:
         self._calls += 1
         if self._calls <= 50:
             self._wire.send(
@@ -181,8 +189,8 @@ class ResponderRole:
                     "depth": depth,
                     "caller": caller,
                     "callee": clip(callee, 60),
-                    "argument": _shown(args[0]) if args else "",
-                    "result": _shown(result),
+                    "argument": _describe_value(args[0]) if args else "",
+                    "result": _describe_value(result),
                 }
             )
 
@@ -190,23 +198,23 @@ class ResponderRole:
         self._units += units
         self._wire.send({"do": "sleep", "units": min(units, 10**15)})
 
-    def _waited(self, until: int) -> None:
+    def _advance_time(self, until: int) -> None:
         self._units = max(self._units, until)
 
     def _emit(self, text: str) -> None:
-        self._wire.send({"do": "print", "text": self._files.without_folders(text)})
+        self._wire.send({"do": "print", "text": self._files.remove_folders(text)})
 
-    def _refused(self, what: str) -> None:
-        self._wire.send({"do": "refused", "what": what, **self._files.place(sys._getframe())})
+    def _report_refusal(self, what: str) -> None:
+        self._wire.send({"do": "refused", "what": what, **self._files.locate_frame(sys._getframe())})
 
-    def _busy(self, _: int, frame: FrameType | None) -> None:
+    def _report_busy(self, _: int, frame: FrameType | None) -> None:
         try:
-            self._wire.send({"do": "busy", **self._files.place(frame)})
+            self._wire.send({"do": "busy", **self._files.locate_frame(frame)})
         finally:
             os._exit(0)
 
 
-def _shown(value: Any) -> str:
+def _describe_value(value: Any) -> str:
     """Return a short text for a value. Never fails, even if its repr does."""
     try:
         return clip(repr(value), 80)

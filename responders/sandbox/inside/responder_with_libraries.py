@@ -12,7 +12,7 @@ from . import libraries, model_files, responder_zygote
 
 NEEDED = responder_zygote.NEEDED
 run = responder_zygote.run
-_COURSE = ("nn_tools.network_views", "nn_tools.sensor_data", "nn_tools.weights")
+_COURSE_MODULES = ("nn_tools.network_views", "nn_tools.sensor_data", "nn_tools.weights")
 
 
 def preload(without: list[str]) -> None:
@@ -20,9 +20,9 @@ def preload(without: list[str]) -> None:
     responder_zygote.preload(without)
     libraries.preload(without)
     missing = (ImportError,) if without else ()
-    for name in _COURSE:
+    for name in _COURSE_MODULES:
         with contextlib.suppress(*missing):
             importlib.import_module(name)
     model_files.preload_runtimes()
     with contextlib.suppress(*missing):
-        model_files.explain_joblib()
+        model_files.explain_joblib_errors()

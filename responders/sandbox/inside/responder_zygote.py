@@ -17,12 +17,12 @@ from .responder_role import ResponderRole
 from .static_analysis import reader  # noqa: F401
 
 #: Modules needed for answering.
-NEEDED = ("nbev3devsim.load_nbev3devwidget", "nbev3devsim.unseen")
+NEEDED = ("nbev3devsim.load_nbev3devwidget", "nbev3devsim.placeholders")
 
 
 def preload(without: list[str]) -> None:
     """Import the standard modules that responders use without a library."""
-    for name in libraries.BESIDE:
+    for name in libraries.STANDARD_MODULES:
         importlib.import_module(name)
 
 

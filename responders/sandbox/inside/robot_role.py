@@ -25,11 +25,11 @@ NEEDED = ("brick_link", "brick_preambles", "ev3dev2_glue")
 
 def preload(without: list[str]) -> None:
     """Compile the preambles."""
-    preamble_codes()
+    compile_preambles()
 
 
 @functools.cache
-def preamble_codes() -> Mapping[str, CodeType]:
+def compile_preambles() -> Mapping[str, CodeType]:
     """Return the compiled preambles by name."""
     from brick_preambles import PREAMBLES
 
@@ -46,13 +46,13 @@ def run(wire: Wire, grants: Grants) -> None:
         files.watch = StatementWatch(wire.send, files.main)
 
     def stuck() -> None:
-        _leave(wire, {"do": "stuck", **files.place(sys._getframe())})
+        _send_and_exit(wire, {"do": "stuck", **files.locate_frame(sys._getframe())})
 
     def busy(_: int, frame: FrameType | None) -> None:
-        _leave(wire, {"do": "busy", **files.place(frame)})
+        _send_and_exit(wire, {"do": "busy", **files.locate_frame(frame)})
 
     def emit(text: str) -> None:
-        link.tell({"do": "print", "text": text})
+        link.notify({"do": "print", "text": text})
 
     def now() -> int:
         link.read_freely()
@@ -62,38 +62,38 @@ def run(wire: Wire, grants: Grants) -> None:
         link.wait_units(units)
 
     def told(what: str) -> None:
-        wire.send({"do": "refused", "what": what, **files.place(sys._getframe())})
+        wire.send({"do": "refused", "what": what, **files.locate_frame(sys._getframe())})
 
     signal.signal(signal.SIGXCPU, busy)
     link.number = spec.get("number", 1)
-    link.connect(wire, stuck, spec["sensors"], spec["tick"], files.lines_in_main)
+    link.connect(wire, stuck, spec["sensors"], spec["tick"], files.pack_main_lines)
     student_code.install_output(emit)
     student_code.install_warnings(told)
     determinism.install_clock(now, sleep)
-    determinism.install_chance(spec["seed"])
-    refusals.install(grants, files, told)
-    own_modules.install(own_modules.given(spec["modules"]), spec["modules"], files, told)
+    determinism.install_randomness(spec["seed"])
+    refusals.install_refusals(grants, files, told)
+    own_modules.install_importer(own_modules.build_source(spec["modules"]), spec["modules"], files, told)
     module = types.ModuleType("__main__")
     sys.modules["__main__"] = module
-    wire.send({"do": "end", "error": _execute(spec, module.__dict__, files)})
+    wire.send({"do": "end", "error": _execute_program(spec, module.__dict__, files)})
     wire.receive()
 
 
-def _execute(spec: Frame, namespace: dict[str, Any], files: student_code.StudentFiles) -> Frame | None:
+def _execute_program(spec: Frame, namespace: dict[str, Any], files: student_code.StudentFiles) -> Frame | None:
     """Run the program. Return its error, or None."""
     try:
-        exec(preamble_codes()[spec["preamble"]], namespace)
+        exec(compile_preambles()[spec["preamble"]], namespace)
         files.execute(spec["text"], files.main, namespace)
     except SystemExit as ending:
         if ending.code in (None, 0):
             return None
         return {"type": "SystemExit", "text": clip(str(ending.code)), "line": None, "file": None}
     except BaseException as error:
-        return files.described(error)
+        return files.describe_error(error)
     return None
 
 
-def _leave(wire: Wire, frame: Frame) -> None:
+def _send_and_exit(wire: Wire, frame: Frame) -> None:
     """Send the reason and end the process at once, so that student code can't continue or catch it."""
     try:
         wire.send(frame)

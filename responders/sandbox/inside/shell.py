@@ -11,14 +11,14 @@ from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from . import libraries, refusals
-from .cell_source import LINE_WRAPPERS, WRAPPERS, wrapped
+from .cell_source import LINE_WRAPPERS, WRAPPERS, extract_wrapped_code
 
-_ROBOT = ("sim_magic", "sim_magic_imports", "sim_magic_preloaded")
+_ROBOT_MAGICS = ("sim_magic", "sim_magic_imports", "sim_magic_preloaded")
 #: Magics whose cells the report draws as diagrams.
-_DIAGRAMS = frozenset(("blockdiag", "seqdiag"))
-_NO_DIAGRAMS = frozenset(("actdiag", "nwdiag", "packetdiag", "rackdiag"))
+_DIAGRAM_MAGICS = frozenset(("blockdiag", "seqdiag"))
+_UNSUPPORTED_DIAGRAM_MAGICS = frozenset(("actdiag", "nwdiag", "packetdiag", "rackdiag"))
 #: Magics that only set up or show something in a browser.
-_WITHOUT_EFFECT = frozenset(
+_IGNORED_MAGICS = frozenset(
     (
         *("load_ext", "reload_ext", "unload_ext", "matplotlib", "pylab", "config", "autoreload", "precision", "xmode"),
         *("colors", "autosave", "alias_magic", "pinfo", "pdoc", "psource"),
@@ -26,11 +26,11 @@ _WITHOUT_EFFECT = frozenset(
         *("html", "HTML", "javascript", "js", "markdown", "latex", "svg", "SVG"),
     )
 )
-_PROGRAMS = frozenset(
+_PROGRAM_MAGICS = frozenset(
     ("bash", "sh", "script", "sx", "system", "cmd", "perl", "ruby", "python", "python2", "python3", "pypy", "R")
 )
-_PACKAGES = frozenset(("pip", "pip3", "conda", "mamba"))
-_NO_PACKAGES = f"packages cannot be installed here; {libraries.WORDS} are there"
+_PACKAGE_MAGICS = frozenset(("pip", "pip3", "conda", "mamba"))
+_PACKAGE_MESSAGE = f"packages cannot be installed here; {libraries.LIBRARY_DESCRIPTION} are there"
 
 
 class RunRequester(Protocol):
@@ -58,7 +58,7 @@ class RunRequester(Protocol):
     def expand(self, line: str) -> str:
         """Return a magic's line with ``{expression}`` and ``$name`` replaced by values."""
 
-    def captured(self, work: Callable[[], None]) -> str:
+    def capture_output(self, work: Callable[[], None]) -> str:
         """Call ``work`` and return its output."""
 
 
@@ -87,19 +87,19 @@ class Shell:
     def __init__(self, requester: RunRequester) -> None:
         self._requester = requester
         self._lines: dict[str, Callable[[str], Any]] = {
-            "cat": self._cat,
-            "less": self._cat,
-            "more": self._cat,
-            "pycat": self._cat,
-            "ls": self._ls,
-            "run": self._run,
-            **dict.fromkeys(LINE_WRAPPERS, lambda line: self._requester.run_line(wrapped(line))),
+            "cat": self._print_files,
+            "less": self._print_files,
+            "more": self._print_files,
+            "pycat": self._print_files,
+            "ls": self._list_files,
+            "run": self._run_file,
+            **dict.fromkeys(LINE_WRAPPERS, lambda line: self._requester.run_line(extract_wrapped_code(line))),
         }
         self._cells: dict[str, Callable[[str, str], Any]] = {
             **dict.fromkeys(WRAPPERS, lambda _, body: self._requester.run_body(body)),
-            "capture": self._capture,
-            "writefile": self._write,
-            "file": self._write,
+            "capture": self._capture_body,
+            "writefile": self._write_file,
+            "file": self._write_file,
         }
 
     @property
@@ -111,30 +111,30 @@ class Shell:
         """Run ``%name line``. An unsupported magic is reported."""
         name = str(magic_name).lstrip("%")
         line = self._requester.expand(str(line))
-        if name in _ROBOT:
+        if name in _ROBOT_MAGICS:
             return self._requester.start_robot(name, line, None)
-        if name in _WITHOUT_EFFECT:
+        if name in _IGNORED_MAGICS:
             return None
-        data = _data_magics().get(name)
+        data = _load_data_magics().get(name)
         if data is not None:
-            return data(_words(line))
+            return data(_split_words(line))
         if name in self._lines:
             return self._lines[name](line)
-        return self._without(name, f"%{name}")
+        return self._report_unsupported(name, f"%{name}")
 
     def run_cell_magic(self, magic_name: str, line: str, cell: str) -> Any:
         """Run ``%%name line`` with the rest of the cell."""
         name = str(magic_name).lstrip("%")
         line, body = self._requester.expand(str(line)), str(cell)
-        if name in _ROBOT:
+        if name in _ROBOT_MAGICS:
             return self._requester.start_robot(name, line, body)
         if name in self._cells:
             return self._cells[name](line, body)
-        if name in _DIAGRAMS:
+        if name in _DIAGRAM_MAGICS:
             return None
-        if name in _NO_DIAGRAMS:
+        if name in _UNSUPPORTED_DIAGRAM_MAGICS:
             return self._requester.note(f"%%{name} was skipped: only %%blockdiag and %%seqdiag are drawn here")
-        return self._without(name, f"%%{name}")
+        return self._report_unsupported(name, f"%%{name}")
 
     def magic(self, arg_s: str) -> Any:
         """Run ``%name line`` given as one text, as in older notebooks."""
@@ -143,7 +143,7 @@ class Shell:
 
     def system(self, cmd: str) -> None:
         """Refuse ``!cmd``."""
-        self._requester.note(f"!{_short(cmd)} was refused: {refusals.PROGRAMS}")
+        self._requester.note(f"!{_shorten_line(cmd)} was refused: {refusals.PROGRAMS}")
 
     def getoutput(self, cmd: str, *_: Any, **__: Any) -> list[str]:
         """Refuse ``x = !cmd`` and return an empty list."""
@@ -155,36 +155,36 @@ class Shell:
             raise AttributeError(name)
         return lambda *args, **kwargs: None
 
-    def _without(self, name: str, shown: str) -> None:
-        if name in _PROGRAMS:
-            self._requester.note(f"{_short(shown)} was refused: {refusals.PROGRAMS}")
-        elif name in _PACKAGES:
-            self._requester.note(f"{shown} was refused: {_NO_PACKAGES}")
-        elif name not in _WITHOUT_EFFECT:
-            self._requester.note(f"{_short(shown)} was skipped: it is not known here")
+    def _report_unsupported(self, name: str, shown: str) -> None:
+        if name in _PROGRAM_MAGICS:
+            self._requester.note(f"{_shorten_line(shown)} was refused: {refusals.PROGRAMS}")
+        elif name in _PACKAGE_MAGICS:
+            self._requester.note(f"{shown} was refused: {_PACKAGE_MESSAGE}")
+        elif name not in _IGNORED_MAGICS:
+            self._requester.note(f"{_shorten_line(shown)} was skipped: it is not known here")
 
-    def _cat(self, line: str) -> None:
-        for name in _words(line):
+    def _print_files(self, line: str) -> None:
+        for name in _split_words(line):
             with open(name, encoding="utf-8", errors="replace") as file:
                 print(file.read())
 
-    def _run(self, line: str) -> None:
-        name = next((word for word in _words(line) if not word.startswith("-")), "")
+    def _run_file(self, line: str) -> None:
+        name = next((word for word in _split_words(line) if not word.startswith("-")), "")
         if name.endswith(".ipynb"):
-            self._requester.note(f"%run {_short(name)} was skipped: another notebook cannot be run here")
+            self._requester.note(f"%run {_shorten_line(name)} was skipped: another notebook cannot be run here")
         else:
             self._requester.run_file(name if name.endswith(".py") else f"{name}.py")
 
-    def _capture(self, line: str, body: str) -> None:
-        text = self._requester.captured(lambda: self._requester.run_body(body))
-        for name in [word for word in _words(line) if not word.startswith("-")][:1]:
+    def _capture_body(self, line: str, body: str) -> None:
+        text = self._requester.capture_output(lambda: self._requester.run_body(body))
+        for name in [word for word in _split_words(line) if not word.startswith("-")][:1]:
             self._requester.namespace[name] = CapturedOutput(text)
 
-    def _ls(self, _: str) -> None:
+    def _list_files(self, _: str) -> None:
         print("  ".join(sorted(os.listdir("."))))
 
-    def _write(self, line: str, body: str) -> None:
-        words = _words(line)
+    def _write_file(self, line: str, body: str) -> None:
+        words = _split_words(line)
         adds = [word for word in words if word in ("-a", "--append")]
         names = [word for word in words if word not in ("-a", "--append")]
         if len(names) != 1:
@@ -195,7 +195,7 @@ class Shell:
             file.write(body if body.endswith("\n") else body + "\n")
 
 
-def _data_magics() -> Mapping[str, Callable[[list[str]], Any]]:
+def _load_data_magics() -> Mapping[str, Callable[[list[str]], Any]]:
     try:
         from nbev3devsim.data_magics import MAGICS
     except ImportError:  # pandas may be excluded by the assignment
@@ -203,10 +203,10 @@ def _data_magics() -> Mapping[str, Callable[[list[str]], Any]]:
     return MAGICS
 
 
-def _words(line: str) -> list[str]:
+def _split_words(line: str) -> list[str]:
     return shlex.split(line, comments=False)
 
 
-def _short(text: str) -> str:
+def _shorten_line(text: str) -> str:
     line = " ".join(str(text).split())
     return line if len(line) <= 60 else line[:57] + "..."

@@ -16,8 +16,8 @@ from .frames import Frame
 
 _TABLE = "__ran__"
 _LONGEST_LINE = 1_000_000
-_DEEPEST = 30_000
-_BLOCKS = ("body", "orelse", "finalbody")
+_RECURSION_LIMIT = 30_000
+_BLOCK_FIELDS = ("body", "orelse", "finalbody")
 
 
 class StatementWatch:
@@ -29,20 +29,20 @@ class StatementWatch:
 
     def compile(self, text: str, name: str, namespace: dict[str, Any]) -> CodeType:
         """Compile a whole file to run in ``namespace``. The file must compile without changes."""
-        namespace[_TABLE] = _Table(self._send, None if name == self._main else name)
+        namespace[_TABLE] = _StatementTable(self._send, None if name == self._main else name)
         limit = sys.getrecursionlimit()
         # Compiling a syntax tree needs deeper recursion than compiling its text.
-        sys.setrecursionlimit(_DEEPEST)
+        sys.setrecursionlimit(_RECURSION_LIMIT)
         try:
             tree = ast.parse(text, name)
-            for block in list(_blocks(tree)):
-                block[:] = [each for statement in block for each in (*_mark(statement), statement)]
+            for block in list(_list_blocks(tree)):
+                block[:] = [each for statement in block for each in (*_build_lookup(statement), statement)]
             return compile(tree, name, "exec", dont_inherit=True)
         finally:
             sys.setrecursionlimit(limit)
 
 
-class _Table(dict[int, None]):
+class _StatementTable(dict[int, None]):
     """The executed statements of one file, by line and column in one number."""
 
     def __init__(self, send: Callable[[Frame], None], file: str | None) -> None:
@@ -54,15 +54,15 @@ class _Table(dict[int, None]):
         self._send({"do": "ran", "file": self._file, "line": line, "column": column})
 
 
-def _blocks(tree: ast.Module) -> Iterator[list[ast.stmt]]:
+def _list_blocks(tree: ast.Module) -> Iterator[list[ast.stmt]]:
     for node in ast.walk(tree):
-        for name in _BLOCKS:
+        for name in _BLOCK_FIELDS:
             block = getattr(node, name, None)
             if isinstance(block, list):
                 yield block
 
 
-def _mark(statement: ast.stmt) -> Iterator[ast.stmt]:
+def _build_lookup(statement: ast.stmt) -> Iterator[ast.stmt]:
     """Yield a lookup for a statement, except where no statement may come before it."""
     match statement:
         case ast.ImportFrom(module="__future__") | ast.Expr(value=ast.Constant(value=str())):

@@ -16,7 +16,7 @@ from types import CodeType, FrameType
 from typing import Any
 
 from .frames import Frame, clip
-from .near_names import meant_by
+from .name_suggestions import suggest_fix
 from .statement_watch import StatementWatch
 
 _MOST_WARNINGS, _LONGEST_WARNING = 20, 180
@@ -51,17 +51,17 @@ class StudentFiles:
 
     def has(self, name: str) -> bool:
         """Return whether a file name belongs to the student's code."""
-        return name == self.main or self._beside(name) is not None
+        return name == self.main or self._find_flat_name(name) is not None
 
-    def place(self, frame: FrameType | None) -> Frame:
+    def locate_frame(self, frame: FrameType | None) -> Frame:
         """Return ``line`` and ``file`` of the innermost student frame. ``file`` is None for the main file."""
         while frame is not None:
             if self.has(frame.f_code.co_filename):
-                return self._place(frame.f_code.co_filename, frame.f_lineno)
+                return self._build_place(frame.f_code.co_filename, frame.f_lineno)
             frame = frame.f_back
         return {"line": None, "file": None}
 
-    def line_in_main(self, frame: FrameType | None) -> int | None:
+    def find_main_line(self, frame: FrameType | None) -> int | None:
         """Return the line of the main file that led to the frame."""
         while frame is not None:
             if frame.f_code.co_filename == self.main:
@@ -69,7 +69,7 @@ class StudentFiles:
             frame = frame.f_back
         return None
 
-    def lines_in_main(self) -> int:
+    def pack_main_lines(self) -> int:
         """Return the innermost and the outermost running line of the main file, packed into one positive number."""
         inner = outer = 0
         frame: FrameType | None = sys._getframe(1)
@@ -82,22 +82,22 @@ class StudentFiles:
             frame = frame.f_back
         return max(inner, 1) + outer * MOST_LINES
 
-    def described(self, error: BaseException) -> Frame:
+    def describe_error(self, error: BaseException) -> Frame:
         """Return the error as a frame: type, text, last student line on its way, and a hint."""
         place: Frame = {"line": None, "file": None}
         if isinstance(error, SyntaxError) and error.filename is not None and self.has(error.filename):
-            place = self._place(error.filename, error.lineno)
+            place = self._build_place(error.filename, error.lineno)
             words = error.msg or "invalid syntax"
         else:
             for frame, number in traceback.walk_tb(error.__traceback__):
                 if self.has(frame.f_code.co_filename):
-                    place = self._place(frame.f_code.co_filename, number)
-            words = _words(error)
-        told = {"type": type(error).__name__, "text": clip(self.without_folders(words)), **place}
-        hint = meant_by(error)
+                    place = self._build_place(frame.f_code.co_filename, number)
+            words = _format_message(error)
+        told = {"type": type(error).__name__, "text": clip(self.remove_folders(words)), **place}
+        hint = suggest_fix(error)
         return {**told, "hint": hint} if hint else told
 
-    def without_folders(self, text: str) -> str:
+    def remove_folders(self, text: str) -> str:
         """Return ``text`` without the paths of this machine's modules and of the working folder."""
         if "/" not in text:
             return text
@@ -105,10 +105,10 @@ class StudentFiles:
             text = text.replace(folder, "")
         return text if self._folder is None else text.replace(self._folder[:-1], ".")
 
-    def _place(self, name: str, line: int | None) -> Frame:
-        return {"line": line, "file": None if name == self.main else self._beside(name)}
+    def _build_place(self, name: str, line: int | None) -> Frame:
+        return {"line": line, "file": None if name == self.main else self._find_flat_name(name)}
 
-    def _beside(self, name: str) -> str | None:
+    def _find_flat_name(self, name: str) -> str | None:
         """Return the flat name of a file beside the main one, or None."""
         if name in self.imported:
             return name
@@ -123,14 +123,14 @@ def is_module_file(name: str) -> bool:
     return name.endswith(".py") and name.removesuffix(".py").isidentifier()
 
 
-def _words(error: BaseException) -> str:
+def _format_message(error: BaseException) -> str:
     try:
         return str(error)
     except Exception:
         return "(its message cannot be shown)"
 
 
-class Output:
+class TextStream:
     """A standard stream that sends each write as one text."""
 
     encoding = "utf-8"
@@ -176,7 +176,7 @@ class Output:
 
 def install_output(emit: Callable[[str], None]) -> None:
     """Make each call of ``print`` send one text, without its end, and refuse ``input``."""
-    stream = Output(emit)
+    stream = TextStream(emit)
     sys.stdout = sys.stderr = stream
     sys.stdin = None
     real_print = builtins.print

@@ -93,7 +93,7 @@ ALLOWED: dict[str, int] = {
 }
 
 #: Calls with paths. For each path: the argument with its start descriptor, if any, and the argument with the path.
-PATHS: dict[int, tuple[tuple[int | None, int], ...]] = {
+PATH_ARGUMENTS: dict[int, tuple[tuple[int | None, int], ...]] = {
     **dict.fromkeys((2, 4, 6, 21, 87, 89), ((None, 0),)),  # open, stat, lstat, access, unlink, readlink
     82: ((None, 0), (None, 1)),  # rename
     # openat, newfstatat, unlinkat, readlinkat, faccessat, statx, faccessat2; renameat, renameat2
@@ -101,7 +101,7 @@ PATHS: dict[int, tuple[tuple[int | None, int], ...]] = {
     **dict.fromkeys((264, 316), ((0, 1), (2, 3))),
 }
 #: Those that may create a file, and the argument with their flags.
-OPENS = {2: 1, 257: 2}
+FLAG_ARGUMENTS = {2: 1, 257: 2}
 
 _LOAD, _JUMP_EQUAL, _JUMP_AT_LEAST, _JUMP_SET, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
 _AND = 0x54
@@ -114,7 +114,7 @@ _O_ACCMODE, _O_TRUNC, _O_CREAT, _O_TMPFILE = 0o3, 0o1000, 0o100, 0o20000000
 _SPECIAL_MODES = 0o7000  # set-uid, set-gid, sticky
 
 
-def _argument(index: int) -> int:
+def _compute_argument_offset(index: int) -> int:
     """Return the offset of an argument's low half in the filter's data; the high half follows."""
     return 16 + 8 * index
 
@@ -123,7 +123,7 @@ Instruction = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True)
-class Rule:
+class ArgumentRule:
     """A call that is allowed if the low 32 bits of each listed argument are among its values."""
 
     number: int
@@ -131,7 +131,7 @@ class Rule:
     zero: int | None = None  # an argument that must be zero in all 64 bits
 
 
-def _rules(pid: int) -> tuple[Rule, ...]:
+def _build_argument_rules(pid: int) -> tuple[ArgumentRule, ...]:
     """Return the calls that depend on an argument. All others are refused."""
     tiocgwinsz, tcgets, fionread, fionbio, fioclex, fionclex = 0x5413, 0x5401, 0x541B, 0x5421, 0x5451, 0x5450
     rename_noreplace, rename_exchange = 1, 2  # not RENAME_WHITEOUT, which creates a device
@@ -146,24 +146,24 @@ def _rules(pid: int) -> tuple[Rule, ...]:
     futex_private, clock_realtime = 128, 256
     waits = tuple(range(futex_private, futex_private + 14))
     return (
-        Rule(16, {1: (tiocgwinsz, tcgets, fionread, fionbio, fioclex, fionclex)}),
-        Rule(28, {2: (dontneed, free, hugepage, nohugepage)}),  # madvise
-        Rule(72, {1: (f_dupfd, f_getfd, f_setfd, f_getfl, f_setfl, f_dupfd_cloexec)}),
-        Rule(62, {0: (pid,), 1: signals}),  # kill
-        Rule(234, {0: (pid,), 2: signals}),  # tgkill
-        Rule(157, {0: (15, 16)}),  # prctl: the name
-        Rule(158, {0: (arch_get_fs, arch_set_fs)}),
-        Rule(316, {4: (0, rename_noreplace, rename_exchange)}),  # renameat2: the flags
-        Rule(302, {0: own}, zero=2),  # prlimit64: only reading; the argument is a pointer
-        Rule(124, {0: own}),  # getsid
-        Rule(140, {0: (0,), 1: own}),  # getpriority
-        *(Rule(number, {0: own}) for number in (143, 145, 204, 274)),  # sched_get*, get_robust_list
-        *(Rule(number, {0: clocks}) for number in (228, 229, 230)),  # clock_*
-        Rule(202, {1: (*waits, *(clock_realtime | each for each in waits))}),  # futex
+        ArgumentRule(16, {1: (tiocgwinsz, tcgets, fionread, fionbio, fioclex, fionclex)}),
+        ArgumentRule(28, {2: (dontneed, free, hugepage, nohugepage)}),  # madvise
+        ArgumentRule(72, {1: (f_dupfd, f_getfd, f_setfd, f_getfl, f_setfl, f_dupfd_cloexec)}),
+        ArgumentRule(62, {0: (pid,), 1: signals}),  # kill
+        ArgumentRule(234, {0: (pid,), 2: signals}),  # tgkill
+        ArgumentRule(157, {0: (15, 16)}),  # prctl: the name
+        ArgumentRule(158, {0: (arch_get_fs, arch_set_fs)}),
+        ArgumentRule(316, {4: (0, rename_noreplace, rename_exchange)}),  # renameat2: the flags
+        ArgumentRule(302, {0: own}, zero=2),  # prlimit64: only reading; the argument is a pointer
+        ArgumentRule(124, {0: own}),  # getsid
+        ArgumentRule(140, {0: (0,), 1: own}),  # getpriority
+        *(ArgumentRule(number, {0: own}) for number in (143, 145, 204, 274)),  # sched_get*, get_robust_list
+        *(ArgumentRule(number, {0: clocks}) for number in (228, 229, 230)),  # clock_*
+        ArgumentRule(202, {1: (*waits, *(clock_realtime | each for each in waits))}),  # futex
     )
 
 
-def instructions(pid: int) -> list[Instruction]:
+def build_filter(pid: int) -> list[Instruction]:
     """Return the filter for the process ``pid``: calls that are not allowed fail with EPERM, foreign ABIs kill."""
     code: list[Instruction] = [
         (_LOAD, 0, 0, _AT_ARCH),
@@ -175,73 +175,73 @@ def instructions(pid: int) -> list[Instruction]:
     ]
     for number in ALLOWED.values():
         code += [(_JUMP_EQUAL, 0, 1, number), (_RETURN, 0, 0, _RET_ALLOW)]
-    for rule in _rules(pid):
-        code += _only_if(rule.number, _equal_to(rule))
-    code += _only_if(_OPEN, _never_set_uid(1, 2) + _never_truncating(1))
-    code += _only_if(_OPENAT, _never_set_uid(2, 3) + _never_truncating(2))
-    code += _only_if(_CLONE3, [(_RETURN, 0, 0, _RET_ERRNO | errno.ENOSYS)])
-    code += _only_if(_CLONE, [(_RETURN, 0, 0, _RET_ERRNO | errno.EAGAIN)])
+    for rule in _build_argument_rules(pid):
+        code += _restrict_to_call(rule.number, _check_arguments(rule))
+    code += _restrict_to_call(_OPEN, _refuse_special_modes(1, 2) + _refuse_truncation(1))
+    code += _restrict_to_call(_OPENAT, _refuse_special_modes(2, 3) + _refuse_truncation(2))
+    code += _restrict_to_call(_CLONE3, [(_RETURN, 0, 0, _RET_ERRNO | errno.ENOSYS)])
+    code += _restrict_to_call(_CLONE, [(_RETURN, 0, 0, _RET_ERRNO | errno.EAGAIN)])
     return [*code, (_RETURN, 0, 0, _RET_ERRNO | errno.EPERM)]
 
 
-def asking() -> bytes:
+def build_path_filter() -> bytes:
     """Return the filter that makes calls with paths wait for a decision. A refusal of the other filter overrides it."""
     code: list[Instruction] = [(_LOAD, 0, 0, _AT_NUMBER)]
-    for number in PATHS:
-        code += _only_if(number, [(_RETURN, 0, 0, _RET_ASK)])
-    return packed([*code, (_RETURN, 0, 0, _RET_ALLOW)])
+    for number in PATH_ARGUMENTS:
+        code += _restrict_to_call(number, [(_RETURN, 0, 0, _RET_ASK)])
+    return pack_instructions([*code, (_RETURN, 0, 0, _RET_ALLOW)])
 
 
-def packed(code: list[Instruction]) -> bytes:
+def pack_instructions(code: list[Instruction]) -> bytes:
     """Return the instructions in the kernel's binary format."""
     return b"".join(struct.pack("=HBBI", *instruction) for instruction in code)
 
 
-def _only_if(number: int, body: list[Instruction]) -> list[Instruction]:
+def _restrict_to_call(number: int, body: list[Instruction]) -> list[Instruction]:
     """Return ``body`` for one call only. The call number is loaded before, and after because a body always returns."""
     return [(_JUMP_EQUAL, 0, len(body), number), *body]
 
 
-def _equal_to(rule: Rule) -> list[Instruction]:
+def _check_arguments(rule: ArgumentRule) -> list[Instruction]:
     refused = (_RETURN, 0, 0, _RET_ERRNO | errno.EPERM)
     body: list[Instruction] = []
     if rule.zero is not None:
         for half in (0, 4):
-            body += [(_LOAD, 0, 0, _argument(rule.zero) + half), (_JUMP_EQUAL, 1, 0, 0), refused]
+            body += [(_LOAD, 0, 0, _compute_argument_offset(rule.zero) + half), (_JUMP_EQUAL, 1, 0, 0), refused]
     for argument, values in rule.values.items():
-        body.append((_LOAD, 0, 0, _argument(argument)))
+        body.append((_LOAD, 0, 0, _compute_argument_offset(argument)))
         body += [(_JUMP_EQUAL, left, 0, value) for left, value in zip(range(len(values), 0, -1), values, strict=True)]
         body.append(refused)
     return [*body, (_RETURN, 0, 0, _RET_ALLOW)]
 
 
-def _never_set_uid(flags: int, mode: int) -> list[Instruction]:
+def _refuse_special_modes(flags: int, mode: int) -> list[Instruction]:
     """Return instructions that refuse O_TMPFILE, and special mode bits when a file is created.
 
     Without O_CREAT, the mode argument is unused and may have any value.
     """
     return [
-        (_LOAD, 0, 0, _argument(flags)),
+        (_LOAD, 0, 0, _compute_argument_offset(flags)),
         (_JUMP_SET, 0, 1, _O_TMPFILE),
         (_RETURN, 0, 0, _RET_ERRNO | errno.EPERM),
         (_JUMP_SET, 0, 3, _O_CREAT),
-        (_LOAD, 0, 0, _argument(mode)),
+        (_LOAD, 0, 0, _compute_argument_offset(mode)),
         (_JUMP_SET, 0, 1, _SPECIAL_MODES),
         (_RETURN, 0, 0, _RET_ERRNO | errno.EPERM),
     ]
 
 
-def _never_truncating(argument: int) -> list[Instruction]:
+def _refuse_truncation(argument: int) -> list[Instruction]:
     """Return instructions that refuse O_TRUNC without write access, which empties a file on old Landlock versions.
 
     The access mode with both bits set is always refused, because Landlock asks for no right then.
     """
     return [
-        (_LOAD, 0, 0, _argument(argument)),
+        (_LOAD, 0, 0, _compute_argument_offset(argument)),
         (_AND, 0, 0, _O_ACCMODE),
         (_JUMP_EQUAL, 0, 1, _O_ACCMODE),
         (_RETURN, 0, 0, _RET_ERRNO | errno.EPERM),
-        (_LOAD, 0, 0, _argument(argument)),
+        (_LOAD, 0, 0, _compute_argument_offset(argument)),
         (_JUMP_SET, 0, 3, _O_TRUNC),
         (_AND, 0, 0, _O_ACCMODE),
         (_JUMP_EQUAL, 0, 1, 0),
@@ -251,10 +251,10 @@ def _never_truncating(argument: int) -> list[Instruction]:
 
 
 #: Larger than any process id.
-_NOBODY = 0x7FFF_FFFF
-_OF_NOBODY = packed(instructions(_NOBODY))
+_PLACEHOLDER_PID = 0x7FFF_FFFF
+_FILTER_TEMPLATE = pack_instructions(build_filter(_PLACEHOLDER_PID))
 
 
-def program(pid: int) -> bytes:
+def pack_filter(pid: int) -> bytes:
     """Return ``instructions`` in binary form. All but the process id is computed before any fork."""
-    return _OF_NOBODY.replace(_NOBODY.to_bytes(4, "little"), pid.to_bytes(4, "little"))
+    return _FILTER_TEMPLATE.replace(_PLACEHOLDER_PID.to_bytes(4, "little"), pid.to_bytes(4, "little"))

@@ -24,14 +24,14 @@ from .frames import Wire
 
 _PR_SET_PDEATHSIG = 1
 _PR_SET_DUMPABLE = 4
-_ENDED = (ctypes.c_char * 152)()  # the status and, from byte 8, the resource usage; zero except briefly
-_STATUS, _USED = ctypes.byref(_ENDED), ctypes.byref(_ENDED, 8)
+_EXIT_REPORT = (ctypes.c_char * 152)()  # the status and, from byte 8, the resource usage; zero except briefly
+_STATUS, _USED = ctypes.byref(_EXIT_REPORT), ctypes.byref(_EXIT_REPORT, 8)
 _ANY_CHILD = b"\xff" * 4  # -1 for wait4(2)
-_PRACTICE = 2
+_PRACTICE_FORKS = 2
 _wait4 = ctypes.CDLL(None).wait4
 #: Environment variables for student code, in addition to a home. Libraries that are loaded late must not start threads
 #: or use other kernels either.
-_KEPT = (
+_KEPT_VARIABLES = (
     "LANG",
     "NPY_DISABLE_CPU_FEATURES",
     "OMP_NUM_THREADS",
@@ -53,20 +53,20 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
         roots: Folders for imports.
     """
     try:
-        _start(role_name, folders, without, roots)
+        _run_zygote(role_name, folders, without, roots)
     except ConnectionError:
         os._exit(0)
 
 
-def _start(role_name: str, folders: str, without: list[str], roots: list[str]) -> None:
-    _before_the_worker()
+def _run_zygote(role_name: str, folders: str, without: list[str], roots: list[str]) -> None:
+    _raise_oom_score()
     prctl = ctypes.CDLL(None).prctl
     prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.dont_write_bytecode = True
     sys.path[:0] = roots
-    from . import battery, determinism, doorkeeper, libraries, refusals, withheld  # noqa: F401
+    from . import battery, determinism, doorkeeper, excluded_modules, libraries, refusals  # noqa: F401
 
     control, specs = socket.socket(fileno=3), socket.socket(fileno=4)
     if role_name == "robot":
@@ -77,36 +77,38 @@ def _start(role_name: str, folders: str, without: list[str], roots: list[str]) -
         from . import responder_zygote as role  # type: ignore[no-redef]
     else:
         from . import responder_with_libraries as role  # type: ignore[no-redef]
-    determinism.install_chance(0)  # libraries draw random numbers while loading, which affects addresses
+    determinism.install_randomness(0)  # libraries draw random numbers while loading, which affects addresses
     for name in role.NEEDED:
         importlib.import_module(name)
-    closed = withheld.keep_out(tuple(without))
-    readable = grants.readable(roots, closed)
-    allowed = lockdown.Grants(readable, grants.listable(roots, closed), open_to_others=grants.open_to_others(readable))
-    door = doorkeeper.start(allowed, (control.fileno(), specs.fileno()))
+    closed = excluded_modules.exclude_modules(tuple(without))
+    readable = grants.list_readable_paths(roots, closed)
+    allowed = lockdown.Grants(
+        readable, grants.list_listable_folders(roots, closed), open_to_others=grants.is_open_to_others(readable)
+    )
+    door = doorkeeper.start_doorkeeper(allowed, (control.fileno(), specs.fileno()))
     role.preload(without)
-    prepared = child.Prepared(
-        allowed, lockdown.reading_rules(allowed), child.changed_signals(), os.getpid(), door.fileno()
+    prepared = child.ChildSetup(
+        allowed, lockdown.build_reading_rules(allowed), child.list_changed_signals(), os.getpid(), door.fileno()
     )
     with_libraries = role_name.endswith("with libraries")
-    run = role.run if with_libraries else functools.partial(libraries.run_without, role.run)
+    run = role.run if with_libraries else functools.partial(libraries.run_without_libraries, role.run)
     roles = {"role": run, "battery": battery.run}
-    kept = {name: os.environ[name] for name in _KEPT if name in os.environ}
+    kept = {name: os.environ[name] for name in _KEPT_VARIABLES if name in os.environ}
     os.environ.clear()
     os.environ.update(kept, HOME="/")
-    _one_thread()
+    _check_single_thread()
     gc.collect()
     gc.disable()
     gc.freeze()
     inside = os.open(folders, os.O_RDONLY | os.O_DIRECTORY)
-    _reply(control, {"ready": True}, [inside])
+    _send_reply(control, {"ready": True}, [inside])
     os.close(inside)
-    _practise()
-    _serve(control, functools.partial(_become_child, specs, roles, prepared))
+    _practise_forks()
+    _serve_orders(control, functools.partial(_become_child, specs, roles, prepared))
     os._exit(0)
 
 
-def _serve(control: socket.socket, become_child: Callable[[], object]) -> None:
+def _serve_orders(control: socket.socket, become_child: Callable[[], object]) -> None:
     """Fork a child for each order of 0. For any other order, wait for the end of the child with that id.
 
     A child reads its own spec. This process keeps no new objects meanwhile, so the initial memory and addresses of
@@ -120,54 +122,54 @@ def _serve(control: socket.socket, become_child: Callable[[], object]) -> None:
             become_child()
 
 
-def _practise() -> None:
+def _practise_forks() -> None:
     """Fork children that end at once, so that effects of first calls on memory occur before any other child."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    for _ in range(_PRACTICE):
+    for _ in range(_PRACTICE_FORKS):
         theirs.send(bytes(4))
         theirs.send(_ANY_CHILD)
     theirs.shutdown(socket.SHUT_WR)
-    _serve(ours, functools.partial(os._exit, 0))
+    _serve_orders(ours, functools.partial(os._exit, 0))
     ours.close()
     theirs.close()
 
 
 def _become_child(
-    specs: socket.socket, roles: Mapping[str, Callable[[Wire, lockdown.Grants], None]], prepared: child.Prepared
+    specs: socket.socket, roles: Mapping[str, Callable[[Wire, lockdown.Grants], None]], prepared: child.ChildSetup
 ) -> None:
     """Run a child in this process; never returns."""
     try:
-        spec, descriptors = _receive(specs)
+        spec, descriptors = _receive_spec(specs)
         pidfd = os.pidfd_open(os.getpid())
     except OSError as error:
-        _reply(specs, {"missing": f"pidfd_open: {error.strerror}"})
+        _send_reply(specs, {"missing": f"pidfd_open: {error.strerror}"})
         os._exit(0)
-    _reply(specs, {"pid": os.getpid()}, [pidfd])
-    child.start(spec, descriptors, roles[spec["work"]], prepared)
+    _send_reply(specs, {"pid": os.getpid()}, [pidfd])
+    child.run_child(spec, descriptors, roles[spec["work"]], prepared)
 
 
 def _reap(control: socket.socket, pid: int) -> None:
     """Report the end of a child without decoding it: any object kept here would be in the next child's memory."""
     if _wait4(pid, _STATUS, 0, _USED) < 0:
         raise ChildProcessError(f"no child {pid}")
-    control.send(_ENDED)
-    ctypes.memset(_ENDED, 0, ctypes.sizeof(_ENDED))
+    control.send(_EXIT_REPORT)
+    ctypes.memset(_EXIT_REPORT, 0, ctypes.sizeof(_EXIT_REPORT))
 
 
-def _before_the_worker() -> None:
+def _raise_oom_score() -> None:
     """Let the kernel kill children first when memory runs out, then the zygote, and the worker last."""
     with contextlib.suppress(OSError), open("/proc/self/oom_score_adj", "w") as score:
         score.write("700")
 
 
-def _one_thread() -> None:
+def _check_single_thread() -> None:
     with open("/proc/self/status") as status:
         threads = next(int(line.split()[1]) for line in status if line.startswith("Threads:"))
     if threads != 1:
         raise SystemExit(f"the zygote has {threads} threads; it can fork safely only with one")
 
 
-def _receive(specs: socket.socket) -> tuple[dict[str, Any], list[int]]:
+def _receive_spec(specs: socket.socket) -> tuple[dict[str, Any], list[int]]:
     data, ancillary, _, _ = specs.recvmsg(65536, socket.CMSG_SPACE(8 * 4))
     descriptors = array.array("i")
     for _, _, payload in ancillary:
@@ -175,7 +177,7 @@ def _receive(specs: socket.socket) -> tuple[dict[str, Any], list[int]]:
     return json.loads(data), list(descriptors)
 
 
-def _reply(control: socket.socket, answer: dict[str, Any], descriptors: list[int] | None = None) -> None:
+def _send_reply(control: socket.socket, answer: dict[str, Any], descriptors: list[int] | None = None) -> None:
     payload = array.array("i", descriptors or [])
     ancillary = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, payload)] if descriptors else []
     control.sendmsg([json.dumps(answer).encode()], ancillary)

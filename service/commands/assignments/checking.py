@@ -25,4 +25,4 @@ def check(
         raise UsageError("name one assignment to use --write-expected")
     from service.commands.assignments import examples
 
-    examples.check(assignment, write_expected=write_expected)
+    examples.check_assignments(assignment, write_expected=write_expected)

@@ -9,20 +9,20 @@ from typing import Any
 
 from rich.progress import track
 
-from service.commands.assignments.which import count_words
-from service.commands.example_table import catalogue_table, examples_table, measures_table
-from service.commands.shown import document, note, progress, show, tell
-from service.commands.statistics_shown import statistics_parts
+from service.commands.assignments.arguments import format_count
+from service.commands.example_tables import build_catalogue_table, build_examples_table, build_measures_table
+from service.commands.output import create_progress_console, print_json, print_line, print_note, print_renderables
+from service.commands.statistics_tables import build_statistics
+from service.grading.class_statistics import compute_statistics
 from service.grading.example_check import CheckedAssignment, check_examples
-from service.grading.statistics import statistics_of
 from service.grading.trial_runner import TrialRunner
-from service.home import for_the_user
+from service.home import user_permissions
 from sim.errors import AssignmentError
 from submissions.assignment.examples import EXAMPLES, EXPECTED, add_expected
-from submissions.assignment.folder import FILE_NAME, REFERENCE, catalogue
+from submissions.assignment.folder import FILE_NAME, REFERENCE, list_catalogue_ids
 
 
-def check(assignment: str | None, *, write_expected: bool) -> None:
+def check_assignments(assignment: str | None, *, write_expected: bool) -> None:
     """Check one assignment, or the whole catalogue if ``assignment`` is None.
 
     Args:
@@ -36,28 +36,28 @@ def check(assignment: str | None, *, write_expected: bool) -> None:
         if assignment is not None:
             checked = [check_examples(assignment, runner=runner)]
             if write_expected:
-                checked = [_noted(assignment, checked[0])]
-            _show(checked[0])
+                checked = [_write_expectations(assignment, checked[0])]
+            _show_checked(checked[0])
         else:
-            names = track(catalogue(), "grading", transient=True, console=progress())
+            names = track(list_catalogue_ids(), "grading", transient=True, console=create_progress_console())
             checked = [check_examples(name, runner=runner) for name in names]
-            show(catalogue_table(checked))
-    statistics = statistics_of(example.marked for each in checked for example in each.examples if example.marked)
+            print_renderables(build_catalogue_table(checked))
+    statistics = compute_statistics(example.marked for each in checked for example in each.examples if example.marked)
     if assignment is not None:
-        show(*statistics_parts(statistics))
-    document(assignments=list(map(_told, checked)), statistics=statistics)
+        print_renderables(*build_statistics(statistics))
+    print_json(assignments=list(map(_checked_to_json, checked)), statistics=statistics)
     for each in checked:
         for warning in each.warnings:
-            note(f"robomark: {each.assignment.id}: {warning}")
+            print_note(f"robomark: {each.assignment.id}: {warning}")
     problems = [f"{each.assignment.id}: {problem}" for each in checked for problem in each.problems]
     if problems:
         raise AssignmentError("\n".join(problems))
     if assignment is None:
         count = sum(len(each.examples) for each in checked)
-        tell(f"{len(checked)} assignments, {count} examples: all as expected")
+        print_line(f"{len(checked)} assignments, {count} examples: all as expected")
 
 
-def _told(checked: CheckedAssignment) -> dict[str, Any]:
+def _checked_to_json(checked: CheckedAssignment) -> dict[str, Any]:
     """Return the JSON value for an assignment and its examples."""
     return {
         "id": checked.assignment.id,
@@ -70,7 +70,7 @@ def _told(checked: CheckedAssignment) -> dict[str, Any]:
         ],
         "measures": [
             {"measure": each.original.measure, "value": each.value, "original": each.original.value,
-             "unit": each.unit, "agrees": each.agrees}
+             "unit": each.unit, "agrees": each.is_close}
             for each in checked.measures
         ],
         "problems": checked.problems,
@@ -78,25 +78,29 @@ def _told(checked: CheckedAssignment) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _noted(assignment: str, checked: CheckedAssignment) -> CheckedAssignment:
+def _write_expectations(assignment: str, checked: CheckedAssignment) -> CheckedAssignment:
     """Write the missing expectations to a file for review, and return the check result with them."""
-    if not checked.unwritten:
-        tell(f"{EXPECTED} has a table for every example: no changes")
+    if not checked.missing_expectations:
+        print_line(f"{EXPECTED} has a table for every example: no changes")
         return checked
-    with for_the_user():
-        path = add_expected(assignment, checked.unwritten)
-    tell(f"{path}: results of {', '.join(checked.unwritten)} written; check that they are the expected ones")
-    return checked.written()
+    with user_permissions():
+        path = add_expected(assignment, checked.missing_expectations)
+    print_line(
+        f"{path}: results of {', '.join(checked.missing_expectations)} written; check that they are the expected ones"
+    )
+    return checked.as_written()
 
 
-def _show(checked: CheckedAssignment) -> None:
+def _show_checked(checked: CheckedAssignment) -> None:
     found = checked.assignment
-    criteria = count_words(len(found.criteria), "criterion", "criteria")
-    trials = count_words(found.trial_count, "trial", "trials")
-    tell(f"{found.id}: no problems; {criteria}, {found.max_marks:g} marks, {trials} (version {found.version[:12]})")
+    criteria = format_count(len(found.criteria), "criterion", "criteria")
+    trials = format_count(found.trial_count, "trial", "trials")
+    print_line(
+        f"{found.id}: no problems; {criteria}, {found.max_marks:g} marks, {trials} (version {found.version[:12]})"
+    )
     if checked.examples:
-        show(examples_table(checked))
+        print_renderables(build_examples_table(checked))
     else:
-        tell(f"no examples to grade: expected {EXAMPLES}/{REFERENCE} beside {FILE_NAME}")
+        print_line(f"no examples to grade: expected {EXAMPLES}/{REFERENCE} beside {FILE_NAME}")
     if checked.measures:
-        show(measures_table(checked))
+        print_renderables(build_measures_table(checked))

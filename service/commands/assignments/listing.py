@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from service.commands.shown import document, show, table
-from service.reports.readable import number, one_line
-from submissions.assignment.assignment_overview import overview
-from submissions.assignment.folder import assignment_folder, catalogue
+from service.commands.output import create_table, print_json, print_renderables
+from service.reports.display_text import format_decimal, to_one_line
+from submissions.assignment.assignment_overview import read_overview
+from submissions.assignment.folder import list_catalogue_ids, locate_assignment_folder
 
 
 def list_assignments() -> None:
     """The assignments of the catalogue."""
-    assignments = [overview(assignment_folder(name)) for name in catalogue()]
-    document(assignments=assignments)
-    listed = table("section", "id", "title", "marks", "trials", right=("marks", "trials"))
+    assignments = [read_overview(locate_assignment_folder(name)) for name in list_catalogue_ids()]
+    print_json(assignments=assignments)
+    listed = create_table("section", "id", "title", "marks", "trials", right=("marks", "trials"))
     for each in assignments:
-        listed.add_row(each.section, each.id, one_line(each.title), number(each.marks), str(each.trials))
-    show(listed)
+        listed.add_row(each.section, each.id, to_one_line(each.title), format_decimal(each.marks), str(each.trials))
+    print_renderables(listed)

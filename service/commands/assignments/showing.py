@@ -4,41 +4,41 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from service.commands.assignments.which import Which, count_words
-from service.commands.shown import document, table, tell
-from service.commands.shown import show as show_parts
+from service.commands.assignments.arguments import AssignmentArgument, format_count
+from service.commands.output import create_table, print_json, print_line
+from service.commands.output import print_renderables as show_parts
 
 if TYPE_CHECKING:
     from submissions.assignment.definition import Assignment
 
 
-def show(assignment: Which) -> None:
+def show(assignment: AssignmentArgument) -> None:
     """Show the task of an assignment and its marking scheme."""
     from rich.text import Text
 
-    from service.reports.readable import flowing, one_line, readable
+    from service.reports.display_text import join_wrapped_lines, to_display_text, to_one_line
     from submissions.assignment.reader import find_assignment
 
     found = find_assignment(assignment)
     trials = {each.id: sum(trial.scenario is each for trial in found.trials()) for each in found.scenarios}
-    document(**_told(found, trials))
-    title = Text(one_line(found.title), style="bold")
+    print_json(**_assignment_to_json(found, trials))
+    title = Text(to_one_line(found.title), style="bold")
     show_parts(title.append(f" ({found.id}), {found.max_marks:g} marks", style="not bold"))
     if found.description:
-        show_parts(Text(flowing(readable(found.description.strip(), 20_000, lines=500))))
-    show_parts(f"\n{_setting(found)}")
+        show_parts(Text(join_wrapped_lines(to_display_text(found.description.strip(), 20_000, lines=500))))
+    show_parts(f"\n{_describe_setting(found)}")
     if found.given:
         show_parts(f"given files: {', '.join(sorted(found.given))}")
-    criteria = table("criterion", "check", "marks", right=("marks",))
+    criteria = create_table("criterion", "check", "marks", right=("marks",))
     for criterion in found.criteria:
-        criteria.add_row(one_line(criterion.title), criterion.check, f"{criterion.marks:g}")
+        criteria.add_row(to_one_line(criterion.title), criterion.check, f"{criterion.marks:g}")
     show_parts(criteria)
     for scenario in found.scenarios:
-        counted = count_words(trials[scenario.id], "trial", "trials")
-        tell(f"scenario {scenario.id}: {counted} of at most {scenario.seconds:g} s, {scenario.visibility}")
+        counted = format_count(trials[scenario.id], "trial", "trials")
+        print_line(f"scenario {scenario.id}: {counted} of at most {scenario.seconds:g} s, {scenario.visibility}")
 
 
-def _told(found: Assignment, trials: dict[str, int]) -> dict[str, object]:
+def _assignment_to_json(found: Assignment, trials: dict[str, int]) -> dict[str, object]:
     """Return the JSON value for an assignment."""
     return {
         "id": found.id,
@@ -62,14 +62,14 @@ def _told(found: Assignment, trials: dict[str, int]) -> dict[str, object]:
     }
 
 
-def _cell(which: str) -> str:
+def _describe_cell(which: str) -> str:
     """Describe which notebook cell contains the marked robot program."""
     if which.isdecimal():
         return f"robot program {which}"
     return "the last robot program" if which == "last" else f'the cell tagged "{which.removeprefix("tag:")}"'
 
 
-def _setting(found: Assignment) -> str:
+def _describe_setting(found: Assignment) -> str:
     if not found.scenarios:
         return f"no robot is run; responder: {found.parts.responder}"
     agents = "".join(f", {name}: {who}" for name, who in found.parts.agents.items())
@@ -77,5 +77,5 @@ def _setting(found: Assignment) -> str:
     return (
         f"world: {found.world.background}, robot {found.world.robot}{noise}; "
         f"program: {found.parts.program}, responder: {found.parts.responder}{agents}; "
-        f"of a notebook: {_cell(found.parts.cell)}"
+        f"of a notebook: {_describe_cell(found.parts.cell)}"
     )

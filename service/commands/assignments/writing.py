@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-from service.commands.assignments.which import Which, count_words
-from service.commands.shown import document, tell
-from service.home import for_the_user
+from service.commands.assignments.arguments import AssignmentArgument, format_count
+from service.commands.output import print_json, print_line
+from service.home import user_permissions
 from submissions.assignment.folder import FILE_NAME
 
 
@@ -21,16 +21,16 @@ def new(
     ] = None,
 ) -> None:
     """Create the folder of a new assignment with a reference solution, as a template to edit."""
-    from submissions.assignment.export import write_new
+    from submissions.assignment.export import create_assignment
 
-    with for_the_user():
-        write_new(folder, like)
-    document(output=folder)
-    tell(f"{folder}: change {FILE_NAME}, then: robomark assignments check {shlex.quote(str(folder))}")
+    with user_permissions():
+        create_assignment(folder, like)
+    print_json(output=folder)
+    print_line(f"{folder}: change {FILE_NAME}, then: robomark assignments check {shlex.quote(str(folder))}")
 
 
 def export(
-    assignment: Which,
+    assignment: AssignmentArgument,
     output: Annotated[Path, typer.Option("-o", "--output", help="A folder to write to, or a .zip file to create.")],
     student: Annotated[
         bool,
@@ -38,24 +38,24 @@ def export(
     ] = False,
 ) -> None:
     """Export an assignment: all of it, or with --student the part that students may see."""
-    from submissions.assignment.export import export_for_students, export_whole
+    from submissions.assignment.export import export_all, export_for_students
 
-    with for_the_user():
-        written = export_for_students(assignment, output) if student else export_whole(assignment, output)
-    document(output=output, files=written)
-    tell(f"{output}: {count_words(written, 'file', 'files')}")
+    with user_permissions():
+        written = export_for_students(assignment, output) if student else export_all(assignment, output)
+    print_json(output=output, files=written)
+    print_line(f"{output}: {format_count(written, 'file', 'files')}")
 
 
 def autograder(
-    assignment: Which,
+    assignment: AssignmentArgument,
     output: Annotated[Path, typer.Option("-o", "--output", help="The folder to create.")],
 ) -> None:
     """Create the folder of a Gradescope autograder. It contains this installation's secret."""
     from service.autograder import write_autograder
-    from service.home_secret import secret_here
+    from service.home_secret import load_home_secret
     from service.settings import load_settings
 
-    with for_the_user():
-        write_autograder(assignment, output, secret_here(load_settings()))
-    document(output=output)
-    tell(f"{output}: zip the contents of this folder and upload the zip to Gradescope")
+    with user_permissions():
+        write_autograder(assignment, output, load_home_secret(load_settings()))
+    print_json(output=output)
+    print_line(f"{output}: zip the contents of this folder and upload the zip to Gradescope")

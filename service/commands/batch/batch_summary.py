@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _MOST_NAMED = 10
 
 
-def summary(line: BatchLine) -> str:
+def summarize_jobs(line: BatchLine) -> str:
     """Return the number of jobs in each state as text."""
     if line.web_assignment is not None:
         held = "open: " if line.takes_in else "closed: "
@@ -25,13 +25,13 @@ def summary(line: BatchLine) -> str:
     return held + (", ".join(parts) or "empty")
 
 
-def remarks(line: JobLine) -> list[str]:
+def list_remarks(line: JobLine) -> list[str]:
     """Return the remarks about a grade, for example ``2 days late`` or ``published``."""
-    from service.operations.batch_views import in_days
+    from service.operations.batch_views import format_days
 
     told = {
         f"same as {line.copied_from}": line.copied_from is not None,
-        f"{in_days(line.days_late)} late": line.days_late > 0 and line.staff_only is None,
+        f"{format_days(line.days_late)} late": line.days_late > 0 and line.staff_only is None,
         f"staff only: {line.staff_only}": line.staff_only is not None,
         f"no {line.missing}": bool(line.missing),
         f"{line.unjudged} criteria not judged": line.unjudged > 0,
@@ -44,7 +44,7 @@ def remarks(line: JobLine) -> list[str]:
     return [remark for remark, holds in told.items() if holds]
 
 
-def unjudged_words(lines: Sequence[JobLine]) -> str:
+def describe_unjudged(lines: Sequence[JobLine]) -> str:
     """Return a sentence about grades with criteria that were not judged, or an empty string if there are none."""
     students = [line.student for line in lines if line.unjudged]
     if not students:
@@ -54,7 +54,7 @@ def unjudged_words(lines: Sequence[JobLine]) -> str:
     return f"{whose} criteria that could not be judged and give no marks: {told}; robomark show GRADE shows the reasons"
 
 
-def out_of(marks: Decimal | None, most: Decimal | None) -> str:
+def format_marks(marks: Decimal | None, most: Decimal | None) -> str:
     """Return the marks and the maximum, such as ``7 / 10``. Return an empty string without marks."""
     if marks is None:
         return ""

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from service.commands.operating import operating
-from service.commands.shown import document, tell
+from service.commands.installation import open_installation
+from service.commands.output import print_json, print_line
 from sim.errors import UsageError
 
 BatchId = Annotated[str, typer.Argument(help="The batch's id, or its first characters.")]
@@ -17,41 +17,41 @@ def pause(batch: BatchId) -> None:
     """Pause a batch: start no more jobs. Running jobs continue."""
     from service.operations import batches as operations
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         found = operations.find(service, actor, batch)
         held = operations.pause(service, actor, found.course_id, found.id)
     was = "is paused" if held.changed else "was paused already"
-    document(batch=found.id, changed=held.changed, waiting=held.waiting, running=held.running)
-    tell(f"batch {found.id} {was}: {held.waiting} queued, {held.running} still running")
+    print_json(batch=found.id, changed=held.changed, waiting=held.waiting, running=held.running)
+    print_line(f"batch {found.id} {was}: {held.waiting} queued, {held.running} still running")
 
 
 def resume(batch: BatchId) -> None:
     """Resume a paused batch."""
     from service.operations import batches as operations
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         found = operations.find(service, actor, batch)
         held = operations.resume(service, actor, found.course_id, found.id)
     was = "is resumed" if held.changed else "was not paused"
-    document(batch=found.id, changed=held.changed, waiting=held.waiting, running=held.running)
-    tell(f"batch {found.id} {was}: {held.waiting} queued, {held.running} running")
+    print_json(batch=found.id, changed=held.changed, waiting=held.waiting, running=held.running)
+    print_line(f"batch {found.id} {was}: {held.waiting} queued, {held.running} running")
 
 
 def cancel(batch: BatchId) -> None:
     """Cancel the unfinished jobs of a batch. Existing marks stay."""
     from service.operations import batches as operations
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         found = operations.find(service, actor, batch)
         ended = operations.cancel(service, actor, found.course_id, found.id)
-    document(batch=found.id, changed=ended.changed, waiting=ended.waiting, running=ended.running)
+    print_json(batch=found.id, changed=ended.changed, waiting=ended.waiting, running=ended.running)
     if ended.changed:
-        tell(
+        print_line(
             f"batch {found.id} is cancelled: {ended.waiting} queued jobs cancelled, {ended.running} running jobs "
             "stopped"
         )
     else:
-        tell(f"batch {found.id}: nothing changed, all its jobs have ended")
+        print_line(f"batch {found.id}: nothing changed, all its jobs have ended")
 
 
 def retry(
@@ -63,13 +63,13 @@ def retry(
 
     if (batch is not None) == every:
         raise UsageError("name one batch, or use --all for the failed jobs of all batches")
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         batch_id = None if batch is None else operations.find(service, actor, batch).id
         retried = operations.retry_dead(service, actor, batch_id)
     where = "all batches" if batch_id is None else f"batch {batch_id}"
-    document(batch=batch_id, queued=retried.queued, outdated=retried.outdated)
+    print_json(batch=batch_id, queued=retried.queued, outdated=retried.outdated)
     if retried.queued + retried.outdated == 0:
-        tell(f"{where}: nothing changed, there are no failed jobs")
+        print_line(f"{where}: nothing changed, there are no failed jobs")
         return
     outdated = f"; {retried.outdated} left out, because there is a newer submission" if retried.outdated else ""
-    tell(f"{where}: {retried.queued} queued again{outdated}")
+    print_line(f"{where}: {retried.queued} queued again{outdated}")

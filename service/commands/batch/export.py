@@ -9,13 +9,13 @@ from typing import Annotated
 import typer
 
 from service.commands.batch.control import BatchId
-from service.commands.options import format_option
-from service.commands.shown import wants_json
+from service.commands.options import create_format_option
+from service.commands.output import is_json_output
 
 
 def export(
     batch: BatchId,
-    form: Annotated[str, format_option("What to write; a wrong one names them all.", _names)] = "csv",
+    form: Annotated[str, create_format_option("What to write; a wrong one names them all.", _list_formats)] = "csv",
     output: Annotated[
         Path | None,
         typer.Option(
@@ -31,12 +31,12 @@ def export(
 
     Every student has a row. Rejected submissions and those without a grade have the reason.
     """
-    from service.commands.batch.exporting import export_batch
+    from service.commands.batch.batch_export import export_batch
 
-    export_batch(batch, "json" if wants_json() else form, output, worksheet, published=published)
+    export_batch(batch, "json" if is_json_output() else form, output, worksheet, published=published)
 
 
-def _names() -> Iterable[str]:
+def _list_formats() -> Iterable[str]:
     from service.reports.formats import FORMATS
 
     return FORMATS

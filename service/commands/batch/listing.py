@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
-from service.commands.batch.batch_summary import summary
-from service.commands.operating import operating
-from service.commands.shown import document, show, table
+from service.commands.batch.batch_summary import summarize_jobs
+from service.commands.installation import open_installation
+from service.commands.output import create_table, print_json, print_renderables
 
 
 def list_batches(
@@ -17,11 +17,13 @@ def list_batches(
     """List the newest batches."""
     from service.operations.batch_views import list_newest
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         lines = list_newest(service, actor, course)
-    listed = table("batch", "name", "submitted", "submissions", "refused", "state", right=("submissions", "refused"))
+    listed = create_table(
+        "batch", "name", "submitted", "submissions", "refused", "state", right=("submissions", "refused")
+    )
     for line in lines:
         when = line.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
-        listed.add_row(line.id, line.name, when, str(line.jobs), str(len(line.refusals)), summary(line))
-    document(batches=lines)
-    show(listed)
+        listed.add_row(line.id, line.name, when, str(line.jobs), str(len(line.refusals)), summarize_jobs(line))
+    print_json(batches=lines)
+    print_renderables(listed)

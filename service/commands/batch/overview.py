@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.commands.batch.control import BatchId
-from service.commands.operating import operating
-from service.commands.shown import document, show, table, tell
-from service.commands.statistics_shown import named, statistics_parts
-from service.grading.statistics import PASS_SHARE
+from service.commands.installation import open_installation
+from service.commands.output import create_table, print_json, print_line, print_renderables
+from service.commands.statistics_tables import build_statistics, format_names
+from service.grading.class_statistics import PASS_SHARE
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from service.operations.batch_views import ClassOverview, TableLine
     from submissions.student_identity import Student
 
-_WHY = {
+_OUTLIER_REASONS = {
     "low": "much lower than the others",
     "slow": "took much longer than the others",
     "close": "close to the pass mark",
@@ -36,32 +36,32 @@ def show_overview(
     """Show marks and their distribution, criteria, causes, students who need attention, and missing submissions."""
     from service.operations import batch_views, batches
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         found = batches.find(service, actor, batch)
         shown = batch_views.show_overview(service, actor, found.course_id, found.id, Decimal(pass_mark) / 100)
     classes, refusals = shown.classes, shown.batch.refusals
-    document(batch=found.id, classes=classes, refusals=refusals, missing=shown.missing)
+    print_json(batch=found.id, classes=classes, refusals=refusals, missing=shown.missing)
     by_id = {line.id: line for line in shown.lines}
     for each in classes:
-        show(*statistics_parts([each.statistics]), _distribution(each))
-        tell(f"{each.passed} of {each.statistics.n} have {pass_mark} % or more")
+        print_renderables(*build_statistics([each.statistics]), _build_distribution(each))
+        print_line(f"{each.passed} of {each.statistics.n} have {pass_mark} % or more")
         if each.outliers:
-            show(_outliers(each, by_id))
+            print_renderables(_build_outliers(each, by_id))
         for same in each.identical:
-            tell(f"identical: {named(tuple(line.student for line in same))}")
-        _tell_missing(each.missing)
-    _tell_missing(shown.missing)
+            print_line(f"identical: {format_names(tuple(line.student for line in same))}")
+        _print_missing(each.missing)
+    _print_missing(shown.missing)
     for refusal in refusals:
-        tell(f"rejected: {refusal.source}: {refusal.reason}")
+        print_line(f"rejected: {refusal.source}: {refusal.reason}")
 
 
-def _tell_missing(students: Sequence[Student]) -> None:
+def _print_missing(students: Sequence[Student]) -> None:
     if students:
-        tell(f"not submitted: {named(tuple(student.name or student.id for student in students))}")
+        print_line(f"not submitted: {format_names(tuple(student.name or student.id for student in students))}")
 
 
-def _distribution(each: ClassOverview) -> Table:
-    made = table("marks", "students", right=("students",))
+def _build_distribution(each: ClassOverview) -> Table:
+    made = create_table("marks", "students", right=("students",))
     for place, bin_ in enumerate(each.distribution, start=1):
         low, high = (f"{edge.normalize():f}" for edge in (bin_.low, bin_.high))
         marks = f"{low} (all)" if place == len(each.distribution) else f"{low} to below {high}"
@@ -69,8 +69,8 @@ def _distribution(each: ClassOverview) -> Table:
     return made
 
 
-def _outliers(each: ClassOverview, by_id: dict[str, TableLine]) -> Table:
-    made = table("needs review", "why", "grade")
+def _build_outliers(each: ClassOverview, by_id: dict[str, TableLine]) -> Table:
+    made = create_table("needs review", "why", "grade")
     for outlier in each.outliers:
-        made.add_row(by_id[outlier.id].student, _WHY[outlier.why], outlier.id)
+        made.add_row(by_id[outlier.id].student, _OUTLIER_REASONS[outlier.why], outlier.id)
     return made

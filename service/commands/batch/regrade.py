@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.commands.batch.control import BatchId
-from service.commands.operating import operating
-from service.commands.shown import document, note, show, tell
+from service.commands.installation import open_installation
+from service.commands.output import print_json, print_line, print_note, print_renderables
 from sim.errors import HostError
 
 if TYPE_CHECKING:
-    from service.operations.regrades import Published, Regraded
+    from service.operations.regrades import PublicationCounts, RegradeBatch
     from submissions.assignment.definition import Assignment
 
 GradeId = Annotated[str, typer.Argument(help="The grade's id, or its first characters.")]
@@ -29,32 +29,32 @@ def regrade(
 ) -> None:
     """Grade a batch again after its assignment or the grader changed; the old grades stay valid until you publish."""
     # The queue loads slowly, and publishing does not need it.
-    from service.commands.batch.awaited import NotifiedLater, awaited
+    from service.commands.batch.grading_services import NullNotifier, pending_batches
     from service.operations import batches
     from service.operations import regrades as operations
     from service.operations.types import JobState
 
-    changed = _assignment(assignment)
-    with operating() as (service, actor):
+    changed = _resolve_assignment(assignment)
+    with open_installation() as (service, actor):
         found = batches.find(service, actor, batch)
-        by = replace(service, notifier=NotifiedLater()) if wait else service
+        by = replace(service, notifier=NullNotifier()) if wait else service
         made = operations.regrade_batch(by, actor, found.course_id, found.id, changed)
-        tell(f"batch {made.batch_id}: {made.jobs} queued for regrading{_left_out(made)}")
+        print_line(f"batch {made.batch_id}: {made.jobs} queued for regrading{_describe_omitted(made)}")
         if not wait:
-            note(f"changes and reasons: robomark batch status {made.batch_id}")
-            document(batch=made.batch_id, regraded=made)
+            print_note(f"changes and reasons: robomark batch status {made.batch_id}")
+            print_json(batch=made.batch_id, regraded=made)
             return
-        from service.commands.batch.tables import changes_table
+        from service.commands.batch.tables import build_changes_table
         from service.queue.logs import configure_logging
 
         configure_logging(service.settings.log_level)
-        with awaited(service, actor, [made.batch_id], made.jobs) as regraded:
-            regraded.for_marks()
+        with pending_batches(service, actor, [made.batch_id], made.jobs) as regraded:
+            regraded.wait_for_marks()
             changes = operations.list_changes(service, actor, found.course_id, made.batch_id)
-            show(changes_table(changes))
-            note(f"to publish the new grades: robomark batch publish {made.batch_id}")
-            regraded.for_plots()
-    document(batch=made.batch_id, regraded=made, changes=changes)
+            print_renderables(build_changes_table(changes))
+            print_note(f"to publish the new grades: robomark batch publish {made.batch_id}")
+            regraded.wait_for_plots()
+    print_json(batch=made.batch_id, regraded=made, changes=changes)
     dead = [change for change in changes if change.state is JobState.DEAD]
     if dead:
         raise HostError(f"{len(dead)} of {len(changes)} could not be graded; {dead[0].student}: {dead[0].reason}")
@@ -70,11 +70,11 @@ def publish(
     from service.operations import batches
     from service.operations import regrades as operations
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         found = batches.find(service, actor, batch)
         done = operations.publish(service, actor, found.course_id, found.id, anyway=anyway)
-    document(batch=found.id, published=done)
-    _tell_published(f"batch {found.id}", done)
+    print_json(batch=found.id, published=done)
+    _print_published(f"batch {found.id}", done)
 
 
 def publish_one(
@@ -87,11 +87,11 @@ def publish_one(
     from service.operations import batches
     from service.operations import regrades as operations
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         found = batches.find_grade(service, actor, grade)
         done = operations.publish_one(service, actor, found.course_id, found.id, anyway=anyway)
-    document(grade=found.id, published=done)
-    _tell_published(f"grade {found.id}", done)
+    print_json(grade=found.id, published=done)
+    _print_published(f"grade {found.id}", done)
 
 
 def regrade_one(
@@ -104,13 +104,13 @@ def regrade_one(
     from service.operations import batches
     from service.operations import regrades as operations
 
-    changed = _assignment(assignment)
-    with operating() as (service, actor):
+    changed = _resolve_assignment(assignment)
+    with open_installation() as (service, actor):
         found = batches.find_grade(service, actor, grade)
         job = operations.regrade_one(service, actor, found.course_id, found.id, changed)
-    document(grade=found.id, job=job)
-    tell(f"grade {found.id}: queued for regrading as {job}")
-    note(f"to publish the new grade: robomark batch publish-one {job}")
+    print_json(grade=found.id, job=job)
+    print_line(f"grade {found.id}: queued for regrading as {job}")
+    print_note(f"to publish the new grade: robomark batch publish-one {job}")
 
 
 def grade_over_limit(grade: GradeId) -> None:
@@ -118,11 +118,11 @@ def grade_over_limit(grade: GradeId) -> None:
     from service.operations import batches
     from service.operations import regrades as operations
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         found = batches.find_grade(service, actor, grade)
         operations.grade_over_limit(service, actor, found.course_id, found.id)
-    document(grade=found.id)
-    tell(f"grade {found.id} is queued")
+    print_json(grade=found.id)
+    print_line(f"grade {found.id} is queued")
 
 
 def preview_publication(batch: BatchId) -> None:
@@ -130,28 +130,28 @@ def preview_publication(batch: BatchId) -> None:
     from service.operations import batches
     from service.operations import regrades as operations
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         found = batches.find(service, actor, batch)
-        would = operations.preview(service, actor, found.course_id, found.id)
-    document(batch=found.id, publication=would.counts, students=would.students)
-    tell(f"batch {found.id}, {would.students} students: {_counted(would.counts, 'to publish')}")
+        would = operations.preview_publication(service, actor, found.course_id, found.id)
+    print_json(batch=found.id, publication=would.counts, students=would.students)
+    print_line(f"batch {found.id}, {would.students} students: {_describe_published(would.counts, 'to publish')}")
 
 
-def _assignment(name: str | None) -> Assignment | str:
+def _resolve_assignment(name: str | None) -> Assignment | str:
     """Return an assignment id as given, or the assignment if ``name`` is a folder on this machine."""
-    from submissions.assignment.folder import catalogue
+    from submissions.assignment.folder import list_catalogue_ids
     from submissions.assignment.reader import find_assignment
 
     if name is None:
         return ""
-    return find_assignment(name) if Path(name).exists() and name not in catalogue() else name
+    return find_assignment(name) if Path(name).exists() and name not in list_catalogue_ids() else name
 
 
-def _tell_published(of_what: str, done: Published) -> None:
-    tell(f"{of_what}: {_counted(done, 'published')}")
+def _print_published(of_what: str, done: PublicationCounts) -> None:
+    print_line(f"{of_what}: {_describe_published(done, 'published')}")
 
 
-def _counted(done: Published, verb: str) -> str:
+def _describe_published(done: PublicationCounts, verb: str) -> str:
     """Return a sentence with the number of published grades and of those held back, with reasons."""
     left = [
         f"{count} {what}"
@@ -167,7 +167,7 @@ def _counted(done: Published, verb: str) -> str:
     return f"{done.published} grades {verb}{replaced}{'; not published: ' if left else ''}{', '.join(left)}"
 
 
-def _left_out(made: Regraded) -> str:
+def _describe_omitted(made: RegradeBatch) -> str:
     left = []
     if made.other_assignment:
         left.append(f"{made.other_assignment} left out, for another assignment")

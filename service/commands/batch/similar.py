@@ -23,6 +23,6 @@ def similar(
 
     Similarity is a reason to look closer, not a proof. It changes no marks, and students never see it.
     """
-    from service.commands.batch.finding_similar import find_similar
+    from service.commands.batch.similarity_list import find_similar
 
     find_similar(batch, given, output)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from service.commands.batch.batch_summary import summary, unjudged_words
+from service.commands.batch.batch_summary import describe_unjudged, summarize_jobs
 from service.commands.batch.control import BatchId
 from service.commands.batch.tables import (
-    changes_table,
-    history_table,
-    marks_table,
-    rank_table,
+    build_changes_table,
+    build_history_table,
+    build_marks_table,
+    build_rank_table,
 )
-from service.commands.operating import operating
-from service.commands.shown import document, show, tell
-from service.commands.statistics_shown import statistics_parts
+from service.commands.installation import open_installation
+from service.commands.output import print_json, print_line, print_renderables
+from service.commands.statistics_tables import build_statistics
 
 
 def status(batch: BatchId) -> None:
@@ -20,11 +20,11 @@ def status(batch: BatchId) -> None:
     from service.operations import batches
     from service.operations.batch_views import show_status
 
-    with operating() as (service, actor):
+    with open_installation() as (service, actor):
         found = batches.find(service, actor, batch)
         shown = show_status(service, actor, found.course_id, found.id)
     graded, line, pace = shown.graded, shown.graded.view.batch, shown.graded.view.pace
-    document(
+    print_json(
         batch=line,
         pace=pace,
         jobs=graded.lines,
@@ -34,14 +34,20 @@ def status(batch: BatchId) -> None:
         statistics=graded.statistics,
         history=shown.history,
     )
-    tell(f"batch {line.id}: {line.name}: {summary(line)}")
+    print_line(f"batch {line.id}: {line.name}: {summarize_jobs(line)}")
     if pace is not None:
-        tell(f"{pace.per_minute:.0f} per minute, {pace.left} left")
-    show(marks_table(graded.lines, line.refusals) if line.regrade_of is None else changes_table(shown.changes))
-    show(*map(rank_table, shown.ranks), *statistics_parts(graded.statistics))
-    if unjudged := unjudged_words(graded.lines):
-        tell(unjudged)
+        print_line(f"{pace.per_minute:.0f} per minute, {pace.left} left")
+    print_renderables(
+        build_marks_table(graded.lines, line.refusals)
+        if line.regrade_of is None
+        else build_changes_table(shown.changes)
+    )
+    print_renderables(*map(build_rank_table, shown.ranks), *build_statistics(graded.statistics))
+    if unjudged := describe_unjudged(graded.lines):
+        print_line(unjudged)
     if graded.waiting_regrades:
-        tell(f"{graded.waiting_regrades} regrades are completed but not published: robomark batch publish {line.id}")
+        print_line(
+            f"{graded.waiting_regrades} regrades are completed but not published: robomark batch publish {line.id}"
+        )
     if shown.history:
-        show(history_table(shown.history))
+        print_renderables(build_history_table(shown.history))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from service.commands.operating import operating
+from service.commands.installation import open_installation
 from sim.errors import UsageError
 
 
@@ -46,9 +46,11 @@ def submit(
             grading_requests, assignment, output=output, again=again, people=people, course=course
         )
     else:
-        from service.commands.batch import submitting
+        from service.commands.batch import batch_submission
 
-        refused = submitting.submit(submitting.BatchToSubmit(grading_requests, assignment, people, course, again))
+        refused = batch_submission.submit(
+            batch_submission.BatchToSubmit(grading_requests, assignment, people, course, again)
+        )
     if refused:
         what = "submission was" if refused == 1 else "submissions were"
         raise UsageError(f"{refused} {what} rejected; the others are queued")
@@ -67,16 +69,16 @@ def submit_and_wait(
 
     Uses the running services, or starts its own.
     """
-    from service.commands.batch.awaited import started
+    from service.commands.batch.grading_services import grading_services
     from service.queue.logs import configure_logging
-    from service.reports.written import prepare_folder
+    from service.reports.output_files import prepare_folder
 
     if output is not None:
         prepare_folder(output)
-    with operating() as (service, actor), started(service) as services:
+    with open_installation() as (service, actor), grading_services(service) as services:
         configure_logging(service.settings.log_level)
         # The worker starts during this import and while submissions are read and stored.
-        from service.commands.batch.submitting import BatchToSubmit, submit_to
+        from service.commands.batch.batch_submission import BatchToSubmit, submit_and_grade
 
         batch = BatchToSubmit(grading_requests, assignment, people, course, again)
-        return submit_to(services, service, actor, batch, output)
+        return submit_and_grade(services, service, actor, batch, output)

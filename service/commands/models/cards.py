@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from models.cards import Card, CardCurve, Tally, card, names
-from service.commands.models.shared import Output, interval, keep
-from service.commands.shown import document, show, table
-from service.home import for_the_user
+from models.cards import Card, CardCurve, Tally, list_classifier_names, load_card
+from service.commands.models.shared import Output, format_interval, write_output
+from service.commands.output import create_table, print_json, print_renderables
+from service.home import user_permissions
 from sim.errors import UsageError
 
 if TYPE_CHECKING:
@@ -19,15 +19,16 @@ if TYPE_CHECKING:
 
 def list_models() -> None:
     """The packaged classifiers and how often each is right, with the 95 % interval."""
-    cards = [card(name) for name in names()]
-    document(models=[_told(about) for about in cards])
+    cards = [load_card(name) for name in list_classifier_names()]
+    print_json(models=[_card_to_json(about) for about in cards])
     numbers = ("trained on", "right", "95 % interval", "of")
-    listed = table("name", "file", *numbers, right=numbers)
+    listed = create_table("name", "file", *numbers, right=numbers)
     for about in cards:
         accuracy = about.measured.accuracy
-        listed.add_row(about.name, about.file, str(about.training_images), f"{accuracy.share:.3f}", interval(accuracy),
-                       str(accuracy.n))  # fmt: skip
-    show(listed)
+        share = f"{accuracy.share:.3f}"
+        interval = format_interval(accuracy)
+        listed.add_row(about.name, about.file, str(about.training_images), share, interval, str(accuracy.n))
+    print_renderables(listed)
 
 
 def compare(
@@ -35,27 +36,27 @@ def compare(
     output: Output = None,
 ) -> None:
     """Compare the cards of classifiers: the accuracy of each, with 95 % intervals."""
-    with for_the_user():
-        about = [card(name) for name in chosen]
+    with user_permissions():
+        about = [load_card(name) for name in chosen]
         if len({each.classes for each in about}) > 1 or len(set(chosen)) < 2:
             raise UsageError(f"{', '.join(chosen)} cannot be compared; expected two or more models of the same classes")
     if output is not None:
-        from service.reports.written import prepare_folder
+        from service.reports.output_files import prepare_folder
 
         prepare_folder(output)
-    document(models=[_told(each) for each in about], curves=_in_common(about))
-    show(_beside("", [("accuracy", [each.measured.accuracy for each in about])], chosen))
-    for curves in _in_common(about):
+    print_json(models=[_card_to_json(each) for each in about], curves=_find_common_curves(about))
+    print_renderables(_build_comparison_table("", [("accuracy", [each.measured.accuracy for each in about])], chosen))
+    for curves in _find_common_curves(about):
         first = curves[0]
         rows = [(f"{value:g}", [curve.tallies[at] for curve in curves]) for at, value in enumerate(first.values)]
-        show("", _beside(f"{first.varied} ({first.unit}): {first.under}", rows, chosen))
+        print_renderables("", _build_comparison_table(f"{first.varied} ({first.unit}): {first.under}", rows, chosen))
     if output is not None:
-        from service.reports.plots.models import comparison_plot
+        from service.reports.plots.evaluation import render_comparison_plot
 
-        keep(output / f"{'-and-'.join(chosen)}.png", comparison_plot(chosen, _in_common(about)))
+        write_output(output / f"{'-and-'.join(chosen)}.png", render_comparison_plot(chosen, _find_common_curves(about)))
 
 
-def _told(about: Card) -> dict[str, Any]:
+def _card_to_json(about: Card) -> dict[str, Any]:
     """Return the JSON value for a model card."""
     accuracy = about.measured.accuracy
     low, high = accuracy.interval
@@ -68,7 +69,7 @@ def _told(about: Card) -> dict[str, Any]:
     }
 
 
-def _in_common(about: Sequence[Card]) -> list[list[CardCurve]]:
+def _find_common_curves(about: Sequence[Card]) -> list[list[CardCurve]]:
     """Return the curves that all cards share. Each entry lists the curve of every card."""
     found = []
     for first in about[0].measured.curves:
@@ -83,9 +84,9 @@ def _in_common(about: Sequence[Card]) -> list[list[CardCurve]]:
     return found
 
 
-def _beside(title: str, rows: Sequence[tuple[str, Sequence[Tally]]], chosen: Sequence[str]) -> Table:
-    made = table("", *chosen, "of", right=("", *chosen, "of"), title=title)
+def _build_comparison_table(title: str, rows: Sequence[tuple[str, Sequence[Tally]]], chosen: Sequence[str]) -> Table:
+    made = create_table("", *chosen, "of", right=("", *chosen, "of"), title=title)
     for head, tallies in rows:
-        shares = (f"{tally.share:.3f} ({interval(tally)})" for tally in tallies)
+        shares = (f"{tally.share:.3f} ({format_interval(tally)})" for tally in tallies)
         made.add_row(head, *shares, "/".join(dict.fromkeys(str(tally.n) for tally in tallies)))
     return made

@@ -10,34 +10,34 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from typing import Any
 
-from responders.message_format import JSON, parsed_answer
-from service.grading.judging.message_parts import fault_words
+from responders.message_format import JSON, parse_answer
+from service.grading.judging.message_parts import describe_fault
 from sim.recording import Fault, Message, Recording
 
 
-class Nothing:
+class MissingValue:
     """Type of NOTHING, which marks a missing value. It differs from JSON's null."""
 
 
-NOTHING = Nothing()
+MISSING = MissingValue()
 
 
 def is_json_answer(text: str) -> bool:
     """Return whether the text is ``JSON::`` followed by well-formed JSON."""
-    return not isinstance(parsed(text), Nothing)
+    return not isinstance(parse_json_answer(text), MissingValue)
 
 
-def parsed(text: str) -> Any:
+def parse_json_answer(text: str) -> Any:
     """Return the value after ``JSON::``; NOTHING if the text has no such prefix or is malformed."""
     if not text.startswith(JSON):
-        return NOTHING
+        return MISSING
     try:
-        return parsed_answer(text)
+        return parse_answer(text)
     except ValueError:
-        return NOTHING
+        return MISSING
 
 
-def at_path(value: Any, path: str) -> Any:
+def find_at_path(value: Any, path: str) -> Any:
     """Return the value at a path such as ``message.shape``; NOTHING if there is none. Integers index lists."""
     for part in path.split("."):
         if isinstance(value, dict) and part in value:
@@ -45,10 +45,10 @@ def at_path(value: Any, path: str) -> Any:
         elif isinstance(value, list) and part.removeprefix("-").isdecimal() and part.isascii():
             index = int(part[:6])
             if not -len(value) <= index < len(value):
-                return NOTHING
+                return MISSING
             value = value[index]
         else:
-            return NOTHING
+            return MISSING
     return value
 
 
@@ -62,7 +62,7 @@ def as_text(value: Any) -> str:
         return "(nested too deeply)"
 
 
-def same_value(found: Any, expected: Any) -> bool:
+def is_same_value(found: Any, expected: Any) -> bool:
     """Return whether two JSON values are equal. Numbers compare by value, booleans only with booleans."""
     if isinstance(found, bool) or isinstance(expected, bool):
         return found is expected
@@ -74,9 +74,9 @@ def same_value(found: Any, expected: Any) -> bool:
     if isinstance(found, str) and isinstance(expected, str):
         return found.split() == expected.split()
     if isinstance(found, list) and isinstance(expected, list | tuple):
-        return len(found) == len(expected) and all(map(same_value, found, expected))
+        return len(found) == len(expected) and all(map(is_same_value, found, expected))
     if isinstance(found, dict) and isinstance(expected, dict):
-        return found.keys() == expected.keys() and all(same_value(found[key], expected[key]) for key in expected)
+        return found.keys() == expected.keys() and all(is_same_value(found[key], expected[key]) for key in expected)
     return found is None and expected is None
 
 
@@ -94,20 +94,20 @@ class Answers:
                     self._first.setdefault(message.reply_to, message)
         self._faults = sorted((fault for fault in recording.faults if fault.who == "responder"), key=lambda f: f.t)
 
-    def to(self, index: int) -> Message | None:
+    def find_answer(self, index: int) -> Message | None:
         """Return the first answer to the message at ``index``, delivered or not, without copies made by the channel."""
         return self._first.get(index)
 
-    def all_to(self, index: int) -> Sequence[Message]:
+    def list_answers(self, index: int) -> Sequence[Message]:
         """Return every answer to the message at ``index``, including copies and lost ones, in the order given."""
         return self._all.get(index, ())
 
-    def fault_after(self, index: int) -> Fault | None:
+    def find_fault_after(self, index: int) -> Fault | None:
         """Return the responder's first fault since the message at ``index`` was sent, or None."""
         place = bisect_left(self._faults, self._messages[index].t - 1e-9, key=lambda fault: fault.t)
         return self._faults[place] if place < len(self._faults) else None
 
-    def silence(self, index: int) -> str:
+    def describe_silence(self, index: int) -> str:
         """Return a sentence part that the message at ``index`` had no answer, with the reason if it is recorded."""
-        fault = self.fault_after(index) or (self._faults[-1] if self._faults else None)
-        return "there was no answer" + (f": {fault_words(fault)}" if fault else "")
+        fault = self.find_fault_after(index) or (self._faults[-1] if self._faults else None)
+        return "there was no answer" + (f": {describe_fault(fault)}" if fault else "")

@@ -8,35 +8,37 @@ from __future__ import annotations
 from fractions import Fraction
 
 from service.grading.grade import CriterionResult
-from service.grading.judging.judges import Case, Indexed, has_hidden, judges_case
-from service.grading.judging.outcome import in_steps, share_of_accuracy, share_of_steps
-from service.grading.judging.recognition import Classified, classify, pooled, recognised
-from service.grading.judging.sweeps import curves_of
+from service.grading.judging.accuracy_curves import compute_curves
+from service.grading.judging.judge_declaration import Case, IndexedTrials, declare_case_judge, has_hidden
+from service.grading.judging.outcome import compute_accuracy_share, compute_steps_share, round_to_steps
+from service.grading.judging.recognition import ClassificationResult, build_recognition_result, classify, judge_pooled
 from submissions.criteria.classification import Classification
 
 
-@judges_case(Classification)
+@declare_case_judge(Classification)
 def judge_classification(criterion: Classification, case: Case) -> CriterionResult:
     """Return the fraction of images identified correctly over all trials, and the marks for it."""
 
-    def judged(trials: Indexed) -> CriterionResult:
+    def judged(trials: IndexedTrials) -> CriterionResult:
         found = classify(criterion, case.assignment, trials)
-        share = _share(criterion, found, has_hidden(trials))
-        words = _what_marks_need(criterion) if share < 1 else ""
-        return recognised(criterion, found, share, words, curves_of(found.samples, dict(trials)), dict(trials))
+        share = _compute_share(criterion, found, has_hidden(trials))
+        words = _describe_mark_conditions(criterion) if share < 1 else ""
+        return build_recognition_result(
+            criterion, found, share, words, compute_curves(found.samples, dict(trials)), dict(trials)
+        )
 
-    return pooled(case.looked_at_by(criterion), judged)
+    return judge_pooled(case.list_trials(criterion), judged)
 
 
-def _share(criterion: Classification, found: Classified, hidden: bool) -> Fraction:
-    right, count = found.right, found.accuracy.n
+def _compute_share(criterion: Classification, found: ClassificationResult, hidden: bool) -> Fraction:
+    right, count = found.correct_count, found.accuracy.n
     if criterion.steps:
-        return share_of_steps(right, count, criterion.steps, criterion.marks)
-    share = share_of_accuracy(right, count, criterion.at_least, criterion.over)
-    return in_steps(share) if hidden else share
+        return compute_steps_share(right, count, criterion.steps, criterion.marks)
+    share = compute_accuracy_share(right, count, criterion.at_least, criterion.over)
+    return round_to_steps(share) if hidden else share
 
 
-def _what_marks_need(criterion: Classification) -> str:
+def _describe_mark_conditions(criterion: Classification) -> str:
     if criterion.at_least is not None:
         return f" Full marks need an accuracy of {criterion.at_least:g}."
     if criterion.steps:

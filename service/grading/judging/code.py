@@ -11,39 +11,41 @@ from fnmatch import fnmatchcase
 from fractions import Fraction
 from typing import Any
 
-from responders.function_calls import Called, FunctionCall, Returned, no_function
+from responders.function_calls import CallResult, CallResults, FunctionCall, describe_missing_function
 from service.grading.grade import CriterionResult, Measure, TrialResult
-from service.grading.judging.answers import NOTHING, as_text, at_path, parsed
-from service.grading.judging.judges import Case, by_trial, judges_case, once
-from service.grading.judging.message_parts import fault_words, quoted
-from service.grading.judging.outcome import Outcome, failed, in_steps, passed
+from service.grading.judging.answers import MISSING, as_text, find_at_path, parse_json_answer
+from service.grading.judging.judge_declaration import Case, declare_case_judge, judge_by_trial, judge_once
+from service.grading.judging.message_parts import describe_fault, quote_text
+from service.grading.judging.outcome import Outcome, fail_with, pass_with, round_to_steps
 from service.grading.judging.source_answers import SPEECH, SourceAnswers
 from sim.errors import AssignmentError
-from submissions.criteria.code import CONSTRUCTS, ExpectedCall, Functions, PythonCheck, SourceRules, flags_in
+from submissions.criteria.code import CONSTRUCTS, ExpectedCall, Functions, PythonCheck, SourceRules, parse_flag_texts
 from submissions.magics import Flags
 
 #: The largest number of problems to report, so that the first is easy to see.
-_MOST_TOLD = 4
+_MAX_LISTED = 4
 
 
-@judges_case(SourceRules)
+@declare_case_judge(SourceRules)
 def judge_source_rules(criterion: SourceRules, case: Case) -> CriterionResult:
     """Judge what the source must and must not contain, once for all trials."""
     driven = case.trials if criterion.part == "program" else ()
     answers = case.analysis.answers.get(criterion.id)
-    return once(criterion, judge_source(criterion, answers, case.analysis.flags, driven))
+    return judge_once(criterion, judge_source(criterion, answers, case.analysis.flags, driven))
 
 
-@judges_case(Functions)
+@declare_case_judge(Functions)
 def judge_functions(criterion: Functions, case: Case) -> CriterionResult:
     """Judge the results of the responder's functions, once for all trials."""
-    return once(criterion, _returned(criterion, case.analysis.called.get(criterion.id)))
+    return judge_once(criterion, _judge_calls(criterion, case.analysis.called.get(criterion.id)))
 
 
-@judges_case(PythonCheck)
+@declare_case_judge(PythonCheck)
 def judge_python_check(criterion: PythonCheck, case: Case) -> CriterionResult:
     """Judge each trial by the result of the instructor's own check."""
-    return by_trial(criterion, case, lambda index, _: _checked(criterion, case.analysis.checks[criterion.id, index]))
+    return judge_by_trial(
+        criterion, case, lambda index, _: _judge_check_result(criterion, case.analysis.checks[criterion.id, index])
+    )
 
 
 def judge_source(
@@ -52,17 +54,23 @@ def judge_source(
     """Judge the source. ``trials`` are the runs of the program."""
     whose = "your program" if criterion.part == "program" else "your responder"
     if answers is None:
-        return failed(f"Expected {whose} to be submitted, but it was not.")
+        return fail_with(f"Expected {whose} to be submitted, but it was not.")
     if answers.error:
-        return failed(f"Expected {whose} to be readable as Python, but: {answers.error}.")
+        return fail_with(f"Expected {whose} to be readable as Python, but: {answers.error}.")
     wrong: list[str] = []
     for rule, place in zip(criterion.uses, answers.uses, strict=True):
         if place is None:
-            wrong.append(f"Expected {whose} to use {_words(rule)}, but it does not, or only in code that is not run")
+            wrong.append(
+                f"Expected {whose} to use {_describe_rule(rule)}, but it does not, or only in code that is not run"
+            )
     for rule, place in zip(criterion.avoids, answers.avoids, strict=True):
-        but = f"{place} uses it" if place is not None else _spoke(rule, answers, trials) or answers.unread
+        but = (
+            f"{place} uses it"
+            if place is not None
+            else _describe_unseen_speech(rule, answers, trials) or answers.unread
+        )
         if but:
-            wrong.append(f"Expected {whose} not to use {_words(rule)}, but {but}")
+            wrong.append(f"Expected {whose} not to use {_describe_rule(rule)}, but {but}")
     for rule, place in zip(criterion.in_loop, answers.in_loop, strict=True):
         if place is None:
             wrong.append(
@@ -71,17 +79,17 @@ def judge_source(
     for rule, place in zip(criterion.defines, answers.defines, strict=True):
         if place is None:
             wrong.append(f"Expected {whose} to define a function {rule}, but it does not")
-    asked = _missing_flags(criterion, flags)
+    asked = _list_missing_flags(criterion, flags)
     wrong += [f"Expected the magic line of {whose} to have {told}, but it does not" for told in asked if told]
-    for_staff = _for_staff(criterion, answers)
+    for_staff = _build_staff_note(criterion, answers)
     if not wrong:
-        return passed(f"The code of {whose} is as expected.", for_staff=for_staff)
+        return pass_with(f"The code of {whose} is as expected.", for_staff=for_staff)
     count = len(criterion.uses + criterion.avoids + criterion.in_loop + criterion.defines) + len(asked)
-    message = f"{'. '.join(wrong[:_MOST_TOLD])}."
-    return failed(message, score=Fraction(count - len(wrong), count), for_staff=for_staff)
+    message = f"{'. '.join(wrong[:_MAX_LISTED])}."
+    return fail_with(message, score=Fraction(count - len(wrong), count), for_staff=for_staff)
 
 
-def _spoke(rule: str, answers: SourceAnswers, trials: Sequence[TrialResult]) -> str:
+def _describe_unseen_speech(rule: str, answers: SourceAnswers, trials: Sequence[TrialResult]) -> str:
     """Return a note that the robot spoke although the source shows no call for it; empty if it did not.
 
     A rule may name only one of the speech functions.
@@ -94,18 +102,18 @@ def _spoke(rule: str, answers: SourceAnswers, trials: Sequence[TrialResult]) -> 
     return "the robot spoke during the run" if spoke else ""
 
 
-def _for_staff(criterion: SourceRules, answers: SourceAnswers) -> str:
+def _build_staff_note(criterion: SourceRules, answers: SourceAnswers) -> str:
     """Return what staff should check for avoided constructs, because the source does not show all it can do."""
     if not criterion.avoids or not answers.doubts:
         return ""
     return f"The code may do more than it shows: {'; '.join(answers.doubts)}."
 
 
-def _missing_flags(criterion: SourceRules, flags: Flags) -> list[str]:
+def _list_missing_flags(criterion: SourceRules, flags: Flags) -> list[str]:
     """Return one entry per required flag: the flag if it is missing, otherwise empty."""
     if not criterion.flags:
         return []
-    wanted = flags_in(criterion.flags)
+    wanted = parse_flag_texts(criterion.flags)
     values = [
         "" if flags.values.get(short) == value else f"-{short} {value}"
         for short, value in sorted(wanted.values.items())
@@ -113,7 +121,7 @@ def _missing_flags(criterion: SourceRules, flags: Flags) -> list[str]:
     return values + ["" if short in flags.switches else f"-{short}" for short in sorted(wanted.switches)]
 
 
-def _words(rule: str) -> str:
+def _describe_rule(rule: str) -> str:
     if rule not in CONSTRUCTS:
         return rule
     return f"a {rule} loop" if rule in ("for", "while") else rule
@@ -123,7 +131,7 @@ _LONGEST_MESSAGE = 500
 _MOST_MEASURES = 20
 
 
-def calls_of(criterion: Functions) -> tuple[FunctionCall, ...]:
+def list_calls(criterion: Functions) -> tuple[FunctionCall, ...]:
     """Return the calls that the criterion needs."""
     return tuple(
         FunctionCall(call.function or criterion.function, call.arguments, call.named, call.hidden)
@@ -131,69 +139,74 @@ def calls_of(criterion: Functions) -> tuple[FunctionCall, ...]:
     )
 
 
-def _returned(criterion: Functions, called: Called | None) -> Outcome:
+def _judge_calls(criterion: Functions, called: CallResults | None) -> Outcome:
     if called is None:
-        return failed("Expected a responder to be submitted, but it was not.")
+        return fail_with("Expected a responder to be submitted, but it was not.")
     if called.fault is not None:
-        return failed(f"Expected the responder to be loaded, but: {fault_words(called.fault)}.")
+        return fail_with(f"Expected the responder to be loaded, but: {describe_fault(called.fault)}.")
     scores: list[Fraction] = []
     first = for_staff = ""
     least = Fraction(str(criterion.at_least)) if criterion.each else Fraction(1)
     for call, gave in zip(criterion.calls, called.returned, strict=True):
-        score, what = _compare(criterion, call, gave)
+        score, what = _compare_call(criterion, call, gave)
         scores.append(score)
         if score < least:
-            told = f"Expected {_call_words(criterion, call)} to return {_wanted(call)}, but {what}"
+            told = f"Expected {_format_call(criterion, call)} to return {_format_expected(call)}, but {what}"
             if call.hidden:
                 for_staff = for_staff or f"The first hidden call with a wrong result: {told}."
             else:
                 first = first or told
-    return _of_calls(criterion, scores, first or _hidden_words(criterion, called, scores, least), for_staff)
+    return _combine_call_scores(
+        criterion, scores, first or _describe_hidden_failures(criterion, called, scores, least), for_staff
+    )
 
 
-def _of_calls(criterion: Functions, scores: Sequence[Fraction], wrong: str, for_staff: str) -> Outcome:
+def _combine_call_scores(criterion: Functions, scores: Sequence[Fraction], wrong: str, for_staff: str) -> Outcome:
     """Return the outcome of the calls. ``wrong`` describes the first problem, if any."""
     share = sum(scores, Fraction(0)) / len(scores)
     measures = (Measure("right", float(share)),)
     if not wrong or (criterion.table and share >= Fraction(str(criterion.at_least))):
         some = f"{float(share):.0%} correct" if criterion.each else f"{len(scores)} of {len(scores)} calls correct"
         some = f"at least {criterion.at_least:.0%} of {len(scores)} calls correct" if criterion.table else some
-        return passed(f"The functions returned the expected values: {some}.", measures=measures, for_staff=for_staff)
+        return pass_with(f"The functions returned the expected values: {some}.", measures=measures, for_staff=for_staff)
     right = sum(score == 1 for score in scores)
     tally = f" ({right} of {len(scores)} calls correct)" if len(scores) > 1 and not criterion.table else ""
-    score = in_steps(share) if criterion.table else share
-    return failed(f"{wrong}{tally}.", score=score, measures=measures, for_staff=for_staff)
+    score = round_to_steps(share) if criterion.table else share
+    return fail_with(f"{wrong}{tally}.", score=score, measures=measures, for_staff=for_staff)
 
 
-def _hidden_words(criterion: Functions, called: Called, scores: Sequence[Fraction], least: Fraction) -> str:
+def _describe_hidden_failures(
+    criterion: Functions, called: CallResults, scores: Sequence[Fraction], least: Fraction
+) -> str:
     """Return the message if only hidden calls failed, without values or errors, which a program can choose."""
     calls = criterion.calls
     if not any(score < least for score in scores):
         return ""
     faults = [gave.fault.message if gave.fault is not None else "" for gave in called.returned]
     if all(
-        fault == no_function(call.function or criterion.function) for call, fault in zip(calls, faults, strict=True)
+        fault == describe_missing_function(call.function or criterion.function)
+        for call, fault in zip(calls, faults, strict=True)
     ):
         return f"Expected all functions to exist, but {faults[0]}"
     hidden = [score for call, score in zip(calls, scores, strict=True) if call.hidden]
     if criterion.table:
-        share = in_steps(sum(scores, Fraction(0)) / len(scores))
+        share = round_to_steps(sum(scores, Fraction(0)) / len(scores))
         asked = f"Expected {criterion.function} to be correct in {criterion.at_least:.0%} of {len(scores)} calls"
         return f"{asked}, but it was correct in about {float(share):.0%}"
     right = sum(score >= least for score in hidden)
     return f"Expected the right values in all {len(hidden)} hidden calls as well, but {right} of them were right"
 
 
-def _checked(criterion: PythonCheck, gave: Returned) -> Outcome:
+def _judge_check_result(criterion: PythonCheck, gave: CallResult) -> Outcome:
     """Return the outcome from an instructor's check.
 
     Raises:
         AssignmentError: The check failed or returned an invalid value.
     """
     if gave.fault is not None:
-        raise AssignmentError(f"The assignment's own check fails: {criterion.file}: {fault_words(gave.fault)}.")
+        raise AssignmentError(f"The assignment's own check fails: {criterion.file}: {describe_fault(gave.fault)}.")
     told = {"passed": gave.value} if isinstance(gave.value, bool) else gave.value
-    returned = f"{criterion.file}: check returned {quoted(as_text(gave.value))}"
+    returned = f"{criterion.file}: check returned {quote_text(as_text(gave.value))}"
     wrong = f"The assignment's own check fails: {returned}, expected True, False or a dict"
     if not isinstance(told, dict) or not isinstance(told.get("passed"), bool):
         raise AssignmentError(f'{wrong} with "passed".')
@@ -205,34 +218,34 @@ def _checked(criterion: PythonCheck, gave: Returned) -> Outcome:
     message = " ".join(message.split())[:_LONGEST_MESSAGE]
     kept = tuple(Measure(str(name)[:60], float(value)) for name, value in list(measures.items())[:_MOST_MEASURES])
     if told["passed"]:
-        return passed(message, measures=kept)
-    return failed(message, score=Fraction(str(score)), measures=kept)
+        return pass_with(message, measures=kept)
+    return fail_with(message, score=Fraction(str(score)), measures=kept)
 
 
-def _compare(criterion: Functions, call: ExpectedCall, gave: Returned) -> tuple[Fraction, str]:
+def _compare_call(criterion: Functions, call: ExpectedCall, gave: CallResult) -> tuple[Fraction, str]:
     """Return the correct fraction of a call, and a description of what happened."""
     if gave.fault is not None:
-        return Fraction(0), f"it did not: {fault_words(gave.fault)}"
+        return Fraction(0), f"it did not: {describe_fault(gave.fault)}"
     value = gave.value
     if criterion.path is not None:
-        value = at_path(parsed(value), criterion.path) if isinstance(value, str) else NOTHING
-        if value is NOTHING:
-            return Fraction(0), f"there is nothing at {criterion.path} in {quoted(as_text(gave.value))}"
-    what = f"it returned {_shown(value)}"
+        value = find_at_path(parse_json_answer(value), criterion.path) if isinstance(value, str) else MISSING
+        if value is MISSING:
+            return Fraction(0), f"there is nothing at {criterion.path} in {quote_text(as_text(gave.value))}"
+    what = f"it returned {_format_value(value)}"
     if criterion.each:
-        return _entries_right(criterion, call.returns, value), what
+        return _compute_correct_share(criterion, call.returns, value), what
     wanted = call.one_of or (call.returns,)
-    return Fraction(any(_same(criterion, value, each) for each in wanted)), what
+    return Fraction(any(_is_close_value(criterion, value, each) for each in wanted)), what
 
 
-def _entries_right(criterion: Functions, wanted: Sequence[Any], value: Any) -> Fraction:
+def _compute_correct_share(criterion: Functions, wanted: Sequence[Any], value: Any) -> Fraction:
     if not isinstance(value, list):
         return Fraction(0)
-    right = sum(_same(criterion, got, each) for got, each in zip(value, wanted, strict=False))
+    right = sum(_is_close_value(criterion, got, each) for got, each in zip(value, wanted, strict=False))
     return Fraction(right, max(len(wanted), len(value)))
 
 
-def _same(criterion: Functions, found: Any, wanted: Any) -> bool:
+def _is_close_value(criterion: Functions, found: Any, wanted: Any) -> bool:
     """Return whether values are equal as JSON, numbers within the tolerance, texts apart from repeated spaces."""
     if isinstance(found, bool) or isinstance(wanted, bool):
         return found is wanted
@@ -243,10 +256,12 @@ def _same(criterion: Functions, found: Any, wanted: Any) -> bool:
         return one.casefold() == other.casefold() if criterion.ignore_case else one == other
     if isinstance(found, list) and isinstance(wanted, list | tuple):
         return len(found) == len(wanted) and all(
-            _same(criterion, got, each) for got, each in zip(found, wanted, strict=True)
+            _is_close_value(criterion, got, each) for got, each in zip(found, wanted, strict=True)
         )
     if isinstance(found, dict) and isinstance(wanted, dict):
-        return found.keys() == wanted.keys() and all(_same(criterion, found[key], wanted[key]) for key in wanted)
+        return found.keys() == wanted.keys() and all(
+            _is_close_value(criterion, found[key], wanted[key]) for key in wanted
+        )
     return found is None and wanted is None
 
 
@@ -259,18 +274,18 @@ def _is_number(value: Any) -> bool:
         return False
 
 
-def _call_words(criterion: Functions, call: ExpectedCall) -> str:
+def _format_call(criterion: Functions, call: ExpectedCall) -> str:
     arguments = [repr(value) for value in call.arguments]
     arguments += [f"{name}={value!r}" for name, value in call.named.items()]
     text = ", ".join(arguments)
     return f"{call.function or criterion.function}({text if len(text) <= 80 else text[:77] + '...'})"
 
 
-def _wanted(call: ExpectedCall) -> str:
-    return " or ".join(map(_shown, call.one_of or (call.returns,)))
+def _format_expected(call: ExpectedCall) -> str:
+    return " or ".join(map(_format_value, call.one_of or (call.returns,)))
 
 
-def _shown(value: Any) -> str:
+def _format_value(value: Any) -> str:
     """Return the value for a message: texts in quotes, others as they are, shortened."""
-    told = quoted(as_text(value))
+    told = quote_text(as_text(value))
     return told if isinstance(value, str) else told[1:-1]

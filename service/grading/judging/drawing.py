@@ -14,18 +14,24 @@ from fractions import Fraction
 import numpy as np
 
 from service.grading.grade import Measure, TrialResult
-from service.grading.judging.geometry import pen_down, place_at, positions, stretches, travel
-from service.grading.judging.judges import judges
-from service.grading.judging.message_parts import listed
-from service.grading.judging.moves import straight
-from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.geometry import (
+    compute_pen_mask,
+    compute_positions,
+    compute_travel,
+    find_place,
+    find_true_runs,
+)
+from service.grading.judging.judge_declaration import declare_judge
+from service.grading.judging.message_parts import quote_list
+from service.grading.judging.moves import compute_straight_mask
+from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from sim.recording import Floats, Recording
 from submissions.criteria.drawing import Drawing
 
 #: Two straight parts whose directions differ by less than this may be one leg, degrees.
-_SAME_DIRECTION = 3.0
+_SAME_DIRECTION_DEGREES = 3.0
 #: Shorter straight parts belong to a corner, mm.
-_STUB = 20.0
+_MIN_LEG_MM = 20.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,88 +54,92 @@ class Leg:
         return math.degrees(math.atan2(self.end[1] - self.start[1], self.end[0] - self.start[0]))
 
 
-def legs_of(recording: Recording, pen: bool) -> tuple[Leg, ...]:
+def find_legs(recording: Recording, pen: bool) -> tuple[Leg, ...]:
     """Return the legs of a path in order. With ``pen``, only drawn ones."""
-    points = positions(recording)
-    ahead, _ = travel(recording)
-    going = straight(recording)
-    drawn = pen_down(recording) if pen else np.ones(len(points), dtype=bool)
+    points = compute_positions(recording)
+    ahead, _ = compute_travel(recording)
+    going = compute_straight_mask(recording)
+    drawn = compute_pen_mask(recording) if pen else np.ones(len(points), dtype=bool)
     going &= drawn[:-1] & drawn[1:]
-    parts = [_leg(points, first, last) for way in (1, -1) for first, last in stretches(going & (np.sign(ahead) == way))]
+    parts = [
+        _build_leg(points, first, last)
+        for way in (1, -1)
+        for first, last in find_true_runs(going & (np.sign(ahead) == way))
+    ]
     legs: list[Leg] = []
     for part in sorted(parts, key=lambda leg: leg.first):
-        if part.length < _STUB:
+        if part.length < _MIN_LEG_MM:
             continue
-        if legs and _goes_on(legs[-1], part) and drawn[legs[-1].last : part.first + 1].all():
-            legs[-1] = _leg(points, legs[-1].first, part.last)
+        if legs and _is_continuation(legs[-1], part) and drawn[legs[-1].last : part.first + 1].all():
+            legs[-1] = _build_leg(points, legs[-1].first, part.last)
         else:
             legs.append(part)
     return tuple(legs)
 
 
-def _goes_on(leg: Leg, part: Leg) -> bool:
+def _is_continuation(leg: Leg, part: Leg) -> bool:
     """Return whether a part continues the leg: same direction, and on its line ahead of its end."""
     along = math.radians(leg.direction)
     x, y = part.start[0] - leg.end[0], part.start[1] - leg.end[1]
     ahead, aside = x * math.cos(along) + y * math.sin(along), y * math.cos(along) - x * math.sin(along)
-    same_direction = abs(between(leg.direction, part.direction)) < _SAME_DIRECTION
-    return same_direction and ahead > -_STUB and abs(aside) < _STUB
+    same_direction = abs(compute_turn_angle(leg.direction, part.direction)) < _SAME_DIRECTION_DEGREES
+    return same_direction and ahead > -_MIN_LEG_MM and abs(aside) < _MIN_LEG_MM
 
 
-def between(before: float, after: float) -> float:
+def compute_turn_angle(before: float, after: float) -> float:
     """Return the angle from one direction to another, degrees to the left, -180 to 180."""
     return (after - before + 180) % 360 - 180
 
 
-@judges(Drawing)
+@declare_judge(Drawing)
 def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
     """Judge each figure in order. The score is the fraction of correct figures."""
     recording = trial.recording
-    if criterion.pen and not pen_down(recording).any():
-        return failed(
+    if criterion.pen and not compute_pen_mask(recording).any():
+        return fail_with(
             "Expected something to be drawn, but the pen was never down: the program's magic line has no -p.",
             0.0,
             recording.start,
         )
-    legs = legs_of(recording, criterion.pen)
+    legs = find_legs(recording, criterion.pen)
     wanted = sum(criterion.legs_of_each)
-    measures = _measures(legs)
-    figures, left_over = _figures(criterion, legs)
+    measures = _build_measures(legs)
+    figures, left_over = _group_figures(criterion, legs)
     enough = len(figures) >= criterion.figure_count and not left_over if criterion.at_least else len(legs) == wanted
-    problems = [_problem(criterion, number, figure) for number, figure in enumerate(figures)]
+    problems = [_find_problem(criterion, number, figure) for number, figure in enumerate(figures)]
     right = sum(problem is None for problem in problems[: criterion.figure_count])
     score = Fraction(right, criterion.figure_count)
     if not enough:
         lengths = ", ".join(f"{leg.length:.0f}" for leg in legs[:12])
         told = f"{len(legs)}, of {lengths} mm" if legs else "none"
         row = legs[min(wanted, len(legs)) - 1].last if legs else 0
-        return failed(
-            f"Expected {_figures_words(criterion)}, but the path has {told}.",
-            *place_at(recording, row),
+        return fail_with(
+            f"Expected {_describe_figures(criterion)}, but the path has {told}.",
+            *find_place(recording, row),
             score=score / 2,
             measures=measures,
         )
     found = next((problem for problem in problems if problem is not None), None)
     if found is not None:
-        return failed(found.words, *place_at(recording, found.row), score=score, measures=measures)
-    means = [_mean(figure) for figure in figures]
+        return fail_with(found.words, *find_place(recording, found.row), score=score, measures=measures)
+    means = [_compute_mean_length(figure) for figure in figures]
     if criterion.growing and any(after <= before for before, after in itertools.pairwise(means)):
         number = next(n for n, (before, after) in enumerate(itertools.pairwise(means)) if after <= before)
-        return failed(
+        return fail_with(
             f"Expected each figure to be larger than the one before, but after legs of {means[number]:.0f} mm came "
             f"legs of {means[number + 1]:.0f} mm.",
-            *place_at(recording, figures[number + 1][-1].last),
+            *find_place(recording, figures[number + 1][-1].last),
             measures=measures,
         )
     told = ", ".join(f"{mean:.0f}" for mean in means)
-    return passed(
+    return pass_with(
         f"The path has {len(legs)} straight legs as expected, of {told} mm.",
-        *place_at(recording, legs[-1].last),
+        *find_place(recording, legs[-1].last),
         measures,
     )
 
 
-def _figures(criterion: Drawing, legs: Sequence[Leg]) -> tuple[list[Sequence[Leg]], int]:
+def _group_figures(criterion: Drawing, legs: Sequence[Leg]) -> tuple[list[Sequence[Leg]], int]:
     """Return the complete figures in order, and the number of remaining legs."""
     counts: Iterable[int] = criterion.legs if isinstance(criterion.legs, tuple) else itertools.repeat(criterion.legs)
     figures: list[Sequence[Leg]] = []
@@ -150,9 +160,9 @@ class _Problem:
     row: int
 
 
-def _figures_words(criterion: Drawing) -> str:
+def _describe_figures(criterion: Drawing) -> str:
     if isinstance(criterion.legs, tuple):
-        return f"figures of {listed(tuple(map(str, criterion.legs)))} straight legs ({sum(criterion.legs)} in all)"
+        return f"figures of {quote_list(tuple(map(str, criterion.legs)))} straight legs ({sum(criterion.legs)} in all)"
     legs = f"{criterion.legs} straight leg{'' if criterion.legs == 1 else 's'}"
     least = "at least " if criterion.at_least else ""
     if criterion.figure_count == 1:
@@ -160,9 +170,9 @@ def _figures_words(criterion: Drawing) -> str:
     return f"{least}{criterion.figure_count} figures of {legs} ({criterion.figure_count * criterion.legs} in all)"
 
 
-def _problem(criterion: Drawing, number: int, figure: Sequence[Leg]) -> _Problem | None:
+def _find_problem(criterion: Drawing, number: int, figure: Sequence[Leg]) -> _Problem | None:
     """Return the first problem with the figure, or None."""
-    mean = _mean(figure)
+    mean = _compute_mean_length(figure)
     which = f" of figure {number + 1}" if criterion.figure_count > 1 else ""
     for place, leg in enumerate(figure, 1):
         if leg.length < criterion.shortest:
@@ -178,7 +188,7 @@ def _problem(criterion: Drawing, number: int, figure: Sequence[Leg]) -> _Problem
                 leg.last,
             )
     for place, (before, after) in enumerate(itertools.pairwise(figure), 1):
-        angle = abs(between(before.direction, after.direction))
+        angle = abs(compute_turn_angle(before.direction, after.direction))
         asked = criterion.angle_of_each[min(number, len(criterion.angle_of_each) - 1)]
         if abs(angle - asked) > criterion.angle_within:
             return _Problem(
@@ -205,15 +215,15 @@ def _problem(criterion: Drawing, number: int, figure: Sequence[Leg]) -> _Problem
     return None
 
 
-def _mean(figure: Sequence[Leg]) -> float:
+def _compute_mean_length(figure: Sequence[Leg]) -> float:
     return sum(leg.length for leg in figure) / len(figure)
 
 
-def _measures(legs: Sequence[Leg]) -> tuple[Measure, ...]:
+def _build_measures(legs: Sequence[Leg]) -> tuple[Measure, ...]:
     figures = [Measure("legs", len(legs))]
     figures += [Measure(f"leg {number}", leg.length, "mm") for number, leg in enumerate(legs[:12], 1)]
     figures += [
-        Measure(f"corner {number}", abs(between(before.direction, after.direction)), "°")
+        Measure(f"corner {number}", abs(compute_turn_angle(before.direction, after.direction)), "°")
         for number, (before, after) in enumerate(itertools.pairwise(legs), 1)
     ]
     if legs:
@@ -221,7 +231,7 @@ def _measures(legs: Sequence[Leg]) -> tuple[Measure, ...]:
     return tuple(figures)
 
 
-def _leg(points: Floats, first: int, last: int) -> Leg:
+def _build_leg(points: Floats, first: int, last: int) -> Leg:
     """Return the leg from row ``first`` to row ``last``."""
     (x1, y1), (x2, y2) = points[first], points[last]
     return Leg(first, last, (float(x1), float(y1)), (float(x2), float(y2)))

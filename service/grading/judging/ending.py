@@ -11,43 +11,43 @@ from dataclasses import replace
 import numpy as np
 
 from service.grading.grade import Measure, TrialResult
-from service.grading.judging.geometry import distance_to
-from service.grading.judging.judges import judges
-from service.grading.judging.message_parts import fault_words, quoted
-from service.grading.judging.outcome import Outcome, cut, failed, passed
-from sim.recorded import pose_at
+from service.grading.judging.geometry import measure_area_distance
+from service.grading.judging.judge_declaration import declare_judge
+from service.grading.judging.message_parts import describe_fault, quote_text
+from service.grading.judging.outcome import Outcome, fail_with, find_ending_fault, pass_with
 from sim.recording import Fault, Recording, Verdict
+from sim.recording_values import get_pose_at
 from submissions.criteria.ending import EndPose, Finishes, SinceEvent
 
 
-@judges(Finishes)
+@declare_judge(Finishes)
 def judge_finishes(criterion: Finishes, trial: TrialResult) -> Outcome:
     """Judge how and when the program ended. Faults of the responder are ignored."""
     recording = trial.recording
-    fault = cut(recording)
+    fault = find_ending_fault(recording)
     measures = (Measure("time", recording.end_t, "s"),)
     if fault is not None:
-        message = f"Expected the program to end by itself, but {_ended(fault)}."
-        return replace(failed(message, fault.t, recording.end, measures=measures), tells_end=True)
+        message = f"Expected the program to end by itself, but {_describe_end(fault)}."
+        return replace(fail_with(message, fault.t, recording.end, measures=measures), has_end_reason=True)
     if criterion.seconds is not None and recording.end_t > criterion.seconds + 1e-9:
-        return failed(
+        return fail_with(
             f"Expected the program to end within {criterion.seconds:g} s, but it took {recording.end_t:.2f} s.",
             recording.end_t,
             recording.end,
             measures=measures,
         )
-    return passed(
+    return pass_with(
         f"The program ended by itself after {recording.end_t:.2f} s.", recording.end_t, recording.end, measures
     )
 
 
-def _ended(fault: Fault) -> str:
+def _describe_end(fault: Fault) -> str:
     if fault.verdict is Verdict.TIME_LIMIT:
-        return fault_words(fault)
-    return f"after {fault.t:.2f} s: {fault_words(fault)}"
+        return describe_fault(fault)
+    return f"after {fault.t:.2f} s: {describe_fault(fault)}"
 
 
-@judges(EndPose)
+@declare_judge(EndPose)
 def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
     """Judge the end pose. Distances are in mm, angles in degrees modulo 360; the edges belong to a zone."""
     end, t = trial.recording.end, trial.recording.end_t
@@ -57,12 +57,12 @@ def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
         Measure("end y", end.y, "mm"),
         Measure("end heading", end.heading, "°"),
         Measure("time", t, "s"),
-        *_way(trial.recording),
+        *_measure_displacement(trial.recording),
     )
     if criterion.x is not None and criterion.y is not None:
         distance = math.hypot(end.x - criterion.x, end.y - criterion.y)
         if not distance <= criterion.tolerance:
-            return failed(
+            return fail_with(
                 f"Expected the robot to end within {criterion.tolerance:g} mm of ({criterion.x:g}, {criterion.y:g}), "
                 f"but it ended at {where}, {distance:.1f} mm away.",
                 t,
@@ -72,7 +72,7 @@ def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
     if criterion.zone is not None:
         left, bottom, right, top = criterion.zone
         if not (left <= end.x <= right and bottom <= end.y <= top):
-            return failed(
+            return fail_with(
                 f"Expected the robot to end with x from {left:g} to {right:g} and y from {bottom:g} to {top:g}, "
                 f"but it ended at {where}.",
                 t,
@@ -80,11 +80,11 @@ def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
                 measures=measures,
             )
     if criterion.areas:
-        gaps = [float(distance_to(area, np.array([[end.x, end.y]]))[0]) for area in criterion.areas]
+        gaps = [float(measure_area_distance(area, np.array([[end.x, end.y]]))[0]) for area in criterion.areas]
         if not min(gaps) <= 0:
             near = criterion.areas[gaps.index(min(gaps))]
             one = "in" if len(gaps) == 1 else f"in one of {len(gaps)} areas, the nearest being"
-            return failed(
+            return fail_with(
                 f"Expected the robot to end {one} {near}, but it ended at {where}, {min(gaps):.0f} mm outside.",
                 t,
                 end,
@@ -93,25 +93,25 @@ def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
     if criterion.heading is not None:
         off = abs((end.heading - criterion.heading + 180) % 360 - 180)
         if not off <= criterion.heading_tolerance:
-            return failed(
+            return fail_with(
                 f"Expected the robot to end facing {criterion.heading:g}° within {criterion.heading_tolerance:g}°, "
                 f"but it ended at {where}, {off:.1f}° off.",
                 t,
                 end,
                 measures=measures,
             )
-    if criterion.since is not None and (problem := _since_problem(criterion.since, trial.recording)):
-        return failed(problem, t, end, measures=measures)
-    return passed(f"The robot ended at {where}.", t, end, measures)
+    if criterion.since is not None and (problem := _check_since(criterion.since, trial.recording)):
+        return fail_with(problem, t, end, measures=measures)
+    return pass_with(f"The robot ended at {where}.", t, end, measures)
 
 
-def _since_problem(since: SinceEvent, recording: Recording) -> str:
+def _check_since(since: SinceEvent, recording: Recording) -> str:
     """Return the problem with the distance or time since the event; empty if there is none."""
-    came = next((t for t, text in _texts(since, recording) if since.contains in text), None)
-    what = f"{quoted(since.contains)} was {since.of}"
+    came = next((t for t, text in _collect_texts(since, recording) if since.contains in text), None)
+    what = f"{quote_text(since.contains)} was {since.of}"
     if came is None:
         return f"Expected that {what}, but it never was."
-    then, end = pose_at(recording, came), recording.end
+    then, end = get_pose_at(recording, came), recording.end
     moved = math.hypot(end.x - then.x, end.y - then.y)
     if since.moved is not None and not since.moved[0] <= moved <= since.moved[1]:
         return (
@@ -127,7 +127,7 @@ def _since_problem(since: SinceEvent, recording: Recording) -> str:
     return ""
 
 
-def _texts(since: SinceEvent, recording: Recording) -> list[tuple[float, str]]:
+def _collect_texts(since: SinceEvent, recording: Recording) -> list[tuple[float, str]]:
     """Return the times and texts of this kind, in order of time."""
     match since.of:
         case "sent":
@@ -142,7 +142,7 @@ def _texts(since: SinceEvent, recording: Recording) -> list[tuple[float, str]]:
     return sorted(found)
 
 
-def _way(recording: Recording) -> tuple[Measure, ...]:
+def _measure_displacement(recording: Recording) -> tuple[Measure, ...]:
     """Return the straight-line distance and direction from start to end."""
     dx, dy = recording.end.x - recording.start.x, recording.end.y - recording.start.y
     bearing = math.degrees(math.atan2(dy, dx))

@@ -12,10 +12,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.camera import HEIGHT, WIDTH, sensor_mask
-from sim.light_sensors import Footprint, footprint
-from sim.recorded import pose_after, pose_at, robot_of, seconds_at
+from sim.camera import HEIGHT, WIDTH, build_sensor_mask
+from sim.light_sensors import Footprint, compute_footprint
 from sim.recording import Floats, Pose, Recording
+from sim.recording_values import get_pose_after, get_pose_at, get_recorded_robot, tick_to_seconds
 from sim.robot import LightSensor
 from sim.trigonometry import sincos
 from submissions.criteria.places import Area, LineToFollow, Part, Zone
@@ -27,17 +27,17 @@ Spot = Side | Literal["middle"]
 STILL = 0.01
 
 
-def times(recording: Recording) -> Floats:
+def compute_times(recording: Recording) -> Floats:
     """Return the times of all rows in seconds, shape (n + 1,)."""
     return np.concatenate([[0.0], recording.ticks.t])
 
 
-def headings(recording: Recording) -> Floats:
+def compute_headings(recording: Recording) -> Floats:
     """Return the headings in degrees, unwrapped, shape (n + 1,)."""
     return np.concatenate([[recording.start.heading], recording.ticks.heading])
 
 
-def positions(recording: Recording, part: Part = "robot") -> Floats:
+def compute_positions(recording: Recording, part: Part = "robot") -> Floats:
     """Return the positions x and y of a part, mm, shape (n + 1, 2). For the pen, rows are NaN while it is up.
 
     Invalid positions are NaN too, so every comparison with them is false.
@@ -49,15 +49,15 @@ def positions(recording: Recording, part: Part = "robot") -> Floats:
     if part == "robot":
         return middle
     if part == "pen":
-        return np.where(pen_down(recording)[:, None], middle, np.nan)
-    light = light_of(recording, "left" if part == "left_light" else "right")
+        return np.where(compute_pen_mask(recording)[:, None], middle, np.nan)
+    light = find_light_sensor(recording, "left" if part == "left_light" else "right")
     # Local x is to the robot's right and y forward, so the rotation is the heading minus a right angle.
-    turned = np.radians(headings(recording) - 90)
+    turned = np.radians(compute_headings(recording) - 90)
     cosine, sine = np.cos(turned), np.sin(turned)
     return middle + np.column_stack([cosine * light.x - sine * light.y, sine * light.x + cosine * light.y])
 
 
-def pen_down(recording: Recording) -> NDArray[np.bool_]:
+def compute_pen_mask(recording: Recording) -> NDArray[np.bool_]:
     """Return whether the pen drew on the way to each row, shape (n + 1,), including the first row of each stroke."""
     down = np.zeros(len(recording.ticks) + 1, dtype=bool)
     ends = [tick + 1 for tick, _ in recording.pen[1:]] + [len(down)]
@@ -66,110 +66,112 @@ def pen_down(recording: Recording) -> NDArray[np.bool_]:
     return down
 
 
-def place_at(recording: Recording, row: int) -> tuple[float, Pose]:
+def find_place(recording: Recording, row: int) -> tuple[float, Pose]:
     """Return the time and pose of a row."""
     if row <= 0 or not len(recording.ticks):
         return 0.0, recording.start
-    return seconds_at(recording, row), pose_after(recording, row)
+    return tick_to_seconds(recording, row), get_pose_after(recording, row)
 
 
-def travel(recording: Recording) -> tuple[Floats, Floats]:
+def compute_travel(recording: Recording) -> tuple[Floats, Floats]:
     """Return the motion in each tick: mm along the heading (negative backwards), and degrees. Shapes (n,)."""
-    points, degrees = positions(recording), headings(recording)
+    points, degrees = compute_positions(recording), compute_headings(recording)
     along = np.radians(degrees[:-1])
     steps = np.diff(points, axis=0)
     return steps[:, 0] * np.cos(along) + steps[:, 1] * np.sin(along), np.diff(degrees)
 
 
-def standing(recording: Recording) -> NDArray[np.bool_]:
+def compute_still_mask(recording: Recording) -> NDArray[np.bool_]:
     """Return whether the robot stood still in each tick, shape (n,)."""
-    ahead, turned = travel(recording)
+    ahead, turned = compute_travel(recording)
     return (np.abs(ahead) < STILL) & (np.abs(turned) < STILL)
 
 
-def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def find_true_runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the runs of true entries, as (first, one past the last)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def relative_to(start: Pose, x: float, y: float) -> tuple[float, float]:
+def to_relative_position(start: Pose, x: float, y: float) -> tuple[float, float]:
     """Return a point's distance ahead and to the left of a pose, mm."""
     along = math.radians(start.heading)
     dx, dy = x - start.x, y - start.y
     return dx * math.cos(along) + dy * math.sin(along), -dx * math.sin(along) + dy * math.cos(along)
 
 
-def light_of(recording: Recording, side: Side) -> LightSensor:
+def find_light_sensor(recording: Recording, side: Side) -> LightSensor:
     """Return the light sensor of that side, with its mounting position."""
-    robot = robot_of(recording)
+    robot = get_recorded_robot(recording)
     return robot.left_light if side == "left" else robot.right_light
 
 
-def part_at(recording: Recording, part: Spot, pose: Pose) -> tuple[float, float]:
+def locate_part(recording: Recording, part: Spot, pose: Pose) -> tuple[float, float]:
     """Return the world position of a light sensor's centre or of the axle, with the robot at ``pose``, mm."""
     if part == "middle":
         return pose.x, pose.y
-    return sensor_at(light_of(recording, part), pose)
+    return locate_sensor(find_light_sensor(recording, part), pose)
 
 
-def sensor_at(sensor: LightSensor, pose: Pose) -> tuple[float, float]:
+def locate_sensor(sensor: LightSensor, pose: Pose) -> tuple[float, float]:
     """Return the world position of a light sensor's centre, with the robot at ``pose``, mm."""
     turn = math.radians(pose.heading - 90)
     sine, cosine = math.sin(turn), math.cos(turn)
     return pose.x + cosine * sensor.x - sine * sensor.y, pose.y + sine * sensor.x + cosine * sensor.y
 
 
-def part_at_time(recording: Recording, part: Spot, t: float) -> tuple[float, float]:
-    """Return the position as ``part_at`` does, after the last tick before ``t`` seconds."""
-    return part_at(recording, part, pose_at(recording, t))
+def locate_part_at_time(recording: Recording, part: Spot, t: float) -> tuple[float, float]:
+    """Return the position as ``locate_part`` does, after the last tick before ``t`` seconds."""
+    return locate_part(recording, part, get_pose_at(recording, t))
 
 
-def footprint_at(recording: Recording, side: Side, pose: Pose) -> Footprint:
+def locate_footprint(recording: Recording, side: Side, pose: Pose) -> Footprint:
     """Return the window that a light sensor sees. It does not rotate with the robot, so it alone decides the image."""
-    return footprint(light_of(recording, side), pose.x, pose.y, *sincos(math.radians(pose.heading) - math.pi / 2))
+    return compute_footprint(
+        find_light_sensor(recording, side), pose.x, pose.y, *sincos(math.radians(pose.heading) - math.pi / 2)
+    )
 
 
-def floor_share(recording: Recording, side: Side, pose: Pose) -> float:
+def measure_floor_share(recording: Recording, side: Side, pose: Pose) -> float:
     """Return the fraction of a light sensor's view that is floor, 0 to 1. Everything else is black."""
-    where, diameter = footprint_at(recording, side, pose), light_of(recording, side).diameter
+    where, diameter = locate_footprint(recording, side, pose), find_light_sensor(recording, side).diameter
     rows, columns = where.row + np.arange(diameter), where.column + np.arange(diameter)
     floor = ((rows >= 0) & (rows < HEIGHT))[:, None] & ((columns >= 0) & (columns < WIDTH))
-    mask = sensor_mask(diameter)
+    mask = build_sensor_mask(diameter)
     return float((floor & mask).sum() / mask.sum())
 
 
-def in_zone(place: tuple[float, float], zone: Zone, margin: float = 0.0) -> bool:
+def is_in_zone(place: tuple[float, float], zone: Zone, margin: float = 0.0) -> bool:
     """Return whether a place is in [left, bottom, right, top], extended by ``margin`` mm."""
     (x, y), (left, bottom, right, top) = place, zone
     return left - margin <= x <= right + margin and bottom - margin <= y <= top + margin
 
 
-def zone_words(zone: Zone) -> str:
+def describe_zone(zone: Zone) -> str:
     """Return the zone as ``x from 0 to 100 and y from 20 to 80``."""
     left, bottom, right, top = zone
     return f"x from {left:g} to {right:g} and y from {bottom:g} to {top:g}"
 
 
-def distance_to(area: Area, points: Floats) -> Floats:
+def measure_area_distance(area: Area, points: Floats) -> Floats:
     """Return the signed distance of each point (n, 2) to the edge of the area, mm, negative inside."""
-    distances = _to_shape(area, points)
+    distances = _measure_shape_distance(area, points)
     return -distances if area.outside else distances
 
 
-def _to_shape(area: Area, points: Floats) -> Floats:
+def _measure_shape_distance(area: Area, points: Floats) -> Floats:
     x, y = points[:, 0], points[:, 1]
     if area.circle is not None:
         return np.hypot(x - area.circle[0], y - area.circle[1]) - area.circle[2]
     if area.bar is not None:
         x1, y1, x2, y2, radius = area.bar
-        return to_segment(points, (x1, y1), (x2, y2)) - radius
+        return measure_segment_distance(points, (x1, y1), (x2, y2)) - radius
     corners: tuple[tuple[float, float], ...] = area.polygon or ()
     if area.rectangle is not None:
         left, bottom, right, top = area.rectangle
         corners = ((left, bottom), (right, bottom), (right, top), (left, top))
     edges = list(zip(corners, (*corners[1:], corners[0]), strict=True))
-    nearest = np.min([to_segment(points, first, last) for first, last in edges], axis=0)
+    nearest = np.min([measure_segment_distance(points, first, last) for first, last in edges], axis=0)
     within = np.zeros(len(points), dtype=bool)
     for (x1, y1), (x2, y2) in edges:  # from inside, a ray to the right crosses the outline an odd number of times
         crosses = (y1 > y) != (y2 > y)
@@ -179,7 +181,7 @@ def _to_shape(area: Area, points: Floats) -> Floats:
     return signed
 
 
-def to_segment(points: Floats, first: tuple[float, float], last: tuple[float, float]) -> Floats:
+def measure_segment_distance(points: Floats, first: tuple[float, float], last: tuple[float, float]) -> Floats:
     """Return the distance of each point (n, 2) to a line segment, mm."""
     start, along = np.array(first), np.array(last) - np.array(first)
     length = float(along @ along)
@@ -194,7 +196,7 @@ _WINDOW = 100.0
 
 
 @dataclass(frozen=True, slots=True)
-class Along:
+class LineProgress:
     """The position of each row from ``first`` on, relative to a line.
 
     ``progress`` is along the line (mm; it grows beyond the length if the line is closed). ``offset`` is the distance
@@ -207,7 +209,7 @@ class Along:
     length: float
 
 
-def along(course: LineToFollow, points: Floats, within: float) -> Along | None:
+def track_line_progress(course: LineToFollow, points: Floats, within: float) -> LineProgress | None:
     """Return the path's progress from where it first comes ``within`` mm of the line; None if it never does.
 
     After that, the nearest point is searched only near the previous one. So a path that leaves the line and meets it
@@ -215,20 +217,20 @@ def along(course: LineToFollow, points: Floats, within: float) -> Along | None:
     point by 2 d, so a range of twice ``within`` is enough.
     """
     line = _Line(course)
-    distances = line.distances(points)
+    distances = line.measure_distances(points)
     near = np.flatnonzero(distances <= within)
     if not len(near):
         return None
     first = int(near[0])
     progress, offset = np.empty(len(points) - first), np.empty(len(points) - first)
-    at, window = line.nearest(points[first]), max(_WINDOW, 2.2 * within)
+    at, window = line.find_nearest(points[first]), max(_WINDOW, 2.2 * within)
     for row, (x, y) in enumerate(points[first:]):
         at, offset[row] = line.step(x, y, at, window)
         progress[row] = at
-    return Along(first, progress, offset, line.length)
+    return LineProgress(first, progress, offset, line.length)
 
 
-def covered(found: Along, within: float, begin: float, end: float) -> float:
+def measure_covered_share(found: LineProgress, within: float, begin: float, end: float) -> float:
     """Return the fraction of the line from ``begin`` to ``end`` that was driven forwards, ``within`` mm of it."""
     near = np.abs(found.offset) <= within
     pieces = []
@@ -256,16 +258,16 @@ class _Line:
         self.length = float(self._lengths.sum())
         self._closed = course.is_closed
 
-    def distances(self, points: Floats) -> Floats:
-        return np.array([np.min(self._from(x, y)[1]) for x, y in points])
+    def measure_distances(self, points: Floats) -> Floats:
+        return np.array([np.min(self._measure_from(x, y)[1]) for x, y in points])
 
-    def nearest(self, point: Floats) -> float:
-        progress, distance, _ = self._from(float(point[0]), float(point[1]))
+    def find_nearest(self, point: Floats) -> float:
+        progress, distance, _ = self._measure_from(float(point[0]), float(point[1]))
         return float(progress[int(np.argmin(distance))])
 
     def step(self, x: float, y: float, at: float, window: float) -> tuple[float, float]:
         """Return the nearest place in the window around ``at``, and the signed distance to it."""
-        progress, distance, side = self._from(x, y)
+        progress, distance, side = self._measure_from(x, y)
         if self._closed:
             progress = at + (progress - at + self.length / 2) % self.length - self.length / 2
         allowed = np.abs(progress - at) <= window
@@ -274,7 +276,7 @@ class _Line:
         best = int(np.argmin(np.where(allowed, distance, np.inf)))
         return float(progress[best]), float(np.copysign(distance[best], side[best]))
 
-    def _from(self, x: float, y: float) -> tuple[Floats, Floats, Floats]:
+    def _measure_from(self, x: float, y: float) -> tuple[Floats, Floats, Floats]:
         """Return for each segment the nearest place, the distance to it, and the side (positive to the left)."""
         away_x, away_y = x - self._starts[:, 0], y - self._starts[:, 1]
         forward_x, forward_y = self._directions[:, 0], self._directions[:, 1]

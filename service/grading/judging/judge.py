@@ -10,29 +10,29 @@ from importlib import import_module
 from types import MappingProxyType
 
 from service.grading.grade import CriterionResult, TrialResult
-from service.grading.judging.judges import Case, Judge, StaticAnalysis, once
-from service.grading.judging.outcome import failed
+from service.grading.judging.judge_declaration import Case, Judge, StaticAnalysis, judge_once
+from service.grading.judging.outcome import fail_with
 from sim.errors import HostError
 from sim.recording import Verdict
 from submissions.assignment.definition import Assignment
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.submission import PART_FILES
 
-_NOTHING_FOUND = StaticAnalysis()
+_EMPTY_ANALYSIS = StaticAnalysis()
 
 
-def _judges() -> Mapping[type[Criterion], Judge]:
+def _collect_judges() -> Mapping[type[Criterion], Judge]:
     families = {schema.__module__.rpartition(".")[2] for schema in SCHEMAS.values()}
     declared = [vars(import_module(f"{__package__}.{family}")).values() for family in families]
     return MappingProxyType({each.schema: each for values in declared for each in values if isinstance(each, Judge)})
 
 
 #: The judge of each schema.
-JUDGES = _judges()
+JUDGES = _collect_judges()
 
 
 def judge(
-    assignment: Assignment, trials: tuple[TrialResult, ...], analysis: StaticAnalysis = _NOTHING_FOUND
+    assignment: Assignment, trials: tuple[TrialResult, ...], analysis: StaticAnalysis = _EMPTY_ANALYSIS
 ) -> tuple[CriterionResult, ...]:
     """Return one result for each criterion of the assignment, in its order.
 
@@ -45,21 +45,21 @@ def judge(
         HostError: A trial failed on this machine. It must be run again, not marked.
         AssignmentError: A check of the instructor failed.
     """
-    refuse_spoilt(trials)
+    reject_failed_trials(trials)
     results: dict[str, CriterionResult] = {}
     case = Case(assignment, trials, analysis, results)
-    for criterion in in_turn(assignment):
+    for criterion in order_criteria(assignment):
         results[criterion.id] = judge_one(criterion, case)
     return tuple(results[criterion.id] for criterion in assignment.criteria)
 
 
-def refuse_spoilt(trials: Sequence[TrialResult]) -> None:
+def reject_failed_trials(trials: Sequence[TrialResult]) -> None:
     """Raise HostError if a trial failed on this machine."""
     if any(trial.verdict is Verdict.HOST_ERROR for trial in trials):
         raise HostError("A trial that failed on this machine cannot be marked; it has to be run again.")
 
 
-def in_turn(assignment: Assignment) -> list[Criterion]:
+def order_criteria(assignment: Assignment) -> list[Criterion]:
     """Return the criteria in judging order: those that use the result of another come last."""
     return sorted(assignment.criteria, key=lambda each: each.result_needed is not None)
 
@@ -68,5 +68,5 @@ def judge_one(criterion: Criterion, case: Case) -> CriterionResult:
     """Judge one criterion. If a part that it needs was not submitted, it gets no marks."""
     missing = case.analysis.missing
     if missing in criterion.parts_needed:
-        return once(criterion, failed(f"There is no {PART_FILES[missing]}."))
+        return judge_once(criterion, fail_with(f"There is no {PART_FILES[missing]}."))
     return JUDGES[type(criterion)].judge(criterion, case)

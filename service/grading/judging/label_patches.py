@@ -37,14 +37,14 @@ GREYS: Mapping[str, Mapping[int, str]] = MappingProxyType(
 )
 
 
-def decoded(image: Image, greys: Mapping[int, str], light_noise: float = 0.0) -> str | None:
+def decode_label(image: Image, greys: Mapping[int, str], light_noise: float = 0.0) -> str | None:
     """Return the label whose patch fills the right image's focus; None if there is none.
 
     ``light_noise`` is the amplitude of pixel noise, in grey levels.
     """
     if not greys or len(image.right) != 4 * image.side**2:
         return None
-    seen = focus(image.right, image.side).astype(np.float64)
+    seen = crop_focus(image.right, image.side).astype(np.float64)
     median = float(np.median(seen))
     grey = min(greys, key=lambda known: abs(known - median))
     between = min((after - before for before, after in pairwise(sorted(greys))), default=256)
@@ -54,22 +54,22 @@ def decoded(image: Image, greys: Mapping[int, str], light_noise: float = 0.0) ->
     return greys[grey] if alike.mean() >= _UNIFORM_SHARE else None
 
 
-def focus(rgba: bytes, side: int) -> NDArray[np.uint8]:
+def crop_focus(rgba: bytes, side: int) -> NDArray[np.uint8]:
     """Return the red values of the square inside the round sensor: 14 x 14 of 20 x 20.
 
     The crop (3, 3, 17, 17) is the course's ``sensor_image_focus``. Other sizes are cropped in proportion.
     """
     edge = round(side * 3 / 20)
-    return _pixels(rgba, side)[edge : side - edge, edge : side - edge, 0]
+    return _reshape_pixels(rgba, side)[edge : side - edge, edge : side - edge, 0]
 
 
-def grey_image(image: Image, *, focus: bool) -> NDArray[np.uint8]:
+def convert_to_grey(image: Image, *, focus: bool) -> NDArray[np.uint8]:
     """Return the left image in greys (Pillow's ``convert("L")``): its 14 x 14 focus, or all 20 x 20 pixels."""
     edge = round(image.side * 3 / 20) if focus else 0
-    rgb = np.ascontiguousarray(_pixels(image.left, image.side)[:, :, :3])
+    rgb = np.ascontiguousarray(_reshape_pixels(image.left, image.side)[:, :, :3])
     grey = np.asarray(Pixels.fromarray(rgb).convert("L"))
     return np.ascontiguousarray(grey[edge : image.side - edge, edge : image.side - edge])
 
 
-def _pixels(rgba: bytes, side: int) -> NDArray[np.uint8]:
+def _reshape_pixels(rgba: bytes, side: int) -> NDArray[np.uint8]:
     return np.frombuffer(rgba, dtype=np.uint8).reshape(side, side, 4)

@@ -9,10 +9,10 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 #: For each requirement, whether each candidate matches.
-Suits = Sequence[Sequence[bool]]
+MatchMatrix = Sequence[Sequence[bool]]
 
 
-def most_pairs(suits: Suits) -> list[int | None]:
+def match_most_pairs(suits: MatchMatrix) -> list[int | None]:
     """Return the candidate of each requirement, None without one, with as many pairs as possible.
 
     Uses maximum bipartite matching by augmenting paths. Among equal solutions, earlier requirements get candidates.
@@ -21,14 +21,16 @@ def most_pairs(suits: Suits) -> list[int | None]:
     owners: dict[int, int] = {}
     for wish in range(len(suits)):
         reached_from: dict[int, int] = {}
-        candidate = _free_candidate(wish, suits, owners, reached_from)
+        candidate = _find_free_candidate(wish, suits, owners, reached_from)
         while candidate is not None:
             owner = reached_from[candidate]
             pairs[owner], owners[candidate], candidate = candidate, owner, pairs[owner]
     return pairs
 
 
-def _free_candidate(wish: int, suits: Suits, owners: dict[int, int], reached_from: dict[int, int]) -> int | None:
+def _find_free_candidate(
+    wish: int, suits: MatchMatrix, owners: dict[int, int], reached_from: dict[int, int]
+) -> int | None:
     """Return the nearest candidate without an owner, and record which requirement reached each candidate."""
     waiting = deque([wish])
     while waiting:
@@ -42,7 +44,7 @@ def _free_candidate(wish: int, suits: Suits, owners: dict[int, int], reached_fro
     return None
 
 
-def most_in_order(wishes: int, first_from: Callable[[int, int], int | None], step: int = 1) -> list[int | None]:
+def match_most_in_order(wishes: int, first_from: Callable[[int, int], int | None], step: int = 1) -> list[int | None]:
     """Return the place of each requirement, None if it is left out, with as many in order as possible.
 
     ``first_from(wish, start)`` returns the first place from ``start`` on that matches. The search for the next

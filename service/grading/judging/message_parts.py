@@ -6,32 +6,32 @@ The modules of the families write the messages themselves.
 from __future__ import annotations
 
 from service.grading.grade import TrialResult
-from service.grading.judging.outcome import Outcome, cut
+from service.grading.judging.outcome import Outcome, find_ending_fault
 from sim.recording import Fault, Verdict
 from submissions.sweep import CONDITIONS
 
 _LONGEST_QUOTE = 80
 
 
-def quoted(text: str) -> str:
+def quote_text(text: str) -> str:
     """Return a student's text for use in a sentence: in quotes, on one line, shortened."""
     line = " ".join(text.split())
     return f'"{line}"' if len(line) <= _LONGEST_QUOTE else f'"{line[: _LONGEST_QUOTE - 3]}..."'
 
 
-def listed(texts: tuple[str, ...], word: str = "and") -> str:
+def quote_list(texts: tuple[str, ...], word: str = "and") -> str:
     """Return a list such as ``"a", "b" and "c"``."""
-    quotes = [quoted(text) for text in texts]
+    quotes = [quote_text(text) for text in texts]
     return quotes[0] if len(quotes) == 1 else f"{', '.join(quotes[:-1])} {word} {quotes[-1]}"
 
 
-def fault_words(fault: Fault) -> str:
+def describe_fault(fault: Fault) -> str:
     """Return a fault as ``NameError: name 'x' is not defined (line 3)``."""
     where = f" ({fault.place})" if fault.place else ""
     return f"{fault.message.rstrip('.')}{where}"
 
 
-def place_words(trial: TrialResult, t: float | None) -> str:
+def describe_place(trial: TrialResult, t: float | None) -> str:
     """Return a place as ``In scenario line, from (100, 800) facing 0°, with light noise 32, at 3.00 s``."""
     start = trial.recording.start
     x, y, heading = (f"{round(value, 1):g}" for value in (start.x, start.y, start.heading))
@@ -49,7 +49,7 @@ def place_words(trial: TrialResult, t: float | None) -> str:
     return ", ".join(words)
 
 
-def shown_words(message: str) -> str:
+def add_hidden_note(message: str) -> str:
     """Return the feedback on visible trials with a fixed note that hidden trials are marked as well."""
     return (
         f"{message} Trials that are not shown are marked as well."
@@ -58,10 +58,10 @@ def shown_words(message: str) -> str:
     )
 
 
-def early_end(trial: TrialResult, outcome: Outcome | None = None) -> str:
+def describe_early_end(trial: TrialResult, outcome: Outcome | None = None) -> str:
     """Return why the run ended early; empty if it did not, or the outcome already says so."""
-    fault = cut(trial.recording)
-    if fault is None or (outcome is not None and outcome.tells_end):
+    fault = find_ending_fault(trial.recording)
+    if fault is None or (outcome is not None and outcome.has_end_reason):
         return ""
     if fault.verdict is Verdict.TIME_LIMIT:
         return f" The program was still running when time ran out, at {fault.t:g} s."

@@ -13,10 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.grading.grade import Measure
-from service.grading.judging.geometry import place_at, relative_to, standing, stretches, travel
-from sim.recorded import robot_of, seconds_at
+from service.grading.judging.geometry import (
+    compute_still_mask,
+    compute_travel,
+    find_place,
+    find_true_runs,
+    to_relative_position,
+)
 from sim.recording import Recording
-from submissions.criteria.motion import AskedMotion
+from sim.recording_values import get_recorded_robot, tick_to_seconds
+from submissions.criteria.motion import MotionConditions
 
 #: A smaller relative difference between the wheels counts as straight.
 _STRAIGHT = 0.1
@@ -56,43 +62,43 @@ class Move:
         return f"{' and '.join(words)} in {self.seconds:.2f} s"
 
 
-def moves_of(recording: Recording) -> tuple[Move, ...]:
+def split_moves(recording: Recording) -> tuple[Move, ...]:
     """Return the moves of a run, in order.
 
     Moves are separated by standing still for more than two ticks. They are also separated by a change between driving
     forwards, backwards, turning left and turning right, if both last 0.3 s.
     """
-    ways = _ways(recording)
+    ways = _classify_ticks(recording)
     return tuple(
-        move_between(recording, first, last)
-        for begin, end in _parted_by_rests(ways == 0)
-        for first, last in _parted_by_way(ways, begin, end)
+        build_move(recording, first, last)
+        for begin, end in _split_at_rests(ways == 0)
+        for first, last in _split_by_motion(ways, begin, end)
     )
 
 
-def move_between(recording: Recording, first: int, last: int) -> Move:
+def build_move(recording: Recording, first: int, last: int) -> Move:
     """Return the move made by the ticks after row ``first`` up to row ``last``."""
-    _, before = place_at(recording, first)
-    _, after = place_at(recording, last)
-    ahead, left = relative_to(before, after.x, after.y)
-    return Move(first, last, ahead, left, after.heading - before.heading, seconds_at(recording, last - first))
+    _, before = find_place(recording, first)
+    _, after = find_place(recording, last)
+    ahead, left = to_relative_position(before, after.x, after.y)
+    return Move(first, last, ahead, left, after.heading - before.heading, tick_to_seconds(recording, last - first))
 
 
-def straight(recording: Recording) -> NDArray[np.bool_]:
+def compute_straight_mask(recording: Recording) -> NDArray[np.bool_]:
     """Return whether both wheels moved almost equally in each tick, shape (n,); false while the robot stands still."""
-    ahead, turned = travel(recording)
-    between_wheels = np.radians(turned) * robot_of(recording).wheel_spacing
-    return (np.abs(between_wheels) <= _STRAIGHT * np.abs(ahead)) & ~standing(recording)
+    ahead, turned = compute_travel(recording)
+    between_wheels = np.radians(turned) * get_recorded_robot(recording).wheel_spacing
+    return (np.abs(between_wheels) <= _STRAIGHT * np.abs(ahead)) & ~compute_still_mask(recording)
 
 
-def _ways(recording: Recording) -> NDArray[np.int8]:
+def _classify_ticks(recording: Recording) -> NDArray[np.int8]:
     """Return the kind of motion in each tick, shape (n,): forwards 1, backwards -1, left 2, right -2, rest 0."""
-    ahead, turned = travel(recording)
-    ways = np.where(straight(recording), np.sign(ahead), 2 * np.sign(turned))
-    return np.where(standing(recording), 0, ways).astype(np.int8)
+    ahead, turned = compute_travel(recording)
+    ways = np.where(compute_straight_mask(recording), np.sign(ahead), 2 * np.sign(turned))
+    return np.where(compute_still_mask(recording), 0, ways).astype(np.int8)
 
 
-def misses(wanted: AskedMotion, move: Move) -> str | None:
+def describe_mismatch(wanted: MotionConditions, move: Move) -> str | None:
     """Return how a move differs from the required one, ``a turn of 85 to 95°, but it was 80°``; None if it matches."""
     asked = (
         ("a distance from where it began", "", "", wanted.distance, move.distance, " mm"),
@@ -105,32 +111,32 @@ def misses(wanted: AskedMotion, move: Move) -> str | None:
     for what, positive, negative, wished, value, unit in asked:
         if wished is None or wished[0] <= value <= wished[1]:
             continue
-        side, least, most = facing(wished, positive, negative)
-        found = shown(abs(value))
+        side, least, most = orient_range(wished, positive, negative)
+        found = format_number(abs(value))
         way = "" if found == "0" else negative if value < 0 else positive
-        return f"{what}{side} of {range_words(least, most, unit)}, but it was {found}{unit}{way}"
+        return f"{what}{side} of {describe_range(least, most, unit)}, but it was {found}{unit}{way}"
     return None
 
 
-def facing(wished: tuple[float, float], positive: str, negative: str) -> tuple[str, float, float]:
+def orient_range(wished: tuple[float, float], positive: str, negative: str) -> tuple[str, float, float]:
     """Return a negative range as a positive one, with the word for its side."""
     least, most = wished
     return (negative, -most, -least) if most <= 0 and least < 0 else (positive, least, most)
 
 
-def range_words(least: float, most: float, unit: str) -> str:
+def describe_range(least: float, most: float, unit: str) -> str:
     """Return a range as ``85 to 95°``, ``at least 100 mm`` or ``1 s``."""
     if most >= _NO_BOUND:
         return f"at least {least:g}{unit}"
     return f"{least:g}{unit}" if least == most else f"{least:g} to {most:g}{unit}"
 
 
-def shown(value: float) -> str:
+def format_number(value: float) -> str:
     """Return a number with at most two decimal places, without trailing zeros."""
     return f"{value:.2f}".rstrip("0").rstrip(".") if "." in f"{value:.2f}" else f"{value:.2f}"
 
 
-def measures_of(move: Move, name: str) -> tuple[Measure, ...]:
+def build_move_measures(move: Move, name: str) -> tuple[Measure, ...]:
     """Return the measures of a move, named ``move 2 forward`` and so on."""
     return (
         Measure(f"{name} forward", move.forward, "mm"),
@@ -141,20 +147,20 @@ def measures_of(move: Move, name: str) -> tuple[Measure, ...]:
     )
 
 
-def _parted_by_rests(still: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _split_at_rests(still: NDArray[np.bool_]) -> list[tuple[int, int]]:
     resting = np.zeros_like(still)
-    for first, last in stretches(still):
+    for first, last in find_true_runs(still):
         if last - first > _REST or first == 0 or last == len(still):
             resting[first:last] = True
-    return stretches(~resting)
+    return find_true_runs(~resting)
 
 
-def _parted_by_way(ways: NDArray[np.int8], first: int, last: int) -> list[tuple[int, int]]:
+def _split_by_motion(ways: NDArray[np.int8], first: int, last: int) -> list[tuple[int, int]]:
     """Split a range of ticks where two lasting kinds of motion meet."""
     lasting = sorted(
         (begin, end, way)
         for way in (-2, -1, 1, 2)
-        for begin, end in stretches(ways[first:last] == way)
+        for begin, end in find_true_runs(ways[first:last] == way)
         if end - begin >= _LASTING
     )
     cuts = [first]

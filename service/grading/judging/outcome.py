@@ -14,7 +14,7 @@ from typing import Literal
 from service.grading.grade import Measure
 from sim.recording import Fault, Pose, Recording, Verdict
 
-_SHORT_OF_ALL = Fraction(99, 100)
+_MAX_FAILED_SCORE = Fraction(99, 100)
 Over = Literal["share", "all", "mean", "median", "worst"]
 
 _CENT = Decimal("0.01")
@@ -32,10 +32,10 @@ class Outcome:
     pose: Pose | None = None
     measures: tuple[Measure, ...] = ()
     for_staff: str = ""  # what staff should check; not shown to students
-    tells_end: bool = False  # the message already says why the run ended early
+    has_end_reason: bool = False  # the message already says why the run ended early
 
 
-def passed(
+def pass_with(
     message: str,
     t: float | None = None,
     pose: Pose | None = None,
@@ -46,7 +46,7 @@ def passed(
     return Outcome(True, Fraction(1), message, t, pose, measures, for_staff)
 
 
-def failed(
+def fail_with(
     message: str,
     t: float | None = None,
     pose: Pose | None = None,
@@ -55,10 +55,10 @@ def failed(
     for_staff: str = "",
 ) -> Outcome:
     """Return a failed outcome. ``score`` is kept below 1, because all may be present but in the wrong order."""
-    return Outcome(False, min(max(score, Fraction(0)), _SHORT_OF_ALL), message, t, pose, measures, for_staff)
+    return Outcome(False, min(max(score, Fraction(0)), _MAX_FAILED_SCORE), message, t, pose, measures, for_staff)
 
 
-def cut(recording: Recording) -> Fault | None:
+def find_ending_fault(recording: Recording) -> Fault | None:
     """Return the fault that kept the program from ending by itself, or None.
 
     Errors of a responder don't count, because the program continues after them.
@@ -71,7 +71,7 @@ def cut(recording: Recording) -> Fault | None:
     return Fault(recording.end_t, recording.verdict, "program", str(recording.verdict).replace("_", " "))
 
 
-def earned(marks: Decimal, share: Fraction) -> Decimal:
+def compute_marks(marks: Decimal, share: Fraction) -> Decimal:
     """Return ``share`` (0 to 1) of ``marks``, rounded half up to two places, at most ``marks``."""
     exact = Fraction(marks) * min(max(share, Fraction(0)), Fraction(1))
     # Scaled to whole cents first, so that no decimal expansion is truncated before rounding.
@@ -80,7 +80,7 @@ def earned(marks: Decimal, share: Fraction) -> Decimal:
     return min(Decimal(whole).scaleb(-2), marks).quantize(_CENT, rounding=ROUND_HALF_UP)
 
 
-def share_of(outcomes: Sequence[Outcome], over: Over) -> Fraction:
+def combine_outcomes(outcomes: Sequence[Outcome], over: Over) -> Fraction:
     """Return the fraction of a criterion's marks for these trials, by the rule ``over``; 0 without trials."""
     if not outcomes:
         return Fraction(0)
@@ -100,7 +100,7 @@ def share_of(outcomes: Sequence[Outcome], over: Over) -> Fraction:
             return scores[0]
 
 
-def in_steps(share: Fraction) -> Fraction:
+def round_to_steps(share: Fraction) -> Fraction:
     """Round ``share`` to steps of 5 %; a value below 1 stays below 1.
 
     Used for hidden trials, so that marks don't reveal what a program counted there.
@@ -110,7 +110,7 @@ def in_steps(share: Fraction) -> Fraction:
     return min(Fraction((2 * share * _STEPS + 1) // 2, _STEPS), Fraction(_STEPS - 1, _STEPS))
 
 
-def share_of_accuracy(right: int, count: int, at_least: float | None, over: Over) -> Fraction:
+def compute_accuracy_share(right: int, count: int, at_least: float | None, over: Over) -> Fraction:
     """Return the fraction of a classification's marks for ``right`` of ``count`` answers.
 
     Full marks from ``at_least`` on (all correct if None). Below it, nothing with ``all``, otherwise in proportion.
@@ -125,7 +125,7 @@ def share_of_accuracy(right: int, count: int, at_least: float | None, over: Over
     return Fraction(0) if over == "all" else accuracy / enough
 
 
-def share_of_steps(right: int, count: int, steps: Sequence[tuple[float, float]], marks: Decimal) -> Fraction:
+def compute_steps_share(right: int, count: int, steps: Sequence[tuple[float, float]], marks: Decimal) -> Fraction:
     """Return the fraction of ``marks`` for the last step that the accuracy reaches.
 
     ``steps`` are pairs (accuracy, marks). The accuracy is ``right`` of ``count``.

@@ -10,10 +10,16 @@ from fractions import Fraction
 import numpy as np
 
 from service.grading.grade import Measure, TrialResult
-from service.grading.judging.geometry import distance_to, place_at, positions, standing, stretches
-from service.grading.judging.judges import judges
-from service.grading.judging.matching import most_in_order
-from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.geometry import (
+    compute_positions,
+    compute_still_mask,
+    find_place,
+    find_true_runs,
+    measure_area_distance,
+)
+from service.grading.judging.judge_declaration import declare_judge
+from service.grading.judging.matching import match_most_in_order
+from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from sim.recording import Floats, Recording
 from submissions.criteria.path import KeepsOut, StaysInside, TouchesNothing, Visits
 from submissions.criteria.places import Area, Part
@@ -33,12 +39,12 @@ PART_NAMES = {
 }
 
 
-@judges(Visits)
+@declare_judge(Visits)
 def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
     """Judge the places in order (or at any time). A place is visited when its edge is reached."""
     recording = trial.recording
-    points = positions(recording, criterion.of)
-    visited = _visited(criterion, points)
+    points = compute_positions(recording, criterion.of)
+    visited = _find_visited_rows(criterion, points)
     rows = [row for row in visited if row is not None]
     missed = next((place for place, row in zip(criterion.places, visited, strict=True) if row is None), None)
     reached = len(rows)
@@ -47,32 +53,32 @@ def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
     score = Fraction(min(reached, enough), enough)
     who = PART_NAMES[criterion.of]
     if missed is not None and reached < enough:
-        near = _nearest(distance_to(missed, points))
+        near = _find_nearest(measure_area_distance(missed, points))
         then = ", after the places before it," if criterion.in_order and criterion.places[0] is not missed else ""
         told = f"its smallest distance was {near[1]:.0f} mm" if near and near[1] > 0 else "it did not get there"
-        return failed(
+        return fail_with(
             f"Expected {who} to reach{then} {missed}, but {told} "
             f"({reached} of {len(criterion.places)} places visited).",
-            *place_at(recording, near[0] if near else len(points) - 1),
+            *find_place(recording, near[0] if near else len(points) - 1),
             score=score,
             measures=measures,
         )
-    stops = [(place, row) for place in criterion.places if (row := _stop_in(recording, place, points)) is not None]
+    stops = [(place, row) for place in criterion.places if (row := _find_stop(recording, place, points)) is not None]
     if criterion.without_stopping and stops:
         place, row = stops[0]
-        return failed(
+        return fail_with(
             f"Expected {who} not to stop in {place}, but it stopped there.",
-            *place_at(recording, row),
+            *find_place(recording, row),
             score=Fraction(max(min(reached, enough) - len(stops), 0), enough),
             measures=measures,
         )
     places = str(criterion.places[0]) if len(criterion.places) == 1 else f"{reached} of {len(criterion.places)} places"
-    return passed(f"{_upper(who)} reached {places}.", *place_at(recording, max(rows)), measures)
+    return pass_with(f"{_capitalise(who)} reached {places}.", *find_place(recording, max(rows)), measures)
 
 
-def _visited(criterion: Visits, points: Floats) -> list[int | None]:
+def _find_visited_rows(criterion: Visits, points: Floats) -> list[int | None]:
     """Return the row at which each place is visited, None if it is not; with ``in_order`` as many as possible."""
-    inside = [np.flatnonzero(distance_to(place, points) <= 0) for place in criterion.places]
+    inside = [np.flatnonzero(measure_area_distance(place, points) <= 0) for place in criterion.places]
 
     def first_from(place: int, row: int) -> int | None:
         number = int(np.searchsorted(inside[place], row))
@@ -80,49 +86,49 @@ def _visited(criterion: Visits, points: Floats) -> list[int | None]:
 
     if criterion.in_order:
         # Places may overlap, so one row may be in several.
-        return most_in_order(len(inside), first_from, step=0)
+        return match_most_in_order(len(inside), first_from, step=0)
     return [first_from(place, 0) for place in range(len(inside))]
 
 
-@judges(StaysInside)
+@declare_judge(StaysInside)
 def judge_stays_inside(criterion: StaysInside, trial: TrialResult) -> Outcome:
     """Judge by the first position outside all areas. The score is the fraction of the path before it."""
     recording = trial.recording
-    points = _driven(recording, criterion.of)
+    points = _find_positions(recording, criterion.of)
     if points is None:
-        return _no_pen(recording)
-    depth = np.min([distance_to(area, points) for area in criterion.areas], axis=0)
-    who, where = PART_NAMES[criterion.of], _either(criterion.areas)
+        return _fail_for_missing_pen(recording)
+    depth = np.min([measure_area_distance(area, points) for area in criterion.areas], axis=0)
+    who, where = PART_NAMES[criterion.of], _describe_areas(criterion.areas)
     measures = (
-        *_bounds(points),
+        *_measure_bounds(points),
         Measure("farthest out", float(np.nanmax(depth)), "mm"),
     )
     outside = np.flatnonzero(~(depth <= 0) & ~np.isnan(points[:, 0]))
     if len(outside):
         row = int(outside[0])
         share = Fraction(row, len(points))
-        return failed(
+        return fail_with(
             f"Expected {who} to stay in {where}, but it left it at ({points[row, 0]:.0f}, {points[row, 1]:.0f}) "
             f"and was up to {np.nanmax(depth):.0f} mm outside.",
-            *place_at(recording, row),
+            *find_place(recording, row),
             score=share,
             measures=measures,
         )
-    if _way(recording) < criterion.drives:
-        return _drove_too_little(recording, criterion.drives, measures)
-    return passed(f"{_upper(who)} stayed in {where}.", recording.end_t, recording.end, measures)
+    if _measure_driven_distance(recording) < criterion.drives:
+        return _fail_for_short_drive(recording, criterion.drives, measures)
+    return pass_with(f"{_capitalise(who)} stayed in {where}.", recording.end_t, recording.end, measures)
 
 
-@judges(KeepsOut)
+@declare_judge(KeepsOut)
 def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
     """Judge by the least distance to any of the areas."""
     recording = trial.recording
-    points = _driven(recording, criterion.of)
+    points = _find_positions(recording, criterion.of)
     if points is None:
-        return _no_pen(recording)
+        return _fail_for_missing_pen(recording)
     who = PART_NAMES[criterion.of]
-    distances = np.array([distance_to(area, points) for area in criterion.areas])
-    measures = (Measure("least clearance", float(np.nanmin(distances)), "mm"), *_bounds(points))
+    distances = np.array([measure_area_distance(area, points) for area in criterion.areas])
+    measures = (Measure("least clearance", float(np.nanmin(distances)), "mm"), *_measure_bounds(points))
     within = (distances <= 0) | (distances < criterion.clear_of)
     if within.any():
         row = int(np.flatnonzero(within.any(axis=0))[0])
@@ -133,15 +139,15 @@ def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
         told = f"it entered it {where}"
         if criterion.clear_of:
             told = f"it came too near {where}; its smallest distance was {max(nearest, 0):.0f} mm"
-        return failed(
+        return fail_with(
             f"Expected {who} to {keep} {criterion.areas[number]}, but {told}.",
-            *place_at(recording, row),
+            *find_place(recording, row),
             measures=measures,
         )
-    if _way(recording) < criterion.drives:
-        return _drove_too_little(recording, criterion.drives, measures)
-    return passed(
-        f"{_upper(who)} stayed out of {'them all' if len(criterion.areas) > 1 else criterion.areas[0]}, "
+    if _measure_driven_distance(recording) < criterion.drives:
+        return _fail_for_short_drive(recording, criterion.drives, measures)
+    return pass_with(
+        f"{_capitalise(who)} stayed out of {'them all' if len(criterion.areas) > 1 else criterion.areas[0]}, "
         f"by {np.nanmin(distances):.0f} mm or more.",
         recording.end_t,
         recording.end,
@@ -149,7 +155,7 @@ def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
     )
 
 
-@judges(TouchesNothing)
+@declare_judge(TouchesNothing)
 def judge_touches_nothing(criterion: TouchesNothing, trial: TrialResult) -> Outcome:
     """Judge what the body touched. It fails at the first touch beyond the allowed number."""
     recording = trial.recording
@@ -158,72 +164,73 @@ def judge_touches_nothing(criterion: TouchesNothing, trial: TrialResult) -> Outc
     if len(touches) > criterion.at_most:
         touch = touches[criterion.at_most]
         allowed = f"at most {criterion.at_most} times" if criterion.at_most else "nothing"
-        return failed(
+        return fail_with(
             f"Expected the robot to touch {allowed}, but it touched {touch.what}.",
             touch.t,
             touch.pose,
             measures=measures,
         )
-    return passed("The robot touched nothing." if not touches else f"The robot touched {len(touches)} times.",
+    return pass_with("The robot touched nothing." if not touches else f"The robot touched {len(touches)} times.",
                   recording.end_t, recording.end, measures)  # fmt: skip
 
 
-def _stop_in(recording: Recording, place: Area, points: Floats) -> int | None:
+def _find_stop(recording: Recording, place: Area, points: Floats) -> int | None:
     """Return the row at which the robot had stopped in a place, or None."""
-    inside = distance_to(place, points)[1:] <= 0
-    resting = standing(recording) & inside
-    for first, last in stretches(resting):
+    inside = measure_area_distance(place, points)[1:] <= 0
+    resting = compute_still_mask(recording) & inside
+    for first, last in find_true_runs(resting):
         if last - first > _STOP:
             return first + 1
     return len(points) - 1 if len(inside) and inside[-1] else None
 
 
-def _driven(recording: Recording, part: Part) -> Floats | None:
+def _find_positions(recording: Recording, part: Part) -> Floats | None:
     """Return the part's positions; None if the pen never drew."""
-    points = positions(recording, part)
+    points = compute_positions(recording, part)
     return None if np.isnan(points).all() else points
 
 
-def _way(recording: Recording) -> float:
+def _measure_driven_distance(recording: Recording) -> float:
     """Return the total distance driven, mm."""
-    return float(np.hypot(*np.diff(positions(recording), axis=0).T).sum())
+    return float(np.hypot(*np.diff(compute_positions(recording), axis=0).T).sum())
 
 
-def _drove_too_little(recording: Recording, least: float, measures: tuple[Measure, ...]) -> Outcome:
-    return failed(
-        f"Expected the robot to drive {least:g} mm or more, but it drove only {_way(recording):.0f} mm.",
+def _fail_for_short_drive(recording: Recording, least: float, measures: tuple[Measure, ...]) -> Outcome:
+    return fail_with(
+        f"Expected the robot to drive {least:g} mm or more, but it drove only "
+        f"{_measure_driven_distance(recording):.0f} mm.",
         recording.end_t,
         recording.end,
-        score=Fraction(min(_way(recording) / least, 1.0)).limit_denominator(1000),
+        score=Fraction(min(_measure_driven_distance(recording) / least, 1.0)).limit_denominator(1000),
         measures=measures,
     )
 
 
-def _no_pen(recording: Recording) -> Outcome:
-    return failed(
+def _fail_for_missing_pen(recording: Recording) -> Outcome:
+    return fail_with(
         "Expected the pen to be down, but the program's magic line has no -p, so nothing was drawn.",
         0.0,
         recording.start,
     )
 
 
-def _nearest(distances: Floats) -> tuple[int, float] | None:
+def _find_nearest(distances: Floats) -> tuple[int, float] | None:
     if np.isnan(distances).all():
         return None
     row = int(np.nanargmin(distances))
     return row, float(distances[row])
 
 
-def _bounds(points: Floats) -> tuple[Measure, ...]:
+def _measure_bounds(points: Floats) -> tuple[Measure, ...]:
     """Return the bounding rectangle of the path."""
     (left, bottom), (right, top) = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     figures = (("least x", left), ("greatest x", right), ("least y", bottom), ("greatest y", top))
     return tuple(Measure(name, float(value), "mm") for name, value in figures)
 
 
-def _either(areas: tuple[Area, ...]) -> str:
+def _describe_areas(areas: tuple[Area, ...]) -> str:
     return str(areas[0]) if len(areas) == 1 else f"one of {len(areas)} areas"
 
 
-def _upper(words: str) -> str:
+def _capitalise(words: str) -> str:
     return words[:1].upper() + words[1:]

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Literal
 
-from service.grading.judging.geometry import Side, part_at
-from service.grading.judging.message_parts import listed
+from service.grading.judging.geometry import Side, locate_part
+from service.grading.judging.message_parts import quote_list
 from sim.recording import Image, Recording
 
-How = Literal["first", "any", "majority"]
+CombinationRule = Literal["first", "any", "majority"]
 _Place = tuple[float, float]
 
 
@@ -32,28 +32,28 @@ class Sample:
     confidence: float | None = None
 
     @property
-    def right(self) -> bool:
+    def is_correct(self) -> bool:
         """Return whether the image was identified correctly."""
         return self.answer == self.truth
 
 
-def by_pattern(
-    images: Sequence[Sample], recording: Recording, how: How, apart: float, side: Side = "left"
+def group_by_pattern(
+    images: Sequence[Sample], recording: Recording, how: CombinationRule, apart: float, side: Side = "left"
 ) -> list[Sample]:
     """Return one sample per pattern of a trial's ``images``, in the order in which the robot reached them.
 
     Images with the same truth belong to one pattern if the sensor of that ``side`` was within ``apart`` mm of its
     position at the first of them.
     """
-    groups = _Groups(apart)
+    groups = _PatternGroups(apart)
     for image in images:
         if image.image is not None:
-            groups.add(image, part_at(recording, side, image.image.pose))
-    return [_one(group, how) for group in groups.found]
+            groups.add(image, locate_part(recording, side, image.image.pose))
+    return [_combine_group(group, how) for group in groups.found]
 
 
 @dataclass(slots=True)
-class _Groups:
+class _PatternGroups:
     """Images by pattern. The floor is divided into squares, so that only neighbours are compared."""
 
     apart: float
@@ -61,36 +61,36 @@ class _Groups:
     _near: dict[tuple[str, int, int], list[tuple[int, _Place]]] = field(default_factory=dict)
 
     def add(self, image: Sample, place: _Place) -> None:
-        own = (image.truth, *self._square(place))
-        numbers = [number for number, first in self._neighbours(own) if math.dist(first, place) <= self.apart]
+        own = (image.truth, *self._find_square(place))
+        numbers = [number for number, first in self._find_neighbours(own) if math.dist(first, place) <= self.apart]
         if numbers:
             self.found[min(numbers)].append(image)
         else:
             self._near.setdefault(own, []).append((len(self.found), place))
             self.found.append([image])
 
-    def _square(self, place: _Place) -> tuple[int, int]:
+    def _find_square(self, place: _Place) -> tuple[int, int]:
         return math.floor(place[0] / self.apart), math.floor(place[1] / self.apart)
 
-    def _neighbours(self, square: tuple[str, int, int]) -> Iterable[tuple[int, _Place]]:
+    def _find_neighbours(self, square: tuple[str, int, int]) -> Iterable[tuple[int, _Place]]:
         truth, column, row = square
         for right, up in product((-1, 0, 1), repeat=2):
             yield from self._near.get((truth, column + right, row + up), ())
 
 
-def _one(group: Sequence[Sample], how: How) -> Sample:
+def _combine_group(group: Sequence[Sample], how: CombinationRule) -> Sample:
     if len(group) == 1:
         return group[0]
     match how:
         case "first":
             return group[0]
         case "any":
-            return next((sample for sample in group if sample.right), group[0])
+            return next((sample for sample in group if sample.is_correct), group[0])
         case "majority":
-            return _majority(group)
+            return _choose_majority(group)
 
 
-def _majority(group: Sequence[Sample]) -> Sample:
+def _choose_majority(group: Sequence[Sample]) -> Sample:
     """Return the image with the most frequent answer. Without a single most frequent one, the sample has no answer."""
     counts = Counter(sample.answer for sample in group if sample.answer is not None).most_common()
     if not counts:
@@ -98,7 +98,7 @@ def _majority(group: Sequence[Sample]) -> Sample:
     most = counts[0][1]
     leaders = tuple(str(answer) for answer, count in counts if count == most)
     if len(leaders) > 1:
-        words = f"{listed(leaders)} were answered equally often for its {len(group)} images"
+        words = f"{quote_list(leaders)} were answered equally often for its {len(group)} images"
         return replace(group[0], answer=None, words=words)
     chosen = next(sample for sample in group if sample.answer == leaders[0])
-    return replace(chosen, words=f"it was identified as {listed(leaders)} {most} times in {len(group)} images")
+    return replace(chosen, words=f"it was identified as {quote_list(leaders)} {most} times in {len(group)} images")

@@ -12,9 +12,22 @@ from fractions import Fraction
 import numpy as np
 
 from service.grading.grade import CriterionResult, Measure, TrialResult
-from service.grading.judging.geometry import headings, place_at, positions, stretches, to_segment
-from service.grading.judging.judges import Case, Indexed, by_trial, judges, judges_case, summary
-from service.grading.judging.outcome import Outcome, failed, passed
+from service.grading.judging.geometry import (
+    compute_headings,
+    compute_positions,
+    find_place,
+    find_true_runs,
+    measure_segment_distance,
+)
+from service.grading.judging.judge_declaration import (
+    Case,
+    IndexedTrials,
+    declare_case_judge,
+    declare_judge,
+    judge_by_trial,
+    summarise_trials,
+)
+from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from sim.recording import Floats, Recording
 from submissions.criteria.point import Circuits, Closest, Spread
 
@@ -22,28 +35,28 @@ _FAR = 10_000.0
 _TURN = 2.0
 
 
-@judges(Closest)
+@declare_judge(Closest)
 def judge_closest(criterion: Closest, trial: TrialResult) -> Outcome:
     """Judge the least distance of the robot's centre to a point, and its first turn relative to the point."""
     recording = trial.recording
-    points = positions(recording)
-    near = _nearest(np.hypot(points[:, 0] - criterion.x, points[:, 1] - criterion.y))
+    points = compute_positions(recording)
+    near = _find_nearest(np.hypot(points[:, 0] - criterion.x, points[:, 1] - criterion.y))
     row, least = near if near else (0, math.nan)
-    straight = _straight_on(recording, criterion.x, criterion.y)
+    straight = _measure_straight_distance(recording, criterion.x, criterion.y)
     measures = (Measure("least distance", least, "mm"), Measure("straight on", straight, "mm"))
     point = f"({criterion.x:g}, {criterion.y:g})"
-    where = place_at(recording, row)
+    where = find_place(recording, row)
     if criterion.first_turn is not None:
-        turned = _first_turn(recording, criterion.x, criterion.y)
+        turned = _find_first_turn(recording, criterion.x, criterion.y)
         if turned is None or (turned[1] == "towards") != (criterion.first_turn == "towards"):
-            told = "it did not turn at all" if turned is None else f"it turned {_to(turned[1])} it"
-            wished = f"Expected the robot first to turn {_to(criterion.first_turn)}"
-            return failed(
-                f"{wished} {point}, but {told}.", *place_at(recording, turned[0] if turned else 0), measures=measures
+            told = "it did not turn at all" if turned is None else f"it turned {_describe_direction(turned[1])} it"
+            wished = f"Expected the robot first to turn {_describe_direction(criterion.first_turn)}"
+            return fail_with(
+                f"{wished} {point}, but {told}.", *find_place(recording, turned[0] if turned else 0), measures=measures
             )
     if criterion.distance is not None and not criterion.distance[0] <= least <= criterion.distance[1]:
         low, high = criterion.distance
-        return failed(
+        return fail_with(
             f"Expected the robot's smallest distance to {point} to be {low:g} to {high:g} mm, but it was {least:.0f} "
             "mm.",
             *where,
@@ -51,22 +64,22 @@ def judge_closest(criterion: Closest, trial: TrialResult) -> Outcome:
         )
     if criterion.than_straight is not None and (least < straight) != (criterion.than_straight == "nearer"):
         wish = "come nearer to" if criterion.than_straight == "nearer" else "stay farther from"
-        return failed(
+        return fail_with(
             f"Expected the robot to {wish} {point} than by driving straight on ({straight:.0f} mm), but its smallest "
             f"distance was {least:.0f} mm.",
             *where,
             measures=measures,
         )
-    return passed(f"The robot's smallest distance to {point} was {least:.0f} mm.", *where, measures)
+    return pass_with(f"The robot's smallest distance to {point} was {least:.0f} mm.", *where, measures)
 
 
-def _to(direction: str) -> str:
+def _describe_direction(direction: str) -> str:
     return "towards" if direction == "towards" else "away from"
 
 
-def _first_turn(recording: Recording, x: float, y: float) -> tuple[int, str] | None:
+def _find_first_turn(recording: Recording, x: float, y: float) -> tuple[int, str] | None:
     """Return the row of the first turn by 2 degrees, and its direction relative to the point; None without a turn."""
-    degrees = headings(recording)
+    degrees = compute_headings(recording)
     rows = np.flatnonzero(np.abs(degrees - degrees[0]) > _TURN)
     if not len(rows):
         return None
@@ -77,15 +90,15 @@ def _first_turn(recording: Recording, x: float, y: float) -> tuple[int, str] | N
     return row, "towards" if (degrees[row] > degrees[0]) == left else "away"
 
 
-def _straight_on(recording: Recording, x: float, y: float) -> float:
+def _measure_straight_distance(recording: Recording, x: float, y: float) -> float:
     """Return the least distance from a point to the ray ahead of the start, mm."""
     start = recording.start
     along = math.radians(start.heading)
     end = (start.x + _FAR * math.cos(along), start.y + _FAR * math.sin(along))
-    return float(to_segment(np.array([[x, y]]), (start.x, start.y), end)[0])
+    return float(measure_segment_distance(np.array([[x, y]]), (start.x, start.y), end)[0])
 
 
-def _nearest(distances: Floats) -> tuple[int, float] | None:
+def _find_nearest(distances: Floats) -> tuple[int, float] | None:
     if np.isnan(distances).all():
         return None
     row = int(np.nanargmin(distances))
@@ -102,11 +115,11 @@ _NO_BOUND = 100
 _CORNER = 30.0
 
 
-@judges(Circuits)
+@declare_judge(Circuits)
 def judge_circuits(criterion: Circuits, trial: TrialResult) -> Outcome:
     """Judge how many times, including fractions, and in which direction the path goes round a point."""
     recording = trial.recording
-    round_it = rounds(positions(recording, criterion.of), criterion.x, criterion.y)
+    round_it = compute_rounds(compute_positions(recording, criterion.of), criterion.x, criterion.y)
     times = float(abs(round_it[-1])) if len(round_it) else 0.0
     measures = [Measure("times round", times)]
     point, end = f"({criterion.x:g}, {criterion.y:g})", (recording.end_t, recording.end)
@@ -117,7 +130,7 @@ def judge_circuits(criterion: Circuits, trial: TrialResult) -> Outcome:
     if criterion.direction != "either" and times >= 0.5:
         went = "anticlockwise" if round_it[-1] > 0 else "clockwise"
         if went != criterion.direction:
-            return failed(
+            return fail_with(
                 f"Expected the path to go {criterion.direction} round {point}, but it went {went}.",
                 *end,
                 measures=tuple(measures),
@@ -125,45 +138,47 @@ def judge_circuits(criterion: Circuits, trial: TrialResult) -> Outcome:
     if not low <= times <= high:
         drawn = "" if len(round_it) else "; the pen was never down, which -p in the program's magic line does"
         score = Fraction(min(times / low, 1.0) if low else 0.0).limit_denominator(1000)
-        return failed(
+        return fail_with(
             f"Expected the path to go {wanted} round {point}, but it went {times:.2f} times{drawn}.",
             *end,
             score=score,
             measures=tuple(measures),
         )
     nearest = float(
-        np.nanmin(np.hypot(*(positions(recording, criterion.of) - (criterion.x, criterion.y)).T), initial=np.inf)
+        np.nanmin(
+            np.hypot(*(compute_positions(recording, criterion.of) - (criterion.x, criterion.y)).T), initial=np.inf
+        )
     )
     if nearest < criterion.clear_of:
-        return failed(
+        return fail_with(
             f"Expected the path to keep {criterion.clear_of:g} mm clear of {point}, but its smallest distance was "
             f"{nearest:.0f} mm.",
             *end,
             measures=tuple(measures),
         )
-    for number, (first, last) in enumerate(_whole_rounds(round_it), 1):
-        turned = headings(recording)[first : last + 1]
+    for number, (first, last) in enumerate(_find_complete_rounds(round_it), 1):
+        turned = compute_headings(recording)[first : last + 1]
         change = float(abs(turned[-1] - turned[0]))
-        corners = _corners(turned)
+        corners = _count_corners(turned)
         measures += [Measure(f"gyro in round {number}", change, "°"), Measure(f"corners in round {number}", corners)]
         if criterion.gyro is not None and not criterion.gyro[0] <= change <= criterion.gyro[1]:
-            return failed(
+            return fail_with(
                 f"Expected the gyro to change by {criterion.gyro[0]:g}° to {criterion.gyro[1]:g}° in each round, "
                 f"but in round {number} it changed by {change:.0f}°.",
-                *place_at(recording, last),
+                *find_place(recording, last),
                 measures=tuple(measures),
             )
         if criterion.corners is not None and corners != criterion.corners:
-            return failed(
+            return fail_with(
                 f"Expected the gyro to change in {criterion.corners} steps in each round, "
                 f"but in round {number} there were {corners}.",
-                *place_at(recording, last),
+                *find_place(recording, last),
                 measures=tuple(measures),
             )
-    return passed(f"The path went {times:.2f} times round {point}.", *end, tuple(measures))
+    return pass_with(f"The path went {times:.2f} times round {point}.", *end, tuple(measures))
 
 
-def rounds(points: Floats, x: float, y: float) -> Floats:
+def compute_rounds(points: Floats, x: float, y: float) -> Floats:
     """Return the rounds about (x, y) up to each row, anticlockwise positive.
 
     Rows with NaN (pen up) are left out.
@@ -175,61 +190,61 @@ def rounds(points: Floats, x: float, y: float) -> Floats:
     return np.asarray((angles - angles[0]) / (2 * np.pi))
 
 
-def _whole_rounds(round_it: Floats) -> list[tuple[int, int]]:
+def _find_complete_rounds(round_it: Floats) -> list[tuple[int, int]]:
     """Return the first and last row of each complete round."""
     farthest = np.maximum.accumulate(np.abs(round_it))
     ends = np.searchsorted(farthest, np.arange(1, int(farthest.max(initial=0.0)) + 1)).tolist()
     return list(zip([0, *ends], ends, strict=False))
 
 
-def _corners(turned: Floats) -> int:
+def _count_corners(turned: Floats) -> int:
     """Return the number of corners: parts with above-average turning, at least 0.5 s apart and 30 degrees each."""
     if len(turned) <= _SMOOTH:
         return 0
     smooth = np.convolve(turned, np.ones(_SMOOTH) / _SMOOTH, mode="valid")
     rate = np.diff(smooth) * np.sign(turned[-1] - turned[0])
     fast = rate > rate.mean()
-    for first, last in stretches(~fast):
+    for first, last in find_true_runs(~fast):
         if last - first < _LASTING and first > 0 and last < len(fast):
             fast[first:last] = True
-    return sum(abs(float(smooth[last] - smooth[first])) >= _CORNER for first, last in stretches(fast))
+    return sum(abs(float(smooth[last] - smooth[first])) >= _CORNER for first, last in find_true_runs(fast))
 
 
-@judges_case(Spread)
+@declare_case_judge(Spread)
 def judge_spread(criterion: Spread, case: Case) -> CriterionResult:
     """Judge the spread of the end positions. If no marks were lost, the message has all measurements."""
 
-    def told(trials: Indexed, outcomes: Sequence[Outcome]) -> str:
+    def told(trials: IndexedTrials, outcomes: Sequence[Outcome]) -> str:
         if trials and all(outcome.passed for outcome in outcomes):
-            return _spread_words(criterion, [trial for _, trial in trials])
-        return summary(trials, outcomes)
+            return _describe_spread(criterion, [trial for _, trial in trials])
+        return summarise_trials(trials, outcomes)
 
-    return by_trial(criterion, case, lambda _, trial: _ended(criterion, trial), told)
+    return judge_by_trial(criterion, case, lambda _, trial: _judge_end(criterion, trial), told)
 
 
-def _ended(criterion: Spread, trial: TrialResult) -> Outcome:
+def _judge_end(criterion: Spread, trial: TrialResult) -> Outcome:
     """Judge the distance of the end from the point, mm."""
     recording = trial.recording
-    distance = _distance(criterion, trial)
+    distance = _measure_end_distance(criterion, trial)
     measures = (Measure("distance from the target", distance, "mm"),)
     told = f"ended {distance:.0f} mm from ({criterion.x:g}, {criterion.y:g})"
     if criterion.within is not None and not distance <= criterion.within:
-        return failed(
+        return fail_with(
             f"Expected the robot to end within {criterion.within:g} mm of ({criterion.x:g}, {criterion.y:g}), "
             f"but it ended {distance:.0f} mm from it.",
             recording.end_t,
             recording.end,
             measures=measures,
         )
-    return passed(f"The robot {told}.", recording.end_t, recording.end, measures)
+    return pass_with(f"The robot {told}.", recording.end_t, recording.end, measures)
 
 
-def _spread_words(criterion: Spread, trials: Sequence[TrialResult]) -> str:
+def _describe_spread(criterion: Spread, trials: Sequence[TrialResult]) -> str:
     """Return the least, mean and greatest distance for each level of motor noise."""
     levels = sorted({trial.motor_noise for trial in trials})
     told = []
     for level in levels:
-        distances = [_distance(criterion, trial) for trial in trials if trial.motor_noise == level]
+        distances = [_measure_end_distance(criterion, trial) for trial in trials if trial.motor_noise == level]
         mean = sum(distances) / len(distances)
         told.append(
             f"with motor noise {level:g} {min(distances):.0f} to {max(distances):.0f} mm (mean {mean:.0f}, "
@@ -238,6 +253,6 @@ def _spread_words(criterion: Spread, trials: Sequence[TrialResult]) -> str:
     return f"The robot ended at these distances from ({criterion.x:g}, {criterion.y:g}): {'; '.join(told)}."
 
 
-def _distance(criterion: Spread, trial: TrialResult) -> float:
+def _measure_end_distance(criterion: Spread, trial: TrialResult) -> float:
     end = trial.recording.end
     return math.hypot(end.x - criterion.x, end.y - criterion.y)

@@ -14,8 +14,8 @@ from fractions import Fraction
 from statistics import fmean
 from typing import Literal
 
-from models.intervals import wilson
-from responders.faults import is_no_text
+from models.intervals import compute_wilson_interval
+from responders.faults import is_wrong_return
 from service.grading.grade import (
     Accuracy,
     AccuracyCurve,
@@ -24,23 +24,23 @@ from service.grading.grade import (
     CriterionResult,
     Evidence,
     Prediction,
-    Shown,
     TrialResult,
+    VisibleFeedback,
 )
-from service.grading.judging.answers import NOTHING, Answers, as_text, at_path, parsed
+from service.grading.judging.answers import MISSING, Answers, as_text, find_at_path, parse_json_answer
 from service.grading.judging.geometry import Side
-from service.grading.judging.judges import Indexed
-from service.grading.judging.message_parts import early_end, place_words, quoted, shown_words
-from service.grading.judging.outcome import earned
-from service.grading.judging.patterns import Sample, by_pattern
+from service.grading.judging.judge_declaration import IndexedTrials
+from service.grading.judging.message_parts import add_hidden_note, describe_early_end, describe_place, quote_text
+from service.grading.judging.outcome import compute_marks
+from service.grading.judging.patterns import Sample, group_by_pattern
 from service.grading.judging.text_tokens import LabelFinder
-from service.grading.judging.truths import NO_IMAGE, missing_truth, nameable, shown_in
-from sim.recording import Image, Line, Message, Recording
+from service.grading.judging.true_labels import NO_IMAGE, collect_labels, find_counted_images, find_missing_label
+from sim.recording import Image, Message, Recording, TimedText
 from submissions.assignment.definition import Assignment
 from submissions.criteria.recognition import Recognition
 
 ReplyStatus = Literal["answered", "late", "malformed", "unanswered"]
-_BEST_FIRST: tuple[ReplyStatus, ...] = ("answered", "late", "malformed", "unanswered")
+_STATUS_ORDER: tuple[ReplyStatus, ...] = ("answered", "late", "malformed", "unanswered")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Reply:
     duplicates: int = 0  # answers after the one that counts
 
 
-def reply_to(recording: Recording, answers: Answers, number: int) -> Reply:
+def find_reply(recording: Recording, answers: Answers, number: int) -> Reply:
     """Return the reply to image ``number`` of the recording.
 
     An answer is late if it arrived after the next image was sent, or was in transit when the program ended. A lost
@@ -61,12 +61,12 @@ def reply_to(recording: Recording, answers: Answers, number: int) -> Reply:
     """
     image = recording.images[number]
     following = recording.images[number + 1].t if number + 1 < len(recording.images) else None
-    came = answers.all_to(image.message)
-    statuses = [(_status(message, following), message) for message in came]
+    came = answers.list_answers(image.message)
+    statuses = [(_determine_status(message, following), message) for message in came]
     arrived = [pair for pair in statuses if pair[0] != "unanswered"]
     if not arrived:
-        return _silence(recording, answers, image.message, came)
-    status, message = min(arrived, key=_precedence)
+        return _build_missing_reply(recording, answers, image.message, came)
+    status, message = min(arrived, key=_rank_answer)
     text = message.text
     duplicates = len(arrived) - 1
     if status == "malformed":
@@ -74,13 +74,13 @@ def reply_to(recording: Recording, answers: Answers, number: int) -> Reply:
     return Reply(status, text, "", duplicates)
 
 
-def _precedence(arrived: tuple[ReplyStatus, Message]) -> tuple[int, float]:
+def _rank_answer(arrived: tuple[ReplyStatus, Message]) -> tuple[int, float]:
     """Return the sort key of answers: by status, then by arrival. Answers in transit at the end come last."""
     status, message = arrived
-    return _BEST_FIRST.index(status), math.inf if message.delivered is None else message.delivered
+    return _STATUS_ORDER.index(status), math.inf if message.delivered is None else message.delivered
 
 
-def _status(message: Message, following: float | None) -> ReplyStatus:
+def _determine_status(message: Message, following: float | None) -> ReplyStatus:
     if message.note == "malformed":
         return "malformed"
     if message.delivered is None:
@@ -88,25 +88,25 @@ def _status(message: Message, following: float | None) -> ReplyStatus:
     return "late" if following is not None and message.delivered > following else "answered"
 
 
-def _silence(recording: Recording, answers: Answers, question: int, came: Sequence[Message]) -> Reply:
+def _build_missing_reply(recording: Recording, answers: Answers, question: int, came: Sequence[Message]) -> Reply:
     """Return the reply if nothing arrived: image or answer was lost, the answer was not a text, or none was given."""
     if came:
         return Reply("unanswered", None, "the answer was lost on its way")
     sent = recording.messages[question] if question < len(recording.messages) else None
     if sent is not None and sent.note == "lost":
         return Reply("unanswered", None, "the image was lost on its way")
-    fault = answers.fault_after(question)
-    if fault is not None and is_no_text(fault):
-        return Reply("malformed", None, answers.silence(question))
-    return Reply("unanswered", None, answers.silence(question))
+    fault = answers.find_fault_after(question)
+    if fault is not None and is_wrong_return(fault):
+        return Reply("malformed", None, answers.describe_silence(question))
+    return Reply("unanswered", None, answers.describe_silence(question))
 
 
 #: An image taken this close to an earlier one shows the same again, mm.
-_SAME_PLACE = 1.0
+_SAME_PLACE_MM = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Classified:
+class ClassificationResult:
     """The result of a recognition criterion: a sample for each image or, if it says so, each pattern."""
 
     samples: tuple[Sample, ...]
@@ -115,16 +115,16 @@ class Classified:
     evidence: tuple[Evidence, ...]
 
     @property
-    def right(self) -> int:
+    def correct_count(self) -> int:
         """The number of samples identified correctly."""
-        return sum(sample.right for sample in self.samples)
+        return sum(sample.is_correct for sample in self.samples)
 
 
-def classify(criterion: Recognition, assignment: Assignment, trials: Indexed) -> Classified:
+def classify(criterion: Recognition, assignment: Assignment, trials: IndexedTrials) -> ClassificationResult:
     """Classify every image of ``trials`` (with their indices in the grade) that counts, over all trials."""
-    shown = shown_in(criterion, trials)
+    shown = find_counted_images(criterion, trials)
     truths = [truth for told_truths in shown.values() for _, truth in told_truths]
-    labels = nameable(criterion, assignment, truths)
+    labels = collect_labels(criterion, assignment, truths)
     finder = LabelFinder(labels, criterion.aliases)
     images: list[Sample] = []
     samples: list[Sample] = []
@@ -132,16 +132,16 @@ def classify(criterion: Recognition, assignment: Assignment, trials: Indexed) ->
     duplicates = 0
     for index, trial in trials:
         recording = trial.recording
-        replies = _replies(criterion, recording)
+        replies = _collect_replies(criterion, recording)
         statuses.update(reply.status for reply in replies)
         duplicates += sum(reply.duplicates for reply in replies)
         own = []
         for number, truth in shown[index]:
-            answer, words, confidence = _answer(criterion, replies[number], finder)
+            answer, words, confidence = _read_answer(criterion, replies[number], finder)
             image = recording.images[number]
-            own.append(Sample(index, image, finder.canonical(truth), answer, words, confidence))
+            own.append(Sample(index, image, finder.to_canonical(truth), answer, words, confidence))
         images += own
-        samples += _that_count(criterion, index, trial, own, finder)
+        samples += _collect_counted_samples(criterion, index, trial, own, finder)
     by_index = dict(trials)
     of_trial: dict[int, list[Sample]] = {index: [] for index in by_index}
     for sample in samples:
@@ -163,29 +163,29 @@ def classify(criterion: Recognition, assignment: Assignment, trials: Indexed) ->
         missing,
         "images" if criterion.each_pattern is None else "patterns",
     )
-    return Classified(
+    return ClassificationResult(
         tuple(samples),
-        _accuracy(samples, labels, counts),
+        _compute_accuracy(samples, labels, counts),
         predictions,
-        tuple(_evidence(index, own) for index, own in of_trial.items()),
+        tuple(_build_evidence(index, own) for index, own in of_trial.items()),
     )
 
 
-def pooled(trials: Indexed, judged: Callable[[Indexed], CriterionResult]) -> CriterionResult:
+def judge_pooled(trials: IndexedTrials, judged: Callable[[IndexedTrials], CriterionResult]) -> CriterionResult:
     """Return the result over all trials. If some are hidden, also the feedback from the visible ones alone."""
     result = judged(trials)
     visible = [(index, trial) for index, trial in trials if trial.visibility == "visible"]
     if len(visible) == len(trials):
         return result
     if not visible:
-        return replace(result, shown=Shown(shown_words("")))
+        return replace(result, shown=VisibleFeedback(add_hidden_note("")))
     alone = judged(visible)
-    return replace(result, shown=Shown(shown_words(alone.message), alone.accuracy, alone.curves))
+    return replace(result, shown=VisibleFeedback(add_hidden_note(alone.message), alone.accuracy, alone.curves))
 
 
-def recognised(
+def build_recognition_result(
     criterion: Recognition,
-    found: Classified,
+    found: ClassificationResult,
     share: Fraction,
     words: str,
     curves: tuple[AccuracyCurve, ...],
@@ -195,9 +195,9 @@ def recognised(
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,
-        marks=earned(criterion.marks, share),
+        marks=compute_marks(criterion.marks, share),
         max_marks=criterion.marks,
-        message=_tally(criterion, found) + words + _first_wrong(found.samples, trials),
+        message=_describe_tally(criterion, found) + words + _describe_first_mistake(found.samples, trials),
         visibility=criterion.visibility,
         evidence=found.evidence,
         accuracy=found.accuracy,
@@ -206,18 +206,18 @@ def recognised(
     )
 
 
-def told(sample: Sample) -> str:
+def describe_sample(sample: Sample) -> str:
     """Return a sentence on one image."""
     if sample.image is None:
         if sample.truth == NO_IMAGE:
             return f"Expected an image (IMG_DATA), but {sample.words}."
-        return f"Expected {quoted(sample.truth)}, but {sample.words}."
-    if sample.right:
-        return f"The image showed {quoted(sample.truth)} and was identified correctly."
-    return f"The image showed {quoted(sample.truth)}, but {sample.words}."
+        return f"Expected {quote_text(sample.truth)}, but {sample.words}."
+    if sample.is_correct:
+        return f"The image showed {quote_text(sample.truth)} and was identified correctly."
+    return f"The image showed {quote_text(sample.truth)}, but {sample.words}."
 
 
-def _that_count(
+def _collect_counted_samples(
     criterion: Recognition,
     index: int,
     trial: TrialResult,
@@ -227,118 +227,120 @@ def _that_count(
     """Return a trial's images or patterns. Missing ones are replaced by wrong answers."""
     if criterion.each_pattern is None:
         # Near the start there is one thing to see. Otherwise a robot could send more images of what it is sure of.
-        apart = max(_SAME_PLACE, 2 * (criterion.near_start or 0.0))
-        counted = by_pattern(own, trial.recording, "majority", apart)
+        apart = max(_SAME_PLACE_MM, 2 * (criterion.near_start or 0.0))
+        counted = group_by_pattern(own, trial.recording, "majority", apart)
     else:
         # Grey patches are read by the right sensor.
         side: Side = "right" if criterion.truth == "grey" else "left"
         apart = max(30.0, 2 * criterion.within)
-        counted = by_pattern(own, trial.recording, criterion.each_pattern, apart, side)
+        counted = group_by_pattern(own, trial.recording, criterion.each_pattern, apart, side)
     if counted and len(counted) >= criterion.patterns:
         return counted
     if not counted and criterion.patterns <= 1:
-        truth = missing_truth(criterion, trial)
+        truth = find_missing_label(criterion, trial)
         sent = "the robot sent none" if truth == NO_IMAGE else "the robot sent no image"
         if criterion.near_start is not None and trial.recording.images:
             sent += f" from within {criterion.near_start:g} mm of where it started"
-        return [Sample(index, None, finder.canonical(truth), None, sent)]
+        return [Sample(index, None, finder.to_canonical(truth), None, sent)]
     words = f"the robot sent images of {len(counted)} patterns, and {criterion.patterns} were expected"
     lacking = Sample(index, None, NO_IMAGE, None, words)
     return [*counted, *[lacking] * (criterion.patterns - len(counted))]
 
 
-def _accuracy(samples: Sequence[Sample], labels: tuple[str, ...], counts: Counts) -> Accuracy:
-    right = sum(sample.right for sample in samples)
+def _compute_accuracy(samples: Sequence[Sample], labels: tuple[str, ...], counts: Counts) -> Accuracy:
+    right = sum(sample.is_correct for sample in samples)
     count = len(samples)
-    low, high = wilson(right, count)
+    low, high = compute_wilson_interval(right, count)
     cells = Counter((sample.truth, sample.answer) for sample in samples)
     confusion = tuple(
         (truth, answer, number)
         for (truth, answer), number in sorted(cells.items(), key=lambda item: (item[0][0], item[0][1] or ""))
     )
     known = tuple(dict.fromkeys([*labels, *(sample.truth for sample in samples)]))
-    return Accuracy(right / count if count else 0.0, low, high, count, known, confusion, counts, _confidence(samples))
+    return Accuracy(
+        right / count if count else 0.0, low, high, count, known, confusion, counts, _compute_confidence(samples)
+    )
 
 
-def _confidence(samples: Sequence[Sample]) -> Confidence | None:
+def _compute_confidence(samples: Sequence[Sample]) -> Confidence | None:
     """Return the mean confidence of correct and wrong answers; None if no answer had one."""
-    right = [sample.confidence for sample in samples if sample.right and sample.confidence is not None]
-    wrong = [sample.confidence for sample in samples if not sample.right and sample.confidence is not None]
+    right = [sample.confidence for sample in samples if sample.is_correct and sample.confidence is not None]
+    wrong = [sample.confidence for sample in samples if not sample.is_correct and sample.confidence is not None]
     if not right and not wrong:
         return None
     return Confidence(fmean(right) if right else None, len(right), fmean(wrong) if wrong else None, len(wrong))
 
 
-def _evidence(index: int, own: Sequence[Sample]) -> Evidence:
+def _build_evidence(index: int, own: Sequence[Sample]) -> Evidence:
     """Return the first image of the trial that was misidentified, otherwise its last."""
-    shown = next((sample for sample in own if not sample.right), own[-1])
+    shown = next((sample for sample in own if not sample.is_correct), own[-1])
     image = shown.image
     return Evidence(
         trial=index,
-        passed=all(sample.right for sample in own),
-        message=told(shown),
+        passed=all(sample.is_correct for sample in own),
+        message=describe_sample(shown),
         t=image.t if image else None,
         pose=image.pose if image else None,
     )
 
 
-def _replies(criterion: Recognition, recording: Recording) -> list[Reply]:
+def _collect_replies(criterion: Recognition, recording: Recording) -> list[Reply]:
     """Return the reply to every image of the recording, including images that don't count."""
     if criterion.answer_from == "reply":
         answers = Answers(recording)
-        return [reply_to(recording, answers, number) for number in range(len(recording.images))]
+        return [find_reply(recording, answers, number) for number in range(len(recording.images))]
     said = "said" if criterion.answer_from == "speech" else "printed"
     replies = []
     for image in recording.images:
-        heard = _between(recording, image, criterion.answer_from == "speech")
+        heard = _list_lines_between(recording, image, criterion.answer_from == "speech")
         text = " | ".join(line.text for line in heard)
         silent = Reply("unanswered", None, f"the robot {said} nothing after the image")
         replies.append(Reply("answered", text, "") if heard else silent)
     return replies
 
 
-def _answer(criterion: Recognition, reply: Reply, finder: LabelFinder) -> tuple[str | None, str, float | None]:
+def _read_answer(criterion: Recognition, reply: Reply, finder: LabelFinder) -> tuple[str | None, str, float | None]:
     """Return the label in the answer (None unless there is exactly one), a description, and the confidence."""
     if reply.text is None:
         return None, reply.words, None
     if reply.status == "late" and criterion.late == "wrong":
-        return None, f"the answer came too late: {quoted(reply.text)}", None
+        return None, f"the answer came too late: {quote_text(reply.text)}", None
     text, confidence = reply.text, None
     if criterion.answer_from == "reply":
-        value = parsed(text)
+        value = parse_json_answer(text)
         if criterion.confidence is not None:
-            confidence = _probability(at_path(value, criterion.confidence))
+            confidence = _parse_probability(find_at_path(value, criterion.confidence))
         if criterion.answer is not None:
-            picked = at_path(value, criterion.answer)
-            text = text if picked is NOTHING else as_text(picked)
-    found = finder.labels_in(text)
+            picked = find_at_path(value, criterion.answer)
+            text = text if picked is MISSING else as_text(picked)
+    found = finder.find_labels(text)
     if not found:
-        return None, f"the answer names no label: {quoted(text)}", confidence
+        return None, f"the answer names no label: {quote_text(text)}", confidence
     if len(found) > 1:
-        return None, f"the answer names more than one label: {' and '.join(map(quoted, found))}", confidence
-    return found[0], f"it was identified as {quoted(found[0])}", confidence
+        return None, f"the answer names more than one label: {' and '.join(map(quote_text, found))}", confidence
+    return found[0], f"it was identified as {quote_text(found[0])}", confidence
 
 
-def _probability(value: object) -> float | None:
+def _parse_probability(value: object) -> float | None:
     """Return a JSON number from 0 to 1; None for anything else."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
         return None
     return float(value)
 
 
-def _between(recording: Recording, image: Image, speech: bool) -> Sequence[Line]:
+def _list_lines_between(recording: Recording, image: Image, speech: bool) -> Sequence[TimedText]:
     """Return what the robot said or printed after this image and before the next."""
     following = bisect_right(recording.images, image.message, key=lambda other: other.message)
     end = recording.images[following].t if following < len(recording.images) else math.inf
     lines = recording.spoken if speech else recording.printed
-    return lines[bisect_left(lines, image.t, key=_time) : bisect_left(lines, end, key=_time)]
+    return lines[bisect_left(lines, image.t, key=_get_time) : bisect_left(lines, end, key=_get_time)]
 
 
-def _time(line: Line) -> float:
+def _get_time(line: TimedText) -> float:
     return line.t
 
 
-def counts_words(counts: Counts) -> str:
+def describe_counts(counts: Counts) -> str:
     """Return counts as ``9 images sent: 7 answered, 1 late, 0 malformed, 1 unanswered; 2 duplicate answers``."""
     return (
         f"{counts.sent} images sent: {counts.answered} answered, {counts.late} late, {counts.malformed} malformed, "
@@ -346,16 +348,16 @@ def counts_words(counts: Counts) -> str:
     )
 
 
-def _tally(criterion: Recognition, found: Classified) -> str:
+def _describe_tally(criterion: Recognition, found: ClassificationResult) -> str:
     accuracy = found.accuracy
     what = "images" if criterion.each_pattern is None else "patterns"
     words = (
-        f"{found.right} of {accuracy.n} {what} identified correctly: accuracy {accuracy.value:.2f} "
+        f"{found.correct_count} of {accuracy.n} {what} identified correctly: accuracy {accuracy.value:.2f} "
         f"(95 % interval {accuracy.low:.2f} to {accuracy.high:.2f})."
     )
     counts = accuracy.counts
     if counts is not None and (counts.answered != counts.sent or counts.duplicates):
-        words += f" {counts_words(counts)}."
+        words += f" {describe_counts(counts)}."
     confidence = accuracy.confidence
     if confidence is not None:
         sure = [
@@ -370,10 +372,13 @@ def _tally(criterion: Recognition, found: Classified) -> str:
     return words
 
 
-def _first_wrong(samples: Sequence[Sample], trials: Mapping[int, TrialResult]) -> str:
+def _describe_first_mistake(samples: Sequence[Sample], trials: Mapping[int, TrialResult]) -> str:
     """Return the place of the first misidentified image; empty if there is none."""
-    first = next((sample for sample in samples if not sample.right), None)
+    first = next((sample for sample in samples if not sample.is_correct), None)
     if first is None:
         return ""
     trial = trials[first.trial]
-    return f" {place_words(trial, first.image.t if first.image else None)}: {told(first)}{early_end(trial)}"
+    return (
+        f" {describe_place(trial, first.image.t if first.image else None)}: "
+        f"{describe_sample(first)}{describe_early_end(trial)}"
+    )

@@ -13,7 +13,7 @@ from submissions.criteria.code import SourceRules
 
 #: The calls that make the robot speak.
 SPEECH = ("say()", "speak()")
-_UNREADABLE = "it cannot be read"
+_UNREADABLE_SOURCE = "it cannot be read"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,24 +51,24 @@ class SourceAnswers:
             name, why, line = told["unread"] or ("", "", None)
             where = f" (line {int(line)})" if line is not None else ""
             answers = (
-                _places(told["uses"], criterion.uses),
-                _places(told["avoids"], criterion.avoids),
-                _places(told["in_loop"], criterion.in_loop),
-                _places(told["defines"], criterion.defines),
-                _places(told["shown"], SPEECH),
+                _parse_places(told["uses"], criterion.uses),
+                _parse_places(told["avoids"], criterion.avoids),
+                _parse_places(told["in_loop"], criterion.in_loop),
+                _parse_places(told["defines"], criterion.defines),
+                _parse_places(told["shown"], SPEECH),
             )
-            doubts = tuple(f"{_place(file, line)} has {str(what)[:80]}" for file, line, what in told["doubts"])
+            doubts = tuple(f"{_parse_place(file, line)} has {str(what)[:80]}" for file, line, what in told["doubts"])
         except (LookupError, TypeError, ValueError, OverflowError):
-            return cls(error=_UNREADABLE)
+            return cls(error=_UNREADABLE_SOURCE)
         if why and not name:
             return cls(error=f"{str(why)[:200]}{where}")
         return cls(*answers, doubts, "", f"{str(name)[:60]} cannot be read: {str(why)[:200]}" if name else "")
 
 
-def _places(told: Any, rules: Sequence[str]) -> tuple[MentionPlace | None, ...]:
+def _parse_places(told: Any, rules: Sequence[str]) -> tuple[MentionPlace | None, ...]:
     """Parse the places of each rule. Raises a standard Python exception if the data is malformed."""
-    return tuple(None if place is None else _place(*place) for _, place in zip(rules, told, strict=True))
+    return tuple(None if place is None else _parse_place(*place) for _, place in zip(rules, told, strict=True))
 
 
-def _place(file: Any, line: Any) -> MentionPlace:
+def _parse_place(file: Any, line: Any) -> MentionPlace:
     return MentionPlace(str(file)[:60], int(line))

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from sim.recording import Line
+from sim.recording import TimedText
 
 _SMALL = [
     "zero",
@@ -37,16 +37,16 @@ _NUMBERS = {word: str(number) for number, word in enumerate(_SMALL)} | {
     word: str(number) for number, word in zip(range(30, 101, 10), _TENS, strict=True)
 }
 #: The longest student text that is tokenized.
-_MOST = 20_000
-_MOST_OF_AN_ANSWER = 10_000
+_MAX_CHARACTERS = 20_000
+_MAX_ANSWER_CHARACTERS = 10_000
 _WORD = re.compile(r"[^\W_]+")
 #: A number as Python writes it, or a word. Runs of digits are possessive, which avoids backtracking.
 _TOKEN = re.compile(r"(?P<number>(?<![\w.])[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d{1,3})?(?![^\W_]))|[^\W_]++")
 
 
-def words_of(text: str) -> list[str]:
+def split_words(text: str) -> list[str]:
     """Return the words in order, without case and punctuation; "ten" is "10", "one hundred" is "100"."""
-    words = [_NUMBERS.get(word, word) for word in _WORD.findall(text[:_MOST].casefold())]
+    words = [_NUMBERS.get(word, word) for word in _WORD.findall(text[:_MAX_CHARACTERS].casefold())]
     joined = [word for word, after in pairwise([*words, ""]) if not (word in ("1", "a") and after == "100")]
     return joined
 
@@ -59,10 +59,10 @@ class Token:
     value: float | None
 
 
-def tokens_of(text: str) -> list[Token]:
+def tokenize_text(text: str) -> list[Token]:
     """Return the words and numbers in order, with numbers in Python's notation."""
     found = []
-    for match in _TOKEN.finditer(text[:_MOST].casefold()):
+    for match in _TOKEN.finditer(text[:_MAX_CHARACTERS].casefold()):
         word = _NUMBERS.get(match[0], match[0])
         found.append(Token(word, float(word) if match["number"] or word.isdecimal() else None))
     return found
@@ -77,7 +77,7 @@ def find_words(words: Sequence[str], wanted: Sequence[str], start: int = 0) -> i
     return None
 
 
-def spoken_until(lines: Sequence[Line]) -> list[float]:
+def compute_speech_ends(lines: Sequence[TimedText]) -> list[float]:
     """Return the end time of each utterance, in seconds: they queue up, at 130 words a minute."""
     ends: list[float] = []
     for line in lines:
@@ -92,26 +92,26 @@ class LabelFinder:
     def __init__(self, labels: Iterable[str], aliases: Mapping[str, Sequence[str]]) -> None:
         self._names: dict[str, str] = {}
         for label in labels:
-            self._names[_spelled(label)] = label
+            self._names[_normalise_spelling(label)] = label
         for label, others in aliases.items():
             for name in (label, *others):
-                self._names.setdefault(_spelled(name), self.canonical(label))
+                self._names.setdefault(_normalise_spelling(name), self.to_canonical(label))
         longest_first = sorted((name for name in self._names if name), key=len, reverse=True)
         alternatives = "|".join(map(re.escape, longest_first))
         self._pattern = re.compile(rf"(?<!\w)(?:{alternatives})(?!\w)") if alternatives else None
 
-    def canonical(self, label: str) -> str:
+    def to_canonical(self, label: str) -> str:
         """Return the label in the criterion's spelling."""
-        return self._names.get(_spelled(label), label)
+        return self._names.get(_normalise_spelling(label), label)
 
-    def labels_in(self, text: str) -> list[str]:
+    def find_labels(self, text: str) -> list[str]:
         """Return the different labels in a text, in order."""
         if self._pattern is None:
             return []
-        found = self._pattern.findall(_spelled(text[:_MOST_OF_AN_ANSWER]))
+        found = self._pattern.findall(_normalise_spelling(text[:_MAX_ANSWER_CHARACTERS]))
         return list(dict.fromkeys(self._names[name] for name in found))
 
 
-def _spelled(text: str) -> str:
+def _normalise_spelling(text: str) -> str:
     """Return the text without case, hyphens, underscores and extra spaces."""
     return " ".join(re.sub(r"[-‐-―_]", " ", text).casefold().split())

@@ -10,26 +10,26 @@ from fractions import Fraction
 import numpy as np
 
 from service.grading.grade import CriterionResult, Evidence, Measure, TrialResult
-from service.grading.judging.judges import Case, by_trial, judges, judges_case
-from service.grading.judging.outcome import Outcome, failed, passed
-from service.grading.judging.text_tokens import spoken_until
-from sim.recorded import seconds_at
+from service.grading.judging.judge_declaration import Case, declare_case_judge, declare_judge, judge_by_trial
+from service.grading.judging.outcome import Outcome, fail_with, pass_with
+from service.grading.judging.text_tokens import compute_speech_ends
 from sim.recording import Recording
+from sim.recording_values import tick_to_seconds
 from submissions.criteria.timing import Ranking, Timing
 
 _STILL = 1e-6  # mm or degrees per tick
 
 
-@judges(Timing)
+@declare_judge(Timing)
 def judge_timing(criterion: Timing, trial: TrialResult) -> Outcome:
     """Judge the duration in simulated seconds. The bounds are included."""
     recording = trial.recording
-    seconds, what = _seconds(criterion, recording)
+    seconds, what = _measure_seconds(criterion, recording)
     least, most = criterion.between
     measures = (Measure("time", seconds, "s"),)
     if least - 1e-9 <= seconds <= most + 1e-9:
-        return passed(f"{what} took {seconds:.2f} s.", recording.end_t, recording.end, measures)
-    return failed(
+        return pass_with(f"{what} took {seconds:.2f} s.", recording.end_t, recording.end, measures)
+    return fail_with(
         f"Expected {what[0].lower()}{what[1:]} to take from {least:g} to {most:g} s, but it took {seconds:.2f} s.",
         recording.end_t,
         recording.end,
@@ -37,28 +37,28 @@ def judge_timing(criterion: Timing, trial: TrialResult) -> Outcome:
     )
 
 
-@judges_case(Ranking)
+@declare_case_judge(Ranking)
 def judge_ranking(criterion: Ranking, case: Case) -> CriterionResult:
     """Judge the value that another criterion measured in each trial."""
     other = case.results.get(criterion.of)
-    return by_trial(criterion, case, lambda index, _: _ranked(criterion, index, other))
+    return judge_by_trial(criterion, case, lambda index, _: _judge_rank(criterion, index, other))
 
 
-def _ranked(criterion: Ranking, place: int, other: CriterionResult | None) -> Outcome:
+def _judge_rank(criterion: Ranking, place: int, other: CriterionResult | None) -> Outcome:
     """Return the outcome for the value of trial ``place``; no marks if the other criterion failed."""
     evidence = next((each for each in other.evidence if each.trial == place), None) if other else None
-    measure = _measure(criterion, evidence)
+    measure = _find_measure(criterion, evidence)
     if evidence is None or measure is None:
-        return failed(f"Expected a {criterion.measure}, but none was measured.")
+        return fail_with(f"Expected a {criterion.measure}, but none was measured.")
     unit = f" {measure.unit}" if measure.unit else ""
     found = f"{criterion.measure}: {measure.value:.2f}{unit}"
     if not evidence.passed:
         # Values that don't count are left out of the ranking.
-        return failed(f"The {found} does not count: {evidence.message}", evidence.t, evidence.pose)
-    share = _share(criterion, measure.value)
+        return fail_with(f"The {found} does not count: {evidence.message}", evidence.t, evidence.pose)
+    share = _compute_share(criterion, measure.value)
     best = criterion.steps[0][0]
     if share == 1:
-        return passed(f"The {found}.", evidence.t, evidence.pose, (measure,))
+        return pass_with(f"The {found}.", evidence.t, evidence.pose, (measure,))
     bound = "at least" if criterion.highest else "at most"
     # The instructor defined the share, so it is not capped like a measured score.
     return Outcome(
@@ -71,33 +71,33 @@ def _ranked(criterion: Ranking, place: int, other: CriterionResult | None) -> Ou
     )
 
 
-def _share(criterion: Ranking, value: float) -> Fraction:
+def _compute_share(criterion: Ranking, value: float) -> Fraction:
     for limit, share in criterion.steps:
         if (value >= limit - 1e-9) if criterion.highest else (value <= limit + 1e-9):
             return Fraction(str(share))
     return Fraction(0)
 
 
-def _measure(criterion: Ranking, evidence: Evidence | None) -> Measure | None:
+def _find_measure(criterion: Ranking, evidence: Evidence | None) -> Measure | None:
     measures = evidence.measures if evidence is not None else ()
     return next((measure for measure in measures if measure.name == criterion.measure), None)
 
 
-def _seconds(criterion: Timing, recording: Recording) -> tuple[float, str]:
+def _measure_seconds(criterion: Timing, recording: Recording) -> tuple[float, str]:
     match criterion.of:
         case "program":
             return recording.end_t, "The program"
         case "moving":
-            return _moving(recording), "The movement"
+            return _measure_moving_seconds(recording), "The movement"
         case "speech":
-            return max(spoken_until(recording.spoken), default=0.0), "The speech"
+            return max(compute_speech_ends(recording.spoken), default=0.0), "The speech"
 
 
-def _moving(recording: Recording) -> float:
+def _measure_moving_seconds(recording: Recording) -> float:
     ticks = recording.ticks
     if not len(ticks):
         return 0.0
     start = recording.start
     columns = ((start.x, ticks.x), (start.y, ticks.y), (start.heading, ticks.heading))
     changes = [np.abs(np.diff(column, prepend=first)) > _STILL for first, column in columns]
-    return seconds_at(recording, int(np.logical_or.reduce(changes).sum()))
+    return tick_to_seconds(recording, int(np.logical_or.reduce(changes).sum()))

@@ -11,66 +11,70 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from service.grading.grade import Grade
-from service.reports.formats.registry import table
-from service.reports.readable import number, one_line
+from service.reports.display_text import format_decimal, to_one_line
+from service.reports.formats.registry import register_table
 from service.reports.rows import TableRow
-from service.reports.verdict_sentences import comments_of, hints_of
-from service.reports.view import View, staff_view
+from service.reports.verdict_sentences import format_comments, format_hints
+from service.reports.view import View, build_staff_view
 
 #: The beginning of a formula in a cell. Spreadsheets that separate by semicolons (German Excel) or tabs split one of
 #: our cells into several.
 _FORMULA = re.compile(r"(^|[;\t])(?=[\s'\"]*[=+\-@\t\r\uff1d\uff0b\uff0d\uff20])")
-_WHO = ("student", "name", "email", "assignment")
-_MEASURED = ("accuracy", "accuracy_low", "accuracy_high", "accuracy_n", "submission", "assignment_version")
+_STUDENT_COLUMNS = ("student", "name", "email", "assignment")
+_ACCURACY_COLUMNS = ("accuracy", "accuracy_low", "accuracy_high", "accuracy_n", "submission", "assignment_version")
 
 
-@table("csv", ".csv", staff_view)
-def marks_csv(rows: Sequence[TableRow[View]]) -> str:
+@register_table("csv", ".csv", build_staff_view)
+def render_marks_csv(rows: Sequence[TableRow[View]]) -> str:
     """Return one row per submission: student, marks, verdict, accuracy, hashes, criteria, notes, hints and reason."""
     grades = [row.grade.grade for row in rows if row.grade is not None]
     criteria = list(dict.fromkeys(result.id for grade in grades for result in grade.criteria))
-    header = [*_WHO, "marks", "max_marks", "verdict", *_MEASURED]
+    header = [*_STUDENT_COLUMNS, "marks", "max_marks", "verdict", *_ACCURACY_COLUMNS]
     header += [*(f"marks: {criterion}" for criterion in criteria), "for_staff", "notes", "hints", "file", "reason"]
-    return csv_text([header, *(_wide(row, criteria) for row in rows)])
+    return render_safe_csv([header, *(_format_submission_row(row, criteria) for row in rows)])
 
 
-@table("csv-long", ".csv", staff_view)
-def criteria_csv(rows: Sequence[TableRow[View]]) -> str:
+@register_table("csv-long", ".csv", build_staff_view)
+def render_criteria_csv(rows: Sequence[TableRow[View]]) -> str:
     """Return one row per criterion of each submission; a submission without a grade has one row without marks."""
-    header = [*_WHO, "criterion", "title", "marks", "max_marks", "message", "hints", "file", "reason"]
-    return csv_text([header, *(cells for row in rows for cells in _long(row))])
+    header = [*_STUDENT_COLUMNS, "criterion", "title", "marks", "max_marks", "message", "hints", "file", "reason"]
+    return render_safe_csv([header, *(cells for row in rows for cells in _format_criterion_rows(row))])
 
 
-def csv_text(rows: Iterable[Sequence[str]]) -> str:
+def render_safe_csv(rows: Iterable[Sequence[str]]) -> str:
     """Return the rows as a file that is safe to open in a spreadsheet."""
-    return rows_as_given([safe_cell(value) for value in row] for row in rows)
+    return render_csv([to_safe_cell(value) for value in row] for row in rows)
 
 
-def rows_as_given(rows: Iterable[Sequence[str]], separator: str = ",", ending: str = "\r\n") -> str:
+def render_csv(rows: Iterable[Sequence[str]], separator: str = ",", ending: str = "\r\n") -> str:
     """Return the rows as a file with unchanged cells, for tables from others that are returned to them."""
     stream = io.StringIO()
     csv.writer(stream, delimiter=separator, lineterminator=ending).writerows(rows)
     return stream.getvalue()
 
 
-def safe_cell(value: str) -> str:
+def to_safe_cell(value: str) -> str:
     """Return the cell on one line, neutralised as a formula for any cell separator."""
-    return _FORMULA.sub(r"\1'", one_line(value, 4000))
+    return _FORMULA.sub(r"\1'", to_one_line(value, 4000))
 
 
-def _wide(row: TableRow[View], criteria: Sequence[str]) -> list[str]:
+def _format_submission_row(row: TableRow[View], criteria: Sequence[str]) -> list[str]:
     grade = None if row.grade is None else row.grade.grade
-    marked = _marked(grade, criteria) if grade is not None else [""] * (3 + len(_MEASURED) + len(criteria) + 3)
-    return [*_who(row), *marked, row.source, row.reason]
+    marked = (
+        _format_grade_cells(grade, criteria)
+        if grade is not None
+        else [""] * (3 + len(_ACCURACY_COLUMNS) + len(criteria) + 3)
+    )
+    return [*_format_student_cells(row), *marked, row.source, row.reason]
 
 
-def _marked(grade: Grade, criteria: Sequence[str]) -> list[str]:
-    by_id = {result.id: "" if result.excused else number(result.marks) for result in grade.criteria}
+def _format_grade_cells(grade: Grade, criteria: Sequence[str]) -> list[str]:
+    by_id = {result.id: "" if result.excused else format_decimal(result.marks) for result in grade.criteria}
     accuracy = grade.accuracy
     measured = [f"{accuracy.value:.4f}", f"{accuracy.low:.4f}", f"{accuracy.high:.4f}"] if accuracy else [""] * 3
     return [
-        number(grade.marks),
-        number(grade.max_marks),
+        format_decimal(grade.marks),
+        format_decimal(grade.max_marks),
         grade.verdict.value,
         *measured,
         str(accuracy.n) if accuracy else "",
@@ -78,20 +82,29 @@ def _marked(grade: Grade, criteria: Sequence[str]) -> list[str]:
         grade.assignment_version,
         *(by_id.get(criterion, "") for criterion in criteria),
         "; ".join(f"{result.id}: {result.for_staff}" for result in grade.criteria if result.for_staff),
-        "; ".join([*(f"Comment: {comment}" for comment in comments_of(grade)), *grade.notes[:20]]),
-        " ".join(hints_of(grade)),
+        "; ".join([*(f"Comment: {comment}" for comment in format_comments(grade)), *grade.notes[:20]]),
+        " ".join(format_hints(grade)),
     ]
 
 
-def _long(row: TableRow[View]) -> Iterator[list[str]]:
+def _format_criterion_rows(row: TableRow[View]) -> Iterator[list[str]]:
     if row.grade is None:
-        yield [*_who(row), "", "", "", "", "", "", row.source, row.reason]
+        yield [*_format_student_cells(row), "", "", "", "", "", "", row.source, row.reason]
         return
-    hints = " ".join(hints_of(row.grade.grade))
+    hints = " ".join(format_hints(row.grade.grade))
     for result in row.grade.grade.criteria:
-        marks = ["", ""] if result.excused else [number(result.marks), number(result.max_marks)]
-        yield [*_who(row), result.id, result.title, *marks, result.message, hints, row.source, row.reason]
+        marks = ["", ""] if result.excused else [format_decimal(result.marks), format_decimal(result.max_marks)]
+        yield [
+            *_format_student_cells(row),
+            result.id,
+            result.title,
+            *marks,
+            result.message,
+            hints,
+            row.source,
+            row.reason,
+        ]
 
 
-def _who(row: TableRow[View]) -> list[str]:
+def _format_student_cells(row: TableRow[View]) -> list[str]:
     return [row.student.id, row.student.name, row.student.email, row.assignment]

@@ -12,28 +12,28 @@ from decimal import Decimal
 from typing import Any
 
 from service.grading.grade import CriterionResult, Grade
-from service.reports.cause import diagnose, ended, excerpt_lines
-from service.reports.faults import faults_beside
-from service.reports.formats.registry import document, refusal, table
-from service.reports.readable import json_number, readable
-from service.reports.rows import TableRow, rows_for_students
-from service.reports.verdict_sentences import comments_of
-from service.reports.view import GradebookView, gradebook_view
+from service.reports.diagnosis import describe_outcome, diagnose, format_excerpt
+from service.reports.display_text import to_display_text, to_json_number
+from service.reports.faults import describe_other_faults
+from service.reports.formats.registry import register_document, register_refusal, register_table
+from service.reports.rows import TableRow, select_student_rows
+from service.reports.verdict_sentences import format_comments
+from service.reports.view import GradebookView, build_gradebook_view
 from submissions.submission import Submission
 
 
-def gradescope_document(view: GradebookView, submission: Submission | None = None) -> dict[str, Any]:
+def build_gradescope_document(view: GradebookView, submission: Submission | None = None) -> dict[str, Any]:
     """Return the grade in the schema of gradescope-autograders.readthedocs.io (specifications, output format)."""
     grade = view.entry
     return {
-        "score": json_number(view.marks or Decimal(0)),
-        "output": _output(view, submission),
+        "score": to_json_number(view.marks or Decimal(0)),
+        "output": _format_output(view, submission),
         "output_format": "text",
         "test_output_format": "text",
         "test_name_format": "text",
         "visibility": "visible",
         "stdout_visibility": "hidden",
-        "tests": [_test(number, result) for number, result in enumerate(grade.criteria, start=1)],
+        "tests": [_criterion_to_json(number, result) for number, result in enumerate(grade.criteria, start=1)],
         "extra_data": {
             "assignment": grade.assignment,
             "assignment_version": grade.assignment_version,
@@ -44,58 +44,58 @@ def gradescope_document(view: GradebookView, submission: Submission | None = Non
     }
 
 
-@document("gradescope", ".json", gradebook_view)
-def gradescope_text(view: GradebookView, submission: Submission | None = None) -> str:
+@register_document("gradescope", ".json", build_gradebook_view)
+def render_gradescope(view: GradebookView, submission: Submission | None = None) -> str:
     """Return the document as indented ASCII JSON."""
-    return _text(gradescope_document(view, submission))
+    return _dump_json(build_gradescope_document(view, submission))
 
 
-@refusal("gradescope")
-def gradescope_refusal(row: TableRow[Grade]) -> str:
+@register_refusal("gradescope")
+def render_gradescope_refusal(row: TableRow[Grade]) -> str:
     """Return a document with 0 marks and the reason."""
-    return _text({"score": 0, **_told(row.reason)})
+    return _dump_json({"score": 0, **_ungraded_to_json(row.reason)})
 
 
-@table("gradescope", ".json", gradebook_view)
-def gradescope_list(rows: Sequence[TableRow[GradebookView]]) -> str:
+@register_table("gradescope", ".json", build_gradebook_view)
+def render_gradescope_list(rows: Sequence[TableRow[GradebookView]]) -> str:
     """Return the documents of several rows, each with its student and file, without a score if there is no grade."""
-    return _text([_of_several(row) for row in rows_for_students(rows)])
+    return _dump_json([_row_to_json(row) for row in select_student_rows(rows)])
 
 
-def _of_several(row: TableRow[GradebookView]) -> dict[str, Any]:
-    document = gradescope_document(row.grade) if row.grade is not None else _told(row.reason)
+def _row_to_json(row: TableRow[GradebookView]) -> dict[str, Any]:
+    document = build_gradescope_document(row.grade) if row.grade is not None else _ungraded_to_json(row.reason)
     who = {"student": row.student.id, "name": row.student.name, "email": row.student.email, "file": row.source}
     return {**document, "extra_data": {**who, **document.get("extra_data", {"assignment": row.assignment})}}
 
 
-def _told(reason: str) -> dict[str, Any]:
-    output = f"This submission was not graded: {readable(reason)}"
+def _ungraded_to_json(reason: str) -> dict[str, Any]:
+    output = f"This submission was not graded: {to_display_text(reason)}"
     return {"output": output, "output_format": "text", "visibility": "visible", "stdout_visibility": "hidden"}
 
 
-def _text(value: object) -> str:
+def _dump_json(value: object) -> str:
     return json.dumps(value, indent=2, allow_nan=False) + "\n"
 
 
-def _test(number: int, result: CriterionResult) -> dict[str, Any]:
+def _criterion_to_json(number: int, result: CriterionResult) -> dict[str, Any]:
     return {
         "number": str(number),
-        "name": readable(result.title, 200),
-        "score": json_number(result.marks),
-        "max_score": json_number(result.max_marks),
+        "name": to_display_text(result.title, 200),
+        "score": to_json_number(result.marks),
+        "max_score": to_json_number(result.max_marks),
         **({} if result.excused else {"status": "passed" if result.marks >= result.max_marks else "failed"}),
-        "output": readable(result.message),
+        "output": to_display_text(result.message),
         "visibility": result.visibility,
     }
 
 
-def _output(view: GradebookView, submission: Submission | None) -> str:
+def _format_output(view: GradebookView, submission: Submission | None) -> str:
     shown = view.shown
     diagnosis = diagnose(shown, submission)
-    lines = [f"Comment: {comment}" for comment in comments_of(shown)]
-    lines += [diagnosis.cause, *excerpt_lines(diagnosis), f"Next: {diagnosis.next_step}"]
-    lines += [*diagnosis.further, ended(shown, diagnosis)]
-    for told, group in faults_beside(diagnosis.cause, shown):
+    lines = [f"Comment: {comment}" for comment in format_comments(shown)]
+    lines += [diagnosis.cause, *format_excerpt(diagnosis), f"Next: {diagnosis.next_step}"]
+    lines += [*diagnosis.further, describe_outcome(shown, diagnosis)]
+    for told, group in describe_other_faults(diagnosis.cause, shown):
         lines += [told, *([group.hint] if group.hint and told != group.where else []), f"({group.how_often})"]
-    lines += [f"Note: {readable(note, 300)}" for note in shown.notes[:20]]
+    lines += [f"Note: {to_display_text(note, 300)}" for note in shown.notes[:20]]
     return "\n".join([*lines, f"sandbox: {shown.sandbox}"])

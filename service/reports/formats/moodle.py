@@ -13,17 +13,17 @@ from decimal import Decimal, InvalidOperation
 from typing import BinaryIO
 
 from service.grading.grade import CriterionResult
-from service.reports.cause import diagnose
-from service.reports.formats.csv_output import csv_text, rows_as_given, safe_cell
-from service.reports.formats.registry import FilledIn, filled_in, packed, table
-from service.reports.readable import number, one_line
-from service.reports.rows import ReportPage, TableRow, rows_for_students
-from service.reports.verdict_sentences import comments_of
-from service.reports.view import GradebookView, gradebook_view
+from service.reports.diagnosis import diagnose
+from service.reports.display_text import format_decimal, to_one_line
+from service.reports.formats.csv_output import render_csv, render_safe_csv, to_safe_cell
+from service.reports.formats.registry import FilledWorksheet, register_archive, register_table, register_worksheet
+from service.reports.rows import ReportPage, TableRow, select_student_rows
+from service.reports.verdict_sentences import format_comments
+from service.reports.view import GradebookView, build_gradebook_view
 from sim.errors import UsageError
 from sim.readers.csv_text import read_rows
-from sim.readers.unreadable import Unreadable
-from submissions.downloads import moodle_number
+from sim.readers.reader_errors import UnreadableDataError
+from submissions.downloads import parse_moodle_number
 
 _IDENTIFIER, _GRADE, _FEEDBACK, _MAXIMUM = "Identifier", "Grade", "Feedback comments", "Maximum Grade"
 #: Columns that identify a row if its submission did not come from Moodle, in order of priority.
@@ -32,16 +32,20 @@ _LONGEST = 2000
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time in a zip archive
 
 
-@table("moodle", ".csv", gradebook_view)
-def moodle_csv(rows: Sequence[TableRow[GradebookView]]) -> str:
+@register_table("moodle", ".csv", build_gradebook_view)
+def render_moodle_csv(rows: Sequence[TableRow[GradebookView]]) -> str:
     """Return Moodle's grade import: ID number, grade, and feedback without anything about hidden criteria."""
     # A row without a known student would make the whole import fail.
-    cells = [[row.student.id, _marks(row), _feedback(row)] for row in rows_for_students(rows) if row.student.id]
-    return csv_text([["ID number", "Grade", "Feedback comments"], *cells])
+    cells = [
+        [row.student.id, _format_marks(row), _format_feedback(row)]
+        for row in select_student_rows(rows)
+        if row.student.id
+    ]
+    return render_safe_csv([["ID number", "Grade", "Feedback comments"], *cells])
 
 
-@filled_in("moodle-worksheet", ".csv", gradebook_view)
-def moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> FilledIn:
+@register_worksheet("moodle-worksheet", ".csv", build_gradebook_view)
+def fill_moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> FilledWorksheet:
     """Fill in Grade and Feedback comments of the worksheet. All other rows and cells stay unchanged.
 
     Raises:
@@ -53,7 +57,7 @@ def moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> Fil
     separator = max(",;\t", key=first.count)
     try:
         lines = read_rows(text, separator)
-    except Unreadable as error:
+    except UnreadableDataError as error:
         raise UsageError(f"the worksheet cannot be read: {error}, expected Moodle's grading worksheet") from None
     places = {heading: place for place, heading in enumerate(lines[0])} if lines else {}
     missing = [heading for heading in (_IDENTIFIER, _GRADE) if heading not in places]
@@ -62,10 +66,10 @@ def moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> Fil
             f"the worksheet has no column {' and no column '.join(missing)}, expected the grading worksheet as Moodle "
             "lets it be downloaded, in English"
         )
-    found = _places_of(lines, places)
+    found = _index_lines(lines, places)
     left_over = []
-    for row in rows_for_students(rows):
-        place = _place_of(row, found)
+    for row in select_student_rows(rows):
+        place = _find_line(row, found)
         if place is None:
             left_over.append(row.who)
             continue
@@ -73,17 +77,17 @@ def moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> Fil
         line += [""] * (len(lines[0]) - len(line))
         if row.grade is not None:
             _check_maximum(row.grade.entry.worth, line, places)
-            line[places[_GRADE]] = _marks(row)
+            line[places[_GRADE]] = _format_marks(row)
         feedback = places.get(_FEEDBACK)
         # A pending submission does not overwrite existing feedback.
         if feedback is not None and (row.grade is not None or row.refused or not line[feedback]):
-            line[feedback] = safe_cell(_feedback(row))
+            line[feedback] = to_safe_cell(_format_feedback(row))
     ending = "\r\n" if first.endswith("\r") else "\n"
-    return FilledIn(mark + rows_as_given(lines, separator, ending), tuple(left_over))
+    return FilledWorksheet(mark + render_csv(lines, separator, ending), tuple(left_over))
 
 
-@packed("moodle-feedback", ".zip")
-def moodle_feedback(pages: Iterable[ReportPage], sink: BinaryIO) -> tuple[str, ...]:
+@register_archive("moodle-feedback", ".zip")
+def pack_moodle_feedback(pages: Iterable[ReportPage], sink: BinaryIO) -> tuple[str, ...]:
     """Pack a report for each submission from Moodle, at the path that its feedback import expects.
 
     Returns the students that were left out.
@@ -94,7 +98,7 @@ def moodle_feedback(pages: Iterable[ReportPage], sink: BinaryIO) -> tuple[str, .
     left_over, taken = [], 0
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
         for page in pages:
-            number_of = moodle_number(page.row.source)
+            number_of = parse_moodle_number(page.row.source)
             if not number_of:
                 left_over.append(page.row.who)
                 continue
@@ -107,28 +111,28 @@ def moodle_feedback(pages: Iterable[ReportPage], sink: BinaryIO) -> tuple[str, .
     return tuple(left_over)
 
 
-def _marks(row: TableRow[GradebookView]) -> str:
-    return "" if row.grade is None or row.grade.marks is None else number(row.grade.marks)
+def _format_marks(row: TableRow[GradebookView]) -> str:
+    return "" if row.grade is None or row.grade.marks is None else format_decimal(row.grade.marks)
 
 
-def _feedback(row: TableRow[GradebookView]) -> str:
+def _format_feedback(row: TableRow[GradebookView]) -> str:
     told = [] if row.grade is None else row.grade.shown.criteria
-    lines = [f"{each.title}: {_share(each)}. {each.message}" for each in told]
+    lines = [f"{each.title}: {_format_criterion_marks(each)}. {each.message}" for each in told]
     lines += [f"Note: {note}" for note in row.grade.shown.notes[:20]] if row.grade is not None else []
     if row.reason:
         lines.insert(0, row.reason if row.grade is not None else f"Not graded: {row.reason}")
     first: list[str] = []
     if row.grade is not None:
         diagnosis = diagnose(row.grade.shown)
-        first = [*comments_of(row.grade.shown), diagnosis.cause, diagnosis.next_step, *diagnosis.further]
-    return one_line(" ".join([*first, "; ".join(lines)]), _LONGEST)
+        first = [*format_comments(row.grade.shown), diagnosis.cause, diagnosis.next_step, *diagnosis.further]
+    return to_one_line(" ".join([*first, "; ".join(lines)]), _LONGEST)
 
 
-def _share(result: CriterionResult) -> str:
-    return "excused" if result.excused else f"{number(result.marks)} of {number(result.max_marks)}"
+def _format_criterion_marks(result: CriterionResult) -> str:
+    return "excused" if result.excused else f"{format_decimal(result.marks)} of {format_decimal(result.max_marks)}"
 
 
-def _places_of(lines: Sequence[Sequence[str]], places: Mapping[str, int]) -> dict[tuple[str, str], int]:
+def _index_lines(lines: Sequence[Sequence[str]], places: Mapping[str, int]) -> dict[tuple[str, str], int]:
     """Return the line of each identifier, by column and value, without values that several lines share."""
     called: list[tuple[tuple[str, str], int]] = []
     for place, line in enumerate(lines[1:], start=1):
@@ -142,8 +146,8 @@ def _places_of(lines: Sequence[Sequence[str]], places: Mapping[str, int]) -> dic
     return {key: place for key, place in called if times[key] == 1}
 
 
-def _place_of(row: TableRow[GradebookView], found: Mapping[tuple[str, str], int]) -> int | None:
-    number_of = moodle_number(row.source)
+def _find_line(row: TableRow[GradebookView], found: Mapping[tuple[str, str], int]) -> int | None:
+    number_of = parse_moodle_number(row.source)
     if number_of:
         return found.get((_IDENTIFIER, number_of))
     student = row.student
@@ -159,6 +163,7 @@ def _check_maximum(most: Decimal, line: Sequence[str], places: Mapping[str, int]
         return
     if asked != most:
         raise UsageError(
-            f"the worksheet's Maximum Grade is {number(asked)} and the assignment gives {number(most)} marks; expected "
+            f"the worksheet's Maximum Grade is {format_decimal(asked)} and the assignment gives "
+            f"{format_decimal(most)} marks; expected "
             "the same: set the maximum in Moodle and download the worksheet again"
         )

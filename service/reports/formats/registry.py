@@ -21,7 +21,7 @@ _Shows = TypeVar("_Shows", bound=Callable[..., RenderableType])
 _T = TypeVar("_T", covariant=True)
 
 
-class OfOne(Protocol[_T]):
+class GradeRenderer(Protocol[_T]):
     """Renders one grade, with source lines if the submission is given."""
 
     def __call__(self, grade: Grade, submission: Submission | None = None, /) -> _T:
@@ -29,7 +29,7 @@ class OfOne(Protocol[_T]):
 
 
 @dataclass(frozen=True, slots=True)
-class FilledIn:
+class FilledWorksheet:
     """A table from another system with the grades filled in, and the rows that did not fit."""
 
     text: str
@@ -40,79 +40,81 @@ class FilledIn:
 class Format:
     """An output format: ``document`` writes one grade to a file, ``table`` all grades of a batch to one file.
 
-    ``refusal`` is the document of a rejected submission. ``on_terminal`` is the document for a terminal, if it differs.
-    ``filled_in`` fills in a given table. ``packed`` packs reports into a file.
+    ``refusal`` is the document of a rejected submission. ``terminal`` is the document for a terminal, if it differs.
+    ``worksheet`` fills in a given table. ``archive`` packs reports into a file.
     """
 
     name: str
     suffix: str = ""
-    document: OfOne[str] | None = None
+    document: GradeRenderer[str] | None = None
     refusal: Callable[[TableRow[Grade]], str] | None = None
     table: Callable[[Sequence[TableRow[Grade]]], str] | None = None
-    on_terminal: OfOne[RenderableType] | None = None
-    filled_in: Callable[[Sequence[TableRow[Grade]], str], FilledIn] | None = None
-    packed: Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]] | None = None
+    terminal: GradeRenderer[RenderableType] | None = None
+    worksheet: Callable[[Sequence[TableRow[Grade]], str], FilledWorksheet] | None = None
+    archive: Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]] | None = None
 
 
 FORMATS: dict[str, Format] = {}
 
 
-def document(name: str, suffix: str, view: Callable[[Grade], Any]) -> Callable[[_Writes], _Writes]:
+def register_document(name: str, suffix: str, view: Callable[[Grade], Any]) -> Callable[[_Writes], _Writes]:
     """Register a function that writes one grade, as seen through ``view``, with the submission if it is given."""
 
     def register(render: _Writes) -> _Writes:
         def written(grade: Grade, submission: Submission | None = None, /) -> str:
             return render(view(grade), submission)
 
-        FORMATS[name] = replace(_begun(name), suffix=suffix, document=written)
+        FORMATS[name] = replace(_find_format(name), suffix=suffix, document=written)
         return render
 
     return register
 
 
-def refusal(name: str) -> Callable[[Callable[[TableRow[Grade]], str]], Callable[[TableRow[Grade]], str]]:
+def register_refusal(name: str) -> Callable[[Callable[[TableRow[Grade]], str]], Callable[[TableRow[Grade]], str]]:
     """Register a function that writes the document of a rejected row."""
 
     def register(render: Callable[[TableRow[Grade]], str]) -> Callable[[TableRow[Grade]], str]:
-        FORMATS[name] = replace(_begun(name), refusal=render)
+        FORMATS[name] = replace(_find_format(name), refusal=render)
         return render
 
     return register
 
 
-def table(
+def register_table(
     name: str, suffix: str, view: Callable[[Grade], _V]
 ) -> Callable[[Callable[[Sequence[TableRow[_V]]], str]], Callable[[Sequence[TableRow[_V]]], str]]:
     """Register a function that writes the rows of a batch, with their grades as seen through ``view``."""
 
     def register(render: Callable[[Sequence[TableRow[_V]]], str]) -> Callable[[Sequence[TableRow[_V]]], str]:
         FORMATS[name] = replace(
-            _begun(name), suffix=suffix, table=lambda rows: render([row.shown(view) for row in rows])
+            _find_format(name), suffix=suffix, table=lambda rows: render([row.apply_view(view) for row in rows])
         )
         return render
 
     return register
 
 
-def filled_in(
+def register_worksheet(
     name: str, suffix: str, view: Callable[[Grade], _V]
-) -> Callable[[Callable[[Sequence[TableRow[_V]], str], FilledIn]], Callable[[Sequence[TableRow[_V]], str], FilledIn]]:
+) -> Callable[
+    [Callable[[Sequence[TableRow[_V]], str], FilledWorksheet]], Callable[[Sequence[TableRow[_V]], str], FilledWorksheet]
+]:
     """Register a function that fills the rows of a batch into another system's table."""
 
     def register(
-        render: Callable[[Sequence[TableRow[_V]], str], FilledIn],
-    ) -> Callable[[Sequence[TableRow[_V]], str], FilledIn]:
+        render: Callable[[Sequence[TableRow[_V]], str], FilledWorksheet],
+    ) -> Callable[[Sequence[TableRow[_V]], str], FilledWorksheet]:
         FORMATS[name] = replace(
-            _begun(name),
+            _find_format(name),
             suffix=suffix,
-            filled_in=lambda rows, given: render([row.shown(view) for row in rows], given),
+            worksheet=lambda rows, given: render([row.apply_view(view) for row in rows], given),
         )
         return render
 
     return register
 
 
-def packed(
+def register_archive(
     name: str, suffix: str
 ) -> Callable[
     [Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]]],
@@ -123,24 +125,24 @@ def packed(
     def register(
         pack: Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]],
     ) -> Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]]:
-        FORMATS[name] = replace(_begun(name), suffix=suffix, packed=pack)
+        FORMATS[name] = replace(_find_format(name), suffix=suffix, archive=pack)
         return pack
 
     return register
 
 
-def on_terminal(name: str, view: Callable[[Grade], Any]) -> Callable[[_Shows], _Shows]:
+def register_terminal(name: str, view: Callable[[Grade], Any]) -> Callable[[_Shows], _Shows]:
     """Register a function that shows one grade, as seen through ``view``, in a terminal."""
 
     def register(render: _Shows) -> _Shows:
         def shown(grade: Grade, submission: Submission | None = None, /) -> RenderableType:
             return render(view(grade), submission)
 
-        FORMATS[name] = replace(_begun(name), on_terminal=shown)
+        FORMATS[name] = replace(_find_format(name), terminal=shown)
         return render
 
     return register
 
 
-def _begun(name: str) -> Format:
+def _find_format(name: str) -> Format:
     return FORMATS.get(name, Format(name))

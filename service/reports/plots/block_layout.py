@@ -19,7 +19,7 @@ class BlockPosition:
     row: float
 
 
-def layout_of(diagram: Diagram) -> Mapping[str, BlockPosition]:
+def compute_layout(diagram: Diagram) -> Mapping[str, BlockPosition]:
     """Return a position for each actor. Arrows count in the order of the text, whatever their direction."""
     named = [name for arrow in diagram.arrows for name in (arrow.source, arrow.target)]
     order = {name: number for number, name in enumerate(dict.fromkeys([*named, *(a.name for a in diagram.actors)]))}

@@ -13,8 +13,19 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from service.grading.grade import Accuracy, CriterionResult
-from service.reports.plots.style import FAINT, HEAD, INK, RULE, WIDTH, axes_at, drawable, font, new_figure, write
-from service.reports.readable import one_line
+from service.reports.display_text import to_one_line
+from service.reports.plots.style import (
+    FAINT,
+    HEAD,
+    INK,
+    RULE,
+    WIDTH,
+    add_axes,
+    create_figure,
+    load_font,
+    replace_missing_glyphs,
+    write_text,
+)
 
 NO_ANSWER = "no answer"
 _LABELS, _SHORT_LABELS = 1.22, 0.62  # inches for the true labels at the left
@@ -34,7 +45,7 @@ class ConfusionTable:
     totals: tuple[int, ...]
 
 
-def confusion_table(accuracy: Accuracy) -> ConfusionTable:
+def build_confusion_table(accuracy: Accuracy) -> ConfusionTable:
     """Return all labels in order, then answers that are not labels, then ``no answer`` if there was one."""
     seen = dict.fromkeys(truth for truth, _, _ in accuracy.confusion)
     truths = tuple(dict.fromkeys((*accuracy.labels, *seen)))
@@ -53,17 +64,17 @@ def draw_confusion(result: CriterionResult, accuracy: Accuracy, title: str) -> F
     """Draw the confusion matrix of ``accuracy`` with its value, interval and n."""
     subtitle = (
         f"accuracy {accuracy.value:.2f}, 95 % interval {accuracy.low:.2f} to {accuracy.high:.2f}, "
-        f"n = {accuracy.n} {counted(accuracy)}"
+        f"n = {accuracy.n} {select_unit(accuracy)}"
     )
-    return draw_table(confusion_table(accuracy), title, subtitle)
+    return draw_confusion_table(build_confusion_table(accuracy), title, subtitle)
 
 
-def counted(accuracy: Accuracy) -> str:
+def select_unit(accuracy: Accuracy) -> str:
     """Return the unit of ``n``: ``images`` or ``patterns``."""
     return accuracy.counts.of if accuracy.counts is not None else "images"
 
 
-def draw_table(table: ConfusionTable, title: str, subtitle: str) -> Figure:
+def draw_confusion_table(table: ConfusionTable, title: str, subtitle: str) -> Figure:
     """Draw the confusion matrix of ``table``."""
     across = len(table.answers) + _TOTALS
     labels = _LABELS if any(len(truth) > _SHORT for truth in table.truths) else _SHORT_LABELS
@@ -71,13 +82,13 @@ def draw_table(table: ConfusionTable, title: str, subtitle: str) -> Figure:
     body = cell * (len(table.truths) + 0.85)
     upright = any(len(answer) > _SHORT for answer in table.answers)
     heads = _HEADS if upright else _SHORT_HEADS
-    figure = new_figure(HEAD + heads + body + _FOOT, title, subtitle)
-    axes = axes_at(figure, labels, _FOOT, cell * across, body + heads)
+    figure = create_figure(HEAD + heads + body + _FOOT, title, subtitle)
+    axes = add_axes(figure, labels, _FOOT, cell * across, body + heads)
     axes.set_axis_off()
     axes.set_xlim(0, across)
     axes.set_ylim(body / cell, -heads / cell)
     size = 9.0 if cell > 0.4 else max(8.0, 22 * cell)
-    _draw_names(axes, table, _smaller(size), upright=upright)
+    _draw_names(axes, table, _reduce_size(size), upright=upright)
     _draw_cells(axes, table, size)
     told = (
         "precision: correct share of the answers",
@@ -85,27 +96,29 @@ def draw_table(table: ConfusionTable, title: str, subtitle: str) -> Figure:
         "rows: true class;  columns: answer",
     )
     for number, line in enumerate(told):
-        write(figure, 0.08, 0.10 + 0.14 * number, line, size=8, colour=FAINT)
+        write_text(figure, 0.08, 0.10 + 0.14 * number, line, size=8, colour=FAINT)
     return figure
 
 
 def _draw_names(axes: Axes, table: ConfusionTable, size: float, *, upright: bool) -> None:
     """Draw all headings in one direction: horizontal if every name is short, otherwise upright."""
     for row, truth in enumerate((*table.truths, "precision")):
-        _name(axes, -0.12, row + 0.5, truth, size, ha="right", va="center")
+        _draw_name(axes, -0.12, row + 0.5, truth, size, ha="right", va="center")
     count = len(table.answers)
     heads = [*((column + 0.5, answer) for column, answer in enumerate(table.answers)), (count + _ALL, "total")]
     for x, name in (*heads, (count + _RECALL, "recall")):
         if upright:
-            _name(axes, x, -0.18, name, size, ha="left", va="center", rotation=90)
+            _draw_name(axes, x, -0.18, name, size, ha="left", va="center", rotation=90)
         else:
-            _name(axes, x, -0.14, name, size, ha="center", va="bottom")
+            _draw_name(axes, x, -0.14, name, size, ha="center", va="bottom")
 
 
-def _name(axes: Axes, x: float, y: float, name: str, size: float, *, ha: str, va: str, rotation: float = 0) -> None:
-    text = "\n".join(textwrap.wrap(one_line(name, 40), 15, max_lines=2, placeholder="…"))
+def _draw_name(
+    axes: Axes, x: float, y: float, name: str, size: float, *, ha: str, va: str, rotation: float = 0
+) -> None:
+    text = "\n".join(textwrap.wrap(to_one_line(name, 40), 15, max_lines=2, placeholder="…"))
     axes.text(
-        x, y, drawable(text), font=font(size), color=INK, ha=ha, va=va, rotation=rotation,
+        x, y, replace_missing_glyphs(text), font=load_font(size), color=INK, ha=ha, va=va, rotation=rotation,
         rotation_mode="anchor", parse_math=False, linespacing=1.0, clip_on=False,
     )  # fmt: skip
 
@@ -119,34 +132,34 @@ def _draw_cells(axes: Axes, table: ConfusionTable, size: float) -> None:
             colour = "white" if share > 0.55 else (INK if count else FAINT)
             axes.text(
                 column + 0.5, row + (0.66 if count else 0.5), str(count) if count else "·",
-                font=font(size, bold=count > 0), ha="center",
+                font=load_font(size, bold=count > 0), ha="center",
                 va="center", color=colour,
             )  # fmt: skip
             if count:
                 axes.text(
-                    column + 0.93, row + 0.06, "✓" if right else "✗", font=font(_smaller(size), bold=True), ha="right",
-                    va="top", color=colour,
+                    column + 0.93, row + 0.06, "✓" if right else "✗", font=load_font(_reduce_size(size), bold=True),
+                    ha="right", va="top", color=colour,
                 )  # fmt: skip
-        _figure_text(axes, len(counts) + _ALL, row, str(table.totals[row]), size)
+        _draw_number(axes, len(counts) + _ALL, row, str(table.totals[row]), size)
         right_ones = counts[table.answers.index(table.truths[row])] if table.truths[row] in table.answers else 0
-        _figure_text(axes, len(counts) + _RECALL, row, _share(right_ones, table.totals[row]), _smaller(size))
+        _draw_number(axes, len(counts) + _RECALL, row, _format_share(right_ones, table.totals[row]), _reduce_size(size))
     for column, answer in enumerate(table.answers):
         if answer in table.truths:
             answered = sum(counts[column] for counts in table.counts)
             right_ones = table.counts[table.truths.index(answer)][column]
-            _figure_text(axes, column + 0.5, len(table.truths), _share(right_ones, answered), _smaller(size))
+            _draw_number(axes, column + 0.5, len(table.truths), _format_share(right_ones, answered), _reduce_size(size))
 
 
-def _smaller(size: float) -> float:
+def _reduce_size(size: float) -> float:
     """Return the size for text beside the counts, as small as a phone can show it."""
     return max(0.82 * size, min(size, 8.0))
 
 
-def _figure_text(axes: Axes, x: float, row: int, text: str, size: float) -> None:
-    axes.text(x, row + 0.5, text, font=font(size), ha="center", va="center", color=INK)
+def _draw_number(axes: Axes, x: float, row: int, text: str, size: float) -> None:
+    axes.text(x, row + 0.5, text, font=load_font(size), ha="center", va="center", color=INK)
 
 
-def _share(part: int, whole: int) -> str:
+def _format_share(part: int, whole: int) -> str:
     """Return a ratio as ``.83``, short enough for ten columns; a dash if the divisor is 0."""
     if not whole:
         return "\N{EN DASH}"

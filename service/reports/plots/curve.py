@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
 
+from service.reports.display_text import to_one_line
 from service.reports.plots.style import (
     FAINT,
     FAULT,
@@ -23,14 +24,13 @@ from service.reports.plots.style import (
     RULE,
     SAID,
     WIDTH,
-    axes_at,
-    drawable,
-    font,
-    new_figure,
-    set_tick_type,
-    write,
+    add_axes,
+    create_figure,
+    load_font,
+    replace_missing_glyphs,
+    set_tick_size,
+    write_text,
 )
-from service.reports.readable import one_line
 
 #: Colour, line and marker of the curves, in order. They differ without colour too.
 _STYLES = ((LEFT, "-", "o"), (RIGHT, "--", "s"), (SAID, ":", "^"), (FAINT, "-.", "D"))
@@ -65,15 +65,15 @@ def draw_curves(panels: Sequence[AccuracyPanel], title: str, subtitle: str = "",
     """Draw the panels below each other, all with an axis from 0 to 1. ``counted`` is the unit of ``n``."""
     row = _ABOVE + _PANEL + _BELOW
     height = HEAD + row * len(panels) + _FOOT
-    figure = new_figure(height, title, subtitle)
+    figure = create_figure(height, title, subtitle)
     for place, panel in enumerate(panels):
         top = height - HEAD - row * place
-        write(figure, 0.08, top - 0.14, one_line(panel.varied, 40), size=9, bold=True, va="center")
-        write(figure, WIDTH - _RIGHT_MARGIN, top - 0.14, _counts(panel.curves, counted), size=8, ha="right",
+        write_text(figure, 0.08, top - 0.14, to_one_line(panel.varied, 40), size=9, bold=True, va="center")
+        write_text(figure, WIDTH - _RIGHT_MARGIN, top - 0.14, _format_counts(panel.curves, counted), size=8, ha="right",
               va="center", colour=FAINT)  # fmt: skip
-        axes = axes_at(figure, _LEFT, top - _ABOVE - _PANEL, WIDTH - _LEFT - _RIGHT_MARGIN, _PANEL)
+        axes = add_axes(figure, _LEFT, top - _ABOVE - _PANEL, WIDTH - _LEFT - _RIGHT_MARGIN, _PANEL)
         draw_panel(axes, panel)
-    write(figure, 0.08, 0.09, "line: accuracy;  band: 95 % interval (Wilson)", size=7.5, colour=FAINT)
+    write_text(figure, 0.08, 0.09, "line: accuracy;  band: 95 % interval (Wilson)", size=7.5, colour=FAINT)
     return figure
 
 
@@ -84,25 +84,30 @@ def draw_panel(axes: Axes, panel: AccuracyPanel) -> None:
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.2f}".rstrip("0").rstrip(".")))
     axes.grid(axis="y", color=RULE, linewidth=0.5)
     axes.set_axisbelow(True)
-    for curve, style in zip(panel.curves, _repeated(len(panel.curves)), strict=True):
+    for curve, style in zip(panel.curves, _cycle_styles(len(panel.curves)), strict=True):
         draw_curve(axes, curve, *style)
     xs = sorted({x for curve in panel.curves for x in curve.x})
     if len(xs) <= 9:
-        axes.xaxis.set_major_locator(FixedLocator(_readable_ticks(xs)))
+        axes.xaxis.set_major_locator(FixedLocator(_select_ticks(xs)))
     else:
         axes.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 5, 10]))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}".replace("-", "\N{MINUS SIGN}")))
-    axes.set_xlabel(drawable(f"{one_line(panel.varied, 40)}, {panel.unit}"), font=font(8), color=INK, labelpad=2)
-    axes.set_ylabel("accuracy", font=font(8), color=INK, labelpad=3)
-    set_tick_type(axes)
+    axes.set_xlabel(
+        replace_missing_glyphs(f"{to_one_line(panel.varied, 40)}, {panel.unit}"),
+        font=load_font(8),
+        color=INK,
+        labelpad=2,
+    )
+    axes.set_ylabel("accuracy", font=load_font(8), color=INK, labelpad=3)
+    set_tick_size(axes)
     if panel.level is not None:
         axes.axhline(panel.level, color=FAULT, linewidth=0.9, linestyle=(0, (6, 2)), zorder=2)
         axes.text(
             0.995, panel.level - 0.03, f"required: {panel.level:g}", transform=axes.get_yaxis_transform(), ha="right",
-            va="top", color=FAULT, font=font(7.5),
+            va="top", color=FAULT, font=load_font(7.5),
         )  # fmt: skip
     if len(panel.curves) > 1:
-        legend = axes.legend(loc="best", prop=font(7.5), frameon=True, framealpha=0.85, borderpad=0.3)
+        legend = axes.legend(loc="best", prop=load_font(7.5), frameon=True, framealpha=0.85, borderpad=0.3)
         legend.get_frame().set_edgecolor(RULE)
 
 
@@ -116,11 +121,11 @@ def draw_curve(axes: Axes, curve: Curve, colour: str = LEFT, line: str = "-", ma
         axes.vlines(curve.x, curve.low, curve.high, color=colour, linewidth=1.2, zorder=3)
     axes.plot(
         curve.x, curve.share, color=colour, linestyle=line, marker=marker, markersize=3.4, linewidth=1.4, zorder=4,
-        label=drawable("\n".join(textwrap.wrap(one_line(curve.label, 40), 26))),
+        label=replace_missing_glyphs("\n".join(textwrap.wrap(to_one_line(curve.label, 40), 26))),
     )  # fmt: skip
 
 
-def _counts(curves: Sequence[Curve], counted: str) -> str:
+def _format_counts(curves: Sequence[Curve], counted: str) -> str:
     counts = {count for curve in curves for count in curve.n}
     if not counts:
         return "n = 0"
@@ -128,7 +133,7 @@ def _counts(curves: Sequence[Curve], counted: str) -> str:
     return f"n = {least if least == most else f'{least} to {most}'} {counted} per point"
 
 
-def _readable_ticks(xs: Sequence[float]) -> list[float]:
+def _select_ticks(xs: Sequence[float]) -> list[float]:
     """Return the ``xs`` whose labels don't overlap: at least an eighteenth of the width apart."""
     kept: list[float] = []
     for x in xs:
@@ -137,5 +142,5 @@ def _readable_ticks(xs: Sequence[float]) -> list[float]:
     return kept
 
 
-def _repeated(count: int) -> list[tuple[str, str, str]]:
+def _cycle_styles(count: int) -> list[tuple[str, str, str]]:
     return [_STYLES[place % len(_STYLES)] for place in range(count)]

@@ -16,8 +16,18 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, FancyArrowPatch, FancyBboxPatch, Patch, PathPatch, Polygon, Rectangle
 from matplotlib.path import Path
 
-from service.reports.plots.style import FAINT, FAULT, INK, LEFT, RIGHT, RULE, drawable, font, write
-from service.reports.readable import one_line
+from service.reports.display_text import to_one_line
+from service.reports.plots.style import (
+    FAINT,
+    FAULT,
+    INK,
+    LEFT,
+    RIGHT,
+    RULE,
+    load_font,
+    replace_missing_glyphs,
+    write_text,
+)
 from submissions.diagram import DiagramActor, DiagramArrow
 
 #: Characters of 8 point type in an inch.
@@ -44,26 +54,28 @@ class Highlights:
     sign: str = "✗"
     words: str = ""
 
-    def on(self, arrow: DiagramArrow) -> bool:
+    def is_highlighted(self, arrow: DiagramArrow) -> bool:
         """Return whether an arrow is highlighted, itself or through one of its ends."""
         pair = (arrow.source, arrow.target)
         turned = arrow.heads != "target" and pair[::-1] in self.arrows
         return pair in self.arrows or turned or not self.actors.isdisjoint(pair)
 
-    def signed(self, arrow: DiagramArrow, lines: tuple[str, ...]) -> tuple[str, ...]:
+    def add_sign(self, arrow: DiagramArrow, lines: tuple[str, ...]) -> tuple[str, ...]:
         """Return the label of an arrow with the sign before it, for readers who don't distinguish the colours."""
-        return (f"{self.sign} {lines[0] if lines else ''}".rstrip(), *lines[1:]) if self.on(arrow) else lines
+        return (
+            (f"{self.sign} {lines[0] if lines else ''}".rstrip(), *lines[1:]) if self.is_highlighted(arrow) else lines
+        )
 
-    def explain(self, figure: Figure) -> None:
+    def draw_explanation(self, figure: Figure) -> None:
         """Write the meaning of the sign at the foot of the figure, if the sign is used."""
         if self.actors or self.arrows:
-            write(figure, 0.08, 0.07, f"{self.sign} {self.words}", size=7.8, colour=self.colour, bold=True)
+            write_text(figure, 0.08, 0.07, f"{self.sign} {self.words}", size=7.8, colour=self.colour, bold=True)
 
 
-def broken(text: str, inches: float, most_lines: int) -> tuple[str, ...]:
+def break_label(text: str, inches: float, most_lines: int) -> tuple[str, ...]:
     """Break a label into lines of at most this width. Its own line breaks stay."""
     width = max(4, int(inches * CHARACTERS))
-    kept = [one_line(line, 200) for line in text.split("\n")[: most_lines + 1]]
+    kept = [to_one_line(line, 200) for line in text.split("\n")[: most_lines + 1]]
     lines = [piece for line in kept for piece in textwrap.wrap(line, width) or [""]]
     while lines and not lines[-1]:
         lines.pop()
@@ -72,11 +84,12 @@ def broken(text: str, inches: float, most_lines: int) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def label(axes: Axes, x: float, y: float, lines: tuple[str, ...], colour: str, va: str = "bottom") -> None:
+def draw_label(axes: Axes, x: float, y: float, lines: tuple[str, ...], colour: str, va: str = "bottom") -> None:
     """Draw the lines of a label, centred over ``x``, on white."""
     if any(lines):
         axes.text(
-            x, y, drawable("\n".join(lines)), font=font(8), color=colour, ha="center", va=va, parse_math=False,
+            x, y, replace_missing_glyphs("\n".join(lines)), font=load_font(8), color=colour, ha="center", va=va,
+            parse_math=False,
             linespacing=1.05, zorder=2.5, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4},
         )  # fmt: skip
 
@@ -93,8 +106,8 @@ def draw_actor(
 ) -> Patch:
     """Draw an actor centred at ``x``, ``y``, and return the patch where arrows end."""
     different = actor.name in highlights.actors
-    fill = _usable(actor.colour, _FILL)
-    patch = _shape(actor.shape, x, y, width, height)
+    fill = _choose_colour(actor.colour, _FILL)
+    patch = _create_shape(actor.shape, x, y, width, height)
     patch.set(
         facecolor="white" if actor.shape in _BARE else fill,
         edgecolor=highlights.colour if different else "white" if actor.shape in _BARE else FAINT,
@@ -103,31 +116,31 @@ def draw_actor(
         zorder=3,
     )
     axes.add_patch(patch)
-    ink = _usable(actor.text_colour, INK if actor.shape in _BARE or _is_light(fill) else "white")
+    ink = _choose_colour(actor.text_colour, INK if actor.shape in _BARE or _is_light(fill) else "white")
     axes.text(
-        x, y, drawable("\n".join(lines)), font=font(7.8, bold=True), color=ink, ha="center",
+        x, y, replace_missing_glyphs("\n".join(lines)), font=load_font(7.8, bold=True), color=ink, ha="center",
         va="center" if len(lines) > 1 else "center_baseline", parse_math=False, linespacing=1.05, zorder=5,
     )  # fmt: skip
     if different:
         axes.text(
-            x + width / 2, y + height / 2, highlights.sign, font=font(8.5, bold=True), color=highlights.colour,
+            x + width / 2, y + height / 2, highlights.sign, font=load_font(8.5, bold=True), color=highlights.colour,
             ha="center", va="center", zorder=6,
             bbox={"boxstyle": "circle,pad=0.12", "facecolor": "white", "edgecolor": highlights.colour},
         )  # fmt: skip
     return patch
 
 
-def arrow_colour(arrow: DiagramArrow, highlights: Highlights) -> str:
+def choose_arrow_colour(arrow: DiagramArrow, highlights: Highlights) -> str:
     """Return the colour of an arrow: by highlight, by its text, or by its sender."""
-    if highlights.on(arrow):
+    if highlights.is_highlighted(arrow):
         return highlights.colour
     if arrow.failed:
         return FAULT
     usual = {("robot", "responder"): LEFT, ("responder", "robot"): RIGHT}.get((arrow.source, arrow.target), INK)
-    return _usable(arrow.colour, usual)
+    return _choose_colour(arrow.colour, usual)
 
 
-def connect(
+def draw_arrow(
     axes: Axes,
     arrow: DiagramArrow,
     start: tuple[float, float],
@@ -141,7 +154,7 @@ def connect(
     style = "-" if arrow.failed else styles[arrow.heads]
     line = "dotted" if arrow.failed else arrow.line
     if line == "solid" or arrow.open_head or style == "-":
-        drawn = [(style, _DASHES[line], 1.9 if highlights.on(arrow) else 1.2)]
+        drawn = [(style, _DASHES[line], 1.9 if highlights.is_highlighted(arrow) else 1.2)]
     else:  # otherwise the heads would be dashed too
         drawn = [("-", _DASHES[line], 1.2), (style, "solid", 0.0)]
     for arrow_style, dashes, thick in drawn:
@@ -150,26 +163,26 @@ def connect(
         axes.add_patch(
             FancyArrowPatch(
                 start, end, arrowstyle=sized, connectionstyle=f"arc3,rad={bend}", patchA=ends[0], patchB=ends[1],
-                shrinkA=0, shrinkB=0, mutation_scale=1, color=arrow_colour(arrow, highlights), linewidth=thick,
+                shrinkA=0, shrinkB=0, mutation_scale=1, color=choose_arrow_colour(arrow, highlights), linewidth=thick,
                 linestyle=dashes, joinstyle="miter", zorder=2,
             )
         )  # fmt: skip
 
 
-def frame(axes: Axes, x: float, y: float, width: float, height: float, colour: str, text: str) -> None:
+def draw_group_frame(axes: Axes, x: float, y: float, width: float, height: float, colour: str, text: str) -> None:
     """Draw a group's frame, with its lower left corner at ``x``, ``y`` and its label inside at the top."""
-    fill = _usable(colour, "#dbe6f0")
+    fill = _choose_colour(colour, "#dbe6f0")
     axes.add_patch(
         FancyBboxPatch((x, y), width, height, boxstyle="round,pad=0,rounding_size=0.08", facecolor=fill, alpha=0.45,
                        edgecolor=RULE, linewidth=0.8, zorder=0)
     )  # fmt: skip
     axes.text(
-        x + width / 2, y + height - 0.04, drawable(one_line(text, 40)), font=font(7.6), color=INK, ha="center",
-        va="top", parse_math=False, zorder=1,
+        x + width / 2, y + height - 0.04, replace_missing_glyphs(to_one_line(text, 40)), font=load_font(7.6), color=INK,
+        ha="center", va="top", parse_math=False, zorder=1,
     )  # fmt: skip
 
 
-def _shape(shape: str, x: float, y: float, width: float, height: float) -> Patch:
+def _create_shape(shape: str, x: float, y: float, width: float, height: float) -> Patch:
     left, low = x - width / 2, y - height / 2
     if shape in _ROUND:
         return FancyBboxPatch((left, low), width, height, boxstyle=f"round,pad=0,rounding_size={min(0.16, height / 2)}")
@@ -187,11 +200,11 @@ def _shape(shape: str, x: float, y: float, width: float, height: float) -> Patch
         right, top = left + width, low + height
         return Polygon([(left, low), (right, low), (right, top - fold), (right - fold, top), (left, top)])
     if shape == "flowchart.database":
-        return _cylinder(left, low, width, height)
+        return _create_cylinder(left, low, width, height)
     return Rectangle((left, low), width, height)
 
 
-def _cylinder(left: float, low: float, width: float, height: float) -> Patch:
+def _create_cylinder(left: float, low: float, width: float, height: float) -> Patch:
     """Return a cylinder: its body, and its lid as a separate open line."""
     x, y = left + width / 2 * (1 + np.cos(_HALF_TURN)), height / 11 * np.sin(_HALF_TURN)
     bottom, top = low + height / 11, low + height * 10 / 11
@@ -201,7 +214,7 @@ def _cylinder(left: float, low: float, width: float, height: float) -> Patch:
     return PathPatch(Path([*body, *lid], codes))
 
 
-def _usable(colour: str, otherwise: str) -> str:
+def _choose_colour(colour: str, otherwise: str) -> str:
     return colour if colour and is_color_like(colour.lower()) else otherwise
 
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from service.reports.plots.style import FAULT, HEAD, RULE, WIDTH, axes_at, font, new_figure
-from service.reports.readable import turned, whole
+from service.reports.display_text import format_heading, format_whole_number
+from service.reports.plots.style import FAULT, HEAD, RULE, WIDTH, add_axes, create_figure, load_font
 from sim.floors import Floor
 
 _FLOOR_WIDTH, _FLOOR_HEIGHT = 2362, 1143  # mm
@@ -21,18 +21,20 @@ def draw_floor(floor: Floor) -> Figure:
     width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
     height = width * _FLOOR_HEIGHT / _FLOOR_WIDTH
     pose = floor.default_pose
-    subtitle = f"start ({whole(pose.x)}, {whole(pose.y)}) heading {turned(pose.heading)}°"
+    subtitle = (
+        f"start ({format_whole_number(pose.x)}, {format_whole_number(pose.y)}) heading {format_heading(pose.heading)}°"
+    )
     names = tuple(dict.fromkeys(label.label for label in floor.labels))
     if names:
         subtitle += f"; {len(floor.labels)} labelled places, {len(names)} labels"
-    figure = new_figure(HEAD + height + _FOOT, floor.name, subtitle)
-    axes = axes_at(figure, _LEFT_EDGE, _FOOT, width, height)
+    figure = create_figure(HEAD + height + _FOOT, floor.name, subtitle)
+    axes = add_axes(figure, _LEFT_EDGE, _FOOT, width, height)
     axes.imshow(floor.pixels[:, :, :3], extent=(0, _FLOOR_WIDTH, 0, _FLOOR_HEIGHT), interpolation="antialiased")
     for x, y, across, up in floor.obstacles:
         axes.add_patch(Rectangle((x, y), across, up, facecolor=RULE, edgecolor="black", linewidth=0.8))
     axes.plot(pose.x, pose.y, marker=(3, 0, pose.heading - 90), color=FAULT, markersize=9, markeredgecolor="white")
     axes.set_xlim(0, _FLOOR_WIDTH)
     axes.set_ylim(0, _FLOOR_HEIGHT)
-    axes.set_xlabel("x, mm", font=font(8.5), labelpad=1)
-    axes.set_ylabel("y, mm", font=font(8.5), labelpad=1)
+    axes.set_xlabel("x, mm", font=load_font(8.5), labelpad=1)
+    axes.set_ylabel("y, mm", font=load_font(8.5), labelpad=1)
     return figure

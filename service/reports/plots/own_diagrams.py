@@ -11,11 +11,11 @@ from types import MappingProxyType
 
 from service.grading.grade import Grade
 from service.language import ENGLISH, Language, translatable
-from service.reports.plots.difference import Differences, differences, in_words
-from service.reports.plots.plot import Plot, trial_name
-from service.reports.plots.talk import talks
-from service.reports.readable import one_line
-from service.reports.verdict_sentences import trial_words
+from service.reports.display_text import to_one_line
+from service.reports.plots.diagram_differences import Differences, compare_with_recording, describe_differences
+from service.reports.plots.message_counts import count_messages
+from service.reports.plots.plot import Plot, build_trial_name
+from service.reports.verdict_sentences import format_trial_name
 from service.reports.view import is_for_staff
 from submissions.diagram import DiagramKind
 from submissions.diagram_cells import DiagramCell
@@ -39,7 +39,9 @@ class OwnDiagram:
     plots: tuple[Plot, ...]
 
 
-def own_diagrams(grade: Grade, cells: Sequence[DiagramCell], language: Language = ENGLISH) -> tuple[OwnDiagram, ...]:
+def list_own_diagrams(
+    grade: Grade, cells: Sequence[DiagramCell], language: Language = ENGLISH
+) -> tuple[OwnDiagram, ...]:
     """Return the diagrams of the notebook's ``cells``, from top to bottom.
 
     The events are those of the first trial with messages, preferably a visible one.
@@ -47,44 +49,48 @@ def own_diagrams(grade: Grade, cells: Sequence[DiagramCell], language: Language 
     talking = [index for index, trial in enumerate(grade.trials) if trial.recording.messages]
     talking.sort(key=lambda index: is_for_staff(grade.trials[index].visibility))
     if not talking:
-        return tuple(_alone(cell, language) for cell in cells)
-    compared = _closest(grade, cells, talking[0])
+        return tuple(_build_uncompared(cell, language) for cell in cells)
+    compared = _find_closest(grade, cells, talking[0])
     return tuple(
-        _compared(cell, compared[cell.cell], grade, talking[0], language)
+        _build_compared(cell, compared[cell.cell], grade, talking[0], language)
         if cell.cell in compared
-        else _alone(cell, language)
+        else _build_uncompared(cell, language)
         for cell in cells
     )
 
 
-def title_of_cell(cell: DiagramCell, language: Language = ENGLISH) -> str:
+def format_cell_title(cell: DiagramCell, language: Language = ENGLISH) -> str:
     """Return the title of a cell's diagram."""
     return language.say(_TITLES[cell.diagram.kind], cell=cell.cell)
 
 
-def _closest(grade: Grade, cells: Sequence[DiagramCell], trial: int) -> dict[int, Differences]:
+def _find_closest(grade: Grade, cells: Sequence[DiagramCell], trial: int) -> dict[int, Differences]:
     """Return by cell the diagram of each kind that is closest to the recorded events, the last among equals."""
-    told = talks(grade.trials[trial].recording)
+    told = count_messages(grade.trials[trial].recording)
     best: dict[DiagramKind, tuple[int, Differences]] = {}
     for cell in cells:
-        found = differences(cell.diagram, told)
+        found = compare_with_recording(cell.diagram, told)
         before = best.get(cell.diagram.kind)
-        if found is not None and (before is None or found.alike >= before[1].alike):
+        if found is not None and (before is None or found.similarity >= before[1].similarity):
             best[cell.diagram.kind] = (cell.cell, found)
     return dict(best.values())
 
 
-def _alone(cell: DiagramCell, language: Language) -> OwnDiagram:
-    title, caption = title_of_cell(cell, language), language.say("The diagram in the notebook.")
-    plot = Plot(f"own-cell-{cell.cell}", "own", 0, "", title, caption, _alt(cell, language))
+def _build_uncompared(cell: DiagramCell, language: Language) -> OwnDiagram:
+    title, caption = format_cell_title(cell, language), language.say("The diagram in the notebook.")
+    plot = Plot(f"own-cell-{cell.cell}", "own", 0, "", title, caption, _format_alt_text(cell, language))
     return OwnDiagram(cell, None, title, "", (plot,))
 
 
-def _compared(cell: DiagramCell, found: Differences, grade: Grade, index: int, language: Language) -> OwnDiagram:
+def _build_compared(cell: DiagramCell, found: Differences, grade: Grade, index: int, language: Language) -> OwnDiagram:
     say = language.say
     trial = grade.trials[index]
-    name = f"cell-{cell.cell}-{trial_name(trial)}"
-    title, words, where = title_of_cell(cell, language), in_words(found, language), trial_words(trial, language)
+    name = f"cell-{cell.cell}-{build_trial_name(trial)}"
+    title, words, where = (
+        format_cell_title(cell, language),
+        describe_differences(found, language),
+        format_trial_name(trial, language),
+    )
     drawn, happened = say("The diagram in the notebook."), say("The events recorded in %(trial)s.", trial=where)
     if found.drawn_actors or found.drawn_arrows:
         drawn += " " + say("✗: drawn, but did not happen.")
@@ -92,16 +98,16 @@ def _compared(cell: DiagramCell, found: Differences, grade: Grade, index: int, l
         happened += " " + say("+: happened, but is not drawn.")
     beside = say("The same diagram of the events in %(trial)s.", trial=where)
     plots = (
-        Plot(f"own-{name}", "own", index, "", title, drawn, f"{_alt(cell, language)} {words}"),
+        Plot(f"own-{name}", "own", index, "", title, drawn, f"{_format_alt_text(cell, language)} {words}"),
         Plot(f"happened-{name}", "happened", index, "", say("Events"), happened, f"{beside} {words}"),
     )
     return OwnDiagram(cell, found, title, words, plots)
 
 
-def _alt(cell: DiagramCell, language: Language) -> str:
+def _format_alt_text(cell: DiagramCell, language: Language) -> str:
     return language.say(
         "%(title)s of %(names)s, with %(arrows)s arrows.",
-        title=title_of_cell(cell, language),
-        names=", ".join(one_line(actor.label, 30) for actor in cell.diagram.actors),
+        title=format_cell_title(cell, language),
+        names=", ".join(to_one_line(actor.label, 30) for actor in cell.diagram.actors),
         arrows=len(cell.diagram.arrows),
     )

@@ -23,7 +23,8 @@ from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 
 from service.grading.grade import TrialResult
-from service.reports.plots.path_marks import draw_marks, draw_times, placed
+from service.reports.display_text import format_heading, format_whole_number
+from service.reports.plots.path_marks import draw_marks, draw_times, to_world
 from service.reports.plots.style import (
     FAINT,
     FAULT,
@@ -35,14 +36,13 @@ from service.reports.plots.style import (
     RULE,
     SECOND_ROBOT,
     WIDTH,
-    axes_at,
-    font,
-    new_figure,
-    write,
+    add_axes,
+    create_figure,
+    load_font,
+    write_text,
 )  # fmt: skip
-from service.reports.readable import turned, whole
-from sim.recorded import robot_of
 from sim.recording import Pose, Recording
+from sim.recording_values import get_recorded_robot
 
 Pixels = NDArray[np.uint8]
 
@@ -54,9 +54,9 @@ _WHOLE_FLOOR_SHARE = 0.55  # a path that needs more of the floor than this is sh
 _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.10  # inches
 _LEGEND_COLUMNS = 2
 _OFF_THE_FLOOR = "#a3aab1"
-_DART = Path([(-0.55, -0.55), (1.0, 0.0), (-0.55, 0.55), (-0.2, 0.0), (-0.55, -0.55)])
+_ARROWHEAD = Path([(-0.55, -0.55), (1.0, 0.0), (-0.55, 0.55), (-0.2, 0.0), (-0.55, -0.55)])
 
-_BEACON: Mapping[str, Any] = MappingProxyType(
+_BEACON_STYLE: Mapping[str, Any] = MappingProxyType(
     {"marker": "*", "linestyle": "none", "markersize": 12, "color": RIGHT, "markeredgecolor": INK}
 )
 
@@ -84,53 +84,55 @@ class Viewport:
 def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Figure:
     """Draw the path of ``trial``'s robot. ``floor`` is (1143, 2362, 3), row 0 at y = 1143 mm; None draws it white."""
     recording = trial.recording
-    points = _points(recording)
+    points = _collect_points(recording)
     partner = recording.partner
-    partners = _points(partner) if partner is not None else points[:0]
+    partners = _collect_points(partner) if partner is not None else points[:0]
     everywhere = np.vstack((points, partners))
-    view = _view(recording, everywhere)
+    view = _choose_viewport(recording, everywhere)
     plot_width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
     plot_height = plot_width * view.height / view.width
-    handles = _legend(recording, view)
+    handles = _build_legend(recording, view)
     located = view.width < FLOOR_WIDTH
     legend_rows = -(-len(handles) // _LEGEND_COLUMNS)
     foot = 0.42 + max(0.62 if located else 0.0, 0.17 * legend_rows + 0.04)
-    figure = new_figure(HEAD + plot_height + foot, title, _subtitle(trial))
-    axes = axes_at(figure, _LEFT_EDGE, foot, plot_width, plot_height)
+    figure = create_figure(HEAD + plot_height + foot, title, _format_subtitle(trial))
+    axes = add_axes(figure, _LEFT_EDGE, foot, plot_width, plot_height)
     axes.set_xlim(view.left, view.right)
     axes.set_ylim(view.bottom, view.top)
     axes.set_facecolor(_OFF_THE_FLOOR)
-    draw_floor(axes, floor, view)
+    draw_floor_part(axes, floor, view)
     _draw_obstacles(axes, recording)
     _draw_beacon(axes, recording)
     per_inch = view.width / plot_width  # mm
     if partner is not None:
-        _draw_way(axes, partner, partners, per_inch, SECOND_ROBOT)
-    _draw_way(axes, recording, points, per_inch, LEFT)
-    axes.set_xlabel("x, mm", font=font(8.5), labelpad=1)
-    axes.set_ylabel("y, mm", font=font(8.5), labelpad=1)
+        _draw_robot_path(axes, partner, partners, per_inch, SECOND_ROBOT)
+    _draw_robot_path(axes, recording, points, per_inch, LEFT)
+    axes.set_xlabel("x, mm", font=load_font(8.5), labelpad=1)
+    axes.set_ylabel("y, mm", font=load_font(8.5), labelpad=1)
     figure.legend(
-        handles=handles, loc="lower left", bbox_to_anchor=(0.012, 0.0), ncols=_LEGEND_COLUMNS, prop=font(8),
+        handles=handles, loc="lower left", bbox_to_anchor=(0.012, 0.0), ncols=_LEGEND_COLUMNS, prop=load_font(8),
         frameon=False, handletextpad=0.5, columnspacing=0.9, labelspacing=0.35, borderaxespad=0.3,
     )  # fmt: skip
-    if _goes_on(everywhere, view):
+    if _has_points_outside(everywhere, view):
         axes.text(0.5, 0.03, "the path continues outside this image", transform=axes.transAxes, ha="center",
-                  font=font(7.5, bold=True), color=INK, zorder=9,
+                  font=load_font(7.5, bold=True), color=INK, zorder=9,
                   bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5})  # fmt: skip
     if located:
         _draw_locator(figure, floor, view)
     return figure
 
 
-def _subtitle(trial: TrialResult) -> str:
+def _format_subtitle(trial: TrialResult) -> str:
     start, end, recording = trial.recording.start, trial.recording.end, trial.recording
     return (
-        f"trial {trial.index + 1}; from ({whole(start.x)}, {whole(start.y)}) heading {turned(start.heading)}° to "
-        f"({whole(end.x)}, {whole(end.y)}) heading {turned(end.heading)}° in {recording.end_t:.1f} s"
+        f"trial {trial.index + 1}; from ({format_whole_number(start.x)}, {format_whole_number(start.y)}) heading "
+        f"{format_heading(start.heading)}° to "
+        f"({format_whole_number(end.x)}, {format_whole_number(end.y)}) heading {format_heading(end.heading)}° in "
+        f"{recording.end_t:.1f} s"
     )
 
 
-def _points(recording: Recording) -> NDArray[np.float64]:
+def _collect_points(recording: Recording) -> NDArray[np.float64]:
     """Return x, y and heading of the start and every tick, shape (n + 1, 3), without rows that are not finite."""
     ticks, start = recording.ticks, recording.start
     rows = np.column_stack((ticks.x, ticks.y, ticks.heading)) if len(ticks) else np.empty((0, 3))
@@ -138,8 +140,8 @@ def _points(recording: Recording) -> NDArray[np.float64]:
     return rows[np.isfinite(rows).all(axis=1)]
 
 
-def _view(recording: Recording, points: NDArray[np.float64]) -> Viewport:
-    reach = robot_of(recording).reach
+def _choose_viewport(recording: Recording, points: NDArray[np.float64]) -> Viewport:
+    reach = get_recorded_robot(recording).reach
     places = points[:, :2] if recording.beacon is None else np.vstack((points[:, :2], [recording.beacon]))
     low_x, low_y = (float(value) for value in places.min(axis=0))
     high_x, high_y = (float(value) for value in places.max(axis=0))
@@ -152,10 +154,10 @@ def _view(recording: Recording, points: NDArray[np.float64]) -> Viewport:
         view = Viewport(min(0.0, low_x), min(0.0, low_y), max(FLOOR_WIDTH, high_x), max(FLOOR_HEIGHT, high_y))
     left, right = max(view.left, -_BEYOND), min(view.right, FLOOR_WIDTH + _BEYOND)
     bottom, top = max(view.bottom, -_BEYOND), min(view.top, FLOOR_HEIGHT + _BEYOND)
-    return _shaped(Viewport(left, bottom, right, top))
+    return _widen_viewport(Viewport(left, bottom, right, top))
 
 
-def _shaped(view: Viewport) -> Viewport:
+def _widen_viewport(view: Viewport) -> Viewport:
     """Return ``view`` widened to a shape between a square and the floor's."""
     width, height = max(view.width, _SMALLEST_VIEW), max(view.height, _SMALLEST_VIEW / 1.6)
     width = max(width, height * 1.1)
@@ -164,7 +166,7 @@ def _shaped(view: Viewport) -> Viewport:
     return Viewport(x - width / 2, y - height / 2, x + width / 2, y + height / 2)
 
 
-def draw_floor(axes: Axes, floor: Pixels | None, view: Viewport) -> None:
+def draw_floor_part(axes: Axes, floor: Pixels | None, view: Viewport) -> None:
     """Draw the part of the floor in ``view``, lightened; white if there is no floor."""
     if floor is None:
         axes.add_patch(Rectangle((0, 0), FLOOR_WIDTH, FLOOR_HEIGHT, facecolor="white", edgecolor=RULE))
@@ -198,10 +200,12 @@ def _draw_obstacles(axes: Axes, recording: Recording) -> None:
 
 def _draw_beacon(axes: Axes, recording: Recording) -> None:
     if recording.beacon is not None:
-        axes.plot(*([value] for value in recording.beacon), **_BEACON, zorder=5)
+        axes.plot(*([value] for value in recording.beacon), **_BEACON_STYLE, zorder=5)
 
 
-def _draw_way(axes: Axes, recording: Recording, points: NDArray[np.float64], per_inch: float, colour: str) -> None:
+def _draw_robot_path(
+    axes: Axes, recording: Recording, points: NDArray[np.float64], per_inch: float, colour: str
+) -> None:
     """Draw everything about one robot."""
     _draw_trace(axes, recording, points, colour)
     _draw_robot(axes, recording.start, recording, dashed=True)
@@ -211,19 +215,19 @@ def _draw_way(axes: Axes, recording: Recording, points: NDArray[np.float64], per
 
 
 def _draw_trace(axes: Axes, recording: Recording, points: NDArray[np.float64], colour: str) -> None:
-    for first, last in _pen_strokes(recording, len(points)):
+    for first, last in _list_pen_strokes(recording, len(points)):
         axes.plot(points[first:last, 0], points[first:last, 1], color=PEN, linewidth=5.5, solid_capstyle="round")
     axes.plot(points[:, 0], points[:, 1], color="white", linewidth=3.2, solid_capstyle="round")
     axes.plot(points[:, 0], points[:, 1], color=colour, linewidth=1.5, solid_capstyle="round")
-    for index in _evenly(points, 10):
+    for index in _select_even_rows(points, 10):
         x, y, heading = points[index]
         axes.plot(
-            [x], [y], linestyle="none", marker=MarkerStyle(_DART, transform=Affine2D().rotate_deg(heading)),
+            [x], [y], linestyle="none", marker=MarkerStyle(_ARROWHEAD, transform=Affine2D().rotate_deg(heading)),
             markersize=8, color=colour, markeredgecolor="white", markeredgewidth=0.7, zorder=4,
         )  # fmt: skip
 
 
-def _pen_strokes(recording: Recording, count: int) -> list[tuple[int, int]]:
+def _list_pen_strokes(recording: Recording, count: int) -> list[tuple[int, int]]:
     """Return the row ranges of the path with the pen down."""
     strokes: list[tuple[int, int]] = []
     since: int | None = None
@@ -236,7 +240,7 @@ def _pen_strokes(recording: Recording, count: int) -> list[tuple[int, int]]:
     return [(first, last) for first, last in strokes if last - first > 1]
 
 
-def _evenly(points: NDArray[np.float64], wanted: int) -> list[int]:
+def _select_even_rows(points: NDArray[np.float64], wanted: int) -> list[int]:
     """Return rows at even intervals of distance and turning, without the first and last."""
     steps = np.hypot(np.diff(points[:, 0]), np.diff(points[:, 1])) + 0.8 * np.abs(np.diff(points[:, 2]))
     travelled = np.concatenate(([0.0], np.cumsum(steps)))
@@ -250,7 +254,7 @@ def _evenly(points: NDArray[np.float64], wanted: int) -> list[int]:
 def _draw_robot(axes: Axes, pose: Pose, recording: Recording, *, dashed: bool) -> None:
     if not math.isfinite(pose.x + pose.y + pose.heading):
         return
-    robot = robot_of(recording)
+    robot = get_recorded_robot(recording)
     nose = robot.front
     outline = [
         (-robot.half_width, robot.back), (robot.half_width, robot.back), (robot.half_width, nose * 0.55),
@@ -258,7 +262,7 @@ def _draw_robot(axes: Axes, pose: Pose, recording: Recording, *, dashed: bool) -
     ]  # fmt: skip
     axes.add_patch(
         Polygon(
-            [placed(pose, x, y) for x, y in outline],
+            [to_world(pose, x, y) for x, y in outline],
             closed=True,
             facecolor=(1, 1, 1, 0.12),
             edgecolor=INK,
@@ -268,29 +272,29 @@ def _draw_robot(axes: Axes, pose: Pose, recording: Recording, *, dashed: bool) -
         )
     )
     for sensor, colour in ((robot.left_light, LEFT), (robot.right_light, RIGHT)):
-        centre = placed(pose, sensor.x, sensor.y)
+        centre = to_world(pose, sensor.x, sensor.y)
         axes.add_patch(
             Circle(centre, sensor.diameter / 2, facecolor="none", edgecolor=colour, linewidth=0.9, zorder=2.6)
         )
 
 
-def _goes_on(points: NDArray[np.float64], view: Viewport) -> bool:
+def _has_points_outside(points: NDArray[np.float64], view: Viewport) -> bool:
     x, y = points[:, 0], points[:, 1]
     return bool(((x < view.left) | (x > view.right) | (y < view.bottom) | (y > view.top)).any())
 
 
-def _legend(recording: Recording, view: Viewport) -> list[Artist]:
+def _build_legend(recording: Recording, view: Viewport) -> list[Artist]:
     """Return a legend handle for every kind of element in the image."""
     handles: list[Artist] = [
         Line2D([], [], marker="o", linestyle="none", markersize=7, color="white", markeredgecolor=INK,
                markeredgewidth=1.6, label="start"),
         Line2D([], [], marker="o", linestyle="none", markersize=5.5, color=INK, label="end"),
-        Line2D([], [], color=LEFT, linewidth=1.5, marker=MarkerStyle(_DART), markersize=8,
+        Line2D([], [], color=LEFT, linewidth=1.5, marker=MarkerStyle(_ARROWHEAD), markersize=8,
                markeredgecolor="white", label="path and heading"),
     ]  # fmt: skip
     if recording.partner is not None:
         handles.append(
-            Line2D([], [], color=SECOND_ROBOT, linewidth=1.5, marker=MarkerStyle(_DART), markersize=8,
+            Line2D([], [], color=SECOND_ROBOT, linewidth=1.5, marker=MarkerStyle(_ARROWHEAD), markersize=8,
                    markeredgecolor="white", label="path of robot 2")
         )  # fmt: skip
     if any(down for _, down in recording.pen):
@@ -305,7 +309,7 @@ def _legend(recording: Recording, view: Viewport) -> list[Artist]:
             Line2D([], [], marker="x", linestyle="none", markersize=7, color=FAULT, markeredgewidth=2, label="touch")
         )
     if recording.beacon is not None:
-        handles.append(Line2D([], [], **_BEACON, label="beacon"))
+        handles.append(Line2D([], [], **_BEACON_STYLE, label="beacon"))
     if recording.obstacles:
         handles.append(Patch(facecolor="#c8cdd2", edgecolor=INK, hatch="////", label="obstacle"))
     if min(view.left, view.bottom) < -30 or view.right > FLOOR_WIDTH + 30 or view.top > FLOOR_HEIGHT + 30:
@@ -316,7 +320,7 @@ def _legend(recording: Recording, view: Viewport) -> list[Artist]:
 def _draw_locator(figure: Figure, floor: Pixels | None, view: Viewport) -> None:
     width = 0.94
     height = width * FLOOR_HEIGHT / FLOOR_WIDTH
-    axes = axes_at(figure, WIDTH - _RIGHT_EDGE - width, 0.06, width, height)
+    axes = add_axes(figure, WIDTH - _RIGHT_EDGE - width, 0.06, width, height)
     axes.set_xlim(0, FLOOR_WIDTH)
     axes.set_ylim(0, FLOOR_HEIGHT)
     axes.set_xticks([])
@@ -329,4 +333,4 @@ def _draw_locator(figure: Figure, floor: Pixels | None, view: Viewport) -> None:
     axes.add_patch(
         Rectangle((view.left, view.bottom), view.width, view.height, facecolor="none", edgecolor=FAULT, linewidth=1.4)
     )
-    write(figure, WIDTH - _RIGHT_EDGE - width, 0.10 + height, "whole floor", size=8, colour=FAINT)
+    write_text(figure, WIDTH - _RIGHT_EDGE - width, 0.10 + height, "whole floor", size=8, colour=FAINT)

@@ -12,16 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from service.reports.plots.style import FAULT, INK, SECOND_ROBOT, drawable, font
-from sim.recorded import robot_of, ticks_until
+from service.reports.plots.style import FAULT, INK, SECOND_ROBOT, load_font, replace_missing_glyphs
 from sim.recording import Pose, Recording
+from sim.recording_values import count_ticks_until, get_recorded_robot
 
 _TIME_SIZE, _NUMBER_SIZE = 7.6, 7.8  # points
 _FROM_PATH = 0.17, 0.15  # inches to the centre of a time
 _LINE = 0.16  # inches between two words above each other
 
 
-def placed(pose: Pose, x: float, y: float) -> tuple[float, float]:
+def to_world(pose: Pose, x: float, y: float) -> tuple[float, float]:
     """Return the world coordinates of a point of the robot (x right, y forward, mm)."""
     angle = math.radians(pose.heading - 90)
     cos, sin = math.cos(angle), math.sin(angle)
@@ -37,7 +37,7 @@ def draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], pe
     taken = [end for end in ends if math.isfinite(sum(end))]
     step = next((s for s in (1, 2, 5, 10, 20, 50, 100, 200) if recording.end_t / s <= 9), 500)
     for second in range(step, math.ceil(recording.end_t), step):
-        row = ticks_until(recording, second)
+        row = count_ticks_until(recording, second)
         if row >= len(points):
             break
         x, y = float(points[row, 0]), float(points[row, 1])
@@ -53,10 +53,10 @@ def draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], pe
             for way in (1, -1)
         ]
         fitting = [
-            side for side in sides if _whole_in_view(axes, *side, text, per_inch) and _clear(side, recording, per_inch)
+            side for side in sides if _is_in_view(axes, *side, text, per_inch) and _is_clear(side, recording, per_inch)
         ]
         if fitting:
-            _tag(axes, *fitting[0], text, _TIME_SIZE, colour if colour == SECOND_ROBOT else INK)
+            _draw_tag(axes, *fitting[0], text, _TIME_SIZE, colour if colour == SECOND_ROBOT else INK)
 
 
 def draw_marks(axes: Axes, recording: Recording, per_inch: float, colour: str) -> None:
@@ -75,10 +75,10 @@ def draw_marks(axes: Axes, recording: Recording, per_inch: float, colour: str) -
 
 
 def _draw_images(axes: Axes, recording: Recording, per_inch: float) -> None:
-    sensor = robot_of(recording).left_light
+    sensor = get_recorded_robot(recording).left_light
     places: dict[tuple[int, int], list[int]] = {}
     for count, image in enumerate(recording.images, start=1):
-        x, y = placed(image.pose, sensor.x, sensor.y)
+        x, y = to_world(image.pose, sensor.x, sensor.y)
         places.setdefault((round(x / 8), round(y / 8)), []).append(count)
         corner = (x - image.side / 2, y - image.side / 2)
         for edge, width in (("white", 2.4), (INK, 1.2)):
@@ -90,30 +90,31 @@ def _draw_images(axes: Axes, recording: Recording, per_inch: float) -> None:
     for (column, row), counts in reversed(places.items()):
         text = str(counts[0]) if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
         x, y = column * 8.0, row * 8 + 10 + 0.10 * per_inch
-        apart = 2 * _half_width(text) * per_inch
+        apart = 2 * _estimate_half_width(text) * per_inch
         if all(abs(x - other[0]) > apart or abs(y - other[1]) > _LINE * per_inch for other in numbered):
             numbered.append((x, y))
-            _tag(axes, x, y, text, _NUMBER_SIZE)
+            _draw_tag(axes, x, y, text, _NUMBER_SIZE)
 
 
-def _half_width(text: str) -> float:
+def _estimate_half_width(text: str) -> float:
     """Return about half the width of a time or a number, inches."""
     return 0.032 * len(text) + 0.03
 
 
-def _clear(place: tuple[float, float], recording: Recording, per_inch: float) -> bool:
+def _is_clear(place: tuple[float, float], recording: Recording, per_inch: float) -> bool:
     """Return whether a time at this place would not overlap a touch."""
     return all(math.dist(place, (touch.pose.x, touch.pose.y)) > 0.26 * per_inch for touch in recording.touches[:40])
 
 
-def _whole_in_view(axes: Axes, x: float, y: float, text: str, per_inch: float) -> bool:
+def _is_in_view(axes: Axes, x: float, y: float, text: str, per_inch: float) -> bool:
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
-    width, height = _half_width(text) * per_inch, _LINE / 2 * per_inch
+    width, height = _estimate_half_width(text) * per_inch, _LINE / 2 * per_inch
     return left + width <= x <= right - width and bottom + height <= y <= top - height
 
 
-def _tag(axes: Axes, x: float, y: float, text: str, size: float, colour: str = INK) -> None:
+def _draw_tag(axes: Axes, x: float, y: float, text: str, size: float, colour: str = INK) -> None:
     axes.text(
-        x, y, drawable(text), font=font(size), color=colour, ha="center", va="center", parse_math=False, zorder=9,
+        x, y, replace_missing_glyphs(text), font=load_font(size), color=colour, ha="center", va="center",
+        parse_math=False, zorder=9,
         clip_on=True, bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.6},
     )  # fmt: skip

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 from service.grading.grade import TrialResult
-from service.reports.readable import one_line
+from service.reports.display_text import to_one_line
 from service.reports.view import is_for_staff
 
 #: Resolution of every image, per inch.
 DPI = 200
-Kind = Literal[
+PlotKind = Literal[
     "path",
     "sensors",
     "confusion",
@@ -36,7 +36,7 @@ class Plot:
     """
 
     name: str
-    kind: Kind
+    kind: PlotKind
     subject: int
     scenario: str  # empty if it belongs to no scenario
     title: str
@@ -44,22 +44,22 @@ class Plot:
     alt: str
 
 
-def title_of(what: str) -> str:
+def format_title(what: str) -> str:
     """Return a plot's title, short enough for a phone."""
-    shown = one_line(what, 28)
+    shown = to_one_line(what, 28)
     return shown[:1].upper() + shown[1:]
 
 
-def trial_name(trial: TrialResult) -> str:
+def build_trial_name(trial: TrialResult) -> str:
     """Return a trial's part of a plot's name, which marks hidden trials."""
-    return f"{slug(trial.scenario)}-{trial.index + 1}{hidden_suffix(is_for_staff(trial.visibility))}"
+    return f"{slugify(trial.scenario)}-{trial.index + 1}{build_hidden_suffix(is_for_staff(trial.visibility))}"
 
 
-def hidden_suffix(hidden: bool) -> str:
+def build_hidden_suffix(hidden: bool) -> str:
     """Return the suffix of a plot's name."""
     return "-staff" if hidden else ""
 
 
-def slug(text: str) -> str:
+def slugify(text: str) -> str:
     """Return ``text`` as a part of a name."""
     return re.sub(r"[^A-Za-z0-9_.]+", "-", text)[:60].strip("-.") or "unnamed"

@@ -15,9 +15,20 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from service.grading.grade import Prediction
-from service.reports.plots.sensor_images import FOCUS, chosen_predictions, focus_image, is_right, sensor_image
-from service.reports.plots.style import FAULT, HEAD, INK, RULE, SAID, WIDTH, axes_at, drawable, font, new_figure
-from service.reports.readable import one_line
+from service.reports.display_text import to_one_line
+from service.reports.plots.sensor_images import FOCUS, crop_focus, is_right, select_predictions, to_rgb_image
+from service.reports.plots.style import (
+    FAULT,
+    HEAD,
+    INK,
+    RULE,
+    SAID,
+    WIDTH,
+    add_axes,
+    create_figure,
+    load_font,
+    replace_missing_glyphs,
+)
 
 _CARD_WIDTH, _CARD_HEIGHT = 1.93, 1.70
 _LINE = 28  # characters in a line under a card
@@ -27,11 +38,11 @@ _COLUMNS = 2
 
 def draw_predictions(predictions: Sequence[Prediction], title: str) -> Figure:
     """Draw cards of at most ``MOST_PREDICTIONS`` images, wrong answers first if not all fit."""
-    shown = chosen_predictions(predictions)
+    shown = select_predictions(predictions)
     rows = -(-len(shown) // _COLUMNS)
     height = rows * _CARD_HEIGHT
-    figure = new_figure(HEAD + height + 0.06, title, _subtitle(predictions, shown))
-    axes = axes_at(figure, 0.02, 0.06, WIDTH - 0.04, height + 0.06)
+    figure = create_figure(HEAD + height + 0.06, title, _format_subtitle(predictions, shown))
+    axes = add_axes(figure, 0.02, 0.06, WIDTH - 0.04, height + 0.06)
     axes.set_axis_off()
     for place, number in enumerate(shown):
         x, y = place % _COLUMNS * _CARD_WIDTH, place // _COLUMNS * _CARD_HEIGHT
@@ -41,7 +52,7 @@ def draw_predictions(predictions: Sequence[Prediction], title: str) -> Figure:
     return figure
 
 
-def _subtitle(predictions: Sequence[Prediction], shown: Sequence[int]) -> str:
+def _format_subtitle(predictions: Sequence[Prediction], shown: Sequence[int]) -> str:
     wrong = sum(not is_right(prediction) for prediction in predictions)
     count = (
         f"{len(predictions)} images" if len(shown) == len(predictions) else f"{len(shown)} of {len(predictions)} images"
@@ -51,7 +62,7 @@ def _subtitle(predictions: Sequence[Prediction], shown: Sequence[int]) -> str:
 
 def _draw_card(axes: Axes, prediction: Prediction, number: int, x: float, y: float) -> None:
     right = is_right(prediction)
-    whole, focus = np.asarray(sensor_image(prediction.image)), np.asarray(focus_image(prediction.image))
+    whole, focus = np.asarray(to_rgb_image(prediction.image)), np.asarray(crop_focus(prediction.image))
     _draw_image(axes, whole, x, y)
     _draw_image(axes, np.repeat(focus[:, :, None], 3, axis=2), x + _SIDE + 0.12, y)
     if prediction.image.side == 20:
@@ -67,15 +78,15 @@ def _draw_card(axes: Axes, prediction: Prediction, number: int, x: float, y: flo
                       linewidth=1.8)
         )  # fmt: skip
     sign, word = ("✓", "correct") if right else ("✗", "wrong")
-    answer = "no answer" if prediction.answer is None else one_line(prediction.answer, 30)
+    answer = "no answer" if prediction.answer is None else to_one_line(prediction.answer, 30)
     told = f"answer: {answer}" if prediction.answer is not None else answer
-    said = [one_line(prediction.truth, 40)] if right else [told, f"truth: {one_line(prediction.truth, 40)}"]
+    said = [to_one_line(prediction.truth, 40)] if right else [told, f"truth: {to_one_line(prediction.truth, 40)}"]
     lines = [(f"{number}. {sign} {word}", colour, True)]
     lines += [(line, INK, False) for text in said for line in textwrap.wrap(text, _LINE, max_lines=2, placeholder="…")]
     for row, (text, shade, bold) in enumerate(lines):
         axes.text(
-            x, y + _SIDE + 0.08 + 0.142 * row, drawable(text), color=shade,
-            font=font(8.3, bold=bold), va="top", parse_math=False,
+            x, y + _SIDE + 0.08 + 0.142 * row, replace_missing_glyphs(text), color=shade,
+            font=load_font(8.3, bold=bold), va="top", parse_math=False,
         )  # fmt: skip
 
 

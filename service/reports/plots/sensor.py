@@ -26,15 +26,15 @@ from service.reports.plots.style import (
     SAID,
     SECOND_ROBOT,
     WIDTH,
-    axes_at,
-    font,
-    new_figure,
-    set_tick_type,
-    write,
+    add_axes,
+    create_figure,
+    load_font,
+    set_tick_size,
+    write_text,
 )  # fmt: skip
 from sim.columns import Panel
-from sim.recorded import seconds_at
 from sim.recording import COLUMNS, TICK, Recording
+from sim.recording_values import tick_to_seconds
 
 _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.12  # inches
 _GAP = 0.20  # between panels, room for the panel's title
@@ -71,45 +71,45 @@ class Strip:
 def draw_sensors(trial: TrialResult, title: str) -> Figure:
     """Draw reflected light (mean red, 0..255), distance (cm), gyro and wheel encoders (degrees) of ``trial``."""
     recording = trial.recording
-    panels, strips = panels_of(recording), strips_of(recording)
+    panels, strips = build_panels(recording), build_strips(recording)
     strip_height = _ROW * len(strips) + 0.10 if strips else 0.0
     body = sum(each.panel.height + _GAP for each in panels)
-    figure = new_figure(HEAD + strip_height + body + 0.36, title, _subtitle(trial))
-    end = max(recording.end_t, seconds_at(recording, len(recording.ticks)), 0.1)
+    figure = create_figure(HEAD + strip_height + body + 0.36, title, _format_subtitle(trial))
+    end = max(recording.end_t, tick_to_seconds(recording, len(recording.ticks)), 0.1)
     top = float(figure.get_size_inches()[1]) - HEAD
     width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
     if strips:
         top -= strip_height
-        _draw_strips(axes_at(figure, _LEFT_EDGE, top, width, strip_height), strips, end)
+        _draw_strips(add_axes(figure, _LEFT_EDGE, top, width, strip_height), strips, end)
     for number, each in enumerate(panels):
         height = each.panel.height
         top -= height + _GAP
-        axes = axes_at(figure, _LEFT_EDGE, top, width, height)
-        write(figure, _LEFT_EDGE, top + height + 0.045, each.panel.title, size=8, bold=True)
+        axes = add_axes(figure, _LEFT_EDGE, top, width, height)
+        write_text(figure, _LEFT_EDGE, top + height + 0.045, each.panel.title, size=8, bold=True)
         _draw_panel(axes, each, recording.ticks.t, end)
         if len(each.curves) > 1:
-            _name_curves(figure, each, top + height + 0.045)
+            _label_curves(figure, each, top + height + 0.045)
         if number < len(panels) - 1:
             axes.tick_params(labelbottom=False)
         else:
-            axes.set_xlabel("simulated time, s", font=font(8.5), labelpad=1)
+            axes.set_xlabel("simulated time, s", font=load_font(8.5), labelpad=1)
     return figure
 
 
-def panels_of(recording: Recording) -> tuple[ReadingPanel, ...]:
+def build_panels(recording: Recording) -> tuple[ReadingPanel, ...]:
     """Return the panels for ``draw_sensors``, top to bottom."""
-    told = recording.ticks.told()
+    told = recording.ticks.to_displayed_columns()
     curves: dict[Panel, list[ReadingCurve]] = {}
     for column in COLUMNS:
         if column.panel is not None:
-            values = told[column.told_as]
+            values = told[column.display_attribute]
             shown = values if values.ndim == 1 else values[:, 0]
             curves.setdefault(column.panel, []).append(ReadingCurve(column.label, shown / column.panel.per))
     ordered = sorted(curves, key=lambda panel: panel.rank)
     return tuple(ReadingPanel(panel, tuple(curves[panel])) for panel in ordered)
 
 
-def strips_of(recording: Recording) -> tuple[Strip, ...]:
+def build_strips(recording: Recording) -> tuple[Strip, ...]:
     """Return the kinds of events that occurred, with their times in seconds."""
     answers = [m for m in recording.messages if m.sender == "responder"]
     heard = [m for m in recording.messages if m.sender == "partner"]
@@ -124,7 +124,7 @@ def strips_of(recording: Recording) -> tuple[Strip, ...]:
     return tuple(strip for strip in strips if strip.times)
 
 
-def _subtitle(trial: TrialResult) -> str:
+def _format_subtitle(trial: TrialResult) -> str:
     noise = []
     if trial.light_noise:
         noise.append(f"light noise {trial.light_noise:g}")
@@ -139,7 +139,7 @@ def _draw_strips(axes: Axes, strips: Sequence[Strip], end: float) -> None:
     axes.set_ylim(-0.6, len(strips) - 0.4)
     axes.set_xticks([])
     axes.set_yticks(range(len(strips)), [strip.label for strip in reversed(strips)])
-    set_tick_type(axes, 7.5)
+    set_tick_size(axes, 7.5)
     axes.tick_params(axis="y", length=0)
     for row, strip in enumerate(reversed(strips)):
         axes.axhline(row, color=RULE, linewidth=0.6, zorder=0)
@@ -154,7 +154,7 @@ def _draw_panel(axes: Axes, panel: ReadingPanel, times: NDArray[np.float64], end
     axes.set_xlim(0, end)
     for curve, colour, dashes, width in zip(panel.curves, (LEFT, RIGHT), ((), (3.2, 1.2)), (1.1, 1.3), strict=False):
         axes.plot(times, curve.values, color=colour, linewidth=width, dashes=dashes or (None, None))
-    limits = panel.panel.limits or _fitted(panel)
+    limits = panel.panel.limits or _compute_limits(panel)
     axes.set_ylim(*limits)
     if panel.panel.marks:
         axes.set_yticks(panel.panel.marks)
@@ -165,10 +165,10 @@ def _draw_panel(axes: Axes, panel: ReadingPanel, times: NDArray[np.float64], end
     axes.spines["right"].set_visible(False)
     if not len(times):
         axes.text(0.5, 0.5, "no time passed", transform=axes.transAxes, ha="center", va="center", color=FAINT,
-                  font=font(8))  # fmt: skip
+                  font=load_font(8))  # fmt: skip
 
 
-def _fitted(panel: ReadingPanel) -> tuple[float, float]:
+def _compute_limits(panel: ReadingPanel) -> tuple[float, float]:
     values = np.concatenate([curve.values for curve in panel.curves])
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
@@ -178,11 +178,11 @@ def _fitted(panel: ReadingPanel) -> tuple[float, float]:
     return low - room, high + room
 
 
-def _name_curves(figure: Figure, panel: ReadingPanel, y: float) -> None:
+def _label_curves(figure: Figure, panel: ReadingPanel, y: float) -> None:
     right = WIDTH - _RIGHT_EDGE
     width, height = figure.get_size_inches()
     for curve, text_x, colour in zip(panel.curves, (right - 0.86, right - 0.30), (LEFT, RIGHT), strict=True):
-        write(figure, text_x, y, curve.label, size=8, colour=INK)
+        write_text(figure, text_x, y, curve.label, size=8, colour=INK)
         ends = [(text_x - 0.25) / width, (text_x - 0.05) / width]
         line = Line2D(ends, [(y + 0.045) / height] * 2, color=colour, linewidth=1.5)
         if colour == RIGHT:

@@ -22,7 +22,7 @@ FOCUS = (3, 3, 17, 17)
 
 
 @dataclass(frozen=True, slots=True)
-class Misread:
+class MisreadImage:
     """A misread image, and the nearest correctly read ones of its truth and of its answer, if they exist."""
 
     number: int  # of the image, from 1
@@ -31,7 +31,7 @@ class Misread:
     like_answer: Prediction | None
 
 
-def chosen_predictions(predictions: Sequence[Prediction]) -> tuple[int, ...]:
+def select_predictions(predictions: Sequence[Prediction]) -> tuple[int, ...]:
     """Return the indices of the images to show, ascending. If there are too many, wrong ones have priority."""
     order = sorted(range(len(predictions)), key=lambda index: (is_right(predictions[index]), index))
     return tuple(sorted(order[:MOST_PREDICTIONS]))
@@ -42,18 +42,18 @@ def is_right(prediction: Prediction) -> bool:
     return prediction.answer is not None and prediction.answer == prediction.truth
 
 
-def sensor_image(image: Image) -> Pixels.Image:
+def to_rgb_image(image: Image) -> Pixels.Image:
     """Return the left sensor's image as RGB, ``image.side`` squared."""
     return Pixels.frombytes("RGBA", (image.side, image.side), image.left).convert("RGB")
 
 
-def focus_image(image: Image) -> Pixels.Image:
+def crop_focus(image: Image) -> Pixels.Image:
     """Return the greyscale crop that a network gets. Sensors of a size other than 20 are shown whole."""
-    whole = sensor_image(image).convert("L")
+    whole = to_rgb_image(image).convert("L")
     return whole.crop(FOCUS) if image.side == 20 else whole
 
 
-def misread(predictions: Sequence[Prediction]) -> tuple[Misread, ...]:
+def find_misread(predictions: Sequence[Prediction]) -> tuple[MisreadImage, ...]:
     """Return every wrongly answered image, in the order sent.
 
     Neighbours are searched only for the images that are drawn.
@@ -63,26 +63,26 @@ def misread(predictions: Sequence[Prediction]) -> tuple[Misread, ...]:
         for number, prediction in enumerate(predictions, start=1)
         if prediction.answer is not None and not is_right(prediction)
     ]
-    greys = [(prediction, _greys(prediction)) for prediction in predictions if is_right(prediction)] if wrong else []
+    greys = [(prediction, _to_greys(prediction)) for prediction in predictions if is_right(prediction)] if wrong else []
     drawn = (
-        Misread(
+        MisreadImage(
             number,
             prediction,
-            _nearest(prediction, prediction.truth, greys),
-            _nearest(prediction, prediction.answer, greys),
+            _find_nearest(prediction, prediction.truth, greys),
+            _find_nearest(prediction, prediction.answer, greys),
         )
         for number, prediction in wrong[:MOST_MISREAD]
     )
-    return (*drawn, *(Misread(number, prediction, None, None) for number, prediction in wrong[MOST_MISREAD:]))
+    return (*drawn, *(MisreadImage(number, prediction, None, None) for number, prediction in wrong[MOST_MISREAD:]))
 
 
-def _greys(prediction: Prediction) -> NDArray[np.float64]:
-    return np.asarray(focus_image(prediction.image), dtype=np.float64)
+def _to_greys(prediction: Prediction) -> NDArray[np.float64]:
+    return np.asarray(crop_focus(prediction.image), dtype=np.float64)
 
 
-def _nearest(
+def _find_nearest(
     prediction: Prediction, label: str | None, greys: Sequence[tuple[Prediction, NDArray[np.float64]]]
 ) -> Prediction | None:
-    own = _greys(prediction)
+    own = _to_greys(prediction)
     alike = [(prediction, grey) for prediction, grey in greys if prediction.truth == label and grey.shape == own.shape]
     return min(alike, key=lambda pair: float(((pair[1] - own) ** 2).sum()), default=(None, own))[0]

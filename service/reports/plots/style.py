@@ -21,8 +21,8 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 from PIL import Image
 
+from service.reports.display_text import to_one_line
 from service.reports.plots.plot import DPI
-from service.reports.readable import one_line
 
 # A file called matplotlibrc in the current folder must not change plots.
 matplotlib.rcParams.update({name: value for name, value in matplotlib.rcParamsDefault.items() if "backend" not in name})
@@ -47,24 +47,24 @@ FONT_FILE = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf
 _BOLD = FONT_FILE.with_name("DejaVuSans-Bold.ttf")
 
 
-def new_figure(height: float, title: str, subtitle: str = "", width: float = WIDTH) -> Figure:
+def create_figure(height: float, title: str, subtitle: str = "", width: float = WIDTH) -> Figure:
     """Return a white figure of ``width`` x ``height`` inches with its title at the top left, in ``HEAD`` inches.
 
     Very large figures get a lower resolution to save memory.
     """
     dpi = min(DPI, math.sqrt(_MOST_PIXELS / (width * height)))
     figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
-    write(figure, 0.08, height - 0.08, one_line(title, int(width * 10)), size=10, bold=True, va="top")
-    lines = textwrap.wrap(one_line(subtitle, 200), int(width * _CHARACTERS), max_lines=2, placeholder=" …")
+    write_text(figure, 0.08, height - 0.08, to_one_line(title, int(width * 10)), size=10, bold=True, va="top")
+    lines = textwrap.wrap(to_one_line(subtitle, 200), int(width * _CHARACTERS), max_lines=2, placeholder=" …")
     for number, line in enumerate(lines):
-        write(figure, 0.08, height - 0.29 - 0.135 * number, line, size=8, colour=FAINT, va="top")
+        write_text(figure, 0.08, height - 0.29 - 0.135 * number, line, size=8, colour=FAINT, va="top")
     return figure
 
 
 HEAD = 0.68
 
 
-def write(
+def write_text(
     figure: Figure,
     x: float,
     y: float,
@@ -79,12 +79,13 @@ def write(
     """Write text at ``x``, ``y`` inches from the lower left corner of the figure."""
     width, height = figure.get_size_inches()
     return figure.text(
-        x / width, y / height, drawable(text), color=colour, ha=ha, va=va, font=font(size, bold=bold),
+        x / width, y / height, replace_missing_glyphs(text), color=colour, ha=ha, va=va, font=load_font(size,
+        bold=bold),
         parse_math=False,
     )  # fmt: skip
 
 
-def axes_at(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
+def add_axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
     """Return axes at a rectangle in inches, with thin rules and small type."""
     figure_width, figure_height = figure.get_size_inches()
     axes = figure.add_axes((left / figure_width, bottom / figure_height, width / figure_width, height / figure_height))
@@ -92,37 +93,37 @@ def axes_at(figure: Figure, left: float, bottom: float, width: float, height: fl
         side.set_color(RULE)
         side.set_linewidth(0.8)
     axes.tick_params(color=RULE, labelcolor=INK, length=3, width=0.8, pad=2)
-    set_tick_type(axes)
+    set_tick_size(axes)
     return axes
 
 
-def set_tick_type(axes: Axes, size: float = 8) -> None:
+def set_tick_size(axes: Axes, size: float = 8) -> None:
     """Set the size of the tick labels, in points."""
     axes.tick_params(labelsize=max(size, _SMALLEST), labelfontfamily="DejaVu Sans")
 
 
 @lru_cache(maxsize=64)
-def font(size: float, *, bold: bool = False) -> FontProperties:
+def load_font(size: float, *, bold: bool = False) -> FontProperties:
     """Return the type bundled with matplotlib, independent of installed fonts, in a size readable on a phone."""
     return FontProperties(fname=str(_BOLD if bold else FONT_FILE), size=max(size, _SMALLEST))
 
 
-def drawable(text: str) -> str:
+def replace_missing_glyphs(text: str) -> str:
     """Replace every character that the type lacks, so that none is drawn as an empty box."""
-    known = _known_characters()
+    known = _load_known_characters()
     return "".join(character if character == "\n" or ord(character) in known else "\ufffd" for character in text)
 
 
-def png(figure: Figure) -> bytes:
+def render_png(figure: Figure) -> bytes:
     """Return the figure as a PNG of at most 256 colours, without metadata; equal figures give equal bytes."""
     canvas = FigureCanvasAgg(figure)
     canvas.draw()  # type: ignore[no-untyped-call]
     stream = io.BytesIO()
-    _with_palette(np.asarray(canvas.buffer_rgba())).save(stream, "PNG", compress_level=6, dpi=(DPI, DPI))  # type: ignore[no-untyped-call]
+    _reduce_colours(np.asarray(canvas.buffer_rgba())).save(stream, "PNG", compress_level=6, dpi=(DPI, DPI))  # type: ignore[no-untyped-call]
     return stream.getvalue()
 
 
-def _with_palette(rgba: NDArray[np.uint8]) -> Image.Image:
+def _reduce_colours(rgba: NDArray[np.uint8]) -> Image.Image:
     """Return the image with at most 256 colours, chosen by median cut.
 
     Plots are flat: their pixels come in runs. Each of their few thousand colours is examined once, weighted by the root
@@ -144,6 +145,6 @@ def _with_palette(rgba: NDArray[np.uint8]) -> Image.Image:
 
 
 @lru_cache(maxsize=1)
-def _known_characters() -> frozenset[int]:
+def _load_known_characters() -> frozenset[int]:
     # Both weights are used, and the bold one has fewer characters.
     return frozenset(get_font(str(FONT_FILE)).get_charmap()) & frozenset(get_font(str(_BOLD)).get_charmap())

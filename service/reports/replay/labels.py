@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from service.language import Language, translatable
-from service.reports.robots import CALLED
-from service.reports.verdict_sentences import KINDS
+from service.reports.robots import PARTY_NAMES
+from service.reports.verdict_sentences import EVENT_KINDS
 
 #: By the script's keys.
 _SENTENCES: Mapping[str, str] = MappingProxyType(
@@ -96,12 +96,12 @@ _UNITS: Mapping[str, str] = MappingProxyType(
 )
 
 
-def replay_words(language: Language) -> dict[str, dict[str, str]]:
+def translate_labels(language: Language) -> dict[str, dict[str, str]]:
     """Return all texts for the script: sentences with ``%(name)s`` placeholders, and words by key."""
     tables = {
         "sentences": _SENTENCES,
-        "kinds": {**KINDS, **_MORE_KINDS},
-        "called": CALLED,
+        "kinds": {**EVENT_KINDS, **_MORE_KINDS},
+        "called": PARTY_NAMES,
         "readings": _READINGS,
         "units": _UNITS,
     }

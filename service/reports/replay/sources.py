@@ -9,19 +9,19 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from responders.code import Code
-from service.reports.readable import one_line, readable
+from responders.source_file import SourceFile
+from service.reports.display_text import to_display_text, to_one_line
 from sim.recording import Fault
 from submissions.submission import Notebook, Submission
 
 _MOST_LINES, _LONGEST_LINE = 3000, 300
-_WRITES = re.compile(r"\b(?:(print)|say|speak)\w*\s*\(\s*")
+_OUTPUT_CALL = re.compile(r"\b(?:(print)|say|speak)\w*\s*\(\s*")
 _LITERAL = re.compile(r"([fF]?)(['\"])(?!\2\2)([^'\"\\{}]*)(\2\s*\))?")
 _IMAGE = "IMG_DATA"
 
 
 @dataclass(frozen=True, slots=True)
-class _Writer:
+class _OutputText:
     """The text that a line prints or speaks, or its beginning."""
 
     prints: bool
@@ -38,11 +38,11 @@ class ShownSource:
     text: str = field(repr=False)
     cell: int | None = None
 
-    def told(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         """Return the source as replay data, with long lines and files shortened."""
         lines = self.text.rstrip("\n").split("\n")
-        shown = [readable(line[:_LONGEST_LINE], _LONGEST_LINE) for line in lines[:_MOST_LINES]]
-        return {"name": one_line(self.name, 80), "lines": shown, "more": len(lines) - len(shown)}
+        shown = [to_display_text(line[:_LONGEST_LINE], _LONGEST_LINE) for line in lines[:_MOST_LINES]]
+        return {"name": to_one_line(self.name, 80), "lines": shown, "more": len(lines) - len(shown)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,27 +59,27 @@ class Sources:
     def __init__(self, shown: Sequence[ShownSource] = ()) -> None:
         self.shown = tuple(shown)
         #: The lines of each text, at most two: with two, the line is ambiguous.
-        self._writers: dict[_Writer, list[Place]] = {}
+        self._writers: dict[_OutputText, list[Place]] = {}
         for index, source in enumerate(self.shown):
             if source.who == "program":
-                for line, writer in _writers(source.text):
+                for line, writer in _iterate_output_texts(source.text):
                     places = self._writers.setdefault(writer, [])
                     if len(places) < 2:
                         places.append(Place(index, line))
         self._lengths = sorted({len(writer.begins) for writer in self._writers if not writer.is_all})
 
-    def wrote(self, text: str, *, spoken: bool = False) -> Place | None:
+    def find_writing_line(self, text: str, *, spoken: bool = False) -> Place | None:
         """Return the only line of the robot program that can have printed, or spoken, the text; None if unknown.
 
         The text's beginnings are looked up one by one, so that long sources and many texts don't slow it down.
         """
         text = _IMAGE if text.startswith(f"{_IMAGE}::") else text
-        possible = [_Writer(not spoken, text, True)]
-        possible += [_Writer(not spoken, text[:length], False) for length in self._lengths if length <= len(text)]
+        possible = [_OutputText(not spoken, text, True)]
+        possible += [_OutputText(not spoken, text[:length], False) for length in self._lengths if length <= len(text)]
         found = [place for writer in possible for place in self._writers.get(writer, ())]
         return found[0] if len(found) == 1 else None
 
-    def of_fault(self, fault: Fault) -> Place | None:
+    def find_fault_line(self, fault: Fault) -> Place | None:
         """Return the line that a fault names, if it is in the shown sources."""
         if fault.line is None or fault.file or fault.agent:
             return None
@@ -89,42 +89,44 @@ class Sources:
         return None
 
 
-def sources_of(submission: Submission | None) -> Sources:
+def collect_sources(submission: Submission | None) -> Sources:
     """Return the student's sources: both files, or every code cell."""
     if submission is None:
         return Sources()
     if submission.notebook is not None:
-        return sources_of_cells(submission.notebook)
-    return sources_of_files(submission.program, submission.responder)
+        return collect_cell_sources(submission.notebook)
+    return collect_file_sources(submission.program, submission.responder)
 
 
-def sources_of_files(program: Code | None, responder: Code | None) -> Sources:
+def collect_file_sources(program: SourceFile | None, responder: SourceFile | None) -> Sources:
     """Return the sources of a robot program and its responder, if present."""
     files = (("program", program), ("responder", responder))
     return Sources([ShownSource(code.name, who, code.text) for who, code in files if code is not None])
 
 
-def sources_of_cells(notebook: Notebook) -> Sources:
+def collect_cell_sources(notebook: Notebook) -> Sources:
     """Return every code cell that is not empty."""
     return Sources(
         [
-            ShownSource(f"cell {cell.number}", "program" if _is_program(cell.source) else "", cell.source, cell.number)
+            ShownSource(
+                f"cell {cell.number}", "program" if _is_robot_cell(cell.source) else "", cell.source, cell.number
+            )
             for cell in notebook.cells
             if cell.source.strip()
         ]
     )
 
 
-def _is_program(cell: str) -> bool:
+def _is_robot_cell(cell: str) -> bool:
     return cell.lstrip().startswith("%%sim")
 
 
-def _writers(text: str) -> Iterator[tuple[int, _Writer]]:
+def _iterate_output_texts(text: str) -> Iterator[tuple[int, _OutputText]]:
     for number, line in enumerate(text.split("\n")[:_MOST_LINES], start=1):
         code = line[:_LONGEST_LINE].lstrip()
         if code.startswith(("#", "def ")):
             continue
-        for call in _WRITES.finditer(code):
+        for call in _OUTPUT_CALL.finditer(code):
             literal = _LITERAL.match(code, call.end())
             begins = literal[3] if literal else ""
-            yield number, _Writer(call[1] is not None, begins, bool(literal and literal[4]))
+            yield number, _OutputText(call[1] is not None, begins, bool(literal and literal[4]))

@@ -15,39 +15,43 @@ from numpy.typing import NDArray
 
 from service.grading.grade import CriterionResult, Prediction, TrialResult
 from service.language import ENGLISH, Language
-from service.reports.crossing import befell_in_full, note_words
-from service.reports.faults import place_words
-from service.reports.readable import message_words, number, one_line, readable
+from service.reports.display_text import abbreviate_message, format_decimal, to_display_text, to_one_line
+from service.reports.faults import describe_place
+from service.reports.message_losses import describe_loss_fully, describe_note
 from service.reports.replay.sources import Place, Sources
-from service.reports.robots import PARTNER_OF, answering, robots_of
-from service.reports.verdict_sentences import trial_words, verdict_words
-from sim.recorded import pose_at, printed_alone, robot_of
+from service.reports.robots import PARTNER_OF, iterate_robots, select_answering_party
+from service.reports.verdict_sentences import describe_verdict, format_trial_name
 from sim.recording import COLUMNS, SECOND, Image, Pose, Recording, Ticks, Verdict
+from sim.recording_values import collect_printed_lines, get_pose_at, get_recorded_robot
 from sim.robot import LightSensor
 
 #: Of each kind of event, in one trial.
-_MOST = 2000
+_MOST_EVENTS = 2000
 _MOST_IMAGES = 1000
 _LONGEST_TEXT, _MOST_LINES = 600, 12
 #: Steps in one unit of a column. A canvas shows nothing smaller.
-_FINE = frozenset({"x", "y", "heading"})
+_FINE_COLUMNS = frozenset({"x", "y", "heading"})
 _STEPS_OF_FINE, _STEPS = 100, 10
 #: The largest number of steps. A program can set the position of a wheel to any number.
 _MOST_STEPS = 2.0**52
 
 
-def told_columns(ticks: Ticks) -> dict[str, dict[str, Any]]:
+def columns_to_json(ticks: Ticks) -> dict[str, dict[str, Any]]:
     """Return every column with known values, by its public name."""
     told = {}
     for each in COLUMNS:
-        values = np.asarray(getattr(ticks, each.told_as), np.float64).reshape(len(ticks), each.width)
+        values = np.asarray(getattr(ticks, each.display_attribute), np.float64).reshape(len(ticks), each.width)
         if len(ticks) and np.isfinite(values).any():
-            per = _STEPS_OF_FINE if each.name in _FINE else _STEPS
-            told[each.told_as] = {"unit": each.unit, "per": per, "added": [_added(part, per) for part in values.T]}
+            per = _STEPS_OF_FINE if each.name in _FINE_COLUMNS else _STEPS
+            told[each.display_attribute] = {
+                "unit": each.unit,
+                "per": per,
+                "added": [_encode_differences(part, per) for part in values.T],
+            }
     return told
 
 
-def _added(values: NDArray[np.float64], per: int) -> list[int | None]:
+def _encode_differences(values: NDArray[np.float64], per: int) -> list[int | None]:
     """Return the difference of each value from the previous one, the first from 0; None for missing values."""
     known = np.isfinite(values)
     within = np.clip(np.where(known, values, 0), -_MOST_STEPS / per, _MOST_STEPS / per)
@@ -59,7 +63,7 @@ def _added(values: NDArray[np.float64], per: int) -> list[int | None]:
     return added
 
 
-def trial_data(
+def trial_to_json(
     trial: TrialResult,
     sources: Sources,
     criteria: Sequence[CriterionResult] = (),
@@ -68,39 +72,39 @@ def trial_data(
 ) -> dict[str, Any]:
     """Return all data of a trial except its floor. ``index`` is its index in the evidence of the ``criteria``."""
     recording = trial.recording
-    texts, left_out = _events(recording, sources, language)
-    messages = sorted(_messages(recording, sources, language), key=lambda message: message["t"])
-    left_out += max(0, len(messages) - _MOST)
+    texts, left_out = _collect_events(recording, sources, language)
+    messages = sorted(_iterate_messages(recording, sources, language), key=lambda message: message["t"])
+    left_out += max(0, len(messages) - _MOST_EVENTS)
     predictions = [each for result in criteria for each in result.predictions if each.trial == index]
     return {
         "trial": index + 1,
-        "name": trial_words(trial, language),
+        "name": format_trial_name(trial, language),
         "verdict": trial.verdict.value,
-        "ended": verdict_words(trial.verdict, language).short,
+        "ended": describe_verdict(trial.verdict, language).short,
         "seconds": recording.end_t,
         "tick": recording.ticks.length / SECOND,
         "obstacles": recording.obstacles,
         "beacon": recording.beacon,
-        "robots": [_robot(name, own, predictions) for name, own in robots_of(recording)],
-        "messages": messages[:_MOST],
+        "robots": [_robot_to_json(name, own, predictions) for name, own in iterate_robots(recording)],
+        "messages": messages[:_MOST_EVENTS],
         "events": texts,
         "left_out": left_out,
-        "lost": _losses(recording, criteria, index),
+        "lost": _collect_losses(recording, criteria, index),
     }
 
 
-def loss_moment(recording: Recording, t: float | None) -> float:
+def compute_loss_time(recording: Recording, t: float | None) -> float:
     """Return the time at which a criterion was lost; the end of the trial if there is no time."""
     return recording.end_t if t is None or not math.isfinite(t) else max(0.0, min(t, recording.end_t))
 
 
-def moment_hash(trial: int, t: float) -> str:
+def format_moment_link(trial: int, t: float) -> str:
     """Return a link to a moment of a trial, counted from 1. Rounding never makes it earlier."""
     return f"#trial={trial}&t={math.ceil(t * 1000 - 1e-6) / 1000:.3f}"
 
 
-def _robot(name: str, recording: Recording, predictions: Sequence[Prediction]) -> dict[str, Any]:
-    body = robot_of(recording)
+def _robot_to_json(name: str, recording: Recording, predictions: Sequence[Prediction]) -> dict[str, Any]:
+    body = get_recorded_robot(recording)
     return {
         "name": name,
         "body": {
@@ -110,74 +114,82 @@ def _robot(name: str, recording: Recording, predictions: Sequence[Prediction]) -
             "wheel_spacing": body.wheel_spacing,
             "wheel_diameter": body.wheel_diameter,
             "ultrasonic": body.ultrasonic_y,
-            "left": _sensor(body.left_light),
-            "right": _sensor(body.right_light),
+            "left": _sensor_to_json(body.left_light),
+            "right": _sensor_to_json(body.right_light),
         },
-        "start": _pose(recording.start),
-        "end": _pose(recording.end),
-        "columns": told_columns(recording.ticks),
+        "start": _pose_to_json(recording.start),
+        "end": _pose_to_json(recording.end),
+        "columns": columns_to_json(recording.ticks),
         "pen": recording.pen,
-        "images": [_image(image, predictions) for image in recording.images[:_MOST_IMAGES]],
+        "images": [_image_to_json(image, predictions) for image in recording.images[:_MOST_IMAGES]],
     }
 
 
-def _sensor(sensor: LightSensor) -> list[float]:
+def _sensor_to_json(sensor: LightSensor) -> list[float]:
     return [sensor.x, sensor.y, sensor.diameter]
 
 
-def _pose(pose: Pose) -> list[float]:
+def _pose_to_json(pose: Pose) -> list[float]:
     return [round(value, 2) if math.isfinite(value) else 0.0 for value in (pose.x, pose.y, pose.heading)]
 
 
-def _image(image: Image, predictions: Sequence[Prediction]) -> dict[str, Any]:
+def _image_to_json(image: Image, predictions: Sequence[Prediction]) -> dict[str, Any]:
     told: dict[str, Any] = {
         "t": image.t,
         "side": image.side,
-        "pose": _pose(image.pose),
-        "left": _pixels(image.left),
-        "right": _pixels(image.right),
+        "pose": _pose_to_json(image.pose),
+        "left": _encode_pixels(image.left),
+        "right": _encode_pixels(image.right),
     }
     for each in predictions:
         if (each.image.t, each.image.message) == (image.t, image.message):
-            told["truth"] = one_line(each.truth, 60)
-            told["answer"] = None if each.answer is None else one_line(each.answer, 60)
+            told["truth"] = to_one_line(each.truth, 60)
+            told["answer"] = None if each.answer is None else to_one_line(each.answer, 60)
     return told
 
 
-def _pixels(rgba: bytes) -> str:
+def _encode_pixels(rgba: bytes) -> str:
     """Return the pixels without their alpha values, which are all equal."""
     whole = rgba[: len(rgba) // 4 * 4]
     return base64.b64encode(np.frombuffer(whole, np.uint8).reshape(-1, 4)[:, :3].tobytes()).decode("ascii")
 
 
-def _events(recording: Recording, sources: Sources, language: Language) -> tuple[list[dict[str, Any]], int]:
+def _collect_events(recording: Recording, sources: Sources, language: Language) -> tuple[list[dict[str, Any]], int]:
     """Return prints, speech, touches and faults by time, and how many are left out."""
     events: list[dict[str, Any]] = []
     left_out = 0
-    for robot, own in robots_of(recording):
-        is_students, printed = own is recording, printed_alone(own)
+    for robot, own in iterate_robots(recording):
+        is_students, printed = own is recording, collect_printed_lines(own)
         kinds: tuple[list[dict[str, Any]], ...] = (
             [
-                _event(line.t, robot, "printed", line.text, sources.wrote(line.text) if is_students else None)
-                for line in printed[:_MOST]
+                _event_to_json(
+                    line.t, robot, "printed", line.text, sources.find_writing_line(line.text) if is_students else None
+                )
+                for line in printed[:_MOST_EVENTS]
             ],
             [
-                _event(line.t, robot, "said", line.text, sources.wrote(line.text, spoken=True) if is_students else None)
-                for line in own.spoken[:_MOST]
+                _event_to_json(
+                    line.t,
+                    robot,
+                    "said",
+                    line.text,
+                    sources.find_writing_line(line.text, spoken=True) if is_students else None,
+                )
+                for line in own.spoken[:_MOST_EVENTS]
             ],
             [
-                {**_event(touch.t, robot, "touched", touch.what), "pose": _pose(touch.pose)}
-                for touch in own.touches[:_MOST]
+                {**_event_to_json(touch.t, robot, "touched", touch.what), "pose": _pose_to_json(touch.pose)}
+                for touch in own.touches[:_MOST_EVENTS]
             ],
             [
-                _event(
+                _event_to_json(
                     fault.t,
                     fault.agent or fault.who,
                     "stopped" if fault.verdict is Verdict.TIME_LIMIT else "fault",
-                    f"{fault.message} ({place_words(fault, language)})" if fault.place else fault.message,
-                    sources.of_fault(fault),
+                    f"{fault.message} ({describe_place(fault, language)})" if fault.place else fault.message,
+                    sources.find_fault_line(fault),
                 )
-                for fault in own.faults[:_MOST]
+                for fault in own.faults[:_MOST_EVENTS]
             ],
         )
         for kind, told in zip((printed, own.spoken, own.touches, own.faults), kinds, strict=True):
@@ -186,19 +198,24 @@ def _events(recording: Recording, sources: Sources, language: Language) -> tuple
     return sorted(events, key=lambda event: event["t"]), left_out
 
 
-def _event(t: float, who: str, kind: str, text: str, place: Place | None = None) -> dict[str, Any]:
-    told = {"t": t, "who": one_line(who, 60), "kind": kind, "text": readable(text, _LONGEST_TEXT, lines=_MOST_LINES)}
-    return {**told, **_placed(place)}
+def _event_to_json(t: float, who: str, kind: str, text: str, place: Place | None = None) -> dict[str, Any]:
+    told = {
+        "t": t,
+        "who": to_one_line(who, 60),
+        "kind": kind,
+        "text": to_display_text(text, _LONGEST_TEXT, lines=_MOST_LINES),
+    }
+    return {**told, **_place_to_json(place)}
 
 
-def _placed(place: Place | None) -> dict[str, Any]:
+def _place_to_json(place: Place | None) -> dict[str, Any]:
     return {} if place is None else {"line": [place.source, place.line]}
 
 
-def _messages(recording: Recording, sources: Sources, language: Language) -> Iterator[dict[str, Any]]:
+def _iterate_messages(recording: Recording, sources: Sources, language: Language) -> Iterator[dict[str, Any]]:
     """Yield every message, with what the receiver got and when."""
-    for robot, own in robots_of(recording):
-        responder = answering(own)
+    for robot, own in iterate_robots(recording):
+        responder = select_answering_party(own)
         other = PARTNER_OF[robot] if recording.partner is not None else responder
         for message in own.messages:
             if message.sender == "partner":
@@ -209,29 +226,29 @@ def _messages(recording: Recording, sources: Sources, language: Language) -> Ite
                 "t": message.t,
                 "from": robot if from_robot else responder,
                 "to": receiver if from_robot else robot,
-                "text": message_words(message.text, _LONGEST_TEXT),
+                "text": abbreviate_message(message.text, _LONGEST_TEXT),
                 "arrived": message.delivered,
             }
             if message.arrived_as is not None:
-                told["arrived_as"] = message_words(message.arrived_as, _LONGEST_TEXT)
-            befell = befell_in_full(message, language)
+                told["arrived_as"] = abbreviate_message(message.arrived_as, _LONGEST_TEXT)
+            befell = describe_loss_fully(message, language)
             if befell:
                 told["befell"] = befell
             if from_robot and own is recording:
-                told |= _placed(sources.wrote(message.text))
+                told |= _place_to_json(sources.find_writing_line(message.text))
             yield told
     for each in recording.agent_messages:
         told = {
             "t": each.t,
-            "from": one_line(each.sender, 60),
-            "to": one_line(each.receiver, 60),
-            "text": message_words(each.text, _LONGEST_TEXT),
+            "from": to_one_line(each.sender, 60),
+            "to": to_one_line(each.receiver, 60),
+            "text": abbreviate_message(each.text, _LONGEST_TEXT),
             "arrived": None if each.note else each.t,
         }
-        yield {**told, "befell": note_words(each.note, language)} if each.note else told
+        yield {**told, "befell": describe_note(each.note, language)} if each.note else told
 
 
-def _losses(recording: Recording, criteria: Sequence[CriterionResult], index: int) -> list[dict[str, Any]]:
+def _collect_losses(recording: Recording, criteria: Sequence[CriterionResult], index: int) -> list[dict[str, Any]]:
     """Return each criterion that the trial failed, with time and place."""
     lost = []
     for result in criteria:
@@ -239,14 +256,14 @@ def _losses(recording: Recording, criteria: Sequence[CriterionResult], index: in
         for item in result.evidence if result.max_marks else ():
             if item.passed or item.trial != index:
                 continue
-            t = loss_moment(recording, item.t)
+            t = compute_loss_time(recording, item.t)
             lost.append(
                 {
                     "t": t,
-                    "pose": _pose(item.pose or pose_at(recording, t)),
-                    "title": one_line(result.title, 120),
-                    "text": readable(item.message or result.message, _LONGEST_TEXT, lines=_MOST_LINES),
-                    "marks": f"{number(result.marks)} / {number(result.max_marks)}",
+                    "pose": _pose_to_json(item.pose or get_pose_at(recording, t)),
+                    "title": to_one_line(result.title, 120),
+                    "text": to_display_text(item.message or result.message, _LONGEST_TEXT, lines=_MOST_LINES),
+                    "marks": f"{format_decimal(result.marks)} / {format_decimal(result.max_marks)}",
                 }
             )
     return lost

@@ -15,9 +15,9 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from service.store.batches.batches import standing_in
+from service.store.batches.batches import match_standing_jobs
 from service.store.courses.hidden_names import HiddenNames
-from service.store.grades import current, overrides
+from service.store.grades import current_grades, overrides
 from service.store.models import (
     AssignmentVersion,
     Batch,
@@ -28,7 +28,7 @@ from service.store.models import (
     TrialRow,
 )
 from service.store.states import CancelReason, JobState
-from submissions.student_identity import Refusal
+from submissions.student_identity import RejectedSubmission
 
 REFUSED = "refused"
 ROWS_A_PAGE = 100
@@ -70,7 +70,7 @@ class TableLine:
 
 
 @dataclass(frozen=True, slots=True)
-class TableAsked:
+class TableRequest:
     """Filter, sort order and page of a table. An empty ``state`` selects all states."""
 
     state: str = ""
@@ -91,21 +91,21 @@ class TablePage:
 
 
 @dataclass(frozen=True, slots=True)
-class Remarked:
+class ReviewCounts:
     """Additional review counts of a job: unjudged criteria, and trials in which Robomark's own code failed."""
 
     unjudged: int = 0
     surprises: int = 0
 
 
-def _by_student(line: TableLine) -> tuple[Any, ...]:
+def _build_student_key(line: TableLine) -> tuple[Any, ...]:
     return (line.student.casefold(), line.assignment, line.id)
 
 
 #: Sort keys, by the name of the order.
 SORTS: Mapping[str, Callable[[TableLine], Any]] = MappingProxyType(
     {
-        "student": _by_student,
+        "student": _build_student_key,
         "name": lambda line: line.name.casefold(),
         "assignment": lambda line: line.assignment,
         "marks": lambda line: line.share,
@@ -115,7 +115,9 @@ SORTS: Mapping[str, Callable[[TableLine], Any]] = MappingProxyType(
 )
 
 
-def table_lines(session: Session, batch_id: str, refusals: Sequence[Refusal], hidden: HiddenNames) -> list[TableLine]:
+def load_table_lines(
+    session: Session, batch_id: str, refusals: Sequence[RejectedSubmission], hidden: HiddenNames
+) -> list[TableLine]:
     """Return all rows of a batch, ordered by student."""
     row = session.get(Batch, batch_id)  # kept, so that it is read once
     query = (
@@ -142,37 +144,39 @@ def table_lines(session: Session, batch_id: str, refusals: Sequence[Refusal], hi
             Job.graded_at,
             Job.published_at,
             SubmissionRow.batch_id,
-            current.newer_attempt(),
+            current_grades.select_newer_attempt(),
         )
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
-        .where(*standing_in(session, batch_id))
+        .where(*match_standing_jobs(session, batch_id))
     )
     own_batch = None if row is None or row.regrade_of is not None else batch_id
-    lines = [_line(tuple(found), own_batch, hidden) for found in session.execute(query)]
-    lines += [_refused(refusal) for refusal in refusals]
-    return sorted(lines, key=_by_student)
+    lines = [_build_line(tuple(found), own_batch, hidden) for found in session.execute(query)]
+    lines += [_build_rejected_line(refusal) for refusal in refusals]
+    return sorted(lines, key=_build_student_key)
 
 
-def table_page(lines: Sequence[TableLine], asked: TableAsked) -> TablePage:
+def build_table_page(lines: Sequence[TableLine], asked: TableRequest) -> TablePage:
     """Return the requested page of the matching rows, or the last page if there are fewer."""
     text = asked.text.strip().casefold()
-    found = [line for line in lines if (not asked.state or line.state == asked.state) and text in _searched(line)]
-    found.sort(key=SORTS.get(asked.sort, _by_student), reverse=asked.descending)
+    found = [
+        line for line in lines if (not asked.state or line.state == asked.state) and text in _build_search_text(line)
+    ]
+    found.sort(key=SORTS.get(asked.sort, _build_student_key), reverse=asked.descending)
     pages = max(1, -(-len(found) // ROWS_A_PAGE))
     page = min(max(asked.page, 1), pages)
     return TablePage(tuple(found[(page - 1) * ROWS_A_PAGE : page * ROWS_A_PAGE]), len(found), page, pages)
 
 
-def remarked(session: Session, lines: Sequence[TableLine]) -> dict[str, Remarked]:
+def load_review_counts(session: Session, lines: Sequence[TableLine]) -> dict[str, ReviewCounts]:
     """Return the review counts of some jobs, by job id."""
     ids = [line.id for line in lines if line.id]
     unjudged = dict(
         session.execute(
             select(CriterionResultRow.job_id, func.count())
             .join(Job, CriterionResultRow.job_id == Job.id)
-            .where(CriterionResultRow.job_id.in_(ids), overrides.waits_for_judgement())
+            .where(CriterionResultRow.job_id.in_(ids), overrides.match_unjudged())
             .group_by(CriterionResultRow.job_id)
         ).all()
     )
@@ -183,10 +187,12 @@ def remarked(session: Session, lines: Sequence[TableLine]) -> dict[str, Remarked
             .group_by(TrialRow.job_id)
         ).all()
     )
-    return {job_id: Remarked(unjudged.get(job_id, 0), surprises.get(job_id, 0)) for job_id in {*unjudged, *surprises}}
+    return {
+        job_id: ReviewCounts(unjudged.get(job_id, 0), surprises.get(job_id, 0)) for job_id in {*unjudged, *surprises}
+    }
 
 
-def _line(row: tuple[Any, ...], own_batch: str | None, hidden: HiddenNames) -> TableLine:
+def _build_line(row: tuple[Any, ...], own_batch: str | None, hidden: HiddenNames) -> TableLine:
     job_id, submission_id, student, name, source, assignment, state, verdict, marks, max_marks, *rest = row
     error, cancelled_for, superseded_by, *rest = rest
     suspect, staff_only, days_late, attempt, sha256, started_at, graded_at, published_at, batch_id, newer = rest
@@ -195,7 +201,7 @@ def _line(row: tuple[Any, ...], own_batch: str | None, hidden: HiddenNames) -> T
     return TableLine(
         id=job_id,
         submission_id=submission_id,
-        student=hidden.called(assignment, student),
+        student=hidden.label_student(assignment, student),
         name="" if nameless else name,
         source="" if nameless else source,
         assignment=assignment,
@@ -218,7 +224,7 @@ def _line(row: tuple[Any, ...], own_batch: str | None, hidden: HiddenNames) -> T
     )
 
 
-def _refused(refusal: Refusal) -> TableLine:
+def _build_rejected_line(refusal: RejectedSubmission) -> TableLine:
     return TableLine(
         id="",
         submission_id=0,
@@ -245,5 +251,5 @@ def _refused(refusal: Refusal) -> TableLine:
     )
 
 
-def _searched(line: TableLine) -> str:
+def _build_search_text(line: TableLine) -> str:
     return " ".join((line.student, line.name, line.source, line.assignment, line.verdict or "")).casefold()

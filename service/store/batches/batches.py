@@ -1,7 +1,7 @@
 """Queries about batches and jobs for instructors: progress, marks and failures. Read-only.
 
 A batch has a row for each student who submitted in it. The row shows the student's current attempt, which may be in
-another batch (``service.store.grades.current``).
+another batch (``service.store.grades.current_grades``).
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from sqlalchemy import ColumnElement, Row, Select, and_, case, func, or_, select
 from sqlalchemy.orm import InstrumentedAttribute, Session, aliased
 
 from service.store.codec import decode
-from service.store.courses.hidden_names import NAMED, HiddenNames
-from service.store.grades import current, overrides
+from service.store.courses.hidden_names import NO_HIDDEN_NAMES, HiddenNames
+from service.store.grades import current_grades, overrides
 from service.store.models import (
     AssignmentVersion,
     Batch,
@@ -30,11 +30,11 @@ from service.store.models import (
 from service.store.states import UNFINISHED, BatchState, CancelReason, JobState, PlotState, Role, Standing
 from service.store.web_tables import OpenAssignment, Override
 from sim.errors import UsageError
-from submissions.nearest import did_you_mean
-from submissions.student_identity import Refusal
+from submissions.student_identity import RejectedSubmission
+from submissions.suggestions import suggest_name
 
 #: Columns read for each job.
-_Asked = tuple[
+_JobColumns = tuple[
     Job, str, str, str, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None,
     int | None, str | None, int | None,
 ]  # fmt: skip
@@ -86,11 +86,11 @@ class JobLine:
         """Return whether the job has reached a final state."""
         return self.state not in UNFINISHED
 
-    def hidden_by(self, names: HiddenNames) -> JobLine:
+    def hide_name(self, names: HiddenNames) -> JobLine:
         """Return the line without identifying data if names are hidden for its assignment."""
         if self.assignment not in names.assignments:
             return self
-        return replace(self, student=names.called(self.assignment, self.student), name="", email="", source="")
+        return replace(self, student=names.label_student(self.assignment, self.student), name="", email="", source="")
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +101,7 @@ class BatchLine:
     name: str
     state: BatchState
     created_at: datetime
-    refusals: tuple[Refusal, ...]
+    refusals: tuple[RejectedSubmission, ...]
     jobs: int
     states: dict[JobState, int]
     regrade_of: str | None  # the batch that was graded again
@@ -126,15 +126,15 @@ class BatchProgress:
 
 def find_batch(session: Session, start: str) -> str:
     """Return the id of the batch that begins with ``start``. Raises UsageError for no match or several."""
-    return _find(session, Batch.id, Batch.created_at, start, "batch")
+    return _find_by_prefix(session, Batch.id, Batch.created_at, start, "batch")
 
 
 def find_job(session: Session, start: str) -> str:
     """Return the id of the job that begins with ``start``. Raises UsageError for no match or several."""
-    return _find(session, Job.id, Job.queued_at, start, "grade")
+    return _find_by_prefix(session, Job.id, Job.queued_at, start, "grade")
 
 
-def job_before(session: Session, job_id: str) -> str:
+def find_previous_job(session: Session, job_id: str) -> str:
     """Return the id of the standing grade of the same student's previous attempt.
 
     Skips staff-only and untrusted grades. Raises UsageError if there is none.
@@ -149,7 +149,7 @@ def job_before(session: Session, job_id: str) -> str:
             SubmissionRow.enrolment_id == mine.enrolment_id,
             SubmissionRow.assignment == mine.assignment,
             SubmissionRow.attempt < mine.attempt,
-            *current.CAN_COUNT,
+            *current_grades.CAN_COUNT,
         )
         .order_by(SubmissionRow.attempt.desc())
         .limit(1)
@@ -164,25 +164,27 @@ def list_batches(session: Session, course_id: int | None = None) -> list[BatchLi
     query = select(Batch).order_by(Batch.created_at.desc(), Batch.id).limit(_MOST_LISTED)
     if course_id is not None:
         query = query.where(Batch.course_id == course_id)
-    return _batch_lines(session, session.scalars(query).all())
+    return _build_batch_lines(session, session.scalars(query).all())
 
 
-def batches_of(session: Session, course_id: int, limit: int, after: tuple[datetime, str] | None) -> list[BatchLine]:
+def list_course_batches(
+    session: Session, course_id: int, limit: int, after: tuple[datetime, str] | None
+) -> list[BatchLine]:
     """Return the next ``limit`` batches of a course, newest first, after the batch with this creation time and id."""
     query = select(Batch).where(Batch.course_id == course_id)
     if after is not None:
         earlier = and_(Batch.created_at == after[0], Batch.id > after[1])
         query = query.where(or_(Batch.created_at < after[0], earlier))
     rows = session.scalars(query.order_by(Batch.created_at.desc(), Batch.id).limit(limit)).all()
-    return _batch_lines(session, rows)
+    return _build_batch_lines(session, rows)
 
 
-def batch(session: Session, batch_id: str) -> BatchLine:
+def load_batch(session: Session, batch_id: str) -> BatchLine:
     """Return one batch. Raises UsageError if the id is unknown."""
     row = session.get(Batch, batch_id)
     if row is None:
         raise UsageError(f"there is no batch {batch_id}")
-    return _batch_lines(session, [row])[0]
+    return _build_batch_lines(session, [row])[0]
 
 
 def is_regrade(session: Session, batch_id: str) -> bool:
@@ -191,42 +193,44 @@ def is_regrade(session: Session, batch_id: str) -> bool:
     return row is not None and row.regrade_of is not None
 
 
-def standing_in(session: Session, batch_id: str) -> tuple[ColumnElement[bool], ...]:
+def match_standing_jobs(session: Session, batch_id: str) -> tuple[ColumnElement[bool], ...]:
     """Return the conditions that select the standing jobs of a batch; for a batch of regrades, its own jobs."""
     if is_regrade(session, batch_id):
         return (Job.batch_id == batch_id, Job.suspect.is_(None))
-    return (Job.submission_id.in_(counting([batch_id])), Job.standing == Standing.STANDS)
+    return (Job.submission_id.in_(select_shown_submissions([batch_id])), Job.standing == Standing.STANDS)
 
 
-def submissions_in(session: Session, batch_id: str) -> Select[int]:
+def select_submissions(session: Session, batch_id: str) -> Select[int]:
     """Return a query for the submissions of a batch: the current ones, or all in a batch of regrades."""
     if is_regrade(session, batch_id):
         return select(Job.submission_id).where(Job.batch_id == batch_id)
-    return counting([batch_id])
+    return select_shown_submissions([batch_id])
 
 
-def counting(batch_ids: Sequence[str]) -> Select[int]:
+def select_shown_submissions(batch_ids: Sequence[str]) -> Select[int]:
     """Return a query for the submissions that the rows of some batches show: the current attempt of each student."""
-    return current.shown(current.attempted_in(select(Batch.id).where(Batch.id.in_(batch_ids))))
+    return current_grades.select_shown_submissions(
+        current_grades.match_students_of_batches(select(Batch.id).where(Batch.id.in_(batch_ids)))
+    )
 
 
-def job_lines(session: Session, batch_id: str, hidden: HiddenNames = NAMED) -> list[JobLine]:
+def load_job_lines(session: Session, batch_id: str, hidden: HiddenNames = NO_HIDDEN_NAMES) -> list[JobLine]:
     """Return the standing job of each submission of a batch, ordered by displayed student name.
 
     For a batch of regrades, returns its own jobs.
     """
-    query = _job_lines().where(*standing_in(session, batch_id)).order_by(Enrolment.student, Job.id)
-    lines = _under_their_names_in(session, batch_id, [_line(row) for row in session.execute(query)])
-    return _by_shown_names(lines, hidden)
+    query = _select_job_lines().where(*match_standing_jobs(session, batch_id)).order_by(Enrolment.student, Job.id)
+    lines = _restore_source_names(session, batch_id, [_build_job_line(row) for row in session.execute(query)])
+    return _sort_by_shown_name(lines, hidden)
 
 
-def attempt_lines(session: Session, batch_id: str) -> list[JobLine]:
+def load_attempt_lines(session: Session, batch_id: str) -> list[JobLine]:
     """Return the standing job of each submission made in a batch, current or not."""
-    query = _job_lines().where(SubmissionRow.batch_id == batch_id, Job.standing == Standing.STANDS)
-    return [_line(row) for row in session.execute(query.order_by(Enrolment.student, Job.id))]
+    query = _select_job_lines().where(SubmissionRow.batch_id == batch_id, Job.standing == Standing.STANDS)
+    return [_build_job_line(row) for row in session.execute(query.order_by(Enrolment.student, Job.id))]
 
 
-def some_job_lines(
+def load_job_lines_page(
     session: Session, batch_id: str, hidden: HiddenNames, limit: int, after: str | None = None
 ) -> list[JobLine]:
     """Return at most ``limit`` job lines of a batch, after the job with this id.
@@ -234,7 +238,7 @@ def some_job_lines(
     Hidden names are left out and do not affect the order.
     """
     student = case((SubmissionRow.assignment.in_(hidden.assignments), ""), else_=Enrolment.student)
-    query = _job_lines().where(*standing_in(session, batch_id)).order_by(student, Job.id).limit(limit)
+    query = _select_job_lines().where(*match_standing_jobs(session, batch_id)).order_by(student, Job.id).limit(limit)
     if after is not None:
         own = (
             select(student)
@@ -244,29 +248,33 @@ def some_job_lines(
             .where(Job.id == after)
         )
         query = query.where(tuple_(student, Job.id) > tuple_(own.correlate(None).scalar_subquery(), after))
-    lines = _under_their_names_in(session, batch_id, [_line(row) for row in session.execute(query)])
-    return [line.hidden_by(hidden) for line in lines]
+    lines = _restore_source_names(session, batch_id, [_build_job_line(row) for row in session.execute(query)])
+    return [line.hide_name(hidden) for line in lines]
 
 
-def course_lines(
-    session: Session, course_id: int, assignments: Sequence[str], hidden: HiddenNames = NAMED
+def load_course_lines(
+    session: Session, course_id: int, assignments: Sequence[str], hidden: HiddenNames = NO_HIDDEN_NAMES
 ) -> list[JobLine]:
     """Return the current job of each student of a course for some assignments, in any batch or in none."""
     students = select(Enrolment.id).where(Enrolment.course_id == course_id, Enrolment.role == Role.STUDENT)
-    ids = current.shown(SubmissionRow.assignment.in_(assignments), SubmissionRow.enrolment_id.in_(students))
-    query = _job_lines().where(Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
-    return _by_shown_names([_line(row) for row in session.execute(query.order_by(Enrolment.student, Job.id))], hidden)
+    ids = current_grades.select_shown_submissions(
+        SubmissionRow.assignment.in_(assignments), SubmissionRow.enrolment_id.in_(students)
+    )
+    query = _select_job_lines().where(Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
+    return _sort_by_shown_name(
+        [_build_job_line(row) for row in session.execute(query.order_by(Enrolment.student, Job.id))], hidden
+    )
 
 
-def job_line(session: Session, job_id: str) -> JobLine:
+def load_job_line(session: Session, job_id: str) -> JobLine:
     """Return one job. Raises UsageError if the id is unknown."""
-    row = session.execute(_job_lines().where(Job.id == job_id)).one_or_none()
+    row = session.execute(_select_job_lines().where(Job.id == job_id)).one_or_none()
     if row is None:
         raise UsageError(f"there is no grade {job_id}")
-    return _line(row)
+    return _build_job_line(row)
 
 
-def progress(session: Session, batch_id: str) -> BatchProgress:
+def load_progress(session: Session, batch_id: str) -> BatchProgress:
     """Return the progress of a batch."""
     of_batch = Job.batch_id == batch_id
     states = dict(session.execute(select(Job.state, func.count()).where(of_batch).group_by(Job.state)).all())
@@ -280,7 +288,7 @@ def progress(session: Session, batch_id: str) -> BatchProgress:
     )
 
 
-def _batch_lines(session: Session, rows: Sequence[Batch]) -> list[BatchLine]:
+def _build_batch_lines(session: Session, rows: Sequence[Batch]) -> list[BatchLine]:
     ids = [row.id for row in rows]
     opened = session.scalars(select(OpenAssignment).where(OpenAssignment.batch_id.in_(ids)))
     of_the_web = {row.batch_id: row for row in opened if row.batch_id is not None}
@@ -304,7 +312,7 @@ def _batch_lines(session: Session, rows: Sequence[Batch]) -> list[BatchLine]:
                     member.batch_id.in_(list(of_the_web)),
                 ),
             )
-            .where(Job.submission_id.in_(counting(list(of_the_web))), Job.standing == Standing.STANDS)
+            .where(Job.submission_id.in_(select_shown_submissions(list(of_the_web))), Job.standing == Standing.STANDS)
         )
         for batch_id, state, count in session.execute(attempts.group_by(member.batch_id, Job.state)):
             states[batch_id][state] = count
@@ -314,7 +322,7 @@ def _batch_lines(session: Session, rows: Sequence[Batch]) -> list[BatchLine]:
             row.name,
             row.state,
             row.created_at,
-            decode(tuple[Refusal, ...], row.refusals),
+            decode(tuple[RejectedSubmission, ...], row.refusals),
             sum(states[row.id].values()),
             states[row.id],
             row.regrade_of,
@@ -325,28 +333,28 @@ def _batch_lines(session: Session, rows: Sequence[Batch]) -> list[BatchLine]:
     ]
 
 
-def _find(session: Session, column: InstrumentedAttribute[str], newest: Any, start: str, what: str) -> str:
+def _find_by_prefix(session: Session, column: InstrumentedAttribute[str], newest: Any, start: str, what: str) -> str:
     found = session.scalars(select(column).where(column.startswith(start, autoescape=True)).limit(2)).all()
     if not found:
         known = session.scalars(select(column).order_by(newest.desc()).limit(_MOST_COMPARED))
-        raise UsageError(f"there is no {what} {start!r}{did_you_mean(start, known)}")
+        raise UsageError(f"there is no {what} {start!r}{suggest_name(start, known)}")
     if len(found) > 1:
         raise UsageError(f"more than one {what} begins with {start!r}; give more of its id")
     return found[0]
 
 
-def _job_lines() -> Select[*_Asked]:
+def _select_job_lines() -> Select[*_JobColumns]:
     accuracy = (
         select(CriterionResultRow.accuracy)
-        .where(CriterionResultRow.job_id == Job.id, CriterionResultRow.accuracy.is_not(None), ~overrides.is_excused())
+        .where(
+            CriterionResultRow.job_id == Job.id, CriterionResultRow.accuracy.is_not(None), ~overrides.match_excused()
+        )
         .order_by(CriterionResultRow.max_marks == 0, CriterionResultRow.position)
         .limit(1)
         .scalar_subquery()
     )
     unjudged = (
-        select(func.count())
-        .where(CriterionResultRow.job_id == Job.id, overrides.waits_for_judgement())
-        .scalar_subquery()
+        select(func.count()).where(CriterionResultRow.job_id == Job.id, overrides.match_unjudged()).scalar_subquery()
     )
     by_hand = (
         select(func.count())
@@ -370,7 +378,7 @@ def _job_lines() -> Select[*_Asked]:
             by_hand,
             surprises,
             SubmissionRow.batch_id,
-            current.newer_attempt(),
+            current_grades.select_newer_attempt(),
         )
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
@@ -378,7 +386,7 @@ def _job_lines() -> Select[*_Asked]:
     )
 
 
-def _line(row: Row[*_Asked]) -> JobLine:
+def _build_job_line(row: Row[*_JobColumns]) -> JobLine:
     job, student, name, email, source, version, attempt, accuracy, staff_only, days_late = row[:10]
     unjudged, by_hand, surprises, batch_id, newer_attempt = row[10:]
     return JobLine(
@@ -418,14 +426,14 @@ def _line(row: Row[*_Asked]) -> JobLine:
     )
 
 
-def _by_shown_names(lines: list[JobLine], names: HiddenNames) -> list[JobLine]:
+def _sort_by_shown_name(lines: list[JobLine], names: HiddenNames) -> list[JobLine]:
     """Return the lines as instructors see them, sorted so that neither order nor count reveals hidden names."""
     if not names.assignments:
         return lines
-    return sorted((line.hidden_by(names) for line in lines), key=lambda line: (line.student, line.id))
+    return sorted((line.hide_name(names) for line in lines), key=lambda line: (line.student, line.id))
 
 
-def _under_their_names_in(session: Session, batch_id: str, lines: list[JobLine]) -> list[JobLine]:
+def _restore_source_names(session: Session, batch_id: str, lines: list[JobLine]) -> list[JobLine]:
     """Return the lines with the source names that the submissions have in this batch.
 
     The system that a batch was downloaded from identifies its rows by these names, even after later submissions.

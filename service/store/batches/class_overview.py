@@ -12,12 +12,12 @@ from decimal import Decimal
 from sqlalchemy import exists, select
 from sqlalchemy.orm import Session
 
-from service.grading.outliers import MarksAndTime, Outlier, outliers
-from service.grading.statistics import AssignmentStatistics, MarksBin, distribution, statistics_of
+from service.grading.class_statistics import AssignmentStatistics, MarksBin, compute_distribution, compute_statistics
+from service.grading.outliers import MarksAndTime, Outlier, find_outliers
 from service.store.batches.batch_table import REFUSED, TableLine
 from service.store.courses.hidden_names import HiddenNames
-from service.store.grades import current
-from service.store.grades.marked import marked
+from service.store.grades import current_grades
+from service.store.grades.statistics_marks import load_marked_submissions
 from service.store.models import Enrolment, SubmissionRow
 from service.store.states import Role
 from submissions.student_identity import Student
@@ -35,14 +35,14 @@ class ClassOverview:
     missing: tuple[Student, ...]  # in the course, without a submission for it; named as in rows
 
 
-def overview(
+def compute_overviews(
     session: Session, course_id: int, lines: Sequence[TableLine], pass_share: Decimal, hidden: HiddenNames
 ) -> tuple[ClassOverview, ...]:
     """Return the overview of each assignment in the rows of a batch."""
-    graded = [line for line in lines if current.is_for_students(line)]
+    graded = [line for line in lines if current_grades.is_for_students(line)]
     found = []
-    counted = marked(session, graded)
-    for statistics in statistics_of(counted):
+    counted = load_marked_submissions(session, graded)
+    for statistics in compute_statistics(counted):
         # A student excused from everything has no marks, so neither passes nor fails.
         own = [line for line in graded if line.assignment == statistics.assignment and line.share >= 0]
         marks = (each.marks for each in counted if each.assignment == statistics.assignment)
@@ -50,17 +50,17 @@ def overview(
         found.append(
             ClassOverview(
                 statistics,
-                distribution(marks, statistics.max_marks),
+                compute_distribution(marks, statistics.max_marks),
                 sum(line.share >= pass_share for line in own),
-                outliers(taken, pass_share),
-                _identical([line for line in lines if line.assignment == statistics.assignment]),
-                missing(session, course_id, statistics.assignment, hidden),
+                find_outliers(taken, pass_share),
+                _group_identical([line for line in lines if line.assignment == statistics.assignment]),
+                load_missing_students(session, course_id, statistics.assignment, hidden),
             )
         )
     return tuple(found)
 
 
-def _identical(lines: Sequence[TableLine]) -> tuple[tuple[TableLine, ...], ...]:
+def _group_identical(lines: Sequence[TableLine]) -> tuple[tuple[TableLine, ...], ...]:
     of_bytes: dict[str, list[TableLine]] = {}
     for line in lines:
         if line.state != REFUSED:
@@ -68,7 +68,9 @@ def _identical(lines: Sequence[TableLine]) -> tuple[tuple[TableLine, ...], ...]:
     return tuple(tuple(same) for same in of_bytes.values() if len(same) > 1)
 
 
-def missing(session: Session, course_id: int, assignment: str, hidden: HiddenNames) -> tuple[Student, ...]:
+def load_missing_students(
+    session: Session, course_id: int, assignment: str, hidden: HiddenNames
+) -> tuple[Student, ...]:
     """Return the students of a course without a submission for an assignment.
 
     If names are hidden, labels are returned: a real name that leaves this list would identify the new row.
@@ -82,4 +84,4 @@ def missing(session: Session, course_id: int, assignment: str, hidden: HiddenNam
     found = [Student(student, name) for student, name in session.execute(query)]
     if assignment not in hidden.assignments:
         return tuple(found)
-    return tuple(Student(label) for label in sorted(hidden.called(assignment, each.id) for each in found))
+    return tuple(Student(label) for label in sorted(hidden.label_student(assignment, each.id) for each in found))

@@ -15,24 +15,29 @@ from sqlalchemy.orm import Session
 
 from service.store import outbox
 from service.store.codec import encode
-from service.store.courses.policies import Ruling, rule
-from service.store.courses.versions import Frozen, assignment_from_bytes, freeze, keep
+from service.store.courses.assignment_versions import (
+    FrozenAssignment,
+    assignment_from_bytes,
+    freeze_assignment,
+    store_version,
+)
+from service.store.courses.policies import Ruling, apply_policy
 from service.store.engine import Store, now, retry_conflicts
 from service.store.grades import result_cache
-from service.store.ids import new_id
-from service.store.installation import secret_of
+from service.store.ids import generate_id
+from service.store.installation import load_secret
 from service.store.locks import lock_jobs
 from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
-from service.store.people.students import DEFAULT_COURSE, Students, course_of
+from service.store.people.students import DEFAULT_COURSE, Students, ensure_course
 from service.store.queue import jobs
-from service.store.states import BatchState, CancelReason, JobState, Lane, Standing
+from service.store.states import BatchState, CancelReason, JobQueue, JobState, Standing
 from service.store.web_tables import Comment
-from service.version import grader_sha256
+from service.version import hash_grader
 from sim.errors import HostError, UsageError
 from submissions.grading_request import GradingRequest
-from submissions.packed import pack_submission, unpack_submission
 from submissions.raw_files import MEGABYTE
-from submissions.student_identity import Refusal
+from submissions.stored_submission import pack_submission, unpack_submission
+from submissions.student_identity import RejectedSubmission
 from submissions.submission import Submission
 
 if TYPE_CHECKING:
@@ -44,7 +49,7 @@ _AT_ONCE = 10
 
 
 @dataclass(frozen=True, slots=True)
-class Accepted:
+class AcceptedSubmission:
     """A submission that was accepted as a job."""
 
     job_id: str
@@ -61,12 +66,12 @@ class AcceptedBatch:
     """An accepted batch; ``refused`` contains students that cannot be identified uniquely in the course."""
 
     id: str
-    jobs: tuple[Accepted, ...]
-    refused: tuple[Refusal, ...] = ()
+    jobs: tuple[AcceptedSubmission, ...]
+    refused: tuple[RejectedSubmission, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class AlreadySubmitted:
+class KnownSubmission:
     """A submission that is identical to the student's newest one for the same assignment, so it changes nothing."""
 
     job_id: str
@@ -78,26 +83,26 @@ class AlreadySubmitted:
 
 
 @dataclass(frozen=True, slots=True)
-class AcceptedNew:
+class BatchIntake:
     """New and already known submissions of a batch. ``batch`` is None if nothing was new."""
 
     batch: AcceptedBatch | None
-    known: tuple[AlreadySubmitted, ...]
-    refused: tuple[Refusal, ...] = ()
+    known: tuple[KnownSubmission, ...]
+    refused: tuple[RejectedSubmission, ...] = ()
 
 
 @retry_conflicts
-def accept(
+def accept_submission(
     store: Store,
     grading_request: GradingRequest,
     *,
     course: str = DEFAULT_COURSE,
     max_attempts: int,
-    lane: Lane = Lane.INTERACTIVE,
+    lane: JobQueue = JobQueue.INTERACTIVE,
     batch_id: str | None = None,
     most_bytes: int | None = None,
     enrolment_id: int | None = None,
-) -> Accepted:
+) -> AcceptedSubmission:
     """Accept one interactive submission. If an identical submission is graded, its grade is copied immediately.
 
     Without a submission time in the request, the current time is used. Of the submissions over a limit only the newest
@@ -108,20 +113,22 @@ def accept(
 
     Raises UsageError if the student is ambiguous, exceeds the size limit or is no longer enrolled.
     """
-    (packed,) = _pack([grading_request])
-    secret = secret_of(store).sha256
+    (packed,) = _pack_requests([grading_request])
+    secret = load_secret(store).sha256
     with store.transaction() as session:
         at = now(session)
         packed = replace(
             packed, grading_request=replace(grading_request, submitted_at=grading_request.submitted_at or at)
         )
-        terms = _Terms(course_of(session, course, at), lane, max_attempts, at, secret, batch_id, most_bytes=most_bytes)
+        terms = _IntakeTerms(
+            ensure_course(session, course, at), lane, max_attempts, at, secret, batch_id, most_bytes=most_bytes
+        )
         students = Students(session, terms.course_id)
         if enrolment_id is None:
             enrolment_id = students.enrol(grading_request.student, at)
         elif not students.is_enrolled(enrolment_id, grading_request.student):
             raise UsageError("you are no longer a student of this course, so nothing was submitted.")
-        return _accept(session, _Item(packed, enrolment_id), terms)
+        return _accept_item(session, _IntakeItem(packed, enrolment_id), terms)
 
 
 @retry_conflicts
@@ -129,61 +136,61 @@ def accept_batch(
     store: Store,
     name: str,
     grading_requests: Sequence[GradingRequest],
-    refusals: Sequence[Refusal],
+    refusals: Sequence[RejectedSubmission],
     *,
     course: str = DEFAULT_COURSE,
     max_attempts: int,
-    record: Callable[[Session, AcceptedNew], None] | None = None,
+    record: Callable[[Session, BatchIntake], None] | None = None,
 ) -> AcceptedBatch:
     """Accept a whole batch or nothing. Each submission is graded again, regardless of earlier submissions.
 
     ``refusals`` were found when the batch was read. ``record`` is called with the accepted batch in the same
     transaction. Raises UsageError if all remaining submissions are rejected.
     """
-    packed = _pack(grading_requests)
-    secret = secret_of(store).sha256
+    packed = _pack_requests(grading_requests)
+    secret = load_secret(store).sha256
     with store.transaction() as session:
         at = now(session)
-        terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at, secret, anew=True)
-        items, refused = _enrolled(session, packed, terms)
+        terms = _IntakeTerms(ensure_course(session, course, at), JobQueue.BATCH, max_attempts, at, secret, anew=True)
+        items, refused = _enrol_students(session, packed, terms)
         if refused and not items:
             raise UsageError(f"no submission can be accepted; {refused[0].source}: {refused[0].reason}")
         made = replace(_accept_batch(session, items, name, [*refusals, *refused], terms), refused=refused)
         if record is not None:
-            record(session, AcceptedNew(made, (), refused))
+            record(session, BatchIntake(made, (), refused))
         return made
 
 
 @retry_conflicts
-def accept_new(
+def accept_new_submissions(
     store: Store,
     name: str,
     grading_requests: Sequence[GradingRequest],
-    refusals: Sequence[Refusal],
+    refusals: Sequence[RejectedSubmission],
     *,
     course: str = DEFAULT_COURSE,
     max_attempts: int,
-    record: Callable[[Session, AcceptedNew], None] | None = None,
-) -> AcceptedNew:
+    record: Callable[[Session, BatchIntake], None] | None = None,
+) -> BatchIntake:
     """Accept the new submissions of a batch. Submitting the same batch twice changes nothing.
 
     A submission is known if it has the same bytes as the student's newest submission and the same assignment version.
     Cancelled submissions are accepted again. A new submission that is identical to a graded one gets that grade
     immediately. ``record`` is called in the same transaction if a batch is created.
     """
-    packed = _pack(grading_requests)
-    secret = secret_of(store).sha256
+    packed = _pack_requests(grading_requests)
+    secret = load_secret(store).sha256
     with store.transaction() as session:
         at = now(session)
-        terms = _Terms(course_of(session, course, at), Lane.BATCH, max_attempts, at, secret)
-        items, refused = _enrolled(session, packed, terms)
+        terms = _IntakeTerms(ensure_course(session, course, at), JobQueue.BATCH, max_attempts, at, secret)
+        items, refused = _enrol_students(session, packed, terms)
         found = [
-            already_submitted(session, item.packed.grading_request, item.enrolment_id, item.packed.frozen.sha256)
+            find_known_submission(session, item.packed.grading_request, item.enrolment_id, item.packed.frozen.sha256)
             for item in items
         ]
         new = [item for item, known in zip(items, found, strict=True) if known is None]
         batch = _accept_batch(session, new, name, [*refusals, *refused], terms) if new else None
-        accepted = AcceptedNew(batch, tuple(known for known in found if known is not None), refused)
+        accepted = BatchIntake(batch, tuple(known for known in found if known is not None), refused)
         if record is not None and batch is not None:
             record(session, accepted)
         return accepted
@@ -205,7 +212,7 @@ def load_grading_request(session: Session, job_id: str) -> GradingRequest:
 def load_submission(session: Session, job_id: str) -> Submission:
     """Return the submission of a job; raises like ``load_grading_request``."""
     kept = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
-    return _read_back(unpack_submission, session.scalar(kept.where(Job.id == job_id)), "submission", job_id)
+    return _unpack_stored(unpack_submission, session.scalar(kept.where(Job.id == job_id)), "submission", job_id)
 
 
 def load_each_submission(session: Session, job_ids: Collection[str]) -> Iterator[tuple[str, Submission]]:
@@ -216,16 +223,16 @@ def load_each_submission(session: Session, job_ids: Collection[str]) -> Iterator
     query = select(Job.id, SubmissionRow.packed).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
     query = query.where(Job.id.in_(job_ids)).order_by(Job.id)
     for job_id, kept in session.execute(query, execution_options={"yield_per": _AT_ONCE}):
-        yield job_id, _read_back(unpack_submission, kept, "submission", job_id)
+        yield job_id, _unpack_stored(unpack_submission, kept, "submission", job_id)
 
 
 def load_assignment(session: Session, job_id: str) -> Assignment:
     """Return the assignment version of a job; raises like ``load_grading_request``."""
     kept = select(AssignmentVersion.content).join(Job, Job.assignment_version_id == AssignmentVersion.id)
-    return _read_back(assignment_from_bytes, session.scalar(kept.where(Job.id == job_id)), "assignment", job_id)
+    return _unpack_stored(assignment_from_bytes, session.scalar(kept.where(Job.id == job_id)), "assignment", job_id)
 
 
-def _read_back(read: Callable[[bytes], Read], kept: bytes | None, what: str, job_id: str) -> Read:
+def _unpack_stored(read: Callable[[bytes], Read], kept: bytes | None, what: str, job_id: str) -> Read:
     if kept is None:
         raise UsageError(f"there is no job {job_id}")
     try:
@@ -235,26 +242,26 @@ def _read_back(read: Callable[[bytes], Read], kept: bytes | None, what: str, job
 
 
 @dataclass(frozen=True, slots=True)
-class _Packed:
+class _PackedRequest:
     grading_request: GradingRequest
     data: bytes
-    frozen: Frozen
+    frozen: FrozenAssignment
 
 
 @dataclass(frozen=True, slots=True)
-class _Item:
+class _IntakeItem:
     """A submission to accept, with the enrolment of its student."""
 
-    packed: _Packed
+    packed: _PackedRequest
     enrolment_id: int
 
 
 @dataclass(frozen=True, slots=True)
-class _Terms:
+class _IntakeTerms:
     """Conditions of an intake. With ``anew``, staff request a regrade: policies and identical grades are ignored."""
 
     course_id: int
-    lane: Lane
+    lane: JobQueue
     max_attempts: int
     at: datetime
     secret_sha256: str
@@ -263,34 +270,36 @@ class _Terms:
     most_bytes: int | None = None  # size limit per student and assignment; None when staff submit
 
 
-def _pack(grading_requests: Sequence[GradingRequest]) -> list[_Packed]:
+def _pack_requests(grading_requests: Sequence[GradingRequest]) -> list[_PackedRequest]:
     """Prepare the stored form of each submission, before the transaction and once per assignment."""
-    frozen: dict[int, Frozen] = {}
+    frozen: dict[int, FrozenAssignment] = {}
     packed = []
     for grading_request in grading_requests:
         key = id(grading_request.assignment)
         if key not in frozen:
-            frozen[key] = freeze(grading_request.assignment)
-        packed.append(_Packed(grading_request, pack_submission(grading_request.submission), frozen[key]))
+            frozen[key] = freeze_assignment(grading_request.assignment)
+        packed.append(_PackedRequest(grading_request, pack_submission(grading_request.submission), frozen[key]))
     return packed
 
 
-def _enrolled(session: Session, packed: Sequence[_Packed], terms: _Terms) -> tuple[list[_Item], tuple[Refusal, ...]]:
+def _enrol_students(
+    session: Session, packed: Sequence[_PackedRequest], terms: _IntakeTerms
+) -> tuple[list[_IntakeItem], tuple[RejectedSubmission, ...]]:
     """Return the submissions with their enrolments, and the rejections of students who are ambiguous."""
     students = Students(session, terms.course_id)
     items, refused = [], []
     for each in packed:
         asked = each.grading_request
         try:
-            items.append(_Item(each, students.enrol(asked.student, terms.at)))
+            items.append(_IntakeItem(each, students.enrol(asked.student, terms.at)))
         except UsageError as error:
-            refused.append(Refusal(asked.source, str(error), asked.student, asked.assignment.id))
+            refused.append(RejectedSubmission(asked.source, str(error), asked.student, asked.assignment.id))
     return items, tuple(refused)
 
 
-def already_submitted(
+def find_known_submission(
     session: Session, grading_request: GradingRequest, enrolment_id: int, assignment_sha256: str
-) -> AlreadySubmitted | None:
+) -> KnownSubmission | None:
     """Return the job of the student's newest submission if it is identical; None for a new submission."""
     newest = session.scalar(
         select(SubmissionRow)
@@ -321,13 +330,17 @@ def already_submitted(
     job = session.scalar(query)
     if job is None:
         return None
-    other_grader = job.state is JobState.DONE and job.grader_sha256 not in (None, grader_sha256())
+    other_grader = job.state is JobState.DONE and job.grader_sha256 not in (None, hash_grader())
     student, assignment = grading_request.submission.student, newest.assignment
-    return AlreadySubmitted(job.id, job.batch_id, student, assignment, job.state, other_grader)
+    return KnownSubmission(job.id, job.batch_id, student, assignment, job.state, other_grader)
 
 
 def _accept_batch(
-    session: Session, items: Sequence[_Item], name: str, refusals: Sequence[Refusal], terms: _Terms
+    session: Session,
+    items: Sequence[_IntakeItem],
+    name: str,
+    refusals: Sequence[RejectedSubmission],
+    terms: _IntakeTerms,
 ) -> AcceptedBatch:
     batch = Batch(course_id=terms.course_id, name=name, refusals=encode(tuple(refusals)), created_at=terms.at)
     session.add(batch)
@@ -336,17 +349,17 @@ def _accept_batch(
     # Students keep the order of the batch. Submission numbers follow another order, so they don't identify students.
     first = {item.enrolment_id: item.packed.grading_request.submission.sha256 for item in reversed(items)}
     order = sorted(range(len(items)), key=lambda number: first[items[number].enrolment_id])
-    taken = {number: _accept(session, items[number], terms) for number in order}
+    taken = {number: _accept_item(session, items[number], terms) for number in order}
     accepted = AcceptedBatch(batch.id, tuple(taken[number] for number in range(len(items))))
-    outbox.batch_ended(session, batch.id)
+    outbox.emit_batch_finished(session, batch.id)
     return accepted
 
 
-def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
+def _accept_item(session: Session, item: _IntakeItem, terms: _IntakeTerms) -> AcceptedSubmission:
     packed, enrolment_id, at = item.packed, item.enrolment_id, terms.at
     grading_request = packed.grading_request
     submission, assignment = grading_request.submission, grading_request.assignment
-    version_id = keep(session, packed.frozen, at)
+    version_id = store_version(session, packed.frozen, at)
     of_student = (SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment == assignment.id)
     earlier = session.scalar(select(func.max(SubmissionRow.attempt)).where(*of_student)) or 0
     # A claim skips locked jobs: no job starts between the ruling, which counts only started jobs, and being
@@ -355,15 +368,15 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
     lock_jobs(session, *waiting)
     ruling = Ruling()
     if not terms.anew:
-        ruling = rule(session, enrolment_id, assignment.id, submission.sha256, grading_request.submitted_at)
+        ruling = apply_policy(session, enrolment_id, assignment.id, submission.sha256, grading_request.submitted_at)
     put_aside = ruling.over is not None and terms.most_bytes is not None
     if put_aside:
-        _forget_put_aside(session, of_student)
+        _delete_put_aside(session, of_student)
     if terms.most_bytes is not None:
         _check_quota(session, of_student, len(packed.data), terms.most_bytes)
-    job_id = new_id()
+    job_id = generate_id()
     if not ruling.over:
-        jobs.supersede(session, select(SubmissionRow.id).where(*of_student), job_id, at)
+        jobs.supersede_jobs(session, select(SubmissionRow.id).where(*of_student), job_id, at)
     row = SubmissionRow(
         enrolment_id=enrolment_id,
         assignment=assignment.id,
@@ -388,24 +401,28 @@ def _accept(session: Session, item: _Item, terms: _Terms) -> Accepted:
         enrolment_id=enrolment_id,
         batch_id=terms.batch_id,
         # No student waits for a staff-only grade.
-        lane=Lane.BATCH if ruling.over else terms.lane,
+        lane=JobQueue.BATCH if ruling.over else terms.lane,
         max_attempts=terms.max_attempts,
         forced=terms.anew,
     )
     jobs.enqueue(session, job, at)
     if put_aside:
-        jobs.put_aside(session, job_id, at)
+        jobs.put_aside_job(session, job_id, at)
     source = (
         None
         if terms.anew or put_aside
-        else result_cache.find(session, result_cache.cache_key(session, job_id, grader_sha256(), terms.secret_sha256))
+        else result_cache.find_cached_grade(
+            session, result_cache.compute_cache_key(session, job_id, hash_grader(), terms.secret_sha256)
+        )
     )
     if source is not None:
-        jobs.copy(session, job_id, source, at)
-    return Accepted(job_id, row.id, submission.student, assignment.id, row.attempt, source, row.staff_only or "")
+        jobs.copy_grade(session, job_id, source, at)
+    return AcceptedSubmission(
+        job_id, row.id, submission.student, assignment.id, row.attempt, source, row.staff_only or ""
+    )
 
 
-def _forget_put_aside(session: Session, of_student: tuple[ColumnElement[bool], ...]) -> None:
+def _delete_put_aside(session: Session, of_student: tuple[ColumnElement[bool], ...]) -> None:
     """Remove earlier submissions over a limit that staff never asked to grade; only the newest is kept.
 
     Submissions with a comment are kept, too.

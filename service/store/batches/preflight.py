@@ -11,15 +11,15 @@ from dataclasses import dataclass
 from sqlalchemy.orm import Session
 
 from service.store.batches import intake
-from service.store.courses.versions import freeze
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.grades import result_cache
 from service.store.people.students import Students
-from service.version import grader_sha256
+from service.version import hash_grader
 from submissions.grading_request import GradingRequest
 
 
 @dataclass(frozen=True, slots=True)
-class Foreseen:
+class IntakePreview:
     """Preview of one submission: whether its student is enrolled and whether the submission is known."""
 
     enrolled: bool
@@ -27,13 +27,13 @@ class Foreseen:
     copied: bool  # an identical one is graded, and its grade is copied
 
 
-def foresee(
+def preview_intake(
     session: Session,
     course_id: int,
     grading_requests: Sequence[GradingRequest],
     secret_sha256: str,
     nameless: Collection[str] = (),
-) -> list[Foreseen]:
+) -> list[IntakePreview]:
     """Return a preview of each grading request, in their order.
 
     For the assignments in ``nameless``, whose students' names are hidden, it does not depend on what the student
@@ -41,11 +41,11 @@ def foresee(
     """
     students = Students(session, course_id)
     versions = {id(each.assignment): each.assignment for each in grading_requests}
-    frozen = {key: freeze(assignment).sha256 for key, assignment in versions.items()}
+    frozen = {key: freeze_assignment(assignment).sha256 for key, assignment in versions.items()}
     return [
-        _one(
+        _preview_request(
             session,
-            students.known(each.student),
+            students.find_enrolment(each.student),
             each,
             frozen[id(each.assignment)],
             secret_sha256,
@@ -55,7 +55,7 @@ def foresee(
     ]
 
 
-def _one(
+def _preview_request(
     session: Session,
     enrolment_id: int | None,
     asked: GradingRequest,
@@ -63,12 +63,14 @@ def _one(
     secret_sha256: str,
     *,
     may_be_known: bool,
-) -> Foreseen:
+) -> IntakePreview:
     if (
         may_be_known
         and enrolment_id is not None
-        and intake.already_submitted(session, asked, enrolment_id, assignment_sha256)
+        and intake.find_known_submission(session, asked, enrolment_id, assignment_sha256)
     ):
-        return Foreseen(enrolled=True, known=True, copied=False)
-    key = result_cache.key_of(asked.submission.sha256, assignment_sha256, grader_sha256(), secret_sha256)
-    return Foreseen(enrolment_id is not None, known=False, copied=result_cache.find(session, key) is not None)
+        return IntakePreview(enrolled=True, known=True, copied=False)
+    key = result_cache.combine_cache_key(asked.submission.sha256, assignment_sha256, hash_grader(), secret_sha256)
+    return IntakePreview(
+        enrolment_id is not None, known=False, copied=result_cache.find_cached_grade(session, key) is not None
+    )

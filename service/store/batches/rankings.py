@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from service.grading.ranks import RankTable, StudentMeasures, ranked
+from service.grading.ranks import RankTable, StudentMeasures, rank_students
 from service.store.batches.batches import JobLine
 from service.store.codec import decode
-from service.store.courses.versions import assignment_from_bytes
-from service.store.grades import current, overrides
+from service.store.courses.assignment_versions import assignment_from_bytes
+from service.store.grades import current_grades, overrides
 from service.store.models import AssignmentVersion, CriterionResultRow, Job
 
 if TYPE_CHECKING:
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 _AT_ONCE = 1000
 
 
-def rank_tables(session: Session, lines: Sequence[JobLine]) -> list[RankTable]:
+def build_rank_tables(session: Session, lines: Sequence[JobLine]) -> list[RankTable]:
     """Return the rank tables of the graded jobs that are not excused and not staff-only."""
-    graded = [line for line in lines if current.is_for_students(line)]
+    graded = [line for line in lines if current_grades.is_for_students(line)]
     asked: dict[tuple[str, str], Ranking] = {}
-    for content in _contents(session, graded):
+    for content in _load_contents(session, graded):
         # Most assignments rank nothing, and decoding one takes longer than everything else here.
         if b'"ranking"' in zlib.decompress(content):
             from submissions.criteria.timing import Ranking
@@ -39,36 +39,36 @@ def rank_tables(session: Session, lines: Sequence[JobLine]) -> list[RankTable]:
             rankings = (each for each in assignment.criteria if isinstance(each, Ranking))
             asked |= {(assignment.id, ranking.id): ranking for ranking in rankings}
     return [
-        _table(session, assignment, ranking, [line for line in graded if line.assignment == assignment])
+        _build_table(session, assignment, ranking, [line for line in graded if line.assignment == assignment])
         for (assignment, _), ranking in asked.items()
     ]
 
 
-def _portions(lines: Sequence[JobLine]) -> Iterator[dict[str, JobLine]]:
+def _split_lines(lines: Sequence[JobLine]) -> Iterator[dict[str, JobLine]]:
     for begin in range(0, len(lines), _AT_ONCE):
         yield {line.id: line for line in lines[begin : begin + _AT_ONCE]}
 
 
-def _contents(session: Session, lines: Sequence[JobLine]) -> Iterator[bytes]:
+def _load_contents(session: Session, lines: Sequence[JobLine]) -> Iterator[bytes]:
     """Yield the content of each assignment version of these jobs once."""
     versions: set[int] = set()
-    for jobs in _portions(lines):
+    for jobs in _split_lines(lines):
         versions.update(session.scalars(select(Job.assignment_version_id).where(Job.id.in_(jobs)).distinct()))
     for version in sorted(versions):
         yield from session.scalars(select(AssignmentVersion.content).where(AssignmentVersion.id == version))
 
 
-def _table(session: Session, assignment: str, ranking: Ranking, lines: Sequence[JobLine]) -> RankTable:
+def _build_table(session: Session, assignment: str, ranking: Ranking, lines: Sequence[JobLine]) -> RankTable:
     from service.grading.grade import Evidence
 
     measures, unit = [], ""
-    for jobs in _portions(lines):
+    for jobs in _split_lines(lines):
         rows = session.execute(
             select(CriterionResultRow.job_id, CriterionResultRow.evidence).where(
                 CriterionResultRow.job_id.in_(jobs), CriterionResultRow.criterion == ranking.id
             )
         )
-        by_hand = overrides.of_jobs(session, list(jobs))
+        by_hand = overrides.load_overrides(session, list(jobs))
         for job_id, kept in rows:
             override = by_hand.get(job_id, {}).get(ranking.id)
             if override is not None and override.marks is None:
@@ -78,4 +78,4 @@ def _table(session: Session, assignment: str, ranking: Ranking, lines: Sequence[
             unit = next((measure.unit for measure in found), unit)
             values = tuple(measure.value for measure in found)
             measures.append(StudentMeasures(jobs[job_id].student, values, len(evidence)))
-    return RankTable(assignment, ranking.title, ranking.measure, unit, ranked(measures, highest=ranking.highest))
+    return RankTable(assignment, ranking.title, ranking.measure, unit, rank_students(measures, highest=ranking.highest))

@@ -15,14 +15,14 @@ from sqlalchemy import case, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
 from service.store.batches import batches
+from service.store.courses.assignment_versions import FrozenAssignment, store_version
 from service.store.courses.hidden_names import HiddenNames
-from service.store.courses.versions import Frozen, keep
 from service.store.engine import now
 from service.store.grades import overrides
 from service.store.grades.overrides import CriterionMarks
 from service.store.models import AssignmentVersion, Batch, Enrolment, Job, SubmissionRow, TrialRow
 from service.store.queue.jobs import enqueue
-from service.store.states import UNFINISHED, JobState, Lane, Standing
+from service.store.states import UNFINISHED, JobQueue, JobState, Standing
 from sim.errors import UsageError
 
 _CHANGES_A_PAGE = 50
@@ -30,7 +30,7 @@ _UNEXPLAINED = "unexplained: other recordings from the same assignment and grade
 
 
 @dataclass(frozen=True, slots=True)
-class Regraded:
+class RegradeBatch:
     """A batch of regrades, with the number of submissions left out: other assignment, or not graded yet."""
 
     batch_id: str
@@ -76,7 +76,7 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
-class Grading:
+class GradingLine:
     """One grading of a submission."""
 
     id: str
@@ -99,20 +99,22 @@ class ChangesPage:
     pages: int
 
 
-def regrade(session: Session, original: Batch, frozen: Frozen | None, *, max_attempts: int) -> Regraded:
+def queue_regrades(
+    session: Session, original: Batch, frozen: FrozenAssignment | None, *, max_attempts: int
+) -> RegradeBatch:
     """Queue a regrade of every submission of the batch that was graded or failed.
 
     Uses the assignment version ``frozen``, or else the version that each was graded against. Standing grades are not
     changed. Raises UsageError if there is nothing to grade again.
     """
     at = now(session)
-    standing = _standing(session, original.id)
+    standing = _load_standing_jobs(session, original.id)
     ended = [row for row in standing if row[0].state in (JobState.DONE, JobState.DEAD)]
     wanted = [job for job, name in ended if frozen is None or name == frozen.assignment.id]
     unfinished = sum(job.state in UNFINISHED for job, _ in standing)
     if not wanted:
-        raise UsageError(_nothing(original.id, frozen, {name for _, name in standing}, unfinished))
-    version_id = None if frozen is None else keep(session, frozen, at)
+        raise UsageError(_describe_empty_regrade(original.id, frozen, {name for _, name in standing}, unfinished))
+    version_id = None if frozen is None else store_version(session, frozen, at)
     batch = Batch(
         course_id=original.course_id,
         name=f"regrade of {original.name}",
@@ -123,11 +125,11 @@ def regrade(session: Session, original: Batch, frozen: Frozen | None, *, max_att
     session.add(batch)
     session.flush()
     for job in wanted:
-        enqueue(session, _proposal(job, version_id, batch.id, Lane.BATCH, max_attempts), at)
-    return Regraded(batch.id, len(wanted), len(ended) - len(wanted), unfinished)
+        enqueue(session, _build_proposal(job, version_id, batch.id, JobQueue.BATCH, max_attempts), at)
+    return RegradeBatch(batch.id, len(wanted), len(ended) - len(wanted), unfinished)
 
 
-def regrade_one(session: Session, asked: Job, frozen: Frozen | None, *, max_attempts: int) -> Job:
+def queue_regrade(session: Session, asked: Job, frozen: FrozenAssignment | None, *, max_attempts: int) -> Job:
     """Queue an interactive regrade of one submission and return the new job.
 
     ``frozen`` as in ``regrade``. Raises UsageError if there is no grade yet, or for another assignment.
@@ -141,33 +143,33 @@ def regrade_one(session: Session, asked: Job, frozen: Frozen | None, *, max_atte
     name = session.get_one(AssignmentVersion, ended[-1].assignment_version_id).assignment
     if frozen is not None and frozen.assignment.id != name:
         raise UsageError(f"this submission is for {name}, not for {frozen.assignment.id}")
-    version_id = None if frozen is None else keep(session, frozen, at)
-    proposal = _proposal(ended[-1], version_id, None, Lane.INTERACTIVE, max_attempts)
+    version_id = None if frozen is None else store_version(session, frozen, at)
+    proposal = _build_proposal(ended[-1], version_id, None, JobQueue.INTERACTIVE, max_attempts)
     enqueue(session, proposal, at)
     session.flush()
     return proposal
 
 
-def change(session: Session, job_id: str) -> Change | None:
+def load_change(session: Session, job_id: str) -> Change | None:
     """Return the change that a regrade makes; None if the job is not a regrade."""
     after = session.get(Job, job_id)
     if after is None or after.regrade_of is None:
         return None
     student = session.get_one(Enrolment, after.enrolment_id).student
-    return _change(session, after, session.get_one(Job, after.regrade_of), student)
+    return _build_change(session, after, session.get_one(Job, after.regrade_of), student)
 
 
-def gradings(session: Session, submission_id: int) -> list[Grading]:
+def load_gradings(session: Session, submission_id: int) -> list[GradingLine]:
     """Return all gradings of a submission, oldest first, without those of quarantined workers."""
     of_submission = (Job.submission_id == submission_id, Job.suspect.is_(None))
     rows = session.scalars(select(Job).where(*of_submission).order_by(Job.queued_at, Job.id))
     return [
-        Grading(row.id, row.state, row.standing, row.marks, row.max_marks, row.queued_at, row.published_at)
+        GradingLine(row.id, row.state, row.standing, row.marks, row.max_marks, row.queued_at, row.published_at)
         for row in rows
     ]
 
 
-def changes(session: Session, batch_id: str, hidden: HiddenNames) -> list[Change]:
+def load_changes(session: Session, batch_id: str, hidden: HiddenNames) -> list[Change]:
     """Return the changes of a batch of regrades, ordered by displayed student name."""
     before = aliased(Job)
     query = (
@@ -178,13 +180,13 @@ def changes(session: Session, batch_id: str, hidden: HiddenNames) -> list[Change
         .where(Job.batch_id == batch_id)
     )
     found = [
-        _change(session, after, earlier, hidden.called(assignment, student))
+        _build_change(session, after, earlier, hidden.label_student(assignment, student))
         for after, earlier, student, assignment in session.execute(query)
     ]
     return sorted(found, key=lambda each: (each.student, each.job_id))
 
 
-def changes_page(session: Session, batch_id: str, page: int, hidden: HiddenNames) -> ChangesPage:
+def load_changes_page(session: Session, batch_id: str, page: int, hidden: HiddenNames) -> ChangesPage:
     """Return a page of the changes of a batch of regrades: different marks first, then by student.
 
     If names are hidden, the order is that of the random job ids.
@@ -209,31 +211,31 @@ def changes_page(session: Session, batch_id: str, page: int, hidden: HiddenNames
         .offset((page - 1) * _CHANGES_A_PAGE)
     )
     shown = tuple(
-        _change(session, after, earlier, hidden.called(assignment, student))
+        _build_change(session, after, earlier, hidden.label_student(assignment, student))
         for after, earlier, student, assignment in session.execute(query)
     )
     return ChangesPage(shown, found, differing, page, max(1, -(-found // _CHANGES_A_PAGE)))
 
 
-def _standing(session: Session, batch_id: str) -> Sequence[tuple[Job, str]]:
+def _load_standing_jobs(session: Session, batch_id: str) -> Sequence[tuple[Job, str]]:
     """Return the standing jobs of the submissions of a batch, with their assignments."""
     query = (
         select(Job, AssignmentVersion.assignment)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
-        .where(Job.submission_id.in_(batches.submissions_in(session, batch_id)), Job.standing == Standing.STANDS)
+        .where(Job.submission_id.in_(batches.select_submissions(session, batch_id)), Job.standing == Standing.STANDS)
         .order_by(Job.queued_at, Job.id)
     )
     return [(job, name) for job, name in session.execute(query)]
 
 
-def _nothing(batch_id: str, frozen: Frozen | None, found: set[str], unfinished: int) -> str:
+def _describe_empty_regrade(batch_id: str, frozen: FrozenAssignment | None, found: set[str], unfinished: int) -> str:
     if frozen is not None and found and frozen.assignment.id not in found:
         return f"batch {batch_id} has no submission for {frozen.assignment.id}, only for {', '.join(sorted(found))}"
     waits = f": {unfinished} of its submissions are not graded yet" if unfinished else ""
     return f"batch {batch_id} has nothing to grade again{waits}"
 
 
-def _proposal(job: Job, version_id: int | None, batch_id: str | None, lane: Lane, max_attempts: int) -> Job:
+def _build_proposal(job: Job, version_id: int | None, batch_id: str | None, lane: JobQueue, max_attempts: int) -> Job:
     return Job(
         submission_id=job.submission_id,
         assignment_version_id=version_id or job.assignment_version_id,
@@ -247,8 +249,8 @@ def _proposal(job: Job, version_id: int | None, batch_id: str | None, lane: Lane
     )
 
 
-def _change(session: Session, after: Job, before: Job, student: str) -> Change:
-    reason = _reason(session, before, after)
+def _build_change(session: Session, after: Job, before: Job, student: str) -> Change:
+    reason = _describe_reason(session, before, after)
     return Change(
         student=student,
         job_id=after.id,
@@ -259,31 +261,31 @@ def _change(session: Session, after: Job, before: Job, student: str) -> Change:
         after=after.marks,
         before_max=before.max_marks,
         after_max=after.max_marks,
-        criteria=_criteria(session, before.id, after.id) if after.state is JobState.DONE else (),
+        criteria=_compare_criteria(session, before.id, after.id) if after.state is JobState.DONE else (),
         reason=reason or _UNEXPLAINED,
         is_unexplained=reason is None,
     )
 
 
-def _criteria(session: Session, before_id: str, after_id: str) -> tuple[CriterionChange, ...]:
-    before, after = _marks(session, before_id), _marks(session, after_id)
+def _compare_criteria(session: Session, before_id: str, after_id: str) -> tuple[CriterionChange, ...]:
+    before, after = _load_marks(session, before_id), _load_marks(session, after_id)
     changed = []
     for key, line in {**before, **after}.items():
-        worths = _worth(before.get(key)), _worth(after.get(key))
+        worths = _read_marks(before.get(key)), _read_marks(after.get(key))
         if worths[0] != worths[1]:
             changed.append(CriterionChange(line.title, *worths, by_hand=key in after and line.override is not None))
     return tuple(changed)
 
 
-def _marks(session: Session, job_id: str) -> dict[str, CriterionMarks]:
-    return {line.criterion: line for line in overrides.criterion_marks(session, job_id)}
+def _load_marks(session: Session, job_id: str) -> dict[str, CriterionMarks]:
+    return {line.criterion: line for line in overrides.load_criterion_marks(session, job_id)}
 
 
-def _worth(line: CriterionMarks | None) -> tuple[Decimal, Decimal] | None:
+def _read_marks(line: CriterionMarks | None) -> tuple[Decimal, Decimal] | None:
     return None if line is None else (line.marks, line.max_marks)
 
 
-def _reason(session: Session, before: Job, after: Job) -> str | None:
+def _describe_reason(session: Session, before: Job, after: Job) -> str | None:
     """Return every difference between two gradings that may explain different marks; None without one."""
     if after.state is not JobState.DONE:
         return after.error or after.state.value
@@ -301,11 +303,11 @@ def _reason(session: Session, before: Job, after: Job) -> str | None:
         reasons.append("secret changed")
     if before.suspect is not None:
         reasons.append("the earlier worker was found to grade wrongly")
-    if not reasons and _chains(session, before.id) != _chains(session, after.id):
+    if not reasons and _load_chains(session, before.id) != _load_chains(session, after.id):
         # The same grader and assignment must give the same recordings, so this needs review.
         return None
     return ", ".join(reasons) or "nothing changed"
 
 
-def _chains(session: Session, job_id: str) -> list[str]:
+def _load_chains(session: Session, job_id: str) -> list[str]:
     return list(session.scalars(select(TrialRow.sha256).where(TrialRow.job_id == job_id).order_by(TrialRow.position)))

@@ -8,27 +8,29 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from service.similarity.behaviour import behaviour_of
-from service.similarity.pairs import Similarity, similarity
-from service.similarity.sources import given_with, sources_of
-from service.similarity.writing import source_of
+from service.similarity.behaviour import extract_behaviour
+from service.similarity.pairs import Similarity, compare_submissions
+from service.similarity.similar_sources import build_source
+from service.similarity.sources import collect_given_code, extract_sources
 from service.store.batches import intake
 from service.store.batches.batches import JobLine
 from service.store.engine import Store
-from service.store.grades import current, results
+from service.store.grades import current_grades, results
 
 #: Maximum number of submissions compared in a request; this takes some seconds.
 MOST_AT_ONCE = 300
 
 
-def similarities(store: Store, lines: Sequence[JobLine], given: Path | None = None) -> list[Similarity]:
+def find_similar_submissions(store: Store, lines: Sequence[JobLine], given: Path | None = None) -> list[Similarity]:
     """Return the similar submissions of each assignment of a batch.
 
     Ignores code given with the assignment and the code in ``given``. Only the recordings of one submission are in
     memory at a time. Raises UsageError if ``given`` cannot be read.
     """
     assignments = sorted({line.assignment for line in lines})
-    return [_of_one(store, [line for line in lines if line.assignment == each], given) for each in assignments]
+    return [
+        _compare_assignment(store, [line for line in lines if line.assignment == each], given) for each in assignments
+    ]
 
 
 class SourceTexts:
@@ -39,24 +41,24 @@ class SourceTexts:
         self._jobs = {(line.assignment, line.student): line.id for line in lines}
         self._texts: dict[str, Mapping[str, str]] = {}
 
-    def of(self, assignment: str, student: str, file: str) -> str:
+    def load_text(self, assignment: str, student: str, file: str) -> str:
         """Return the text of one file of a student."""
         if not self._texts:
             with self._store.reading() as session:
                 each = intake.load_each_submission(session, self._jobs.values())
-                self._texts = {job_id: sources_of(submission) for job_id, submission in each}
+                self._texts = {job_id: extract_sources(submission) for job_id, submission in each}
         return self._texts[self._jobs[assignment, student]][file]
 
 
-def _of_one(store: Store, lines: Sequence[JobLine], given: Path | None) -> Similarity:
-    graded = [line.id for line in lines if current.is_trusted(line)]
+def _compare_assignment(store: Store, lines: Sequence[JobLine], given: Path | None) -> Similarity:
+    graded = [line.id for line in lines if current_grades.is_trusted(line)]
     with store.reading() as session:
         assignment = intake.load_assignment(session, lines[0].id)
-        left_out = given_with(assignment, given)
+        left_out = collect_given_code(assignment, given)
         submissions = intake.load_each_submission(session, [line.id for line in lines])
-        texts = {job_id: sources_of(submission) for job_id, submission in submissions}
+        texts = {job_id: extract_sources(submission) for job_id, submission in submissions}
         trials = results.load_each_trials(session, graded)
-        behaved = {job_id: behaviour_of(of_job) for job_id, of_job in trials}
-    sources = [source_of(line.student, file, text) for line in lines for file, text in texts[line.id].items()]
+        behaved = {job_id: extract_behaviour(of_job) for job_id, of_job in trials}
+    sources = [build_source(line.student, file, text) for line in lines for file, text in texts[line.id].items()]
     behaviours = {line.student: behaved[line.id] for line in lines if line.id in behaved}
-    return similarity(assignment.id, sources, left_out, behaviours)
+    return compare_submissions(assignment.id, sources, left_out, behaviours)

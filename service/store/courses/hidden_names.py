@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 from sqlalchemy import select
 
-from service.store.courses.open_assignments import are_hidden
+from service.store.courses.open_assignments import match_anonymous_assignments
 from service.store.engine import Store
-from service.store.installation import secret_read
+from service.store.installation import require_secret
 from service.store.models import Installation
 from service.store.web_tables import OpenAssignment
 
-_LONG = 6
+_LABEL_LENGTH = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,26 +29,28 @@ class HiddenNames:
     assignments: frozenset[str]
     key: bytes
 
-    def called(self, assignment: str, student: str) -> str:
+    def label_student(self, assignment: str, student: str) -> str:
         """Return the label of the student with this id; the id itself if names are not hidden."""
         if assignment not in self.assignments:
             return student
         whose = f"{assignment}\n{student}".encode("utf-8", "surrogatepass")
         digest = hmac.new(self.key, whose, hashlib.sha256).digest()
-        return f"Participant {base64.b32encode(digest)[:_LONG].decode('ascii')}"
+        return f"Participant {base64.b32encode(digest)[:_LABEL_LENGTH].decode('ascii')}"
 
 
 #: For operators and their commands, which show every name.
-NAMED = HiddenNames(frozenset(), b"")
+NO_HIDDEN_NAMES = HiddenNames(frozenset(), b"")
 
 
-def hidden_names_of(store: Store, course_id: int) -> HiddenNames:
+def load_hidden_names(store: Store, course_id: int) -> HiddenNames:
     """Return the hidden names of a course. Labels are keyed by the installation's secret, so they cannot be guessed."""
     own_secret = select(Installation.secret).scalar_subquery()
     with store.reading() as session:
-        rows = session.execute(select(OpenAssignment.assignment, own_secret).where(*are_hidden(course_id))).all()
+        rows = session.execute(
+            select(OpenAssignment.assignment, own_secret).where(*match_anonymous_assignments(course_id))
+        ).all()
     if not rows:
-        return NAMED
-    secret = store.secret or secret_read(rows[0][1])
+        return NO_HIDDEN_NAMES
+    secret = store.secret or require_secret(rows[0][1])
     key = hmac.new(secret.text.encode("utf-8", "surrogateescape"), f"names {course_id}".encode(), hashlib.sha256)
     return HiddenNames(frozenset(assignment for assignment, _ in rows), key.digest())

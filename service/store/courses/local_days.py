@@ -16,30 +16,30 @@ _ONE_DAY = timedelta(days=1)
 _LOCALTIME = Path("/etc/localtime")
 
 
-def local_zone() -> str:
+def find_local_zone() -> str:
     """Return this server's time zone, such as Europe/Berlin; empty if unknown."""
     named = os.environ.get("TZ", "").removeprefix(":")
     if not named:
         _, found, named = os.fspath(_LOCALTIME.resolve()).rpartition("zoneinfo/")
         named = named if found else ""
-    return named if _zone(named) is not None else ""
+    return named if _load_zone(named) is not None else ""
 
 
 def add_days(moment: datetime, days: int, zone: str) -> datetime:
     """Return the moment ``days`` later at the same local time; the later one if that time occurs twice."""
     if not days:
         return moment
-    here = _wall(moment, zone)
-    tz = _zone(zone)
+    here = _to_local_time(moment, zone)
+    tz = _load_zone(zone)
     moved = here + timedelta(days=days)
     return max(moved.replace(tzinfo=tz, fold=fold).astimezone(UTC) for fold in (0, 1))
 
 
-def days_after(moment: datetime, later: datetime, zone: str) -> int:
+def count_days_after(moment: datetime, later: datetime, zone: str) -> int:
     """Return the number of local days, rounded up, that ``later`` is after ``moment``; 0 if it is not after."""
     if later <= moment:
         return 0
-    days = max(1, math.ceil((_wall(later, zone) - _wall(moment, zone)) / _ONE_DAY))
+    days = max(1, math.ceil((_to_local_time(later, zone) - _to_local_time(moment, zone)) / _ONE_DAY))
     while add_days(moment, days, zone) < later:
         days += 1
     while days > 1 and add_days(moment, days - 1, zone) >= later:
@@ -47,13 +47,13 @@ def days_after(moment: datetime, later: datetime, zone: str) -> int:
     return days
 
 
-def _wall(moment: datetime, zone: str) -> datetime:
+def _to_local_time(moment: datetime, zone: str) -> datetime:
     """Return the local time in the zone, as a naive datetime."""
-    return moment.astimezone(_zone(zone)).replace(tzinfo=None)
+    return moment.astimezone(_load_zone(zone)).replace(tzinfo=None)
 
 
 @cache
-def _zone(name: str) -> tzinfo | None:
+def _load_zone(name: str) -> tzinfo | None:
     """Return the zone of this name; None, which means the server's zone, if it is unknown."""
     try:
         return ZoneInfo(name) if name else None

@@ -16,7 +16,7 @@ from sqlalchemy.orm import Session
 
 from service.store import outbox
 from service.store.courses import policies
-from service.store.courses.versions import Frozen, assignment_from_bytes, keep
+from service.store.courses.assignment_versions import FrozenAssignment, assignment_from_bytes, store_version
 from service.store.engine import now
 from service.store.models import AssignmentVersion, Batch
 from service.store.web_tables import OpenAssignment
@@ -46,48 +46,48 @@ class CourseAssignment:
         return self.opened_at is not None and self.closed_at is None
 
 
-def prepare(session: Session, course_id: int, frozen: Frozen) -> CourseAssignment:
+def prepare_assignment(session: Session, course_id: int, frozen: FrozenAssignment) -> CourseAssignment:
     """Add an assignment to a course without opening it, or replace the version of one with the same id."""
     at = now(session)
-    version_id = keep(session, frozen, at)
-    row = _row(session, course_id, frozen.assignment.id)
+    version_id = store_version(session, frozen, at)
+    row = _find_row(session, course_id, frozen.assignment.id)
     if row is None:
         row = OpenAssignment(course_id=course_id, assignment=frozen.assignment.id, assignment_version_id=version_id)
         session.add(row)
     row.assignment_version_id = version_id
     if row.batch_id is not None:
-        session.get_one(Batch, row.batch_id).name = _batch_name(frozen.assignment.title)
+        session.get_one(Batch, row.batch_id).name = _format_batch_name(frozen.assignment.title)
     session.flush()
-    return find(session, course_id, frozen.assignment.id)
+    return load_course_assignment(session, course_id, frozen.assignment.id)
 
 
 def open_for_students(session: Session, course_id: int, assignment: str) -> None:
     """Show the assignment to students and accept submissions. Raises UsageError if the course does not have it."""
-    row, at = _there(session, course_id, assignment), now(session)
+    row, at = _require_row(session, course_id, assignment), now(session)
     row.opened_at, row.closed_at = row.opened_at or at, None
     if row.batch_id is None:
         title = session.get_one(AssignmentVersion, row.assignment_version_id).title
-        batch = Batch(course_id=course_id, name=_batch_name(title), created_at=at)
+        batch = Batch(course_id=course_id, name=_format_batch_name(title), created_at=at)
         session.add(batch)
         session.flush()
         row.batch_id = batch.id
 
 
-def close(session: Session, course_id: int, assignment: str) -> None:
+def close_assignment(session: Session, course_id: int, assignment: str) -> None:
     """Stop accepting submissions; existing ones are kept. Raises UsageError if the course does not have it."""
-    row = _there(session, course_id, assignment)
+    row = _require_row(session, course_id, assignment)
     row.closed_at = now(session)
     session.flush()
     if row.batch_id is not None:
-        outbox.batch_ended(session, row.batch_id)
+        outbox.emit_batch_finished(session, row.batch_id)
 
 
-def remove(session: Session, course_id: int, assignment: str) -> None:
+def remove_assignment(session: Session, course_id: int, assignment: str) -> None:
     """Remove an assignment and its policy from a course; graded batches are kept.
 
     Raises UsageError if the course does not have it, students have seen it, or it hides names.
     """
-    row = _there(session, course_id, assignment)
+    row = _require_row(session, course_id, assignment)
     if row.opened_at is not None:
         raise UsageError(f"{assignment}: students have already seen it, so it cannot be removed; close it instead")
     if row.names_hidden:
@@ -99,20 +99,20 @@ def remove(session: Session, course_id: int, assignment: str) -> None:
 
 def hide_names(session: Session, course_id: int, assignment: str, hidden: bool) -> None:
     """Hide or show students' names to instructors. Raises UsageError if the course does not have it."""
-    _there(session, course_id, assignment).names_hidden = hidden
+    _require_row(session, course_id, assignment).names_hidden = hidden
 
 
-def with_names_hidden(session: Session, course_id: int) -> frozenset[str]:
+def load_anonymous_assignments(session: Session, course_id: int) -> frozenset[str]:
     """Return the assignments of a course whose instructors do not see students' names."""
-    return frozenset(session.scalars(select(OpenAssignment.assignment).where(*are_hidden(course_id))))
+    return frozenset(session.scalars(select(OpenAssignment.assignment).where(*match_anonymous_assignments(course_id))))
 
 
-def are_hidden(course_id: int) -> tuple[ColumnElement[bool], ...]:
+def match_anonymous_assignments(course_id: int) -> tuple[ColumnElement[bool], ...]:
     """Return the conditions on an ``OpenAssignment`` that select the course's assignments with hidden names."""
     return OpenAssignment.course_id == course_id, OpenAssignment.names_hidden.is_(True)
 
 
-def of_course(session: Session, course_id: int) -> list[CourseAssignment]:
+def list_assignments(session: Session, course_id: int) -> list[CourseAssignment]:
     """Return all assignments of a course, ordered by id."""
     query = (
         select(OpenAssignment, AssignmentVersion)
@@ -120,41 +120,41 @@ def of_course(session: Session, course_id: int) -> list[CourseAssignment]:
         .where(OpenAssignment.course_id == course_id)
         .order_by(OpenAssignment.assignment)
     )
-    return [_line(row, version) for row, version in session.execute(query)]
+    return [_build_course_assignment(row, version) for row, version in session.execute(query)]
 
 
-def find(session: Session, course_id: int, assignment: str) -> CourseAssignment:
+def load_course_assignment(session: Session, course_id: int, assignment: str) -> CourseAssignment:
     """Return one assignment of a course. Raises UsageError if the course does not have it."""
-    row = _there(session, course_id, assignment)
-    return _line(row, session.get_one(AssignmentVersion, row.assignment_version_id))
+    row = _require_row(session, course_id, assignment)
+    return _build_course_assignment(row, session.get_one(AssignmentVersion, row.assignment_version_id))
 
 
-def load(session: Session, course_id: int, assignment: str) -> Assignment:
+def load_assignment(session: Session, course_id: int, assignment: str) -> Assignment:
     """Load the content of an assignment. Raises UsageError if the course does not have it."""
-    row = _there(session, course_id, assignment)
+    row = _require_row(session, course_id, assignment)
     content = session.scalars(
         select(AssignmentVersion.content).where(AssignmentVersion.id == row.assignment_version_id)
     ).one()
     return assignment_from_bytes(content)
 
 
-def _batch_name(title: str) -> str:
+def _format_batch_name(title: str) -> str:
     return f"Submitted on the web: {title}"
 
 
-def _row(session: Session, course_id: int, assignment: str) -> OpenAssignment | None:
+def _find_row(session: Session, course_id: int, assignment: str) -> OpenAssignment | None:
     of_this = (OpenAssignment.course_id == course_id, OpenAssignment.assignment == assignment)
     return session.scalar(select(OpenAssignment).where(*of_this))
 
 
-def _there(session: Session, course_id: int, assignment: str) -> OpenAssignment:
-    row = _row(session, course_id, assignment)
+def _require_row(session: Session, course_id: int, assignment: str) -> OpenAssignment:
+    row = _find_row(session, course_id, assignment)
     if row is None:
         raise UsageError(f"this course has no assignment {assignment!r}")
     return row
 
 
-def _line(row: OpenAssignment, version: AssignmentVersion) -> CourseAssignment:
+def _build_course_assignment(row: OpenAssignment, version: AssignmentVersion) -> CourseAssignment:
     return CourseAssignment(
         row.assignment,
         version.title,

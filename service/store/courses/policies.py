@@ -15,16 +15,16 @@ from sqlalchemy import ColumnElement, delete, func, or_, select
 from sqlalchemy.exc import NoResultFound
 from sqlalchemy.orm import Session
 
-from service.store.courses.local_days import add_days, days_after, local_zone
+from service.store.conditional_insert import insert_if_new
+from service.store.courses.local_days import add_days, count_days_after, find_local_zone
 from service.store.engine import now
-from service.store.inserting import insert_if_new
 from service.store.models import Enrolment, Extension, Job, Policy, SubmissionRow
 from service.store.states import JobState
 
 _ALWAYS = frozenset({"visible"})
 _AFTER_DUE_DATE = frozenset({"after_due_date"})
 _WITH_PUBLICATION = _AFTER_DUE_DATE | {"after_published"}
-_NOT_THE_STUDENTS = ("assignment_error", "host_error")
+_UNCOUNTED_VERDICTS = ("assignment_error", "host_error")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,14 +44,14 @@ class PolicyLimits:
 
     def days_late(self, submitted_at: datetime) -> int:
         """Return the number of days late in the policy's zone, rounded up."""
-        return 0 if self.due_at is None else days_after(self.due_at, submitted_at, self.zone)
+        return 0 if self.due_at is None else count_days_after(self.due_at, submitted_at, self.zone)
 
 
 OverLimit = Literal["attempts", "date", "cool-down"]
 
 
 @dataclass(frozen=True, slots=True)
-class Exceeded:
+class ExceededLimit:
     """An exceeded limit and the actual value: the attempt, the days late, or the minutes waited."""
 
     limit: OverLimit
@@ -63,7 +63,7 @@ class Exceeded:
             case "attempts":
                 return f"attempt {self.actual}, allowed: {self.allowed}"
             case "date":
-                return f"{in_days(self.actual)} late, allowed: {self.allowed}"
+                return f"{format_days(self.actual)} late, allowed: {self.allowed}"
             case "cool-down":
                 return f"submitted {self.actual} min after the previous submission, required: {self.allowed} min"
 
@@ -73,26 +73,28 @@ class Ruling:
     """Days that a submission is late, and the limit that it exceeds, if any."""
 
     days_late: int = 0
-    over: Exceeded | None = None
+    over: ExceededLimit | None = None
 
 
-def limits(session: Session, enrolment_id: int, assignment: str) -> PolicyLimits:
+def load_limits(session: Session, enrolment_id: int, assignment: str) -> PolicyLimits:
     """Return the limits of a student: the assignment's policy, or the course's, with the student's extensions.
 
     Extensions for all assignments and for this one combine: the later due date and the larger number of attempts apply.
     """
-    return limits_of_each(session, enrolment_id, [assignment])[assignment]
+    return load_limits_by_assignment(session, enrolment_id, [assignment])[assignment]
 
 
-def limits_of_each(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, PolicyLimits]:
+def load_limits_by_assignment(
+    session: Session, enrolment_id: int, assignments: Collection[str]
+) -> dict[str, PolicyLimits]:
     """Return ``limits`` for several assignments, with the same number of statements."""
     course_id = select(Enrolment.course_id).where(Enrolment.id == enrolment_id).scalar_subquery()
-    known = _known_policies(session, Policy.course_id == course_id, assignments)
+    known = _load_known_policies(session, Policy.course_id == course_id, assignments)
     own = {assignment: policy for (_, assignment), policy in known.items()}
     of_student = (Extension.enrolment_id == enrolment_id, Extension.assignment.in_(("", *assignments)))
     extensions = session.scalars(select(Extension).where(*of_student)).all()
     return {
-        each: _extended(
+        each: _apply_extensions(
             own.get(each) or own.get("") or PolicyLimits(),
             [extension for extension in extensions if extension.assignment in ("", each)],
         )
@@ -100,7 +102,7 @@ def limits_of_each(session: Session, enrolment_id: int, assignments: Collection[
     }
 
 
-def _extended(policy: PolicyLimits, extensions: Sequence[Extension]) -> PolicyLimits:
+def _apply_extensions(policy: PolicyLimits, extensions: Sequence[Extension]) -> PolicyLimits:
     due_at, attempts = policy.due_at, policy.attempts
     if due_at is not None:
         due_at = max([due_at, *(each.due_at for each in extensions if each.due_at is not None)])
@@ -109,50 +111,52 @@ def _extended(policy: PolicyLimits, extensions: Sequence[Extension]) -> PolicyLi
     return replace(policy, due_at=due_at, attempts=attempts)
 
 
-def in_days(count: int) -> str:
+def format_days(count: int) -> str:
     """Return a number of days in words."""
     return "1 day" if count == 1 else f"{count} days"
 
 
-def rule(session: Session, enrolment_id: int, assignment: str, sha256: str, submitted_at: datetime | None) -> Ruling:
+def apply_policy(
+    session: Session, enrolment_id: int, assignment: str, sha256: str, submitted_at: datetime | None
+) -> Ruling:
     """Apply the policy to a submission that arrives now. An unknown submission time counts as in time."""
-    allowed = limits(session, enrolment_id, assignment)
-    counted = _counted(session, enrolment_id, [assignment]).get(assignment, {})
+    allowed = load_limits(session, enrolment_id, assignment)
+    counted = _load_attempt_times(session, enrolment_id, [assignment]).get(assignment, {})
     earlier = [when for sha, when in counted.items() if sha != sha256]
     if allowed.attempts is not None and len(earlier) >= allowed.attempts:
-        return Ruling(over=Exceeded("attempts", len(earlier) + 1, allowed.attempts))
+        return Ruling(over=ExceededLimit("attempts", len(earlier) + 1, allowed.attempts))
     if submitted_at is None:
         return Ruling()
     days_late = allowed.days_late(submitted_at)
     if days_late > allowed.late_days:
-        return Ruling(days_late, Exceeded("date", days_late, allowed.late_days))
+        return Ruling(days_late, ExceededLimit("date", days_late, allowed.late_days))
     since = [submitted_at - when for when in earlier if when <= submitted_at]
     if since and min(since).total_seconds() < allowed.cool_down_seconds:
         minutes = math.floor(min(since).total_seconds() / 60)
         asked = math.ceil(allowed.cool_down_seconds / 60)
-        return Ruling(days_late, Exceeded("cool-down", minutes, asked))
+        return Ruling(days_late, ExceededLimit("cool-down", minutes, asked))
     return Ruling(days_late)
 
 
-def attempts_made(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, int]:
+def count_attempts(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, int]:
     """Return the number of a student's submissions that count as attempts so far, by assignment."""
-    counted = _counted(session, enrolment_id, assignments)
+    counted = _load_attempt_times(session, enrolment_id, assignments)
     return {each: len(counted.get(each, {})) for each in assignments}
 
 
-def released(session: Session, job_id: str) -> frozenset[str]:
+def load_visibilities(session: Session, job_id: str) -> frozenset[str]:
     """Return the visibilities of a grade that its student may see now.
 
     ``after_due_date`` opens when no student of the course may submit any more, including extensions and late days. All
     but ``hidden`` open when the grade is published. Raises NoResultFound if the job no longer exists.
     """
-    found = released_of_each(session, [job_id])
+    found = load_visibilities_by_job(session, [job_id])
     if job_id not in found:
         raise NoResultFound
     return found[job_id]
 
 
-def released_of_each(session: Session, job_ids: Collection[str]) -> dict[str, frozenset[str]]:
+def load_visibilities_by_job(session: Session, job_ids: Collection[str]) -> dict[str, frozenset[str]]:
     """Return ``released`` for several grades, with the same number of statements."""
     query = (
         select(Job.id, Job.published_at, Enrolment.course_id, SubmissionRow.assignment)
@@ -161,7 +165,7 @@ def released_of_each(session: Session, job_ids: Collection[str]) -> dict[str, fr
         .where(Job.id.in_(job_ids))
     )
     rows = session.execute(query).all()
-    closed = _closed_for_all(session, {(course_id, assignment) for *_, course_id, assignment in rows})
+    closed = _find_closed_assignments(session, {(course_id, assignment) for *_, course_id, assignment in rows})
     return {
         job_id: _ALWAYS
         | (_WITH_PUBLICATION if published_at is not None else frozenset())
@@ -179,7 +183,7 @@ def set_policy(session: Session, course_id: int, assignment: str, allowed: Polic
     row = session.scalars(select(Policy).where(Policy.course_id == course_id, Policy.assignment == assignment)).one()
     row.due_at, row.late_days = allowed.due_at, allowed.late_days
     row.attempts, row.cool_down_seconds = allowed.attempts, allowed.cool_down_seconds
-    row.zone = allowed.zone or local_zone()
+    row.zone = allowed.zone or find_local_zone()
 
 
 def drop_policy(session: Session, course_id: int, assignment: str) -> None:
@@ -187,13 +191,15 @@ def drop_policy(session: Session, course_id: int, assignment: str) -> None:
     session.execute(delete(Policy).where(Policy.course_id == course_id, Policy.assignment == assignment))
 
 
-def policies(session: Session, course_id: int) -> dict[str, PolicyLimits]:
+def load_policies(session: Session, course_id: int) -> dict[str, PolicyLimits]:
     """Return the policies of a course, by assignment."""
     rows = session.scalars(select(Policy).where(Policy.course_id == course_id).order_by(Policy.assignment))
-    return {row.assignment: _limits(row) for row in rows}
+    return {row.assignment: _build_limits(row) for row in rows}
 
 
-def extend(session: Session, enrolment_id: int, assignment: str, due_at: datetime | None, more_attempts: int) -> None:
+def extend_policy(
+    session: Session, enrolment_id: int, assignment: str, due_at: datetime | None, more_attempts: int
+) -> None:
     """Extend the policy for one student; replaces the student's earlier extension for the same assignment."""
     insert_if_new(session, Extension, enrolment_id=enrolment_id, assignment=assignment)
     same = (Extension.enrolment_id == enrolment_id, Extension.assignment == assignment)
@@ -212,7 +218,7 @@ class ExtensionLine:
     more_attempts: int
 
 
-def extensions(session: Session, course_id: int) -> list[ExtensionLine]:
+def list_extensions(session: Session, course_id: int) -> list[ExtensionLine]:
     """Return all extensions of a course, ordered by student."""
     query = (
         select(Extension, Enrolment.student)
@@ -226,22 +232,22 @@ def extensions(session: Session, course_id: int) -> list[ExtensionLine]:
     ]
 
 
-def _known_policies(
+def _load_known_policies(
     session: Session, of_course: ColumnElement[bool], assignments: Collection[str]
 ) -> dict[tuple[int, str], PolicyLimits]:
     """Return the policies of some assignments and the defaults, by course and assignment."""
     rows = session.scalars(select(Policy).where(of_course, Policy.assignment.in_(("", *assignments))))
-    return {(row.course_id, row.assignment): _limits(row) for row in rows}
+    return {(row.course_id, row.assignment): _build_limits(row) for row in rows}
 
 
-def _limits(row: Policy) -> PolicyLimits:
+def _build_limits(row: Policy) -> PolicyLimits:
     return PolicyLimits(row.due_at, row.late_days, row.attempts, row.cool_down_seconds, row.zone)
 
 
-def _closed_for_all(session: Session, which: Collection[tuple[int, str]]) -> set[tuple[int, str]]:
+def _find_closed_assignments(session: Session, which: Collection[tuple[int, str]]) -> set[tuple[int, str]]:
     """Return the given (course, assignment) pairs to which no student may submit any more."""
     course_ids, assignments = {course_id for course_id, _ in which}, {assignment for _, assignment in which}
-    known = _known_policies(session, Policy.course_id.in_(course_ids), assignments)
+    known = _load_known_policies(session, Policy.course_id.in_(course_ids), assignments)
     extended = (
         select(Enrolment.course_id, Extension.assignment, func.max(Extension.due_at))
         .join(Enrolment, Extension.enrolment_id == Enrolment.id)
@@ -262,13 +268,15 @@ def _closed_for_all(session: Session, which: Collection[tuple[int, str]]) -> set
     return closed
 
 
-def _counted(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, dict[str, datetime]]:
+def _load_attempt_times(
+    session: Session, enrolment_id: int, assignments: Collection[str]
+) -> dict[str, dict[str, datetime]]:
     """Return the submission times of different submissions that count as attempts, by assignment and hash.
 
     A submission counts if its grading started and did not end with a fault of the assignment or the host.
     """
     submission = SubmissionRow
-    counts = or_(Job.state == JobState.RUNNING, (Job.state == JobState.DONE) & Job.verdict.not_in(_NOT_THE_STUDENTS))
+    counts = or_(Job.state == JobState.RUNNING, (Job.state == JobState.DONE) & Job.verdict.not_in(_UNCOUNTED_VERDICTS))
     came_at = func.coalesce(submission.submitted_at, submission.created_at)
     query = (
         select(submission.assignment, submission.sha256, came_at)

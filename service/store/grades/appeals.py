@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 from service.store import audit, outbox
 from service.store.courses.hidden_names import HiddenNames
 from service.store.engine import now
-from service.store.grades import current
+from service.store.grades import current_grades
 from service.store.locks import lock_submissions
 from service.store.models import AssignmentVersion, Enrolment, Job, SubmissionRow
 from service.store.states import Standing
@@ -39,14 +39,14 @@ class AppealLine:
     answered_at: datetime | None
 
 
-def may_appeal(session: Session, submission_id: int) -> bool:
+def can_appeal(session: Session, submission_id: int) -> bool:
     """Return whether the submission has a grade that its student may see."""
     seen = select(Job.id).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
-    seen = seen.where(SubmissionRow.id == submission_id, *current.CAN_COUNT)
+    seen = seen.where(SubmissionRow.id == submission_id, *current_grades.CAN_COUNT)
     return session.scalar(seen) is not None
 
 
-def ask(session: Session, submission_id: int, text: str) -> int:
+def open_appeal(session: Session, submission_id: int, text: str) -> int:
     """Open an appeal against the grade of a submission and return the appeal's id.
 
     Raises UsageError if the student may not see a grade, an appeal is open already, or the text is empty or too long.
@@ -58,7 +58,7 @@ def ask(session: Session, submission_id: int, text: str) -> int:
         )
     # Serialises concurrent appeals, so that the second one finds the first open.
     lock_submissions(session, SubmissionRow.id == submission_id)
-    if not may_appeal(session, submission_id):
+    if not can_appeal(session, submission_id):
         raise UsageError("you can appeal after your grade is visible")
     still_open = select(Appeal.id).where(Appeal.submission_id == submission_id, Appeal.answered_at.is_(None))
     if session.scalar(still_open) is not None:
@@ -66,11 +66,11 @@ def ask(session: Session, submission_id: int, text: str) -> int:
     row = Appeal(submission_id=submission_id, text=text, asked_at=now(session))
     session.add(row)
     session.flush()
-    outbox.appeal_opened(session, submission_id, row.id)
+    outbox.emit_appeal_opened(session, submission_id, row.id)
     return row.id
 
 
-def answer(session: Session, course_id: int, appeal_id: int, text: str, actor: str) -> None:
+def answer_appeal(session: Session, course_id: int, appeal_id: int, text: str, actor: str) -> None:
     """Answer and close an open appeal of the course.
 
     Raises UsageError if the appeal does not exist or is answered, or the text is empty or too long.
@@ -81,35 +81,35 @@ def answer(session: Session, course_id: int, appeal_id: int, text: str, actor: s
             "the answer has %(count)s characters, expected 1 to %(most)s", count=len(text), most=LONGEST_TEXT
         )
     row = session.get(Appeal, appeal_id, with_for_update={"key_share": True})
-    if row is None or _course_of(session, row) != course_id:
+    if row is None or _find_course(session, row) != course_id:
         raise UsageError("this course has no appeal %(appeal_id)s", appeal_id=appeal_id)
     if row.answered_at is not None:
         raise UsageError("appeal %(appeal_id)s already has an answer", appeal_id=appeal_id)
     row.answer, row.actor, row.answered_at = text, actor, now(session)
-    audit.note(session, actor, "answer appeal", "submission", str(row.submission_id), appeal=appeal_id)
+    audit.record_action(session, actor, "answer appeal", "submission", str(row.submission_id), appeal=appeal_id)
 
 
-def waiting(session: Session, course_id: int) -> int:
+def count_open_appeals(session: Session, course_id: int) -> int:
     """Return the number of open appeals of a course."""
     query = select(func.count()).select_from(Appeal).join(SubmissionRow, Appeal.submission_id == SubmissionRow.id)
     mine = (Enrolment.course_id == course_id, Appeal.answered_at.is_(None))
     return session.scalar(query.join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id).where(*mine)) or 0
 
 
-def open_in_course(
+def list_open_appeals(
     session: Session, course_id: int, hidden: HiddenNames, *, limit: int | None = None, after: int | None = None
 ) -> list[AppealLine]:
     """Return the open appeals of a course, oldest first.
 
     ``after`` is the id of the last appeal on the previous page.
     """
-    query = _lines().where(Enrolment.course_id == course_id, Appeal.answered_at.is_(None))
+    query = _select_lines().where(Enrolment.course_id == course_id, Appeal.answered_at.is_(None))
     if after is not None:
         query = query.where(Appeal.id > after)
-    return _called(_read(session, query.order_by(Appeal.id).limit(limit)), hidden)
+    return _hide_names(_load_lines(session, query.order_by(Appeal.id).limit(limit)), hidden)
 
 
-def answered_in_course(
+def list_answered_appeals(
     session: Session,
     course_id: int,
     hidden: HiddenNames,
@@ -121,37 +121,39 @@ def answered_in_course(
 
     ``after`` is the answer time and id of the last appeal on the previous page.
     """
-    query = _lines().where(Enrolment.course_id == course_id, Appeal.answered_at.is_not(None))
+    query = _select_lines().where(Enrolment.course_id == course_id, Appeal.answered_at.is_not(None))
     if after is not None:
         at, last = after
         query = query.where(or_(Appeal.answered_at < at, and_(Appeal.answered_at == at, Appeal.id < last)))
-    return _called(_read(session, query.order_by(Appeal.answered_at.desc(), Appeal.id.desc()).limit(limit)), hidden)
+    return _hide_names(
+        _load_lines(session, query.order_by(Appeal.answered_at.desc(), Appeal.id.desc()).limit(limit)), hidden
+    )
 
 
-def _called(found: list[AppealLine], hidden: HiddenNames) -> list[AppealLine]:
-    return [replace(each, who=hidden.called(each.assignment, each.who)) for each in found]
+def _hide_names(found: list[AppealLine], hidden: HiddenNames) -> list[AppealLine]:
+    return [replace(each, who=hidden.label_student(each.assignment, each.who)) for each in found]
 
 
-def of_submission(session: Session, submission_id: int) -> list[AppealLine]:
+def load_appeals(session: Session, submission_id: int) -> list[AppealLine]:
     """Return the appeals of a submission, newest first, as its student sees them."""
-    return _read(session, _lines().where(Appeal.submission_id == submission_id).order_by(Appeal.id.desc()))
+    return _load_lines(session, _select_lines().where(Appeal.submission_id == submission_id).order_by(Appeal.id.desc()))
 
 
-def newest_of(session: Session, enrolment_id: int) -> dict[str, AppealLine]:
+def load_newest_appeals(session: Session, enrolment_id: int) -> dict[str, AppealLine]:
     """Return a student's newest appeal for each assignment."""
-    query = _lines().where(SubmissionRow.enrolment_id == enrolment_id).order_by(Appeal.id)
-    return {each.assignment: each for each in _read(session, query)}
+    query = _select_lines().where(SubmissionRow.enrolment_id == enrolment_id).order_by(Appeal.id)
+    return {each.assignment: each for each in _load_lines(session, query)}
 
 
-_Lines = Select[Appeal, SubmissionRow, str, str, str]
+_LineQuery = Select[Appeal, SubmissionRow, str, str, str]
 
 
-def _course_of(session: Session, row: Appeal) -> int:
+def _find_course(session: Session, row: Appeal) -> int:
     enrolment_id = session.get_one(SubmissionRow, row.submission_id).enrolment_id
     return session.get_one(Enrolment, enrolment_id).course_id
 
 
-def _lines() -> _Lines:
+def _select_lines() -> _LineQuery:
     return (
         select(Appeal, SubmissionRow, Enrolment.student, Job.id, AssignmentVersion.title)
         .join(SubmissionRow, Appeal.submission_id == SubmissionRow.id)
@@ -161,7 +163,7 @@ def _lines() -> _Lines:
     )
 
 
-def _read(session: Session, query: _Lines) -> list[AppealLine]:
+def _load_lines(session: Session, query: _LineQuery) -> list[AppealLine]:
     return [
         AppealLine(
             id=row.id,

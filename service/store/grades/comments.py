@@ -32,7 +32,7 @@ class CommentLine:
     made_at: datetime
 
 
-def comment(session: Session, job_id: str, criterion: str, text: str, actor: str) -> int:
+def add_comment(session: Session, job_id: str, criterion: str, text: str, actor: str) -> int:
     """Add a comment to the submission of this grade and return the comment's id.
 
     Raises UsageError for an unknown criterion, or a text that is empty or too long.
@@ -51,11 +51,13 @@ def comment(session: Session, job_id: str, criterion: str, text: str, actor: str
     row = Comment(submission_id=submission_id, criterion=criterion, text=text, actor=actor, made_at=now(session))
     session.add(row)
     session.flush()
-    audit.note(session, actor, "comment", "submission", str(submission_id), criterion=criterion, comment=row.id)
+    audit.record_action(
+        session, actor, "comment", "submission", str(submission_id), criterion=criterion, comment=row.id
+    )
     return row.id
 
 
-def withdraw(session: Session, job_id: str, comment_id: int, actor: str) -> None:
+def withdraw_comment(session: Session, job_id: str, comment_id: int, actor: str) -> None:
     """Withdraw a comment, so that it is no longer shown.
 
     Raises UsageError if this grade's submission does not have it.
@@ -65,15 +67,15 @@ def withdraw(session: Session, job_id: str, comment_id: int, actor: str) -> None
     if row is None or row.submission_id != submission_id or row.withdrawn_at is not None:
         raise UsageError("grade %(job)s has no comment %(comment)s", job=job_id, comment=comment_id)
     row.withdrawn_at = now(session)
-    audit.note(session, actor, "withdraw comment", "submission", str(submission_id), comment=comment_id)
+    audit.record_action(session, actor, "withdraw comment", "submission", str(submission_id), comment=comment_id)
 
 
-def of_job(session: Session, job_id: str) -> list[CommentLine]:
+def load_comments(session: Session, job_id: str) -> list[CommentLine]:
     """Return the comments on the submission of a job, oldest first."""
-    return of_jobs(session, [job_id]).get(job_id, [])
+    return load_comments_by_job(session, [job_id]).get(job_id, [])
 
 
-def of_jobs(session: Session, job_ids: Collection[str]) -> dict[str, list[CommentLine]]:
+def load_comments_by_job(session: Session, job_ids: Collection[str]) -> dict[str, list[CommentLine]]:
     """Return the comments by job, without jobs that have none."""
     query = (
         select(Job.id, Comment)

@@ -31,23 +31,23 @@ class MarkingStep:
     text: str  # a reason, comment or answer
 
 
-def history(session: Session, submission_id: int) -> list[MarkingStep]:
+def load_history(session: Session, submission_id: int) -> list[MarkingStep]:
     """Return all changes to a submission by staff, oldest first."""
     texts = {
-        "override": _texts(session, submission_id, Override, Override.reason),
-        "comment": _texts(session, submission_id, Comment, Comment.text),
-        "appeal": _texts(session, submission_id, Appeal, Appeal.answer),
+        "override": _load_texts(session, submission_id, Override, Override.reason),
+        "comment": _load_texts(session, submission_id, Comment, Comment.text),
+        "appeal": _load_texts(session, submission_id, Appeal, Appeal.answer),
     }
-    return [_step(entry, texts) for entry in audit.entries(session, "submission", str(submission_id))]
+    return [_build_step(entry, texts) for entry in audit.load_entries(session, "submission", str(submission_id))]
 
 
-def _step(entry: AuditEntry, texts: Mapping[str, Mapping[int, str]]) -> MarkingStep:
+def _build_step(entry: AuditEntry, texts: Mapping[str, Mapping[int, str]]) -> MarkingStep:
     criterion, before, after = (str(entry.detail.get(name, "")) for name in ("criterion", "before", "after"))
     text = next((found.get(entry.detail[kind], "") for kind, found in texts.items() if kind in entry.detail), "")
     return MarkingStep(entry.at, entry.actor, entry.action, criterion, before, after, text)
 
 
-def _texts(
+def _load_texts(
     session: Session,
     submission_id: int,
     table: type[Override | Comment | Appeal],

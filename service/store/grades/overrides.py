@@ -20,12 +20,12 @@ from service.store.models import CriterionResultRow, Job
 from service.store.states import JobState
 from service.store.web_tables import Override
 from sim.errors import UsageError
-from submissions.nearest import did_you_mean
+from submissions.suggestions import suggest_name
 
 LONGEST_REASON = 500
 #: Maximum precision: four digits after the point.
-_FINEST = Decimal("0.0001")
-_NONE = Decimal(0)
+_FINEST_MARKS = Decimal("0.0001")
+_ZERO = Decimal(0)
 
 
 class MarksChanged(UsageError):
@@ -42,9 +42,9 @@ class OverrideLine:
     actor: str
     made_at: datetime
 
-    def counted(self, worth: Decimal) -> tuple[Decimal, Decimal]:
+    def compute_marks(self, worth: Decimal) -> tuple[Decimal, Decimal]:
         """Return the effective marks and maximum of a criterion, given its maximum ``worth``."""
-        return (_NONE, _NONE) if self.marks is None else (min(self.marks, worth), worth)
+        return (_ZERO, _ZERO) if self.marks is None else (min(self.marks, worth), worth)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class CriterionMarks:
     override: OverrideLine | None
 
 
-def read_marks(text: str) -> Decimal:
+def parse_marks(text: str) -> Decimal:
     """Parse marks with a decimal point or comma. Raises UsageError for anything else."""
     try:
         return Decimal(text.strip().replace(",", "."))
@@ -81,42 +81,49 @@ def set_marks(
         UsageError: The grade or criterion is unknown, the marks are out of range, or the reason is missing.
         MarksChanged: The current override is not the one in ``seen``.
     """
-    submission_id, line = _criterion(session, job_id, criterion, seen)
-    if not marks.is_finite() or not _NONE <= marks <= line.worth or marks != marks.quantize(_FINEST):
+    submission_id, line = _load_criterion(session, job_id, criterion, seen)
+    if not marks.is_finite() or not _ZERO <= marks <= line.worth or marks != marks.quantize(_FINEST_MARKS):
         raise UsageError(
             "marks for %(title)s are %(marks)s, expected 0 to %(worth)s with at most four decimal places",
             title=line.title,
             marks=marks,
             worth=f"{line.worth:f}",
         )
-    _replace(session, submission_id, line, abs(marks), reason, actor)
+    _replace_override(session, submission_id, line, abs(marks), reason, actor)
 
 
-def excuse(session: Session, job_id: str, criterion: str, reason: str, actor: str, *, seen: int | None = None) -> None:
+def excuse_criterion(
+    session: Session, job_id: str, criterion: str, reason: str, actor: str, *, seen: int | None = None
+) -> None:
     """Exclude the marks and the maximum of a criterion from the total. Raises UsageError like ``set_marks``."""
-    submission_id, line = _criterion(session, job_id, criterion, seen)
-    _replace(session, submission_id, line, None, reason, actor)
+    submission_id, line = _load_criterion(session, job_id, criterion, seen)
+    _replace_override(session, submission_id, line, None, reason, actor)
 
 
-def withdraw(session: Session, job_id: str, criterion: str, actor: str, *, seen: int | None = None) -> None:
+def withdraw_override(session: Session, job_id: str, criterion: str, actor: str, *, seen: int | None = None) -> None:
     """Restore the grader's marks of a criterion.
 
     Raises UsageError without an override, MarksChanged if the override is not the one in ``seen``.
     """
-    submission_id = _submission(session, job_id)
-    before = of_jobs(session, [job_id]).get(job_id, {}).get(criterion)
+    submission_id = _lock_submission(session, job_id)
+    before = load_overrides(session, [job_id]).get(job_id, {}).get(criterion)
     if before is None:
         raise UsageError(
             "the marks of %(criterion)s in grade %(job)s are not adjusted", criterion=repr(criterion), job=job_id
         )
     _check_seen(before, seen, criterion)
-    _end(session, before, now(session))
-    detail = {"criterion": criterion, "before": _words(before.marks), "after": "as graded", "override": before.id}
-    audit.note(session, actor, "withdraw", "submission", str(submission_id), **detail)
+    _end_override(session, before, now(session))
+    detail = {
+        "criterion": criterion,
+        "before": _format_marks(before.marks),
+        "after": "as graded",
+        "override": before.id,
+    }
+    audit.record_action(session, actor, "withdraw", "submission", str(submission_id), **detail)
     _recount_all(session, submission_id)
 
 
-def of_jobs(session: Session, job_ids: Collection[str]) -> Mapping[str, Mapping[str, OverrideLine]]:
+def load_overrides(session: Session, job_ids: Collection[str]) -> Mapping[str, Mapping[str, OverrideLine]]:
     """Return the overrides for the submissions of these jobs, by job and criterion, without jobs that have none."""
     query = (
         select(Job.id, Override)
@@ -130,31 +137,31 @@ def of_jobs(session: Session, job_ids: Collection[str]) -> Mapping[str, Mapping[
     return found
 
 
-def criterion_marks(session: Session, job_id: str) -> list[CriterionMarks]:
+def load_criterion_marks(session: Session, job_id: str) -> list[CriterionMarks]:
     """Return the criteria of a grade in their order."""
     row = CriterionResultRow
     columns = (row.criterion, row.title, row.message, row.visibility, row.unjudged, row.marks, row.max_marks)
-    by_hand = of_jobs(session, [job_id]).get(job_id, {})
+    by_hand = load_overrides(session, [job_id]).get(job_id, {})
     lines = []
     for criterion, title, message, visibility, unjudged, marks, worth in session.execute(
         select(*columns).where(row.job_id == job_id).order_by(row.position)
     ):
         override = by_hand.get(criterion)
-        counted = (marks, worth) if override is None else override.counted(worth)
+        counted = (marks, worth) if override is None else override.compute_marks(worth)
         graded = None if unjudged else marks
         lines.append(CriterionMarks(criterion, title, message, visibility, graded, worth, *counted, override))
     return lines
 
 
-def recount(session: Session, job_id: str) -> None:
+def recount_marks(session: Session, job_id: str) -> None:
     """Store the effective total of a job's criteria; no other function writes a job's marks."""
-    lines = criterion_marks(session, job_id)
-    marks, most = (sum(each, _NONE) for each in ([line.marks for line in lines], [line.max_marks for line in lines]))
+    lines = load_criterion_marks(session, job_id)
+    marks, most = (sum(each, _ZERO) for each in ([line.marks for line in lines], [line.max_marks for line in lines]))
     statement = update(Job).where(Job.id == job_id).values(marks=marks, max_marks=most)
     session.execute(statement, execution_options={"synchronize_session": False})
 
 
-def is_excused() -> ColumnElement[bool]:
+def match_excused() -> ColumnElement[bool]:
     """Return the condition that a criterion row, joined with its job, is excused."""
     said = exists().where(
         Override.submission_id == Job.submission_id,
@@ -165,7 +172,7 @@ def is_excused() -> ColumnElement[bool]:
     return said.correlate(Job, CriterionResultRow)
 
 
-def waits_for_judgement() -> ColumnElement[bool]:
+def match_unjudged() -> ColumnElement[bool]:
     """Return the condition that a criterion row, joined with its job, is unjudged and has no override."""
     said = (
         exists()
@@ -179,7 +186,7 @@ def waits_for_judgement() -> ColumnElement[bool]:
     return and_(CriterionResultRow.unjudged.is_not(None), ~said)
 
 
-def _submission(session: Session, job_id: str) -> int:
+def _lock_submission(session: Session, job_id: str) -> int:
     """Return the id of a grade's submission and lock all its jobs, so that concurrent regrades are included."""
     job = session.get(Job, job_id)
     if job is None or job.state is not JobState.DONE:
@@ -188,15 +195,15 @@ def _submission(session: Session, job_id: str) -> int:
     return job.submission_id
 
 
-def _criterion(session: Session, job_id: str, criterion: str, seen: int | None) -> tuple[int, CriterionMarks]:
-    submission_id = _submission(session, job_id)
-    lines = {line.criterion: line for line in criterion_marks(session, job_id)}
+def _load_criterion(session: Session, job_id: str, criterion: str, seen: int | None) -> tuple[int, CriterionMarks]:
+    submission_id = _lock_submission(session, job_id)
+    lines = {line.criterion: line for line in load_criterion_marks(session, job_id)}
     if criterion not in lines:
         raise UsageError(
             "grade %(job)s has no criterion %(criterion)s%(hint)s",
             job=job_id,
             criterion=repr(criterion[:80]),
-            hint=did_you_mean(criterion, lines),
+            hint=suggest_name(criterion, lines),
         )
     line = lines[criterion]
     _check_seen(line.override, seen, line.title)
@@ -211,7 +218,7 @@ def _check_seen(override: OverrideLine | None, seen: int | None, title: str) -> 
         )
 
 
-def _replace(
+def _replace_override(
     session: Session, submission_id: int, line: CriterionMarks, marks: Decimal | None, reason: str, actor: str
 ) -> None:
     reason = reason.strip()
@@ -223,7 +230,7 @@ def _replace(
         )
     at = now(session)
     if line.override is not None:
-        _end(session, line.override, at)
+        _end_override(session, line.override, at)
     row = Override(
         submission_id=submission_id,
         criterion=line.criterion,
@@ -236,15 +243,15 @@ def _replace(
     session.add(row)
     session.flush()
     before = line.graded if line.override is None else line.override.marks
-    told = "not judged" if line.override is None and line.graded is None else _words(before)
+    told = "not judged" if line.override is None and line.graded is None else _format_marks(before)
     # Purging removes the reason with the submission, but not the log entry.
-    detail = {"criterion": line.criterion, "before": told, "after": _words(marks), "override": row.id}
+    detail = {"criterion": line.criterion, "before": told, "after": _format_marks(marks), "override": row.id}
     action = "excuse" if marks is None else "set marks"
-    audit.note(session, actor, action, "submission", str(submission_id), **detail)
+    audit.record_action(session, actor, action, "submission", str(submission_id), **detail)
     _recount_all(session, submission_id)
 
 
-def _end(session: Session, line: OverrideLine, at: datetime) -> None:
+def _end_override(session: Session, line: OverrideLine, at: datetime) -> None:
     session.get_one(Override, line.id).withdrawn_at = at
     session.flush()
 
@@ -252,8 +259,8 @@ def _end(session: Session, line: OverrideLine, at: datetime) -> None:
 def _recount_all(session: Session, submission_id: int) -> None:
     done = select(Job.id).where(Job.submission_id == submission_id, Job.state == JobState.DONE)
     for job_id in session.scalars(done).all():
-        recount(session, job_id)
+        recount_marks(session, job_id)
 
 
-def _words(marks: Decimal | None) -> str:
+def _format_marks(marks: Decimal | None) -> str:
     return "excused" if marks is None else f"{marks.normalize():f}"

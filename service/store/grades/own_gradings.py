@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from service.store.models import Job, SubmissionRow
 from service.store.states import JobState, Standing
 
-_MOST = 50
+_MOST_LISTED = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,14 +29,14 @@ class OwnGrading:
     published_at: datetime | None
 
 
-def newest(session: Session, enrolment_id: int, assignment: str = "") -> list[OwnGrading]:
+def list_newest_gradings(session: Session, enrolment_id: int, assignment: str = "") -> list[OwnGrading]:
     """Return the newest grades of one person, for one assignment or for all."""
     query = (
         select(Job, SubmissionRow.assignment, SubmissionRow.attempt)
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .where(Job.enrolment_id == enrolment_id, Job.standing == Standing.STANDS)
         .order_by(Job.queued_at.desc(), Job.id)
-        .limit(_MOST)
+        .limit(_MOST_LISTED)
     )
     if assignment:
         query = query.where(SubmissionRow.assignment == assignment)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.store.codec import decode, encode
-from service.store.grades.recorded_words import RecordingError, with_words
+from service.store.grades.recording_texts import RecordingError, build_recording
 from sim.columns import Column
 from sim.recording import COLUMNS, Image, Recording, Ticks
 
@@ -36,19 +36,19 @@ class StoredRecording:
     data: bytes
 
 
-def cap_for(trials: int) -> int:
+def compute_size_limit(trials: int) -> int:
     """Return the maximum size in bytes of each recording of a grade."""
     return max(SMALLEST_CAP, GRADE_BYTES // max(1, trials))
 
 
-def keep(recording: Recording, cap: int) -> StoredRecording:
+def encode_within_limit(recording: Recording, cap: int) -> StoredRecording:
     """Encode a recording within ``cap`` bytes; parts that do not fit are left out, with a note.
 
     Removed first are images and all but the first texts of each kind, then all texts, then the ticks. The verdict,
     faults, poses and chain hash are always kept.
     """
     data = to_bytes(recording)
-    for trim in (_without_floods, _without_words, _without_ticks):
+    for trim in (_drop_floods, _drop_texts, _drop_ticks):
         if len(data) <= cap:
             break
         if recording.partner is not None:
@@ -66,18 +66,18 @@ def to_bytes(recording: Recording) -> bytes:
         for field in fields(recording)
         if field.name not in ("ticks", "images", "partner", "places")
     }
-    words["ticks"] = _of_all_ticks(ticks)
+    words["ticks"] = _encode_tick_totals(ticks)
     words["images"] = [encode(replace(image, left=b"", right=b"")) for image in recording.images]
     arrays: dict[str, NDArray[Any]] = {
-        "words": _bytes_array(json.dumps(words, separators=(",", ":")).encode("ascii")),
+        "words": _to_byte_array(json.dumps(words, separators=(",", ":")).encode("ascii")),
         "picture_sizes": np.array([[len(i.left), len(i.right)] for i in recording.images], np.int64),
-        "pictures": _bytes_array(b"".join(i.left + i.right for i in recording.images)),
+        "pictures": _to_byte_array(b"".join(i.left + i.right for i in recording.images)),
     }
     for column in COLUMNS:
         values = np.asarray(getattr(ticks, column.name), column.dtype)
-        arrays[column.name] = _shuffled(values.reshape(-1, column.width))
+        arrays[column.name] = _shuffle_bytes(values.reshape(-1, column.width))
     if recording.partner is not None:
-        arrays["partner"] = _bytes_array(to_bytes(recording.partner))
+        arrays["partner"] = _to_byte_array(to_bytes(recording.partner))
     buffer = io.BytesIO()
     np.savez(buffer, **cast(dict[str, Any], arrays))
     return zlib.compress(buffer.getvalue(), 6)
@@ -92,19 +92,19 @@ def from_bytes(data: bytes) -> Recording:
             partner = from_bytes(bytes(arrays["partner"])) if "partner" in arrays else None
             sizes = arrays["picture_sizes"].reshape(-1, 2).tolist()
             # The recording may be older than a column.
-            columns = {each.name: _column(arrays[each.name], each) for each in COLUMNS if each.name in arrays}
+            columns = {each.name: _decode_column(arrays[each.name], each) for each in COLUMNS if each.name in arrays}
         ticks = Ticks(**cast(dict[str, Any], columns), **words.pop("ticks"))
-        images = _with_pixels(words.pop("images"), sizes, pixels)
-        return with_words(words, ticks, images, partner)
+        images = _restore_pixels(words.pop("images"), sizes, pixels)
+        return build_recording(words, ticks, images, partner)
     except (ValueError, KeyError, TypeError, zlib.error, OSError) as error:
         raise RecordingError(f"not a recording: {error}") from error
 
 
-def _of_all_ticks(ticks: Ticks) -> dict[str, int]:
+def _encode_tick_totals(ticks: Ticks) -> dict[str, int]:
     return {"left_pixels": ticks.left_pixels, "right_pixels": ticks.right_pixels, "length": ticks.length}
 
 
-def _with_pixels(images: list[Any], sizes: list[list[int]], pixels: bytes) -> tuple[Image, ...]:
+def _restore_pixels(images: list[Any], sizes: list[list[int]], pixels: bytes) -> tuple[Image, ...]:
     made = []
     offset = 0
     for words, (left, right) in zip(images, sizes, strict=True):
@@ -115,11 +115,11 @@ def _with_pixels(images: list[Any], sizes: list[list[int]], pixels: bytes) -> tu
     return tuple(made)
 
 
-def _bytes_array(data: bytes) -> _Bytes:
+def _to_byte_array(data: bytes) -> _Bytes:
     return np.frombuffer(data, np.uint8)
 
 
-def _shuffled(columns: NDArray[Any]) -> _Bytes:
+def _shuffle_bytes(columns: NDArray[Any]) -> _Bytes:
     """Convert (n, c) 8-byte numbers to (c, 8, n) bytes: bit pattern differences, grouped by byte position.
 
     Halves the compressed size of a path. Lossless, because the differences wrap around.
@@ -130,24 +130,24 @@ def _shuffled(columns: NDArray[Any]) -> _Bytes:
     return np.ascontiguousarray(steps.view(np.uint8).reshape(count, rows, 8).transpose(0, 2, 1))
 
 
-def _unshuffled(data: _Bytes, kind: type[np.generic]) -> NDArray[Any]:
+def _unshuffle_bytes(data: _Bytes, kind: type[np.generic]) -> NDArray[Any]:
     count, _, rows = data.shape
     steps = np.ascontiguousarray(data.transpose(0, 2, 1)).reshape(count, rows * 8).view(np.uint64)
     return np.ascontiguousarray(np.cumsum(steps, axis=1, dtype=np.uint64).view(kind).T)
 
 
-def _column(data: _Bytes, column: Column) -> NDArray[Any]:
-    values = _unshuffled(data, column.dtype)
+def _decode_column(data: _Bytes, column: Column) -> NDArray[Any]:
+    values = _unshuffle_bytes(data, column.dtype)
     return (values if column.width > 1 else values[:, 0]).copy()
 
 
-def _noted(recording: Recording, what: str) -> Recording:
+def _add_note(recording: Recording, what: str) -> Recording:
     note = f"The recording was too large to be kept whole: {what}."
     return replace(recording, notes=(*recording.notes, note))
 
 
-def _without_floods(recording: Recording) -> Recording:
-    return _noted(
+def _drop_floods(recording: Recording) -> Recording:
+    return _add_note(
         replace(
             recording,
             images=(),
@@ -162,7 +162,7 @@ def _without_floods(recording: Recording) -> Recording:
     )
 
 
-def _without_words(recording: Recording) -> Recording:
+def _drop_texts(recording: Recording) -> Recording:
     bare = replace(recording, calls=(), printed=(), spoken=(), datalog=(), messages=(), pen=(), touches=(), notes=())
     outputs = (
         replace(each, printed=each.printed[:_TEXT_KEPT], log=each.log[:_TEXT_KEPT]) for each in recording.agent_outputs
@@ -175,9 +175,9 @@ def _without_words(recording: Recording) -> Recording:
         agent_messages=(),
         agent_outputs=tuple(outputs),
     )
-    return _noted(cut, "what was printed, said and sent is left out")
+    return _add_note(cut, "what was printed, said and sent is left out")
 
 
-def _without_ticks(recording: Recording) -> Recording:
-    ticks = Ticks(**cast(dict[str, Any], {"x": np.empty(0), **_of_all_ticks(recording.ticks)}))
-    return _noted(replace(recording, ticks=ticks), "its ticks are left out")
+def _drop_ticks(recording: Recording) -> Recording:
+    ticks = Ticks(**cast(dict[str, Any], {"x": np.empty(0), **_encode_tick_totals(recording.ticks)}))
+    return _add_note(replace(recording, ticks=ticks), "its ticks are left out")

@@ -13,7 +13,7 @@ from sqlalchemy import exists, insert, literal, select
 from sqlalchemy.orm import Session
 
 from service.store import phases
-from service.store.grades import current
+from service.store.grades import current_grades
 from service.store.models import Artifact, AssignmentVersion, CriterionResultRow, Job, SubmissionRow, TrialRow, Worker
 from service.store.states import PlotState
 
@@ -21,7 +21,7 @@ from service.store.states import PlotState
 _NOT_REPEATABLE = ("cpu_limit", "memory_limit", "stalled", "host_error")
 
 
-def cache_key(session: Session, job_id: str, grader_sha256: str, secret_sha256: str) -> str:
+def compute_cache_key(session: Session, job_id: str, grader_sha256: str, secret_sha256: str) -> str:
     """Return the cache key of a job. Equal keys mean equal grades: assignment and secret determine the seeds."""
     query = (
         select(SubmissionRow.sha256, AssignmentVersion.sha256)
@@ -29,16 +29,16 @@ def cache_key(session: Session, job_id: str, grader_sha256: str, secret_sha256: 
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
         .where(Job.id == job_id)
     )
-    return key_of(*session.execute(query).one(), grader_sha256, secret_sha256)
+    return combine_cache_key(*session.execute(query).one(), grader_sha256, secret_sha256)
 
 
-def key_of(submission_sha256: str, assignment_sha256: str, grader_sha256: str, secret_sha256: str) -> str:
+def combine_cache_key(submission_sha256: str, assignment_sha256: str, grader_sha256: str, secret_sha256: str) -> str:
     """Return the cache key from its parts, for submissions without a job."""
     parts = (submission_sha256, assignment_sha256, grader_sha256, secret_sha256)
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
-def find(session: Session, key: str) -> str | None:
+def find_cached_grade(session: Session, key: str) -> str | None:
     """Return the newest grade that may be copied for this key; None if it must be run.
 
     Never returns a grade made without the sandbox or by a quarantined worker, cut short by a limit of the machine, or
@@ -51,7 +51,7 @@ def find(session: Session, key: str) -> str | None:
         select(Job.id)
         .where(
             Job.cache_key == key,
-            *current.IS_TRUSTED,
+            *current_grades.IS_TRUSTED,
             Job.copied_from.is_(None),
             # The key includes the sandbox policy; these conditions require both layers to be active.
             Job.sandbox.contains("Landlock"),
@@ -75,7 +75,7 @@ def copy_rows(session: Session, source_id: str, job_id: str) -> None:
         session.execute(insert(table).from_select(["job_id", *(column.name for column in kept)], rows))
 
 
-def copied(session: Session, source_id: str, job_id: str, at: datetime) -> dict[str, Any]:
+def build_copied_values(session: Session, source_id: str, job_id: str, at: datetime) -> dict[str, Any]:
     """Return the column values that a job takes over from a copied grade."""
     source = session.scalars(select(Job).where(Job.id == source_id)).one()
     queued_at = session.scalar(select(Job.queued_at).where(Job.id == job_id))
@@ -83,22 +83,22 @@ def copied(session: Session, source_id: str, job_id: str, at: datetime) -> dict[
     names = (*of_grade, "grader_sha256", "secret_sha256", "cache_key")
     drawn = source.plots is PlotState.DONE
     return {name: getattr(source, name) for name in names} | {
-        "notes": _notes(session, source, job_id),
+        "notes": _merge_notes(session, source, job_id),
         "copied_from": source_id,
         "graded_at": at,
-        "phases": phases.written({phases.QUEUED: queued_at, phases.COMMITTED: at}),
+        "phases": phases.encode_times({phases.QUEUED: queued_at, phases.COMMITTED: at}),
         "plots": PlotState.DONE if drawn else PlotState.DUE,
         "plots_due_at": None if drawn else at,
         "plotted_at": at if drawn else None,
     }
 
 
-def _notes(session: Session, source: Job, job_id: str) -> list[str]:
+def _merge_notes(session: Session, source: Job, job_id: str) -> list[str]:
     """Return the notes of reading this submission, then those of the grading.
 
     The notes of reading the other submission are left out, because they may name its folder.
     """
-    from submissions.packed import unpack_submission
+    from submissions.stored_submission import unpack_submission
 
     packed = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
     theirs, own = (

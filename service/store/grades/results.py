@@ -24,21 +24,21 @@ from service.grading.grade import (
     Evidence,
     Grade,
     Prediction,
-    SetByHand,
-    Shown,
+    StaffAdjustment,
     TrialResult,
+    VisibleFeedback,
     WrittenComment,
 )
 from service.store import artifacts
 from service.store.codec import decode, encode
 from service.store.grades import comments, overrides
 from service.store.grades.overrides import OverrideLine
-from service.store.grades.recorded_words import words_from_bytes
+from service.store.grades.recording_texts import texts_from_bytes
 from service.store.models import AssignmentVersion, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
 from sim.errors import HostError, UsageError
-from sim.recorded import faults_of
 from sim.recording import Image, Recording
-from submissions.seeds import PUBLIC
+from sim.recording_values import collect_faults
+from submissions.seeds import PUBLIC_SECRET
 
 _RECORDING = "application/x-robomark-recording"
 
@@ -52,63 +52,67 @@ class PreparedGrade:
     predictions: list[list[dict[str, Any]]]  # one list per criterion
 
 
-def prepare(grade: Grade) -> PreparedGrade:
+def prepare_grade(grade: Grade) -> PreparedGrade:
     """Compress the recordings and replace the images in predictions by references."""
     from service.store.grades import recordings
 
-    cap = recordings.cap_for(len(grade.trials))
-    kept = [recordings.keep(trial.recording, cap) for trial in grade.trials]
-    files = [artifacts.File(_recording_name(position), _RECORDING, item.data) for position, item in enumerate(kept)]
+    cap = recordings.compute_size_limit(len(grade.trials))
+    kept = [recordings.encode_within_limit(trial.recording, cap) for trial in grade.trials]
+    files = [
+        artifacts.File(_format_recording_name(position), _RECORDING, item.data) for position, item in enumerate(kept)
+    ]
     numbers = [{image: number for number, image in enumerate(item.recording.images)} for item in kept]
     predictions = [
         [
             plain
             for prediction in result.predictions
-            if (plain := _encoded_prediction(prediction, numbers[prediction.trial])) is not None
+            if (plain := _encode_prediction(prediction, numbers[prediction.trial])) is not None
         ]
         for result in grade.criteria
     ]
     return PreparedGrade(grade, files, predictions)
 
 
-def insert(session: Session, job_id: str, prepared: PreparedGrade, at: datetime) -> None:
+def insert_grade(session: Session, job_id: str, prepared: PreparedGrade, at: datetime) -> None:
     """Insert the rows of a grade, replacing those of an earlier grading of the same job."""
     grade = prepared.grade
     session.execute(delete(TrialRow).where(TrialRow.job_id == job_id))
     session.execute(delete(CriterionResultRow).where(CriterionResultRow.job_id == job_id))
-    session.add_all(_trial_row(job_id, position, trial) for position, trial in enumerate(grade.trials))
+    session.add_all(_build_trial_row(job_id, position, trial) for position, trial in enumerate(grade.trials))
     session.add_all(
-        _criterion_row(job_id, position, result, prepared.predictions[position])
+        _build_criterion_row(job_id, position, result, prepared.predictions[position])
         for position, result in enumerate(grade.criteria)
     )
-    artifacts.put(session, job_id, prepared.files, at)
+    artifacts.store_files(session, job_id, prepared.files, at)
 
 
-def load(session: Session, job_id: str) -> Grade:
+def load_grade(session: Session, job_id: str) -> Grade:
     """Load the grade of a job as it counts, with overrides and comments. Raises UsageError if it has none."""
-    return _only(load_each(session, [job_id]), job_id)
+    return _require_grade(load_each_grade(session, [job_id]), job_id)
 
 
-def load_each(session: Session, job_ids: Collection[str]) -> Iterator[tuple[str, Grade]]:
+def load_each_grade(session: Session, job_ids: Collection[str]) -> Iterator[tuple[str, Grade]]:
     """Yield the grades like ``load`` for jobs that have one, ordered by id, with a fixed number of statements.
 
     Only the recordings of one job are in memory at a time.
     """
     from service.store.grades.recordings import from_bytes
 
-    return _as_all_count(session, job_ids, _graded(session, job_ids, from_bytes))
+    return _apply_staff_changes(session, job_ids, _load_original_grades(session, job_ids, from_bytes))
 
 
-def load_words(session: Session, job_id: str) -> Grade:
+def load_grade_texts(session: Session, job_id: str) -> Grade:
     """Load a grade like ``load``, but with recordings without ticks and pixels."""
-    return _only(_as_all_count(session, [job_id], _graded(session, [job_id], words_from_bytes)), job_id)
+    return _require_grade(
+        _apply_staff_changes(session, [job_id], _load_original_grades(session, [job_id], texts_from_bytes)), job_id
+    )
 
 
-def load_graded(session: Session, job_id: str) -> Grade:
+def load_original_grade(session: Session, job_id: str) -> Grade:
     """Load the grade of a job as the grader gave it. Raises UsageError if it has none."""
     from service.store.grades.recordings import from_bytes
 
-    return _only(_graded(session, [job_id], from_bytes), job_id)
+    return _require_grade(_load_original_grades(session, [job_id], from_bytes), job_id)
 
 
 def load_marks(session: Session, job_ids: Collection[str]) -> dict[str, Grade]:
@@ -116,10 +120,10 @@ def load_marks(session: Session, job_ids: Collection[str]) -> dict[str, Grade]:
 
     Reads no recordings. Jobs without a grade are left out.
     """
-    heads = _heads(session, job_ids, defer(CriterionResultRow.predictions))
-    by_hand = overrides.of_jobs(session, job_ids)
+    heads = _load_heads(session, job_ids, defer(CriterionResultRow.predictions))
+    by_hand = overrides.load_overrides(session, job_ids)
     return {
-        job_id: _as_it_all_counts(_with_criteria(grade, rows, ()), by_hand.get(job_id, {}))
+        job_id: _apply_overrides(_add_criteria(grade, rows, ()), by_hand.get(job_id, {}))
         for job_id, (grade, rows) in heads.items()
     }
 
@@ -128,40 +132,42 @@ def load_each_trials(session: Session, job_ids: Collection[str]) -> Iterator[tup
     """Yield each job id with its trials, which are empty without a grade. Keeps those of one job in memory."""
     from service.store.grades.recordings import from_bytes
 
-    return _trials(session, job_ids, from_bytes)
+    return _load_trials(session, job_ids, from_bytes)
 
 
-_Loaded = Iterator[tuple[str, Grade]]
+_LoadedGrades = Iterator[tuple[str, Grade]]
 
 
-def _only(found: _Loaded, job_id: str) -> Grade:
+def _require_grade(found: _LoadedGrades, job_id: str) -> Grade:
     for _, grade in found:
         return grade
     raise UsageError(f"{job_id} has no grade")
 
 
-def _as_all_count(session: Session, job_ids: Collection[str], graded: _Loaded) -> _Loaded:
-    by_hand, said = overrides.of_jobs(session, job_ids), comments.of_jobs(session, job_ids)
+def _apply_staff_changes(session: Session, job_ids: Collection[str], graded: _LoadedGrades) -> _LoadedGrades:
+    by_hand, said = overrides.load_overrides(session, job_ids), comments.load_comments_by_job(session, job_ids)
     for job_id, grade in graded:
         written = tuple(WrittenComment(each.criterion, each.text) for each in said.get(job_id, ()))
-        yield job_id, replace(_as_it_all_counts(grade, by_hand.get(job_id, {})), comments=written)
+        yield job_id, replace(_apply_overrides(grade, by_hand.get(job_id, {})), comments=written)
 
 
-def _as_it_all_counts(grade: Grade, by_hand: Mapping[str, OverrideLine]) -> Grade:
-    return replace(grade, criteria=tuple(_as_it_counts(result, by_hand.get(result.id)) for result in grade.criteria))
+def _apply_overrides(grade: Grade, by_hand: Mapping[str, OverrideLine]) -> Grade:
+    return replace(grade, criteria=tuple(_apply_override(result, by_hand.get(result.id)) for result in grade.criteria))
 
 
-def _graded(session: Session, job_ids: Collection[str], read: Callable[[bytes], Recording]) -> _Loaded:
-    heads = _heads(session, job_ids)
-    for job_id, trials in _trials(session, heads, read):
-        yield job_id, _with_criteria(*heads[job_id], trials)
+def _load_original_grades(
+    session: Session, job_ids: Collection[str], read: Callable[[bytes], Recording]
+) -> _LoadedGrades:
+    heads = _load_heads(session, job_ids)
+    for job_id, trials in _load_trials(session, heads, read):
+        yield job_id, _add_criteria(*heads[job_id], trials)
 
 
-def _with_criteria(grade: Grade, rows: Sequence[CriterionResultRow], trials: tuple[TrialResult, ...]) -> Grade:
-    return replace(grade, criteria=tuple(_criterion(row, trials) for row in rows), trials=trials)
+def _add_criteria(grade: Grade, rows: Sequence[CriterionResultRow], trials: tuple[TrialResult, ...]) -> Grade:
+    return replace(grade, criteria=tuple(_build_criterion(row, trials) for row in rows), trials=trials)
 
 
-def _heads(
+def _load_heads(
     session: Session, job_ids: Collection[str], *options: ORMOption
 ) -> dict[str, tuple[Grade, list[CriterionResultRow]]]:
     """Return the grades without criteria and trials, and the criterion rows, by job."""
@@ -173,7 +179,7 @@ def _heads(
         .where(Job.id.in_(job_ids), Job.verdict.is_not(None))
     )
     heads = {
-        job.id: (_head(job, sha256, student, version), list[CriterionResultRow]())
+        job.id: (_build_head(job, sha256, student, version), list[CriterionResultRow]())
         for job, sha256, student, version in session.execute(query)
     }
     rows = select(CriterionResultRow).where(CriterionResultRow.job_id.in_(heads)).options(*options)
@@ -182,7 +188,7 @@ def _heads(
     return heads
 
 
-def _head(job: Job, sha256: str, student: str, version: AssignmentVersion) -> Grade:
+def _build_head(job: Job, sha256: str, student: str, version: AssignmentVersion) -> Grade:
     return Grade(
         assignment=version.assignment,
         assignment_title=version.title,
@@ -196,23 +202,28 @@ def _head(job: Job, sha256: str, student: str, version: AssignmentVersion) -> Gr
         notes=tuple(job.notes),
         missing=job.missing,
         hints=tuple(job.hints),
-        secret_sha256=job.secret_sha256 or PUBLIC.sha256,
+        secret_sha256=job.secret_sha256 or PUBLIC_SECRET.sha256,
         cost=None if job.cost is None else decode(Cost, job.cost),
     )
 
 
-def _trials(
+def _load_trials(
     session: Session, job_ids: Collection[str], read: Callable[[bytes], Recording]
 ) -> Iterator[tuple[str, tuple[TrialResult, ...]]]:
     query = select(TrialRow).where(TrialRow.job_id.in_(job_ids)).order_by(TrialRow.job_id, TrialRow.position)
     rows: dict[str, list[TrialRow]] = {}
     for row in session.scalars(query):
         rows.setdefault(row.job_id, []).append(row)
-    for job_id, files in artifacts.get_each(session, job_ids, prefix="recording-"):
-        yield job_id, tuple(_trial(row, read(_recording(files, job_id, row.position))) for row in rows.get(job_id, ()))
+    for job_id, files in artifacts.load_each_files(session, job_ids, prefix="recording-"):
+        yield (
+            job_id,
+            tuple(
+                _build_trial(row, read(_find_recording(files, job_id, row.position))) for row in rows.get(job_id, ())
+            ),
+        )
 
 
-def _trial(row: TrialRow, recording: Recording) -> TrialResult:
+def _build_trial(row: TrialRow, recording: Recording) -> TrialResult:
     return TrialResult(
         scenario=row.scenario,
         index=row.scenario_index,
@@ -226,11 +237,11 @@ def _trial(row: TrialRow, recording: Recording) -> TrialResult:
     )
 
 
-def _recording_name(position: int) -> str:
+def _format_recording_name(position: int) -> str:
     return f"recording-{position}"
 
 
-def _trial_row(job_id: str, position: int, trial: TrialResult) -> TrialRow:
+def _build_trial_row(job_id: str, position: int, trial: TrialResult) -> TrialRow:
     return TrialRow(
         job_id=job_id,
         position=position,
@@ -245,11 +256,11 @@ def _trial_row(job_id: str, position: int, trial: TrialResult) -> TrialRow:
         end_t=trial.recording.end_t,
         place=trial.place,
         sweep=encode(trial.sweep),
-        surprise=next((fault.staff for fault in faults_of(trial.recording) if fault.staff), None),
+        surprise=next((fault.staff for fault in collect_faults(trial.recording) if fault.staff), None),
     )
 
 
-def _criterion_row(
+def _build_criterion_row(
     job_id: str, position: int, result: CriterionResult, predictions: list[dict[str, Any]]
 ) -> CriterionResultRow:
     accuracy = result.accuracy
@@ -279,7 +290,7 @@ def _criterion_row(
     )
 
 
-def _encoded_prediction(prediction: Prediction, numbers: Mapping[Image, int]) -> dict[str, Any] | None:
+def _encode_prediction(prediction: Prediction, numbers: Mapping[Image, int]) -> dict[str, Any] | None:
     """Encode a prediction with its image as a number in the recording; None if the images were too large to store."""
     if not numbers:
         return None
@@ -288,14 +299,14 @@ def _encoded_prediction(prediction: Prediction, numbers: Mapping[Image, int]) ->
     return plain | {"image": where if where is not None else encode(prediction.image)}
 
 
-def _recording(files: dict[str, artifacts.File], job_id: str, position: int) -> bytes:
-    name = _recording_name(position)
+def _find_recording(files: dict[str, artifacts.File], job_id: str, position: int) -> bytes:
+    name = _format_recording_name(position)
     if name not in files:
         raise HostError(f"The database is damaged: {name} of {job_id} is gone")
     return files[name].data
 
 
-def _criterion(row: CriterionResultRow, trials: tuple[TrialResult, ...]) -> CriterionResult:
+def _build_criterion(row: CriterionResultRow, trials: tuple[TrialResult, ...]) -> CriterionResult:
     return CriterionResult(
         id=row.criterion,
         title=row.title,
@@ -304,29 +315,29 @@ def _criterion(row: CriterionResultRow, trials: tuple[TrialResult, ...]) -> Crit
         message=row.message,
         visibility=row.visibility,
         evidence=decode(tuple[Evidence, ...], row.evidence),
-        accuracy=_accuracy(row),
-        predictions=tuple(_prediction(plain, trials) for plain in row.predictions) if trials else (),
+        accuracy=_build_accuracy(row),
+        predictions=tuple(_decode_prediction(plain, trials) for plain in row.predictions) if trials else (),
         curves=decode(tuple[AccuracyCurve, ...], row.curves),
-        shown=None if row.shown is None else decode(Shown, row.shown),
+        shown=None if row.shown is None else decode(VisibleFeedback, row.shown),
         unjudged=row.unjudged or "",
         for_staff=row.for_staff,
     )
 
 
-def _as_it_counts(result: CriterionResult, override: OverrideLine | None) -> CriterionResult:
+def _apply_override(result: CriterionResult, override: OverrideLine | None) -> CriterionResult:
     if override is None:
         return result
-    marks, max_marks = override.counted(result.max_marks)
+    marks, max_marks = override.compute_marks(result.max_marks)
     excused = override.marks is None
     if not result.unjudged:
-        said = SetByHand(result.marks, result.max_marks, override.reason, excused)
+        said = StaffAdjustment(result.marks, result.max_marks, override.reason, excused)
         return replace(result, marks=marks, max_marks=max_marks, set_by_hand=said)
     # The note that staff will review it no longer applies.
-    said = SetByHand(None, result.max_marks, override.reason, excused)
+    said = StaffAdjustment(None, result.max_marks, override.reason, excused)
     return replace(result, marks=marks, max_marks=max_marks, set_by_hand=said, message="", unjudged="")
 
 
-def _accuracy(row: CriterionResultRow) -> Accuracy | None:
+def _build_accuracy(row: CriterionResultRow) -> Accuracy | None:
     if row.accuracy is None or row.accuracy_low is None or row.accuracy_high is None or row.accuracy_n is None:
         return None
     return Accuracy(
@@ -341,7 +352,7 @@ def _accuracy(row: CriterionResultRow) -> Accuracy | None:
     )
 
 
-def _prediction(plain: dict[str, Any], trials: tuple[TrialResult, ...]) -> Prediction:
+def _decode_prediction(plain: dict[str, Any], trials: tuple[TrialResult, ...]) -> Prediction:
     where = plain["image"]
     image = trials[plain["trial"]].recording.images[where] if isinstance(where, int) else decode(Image, where)
     return Prediction(image, plain["truth"], plain["answer"], plain["scenario"], plain["trial"])

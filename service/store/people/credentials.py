@@ -15,9 +15,9 @@ from typing import Any
 from sqlalchemy import ColumnElement, and_, delete, exists, func, or_, select, true, update
 from sqlalchemy.orm import Session, aliased
 
+from service.store.conditional_insert import insert_if_new
 from service.store.engine import now
-from service.store.ids import new_id
-from service.store.inserting import insert_if_new
+from service.store.ids import generate_id
 from service.store.models import Enrolment, Person
 from service.store.states import CredentialKind, Role
 from service.store.web_tables import Credential, LtiCourse
@@ -28,8 +28,8 @@ LINK_LIFETIME = timedelta(days=2)
 MOST_SESSIONS, MOST_TOKENS = 20, 20
 #: Prefixes of secrets, so that a leaked one can be recognised.
 _PREFIXES = {CredentialKind.LINK: "rml_", CredentialKind.SESSION: "rms_", CredentialKind.TOKEN: "rmt_"}
-_FORGOTTEN = timedelta(days=30)
-_NOTED_EVERY = timedelta(hours=1)
+_RETENTION = timedelta(days=30)
+_USE_INTERVAL = timedelta(hours=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +42,12 @@ class Reach:
     scopes: frozenset[str] = frozenset()  # empty: all scopes for a session, none for a token
 
     @property
-    def is_everywhere(self) -> bool:
+    def is_unlimited(self) -> bool:
         """Return whether it reaches every course of its owner in every role."""
         return self.course_id is None and self.role is None and self.platform_id is None
 
 
-EVERYWHERE = Reach()
+UNLIMITED_REACH = Reach()
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,14 +95,14 @@ class CredentialLine:
     used_at: datetime | None
 
 
-def issue(
+def issue_credential(
     session: Session,
     person_id: int,
     kind: CredentialKind,
     lifetime: timedelta,
     *,
     name: str = "",
-    reach: Reach = EVERYWHERE,
+    reach: Reach = UNLIMITED_REACH,
     token: Credential | None = None,
 ) -> str:
     """Issue a new secret for this person, and delete credentials that expired long ago.
@@ -110,28 +110,30 @@ def issue(
     A session that is started with a ``token`` ends with it.
     """
     at = now(session)
-    _forget_expired(session, at)
+    _delete_expired(session, at)
     secret = _PREFIXES[kind] + secrets.token_urlsafe(32)
     expires_at, token_id = at + lifetime, None
     if token is not None:
         expires_at, token_id = min(expires_at, token.expires_at), token.id
-    session.add(_row(person_id, kind, secret, at, expires_at, name=name, token_id=token_id, **_columns(reach)))
+    session.add(
+        _build_row(person_id, kind, secret, at, expires_at, name=name, token_id=token_id, **_build_columns(reach))
+    )
     session.flush()
     if kind is not CredentialKind.LINK:
-        _note_sign_in(session, person_id, at)
+        _record_sign_in(session, person_id, at)
     if kind is CredentialKind.SESSION:
         _end_oldest_sessions(session, person_id, at)
     return secret
 
 
-def make_token(
+def create_token(
     session: Session,
     person_id: int,
     lifetime: timedelta,
     word: str,
     *,
     name: str,
-    reach: Reach = EVERYWHERE,
+    reach: Reach = UNLIMITED_REACH,
     made_with: str = "",
 ) -> None:
     """Create a token of this person from an unguessable word. Repeating the call creates no second token.
@@ -139,36 +141,36 @@ def make_token(
     If ``made_with`` is the id of a session that was started with a token, the new token ends with that token.
     """
     at = now(session)
-    _forget_expired(session, at)
-    _note_sign_in(session, person_id, at)
-    expires_at, token = at + lifetime, _token_behind(session, made_with)
+    _delete_expired(session, at)
+    _record_sign_in(session, person_id, at)
+    expires_at, token = at + lifetime, _find_parent_token(session, made_with)
     if token is not None:
         expires_at = min(expires_at, token.expires_at)
     insert_if_new(
         session,
         Credential,
-        id=new_id(),
+        id=generate_id(),
         person_id=person_id,
         kind=CredentialKind.TOKEN,
-        sha256=_sha256(_PREFIXES[CredentialKind.TOKEN] + word),
+        sha256=_hash_secret(_PREFIXES[CredentialKind.TOKEN] + word),
         name=name,
         created_at=at,
         expires_at=expires_at,
         token_id=None if token is None else token.id,
-        **_columns(reach),
+        **_build_columns(reach),
     )
 
 
-def _token_behind(session: Session, credential_id: str) -> Credential | None:
+def _find_parent_token(session: Session, credential_id: str) -> Credential | None:
     """Return the token that a session was started with; None if it was started in another way."""
     row = session.get(Credential, credential_id)
     return None if row is None or row.token_id is None else session.get_one(Credential, row.token_id)
 
 
-def unused_token(session: Session, person_id: int, word: str) -> str:
+def find_unused_token(session: Session, person_id: int, word: str) -> str:
     """Return the secret of the token created from this word if it is not used yet, otherwise an empty string."""
     secret = _PREFIXES[CredentialKind.TOKEN] + word
-    row = _valid(session, secret, CredentialKind.TOKEN)
+    row = _find_valid(session, secret, CredentialKind.TOKEN)
     return "" if row is None or row.person_id != person_id or row.used_at is not None else secret
 
 
@@ -176,50 +178,54 @@ def count_tokens(session: Session, person_id: int) -> int:
     """Return the number of a person's valid tokens and lock the person until the end of the transaction."""
     session.get_one(Person, person_id, with_for_update={"key_share": True})
     query = select(func.count()).where(Credential.person_id == person_id, Credential.kind == CredentialKind.TOKEN)
-    return session.scalar(query.where(*_counts(now(session)))) or 0
+    return session.scalar(query.where(*_match_valid(now(session)))) or 0
 
 
 def replace_links(
-    session: Session, person_ids: Sequence[int], lifetime: timedelta, word: str = "", reach: Reach = EVERYWHERE
+    session: Session, person_ids: Sequence[int], lifetime: timedelta, word: str = "", reach: Reach = UNLIMITED_REACH
 ) -> dict[int, str]:
     """Create a new link for each of these persons and return the secrets; their earlier links are revoked.
 
     An unguessable ``word`` determines the secret for a single person, so that the caller can reproduce it.
     """
     at = now(session)
-    _forget_expired(session, at)
+    _delete_expired(session, at)
     links = (Credential.kind == CredentialKind.LINK, Credential.revoked_at.is_(None))
     session.execute(update(Credential).where(*links, Credential.person_id.in_(person_ids)).values(revoked_at=at))
-    made = {person_id: link_of(word or secrets.token_urlsafe(32)) for person_id in person_ids}
-    limits = _columns(reach)
-    session.add_all(_row(who, CredentialKind.LINK, secret, at, at + lifetime, **limits) for who, secret in made.items())
+    made = {person_id: build_link_secret(word or secrets.token_urlsafe(32)) for person_id in person_ids}
+    limits = _build_columns(reach)
+    session.add_all(
+        _build_row(who, CredentialKind.LINK, secret, at, at + lifetime, **limits) for who, secret in made.items()
+    )
     session.flush()
     return made
 
 
-def link_of(word: str) -> str:
+def build_link_secret(word: str) -> str:
     """Return the secret of a link created from this word."""
     return _PREFIXES[CredentialKind.LINK] + word
 
 
-def owner(session: Session, link: str) -> LinkOwner | None:
+def find_link_owner(session: Session, link: str) -> LinkOwner | None:
     """Return the person that the link signs in; None if it is invalid or expired."""
-    row = _valid(session, link, CredentialKind.LINK)
+    row = _find_valid(session, link, CredentialKind.LINK)
     if row is None:
         return None
-    return LinkOwner(row.person_id, person_name(session, row.person_id, row.course_id), row.expires_at)
+    return LinkOwner(row.person_id, load_person_name(session, row.person_id, row.course_id), row.expires_at)
 
 
-def redeem(session: Session, link: str) -> NewSession | None:
+def redeem_link(session: Session, link: str) -> NewSession | None:
     """Exchange a link for a new session with the same reach. None if the link is not valid."""
-    row = _valid(session, link, CredentialKind.LINK)
+    row = _find_valid(session, link, CredentialKind.LINK)
     if row is None:
         return None
     at = now(session)
     taken = update(Credential).where(Credential.id == row.id, Credential.used_at.is_(None)).values(used_at=at)
     if session.execute(taken).rowcount != 1:  # type: ignore[attr-defined]
         return None
-    return NewSession(issue(session, row.person_id, CredentialKind.SESSION, SESSION_LIFETIME, reach=_reach(row)))
+    return NewSession(
+        issue_credential(session, row.person_id, CredentialKind.SESSION, SESSION_LIFETIME, reach=_build_reach(row))
+    )
 
 
 def start_session(session: Session, token: str) -> NewSession | None:
@@ -227,20 +233,22 @@ def start_session(session: Session, token: str) -> NewSession | None:
 
     Returns None if the token does not permit browser sign-in.
     """
-    row = _valid(session, token, CredentialKind.TOKEN)
+    row = _find_valid(session, token, CredentialKind.TOKEN)
     if row is None or "sign-in" not in row.scopes:
         return None
     kind, lifetime = CredentialKind.SESSION, min(SESSION_LIFETIME, row.expires_at - now(session))
-    return NewSession(issue(session, row.person_id, kind, lifetime, reach=_reach(row), token=row), lifetime)
+    return NewSession(
+        issue_credential(session, row.person_id, kind, lifetime, reach=_build_reach(row), token=row), lifetime
+    )
 
 
 def identify(session: Session, secret: str, kind: CredentialKind) -> Identity | None:
     """Return the owner of a session or token, with the roles within its reach. None if it is not valid."""
-    row = _valid(session, secret, kind)
+    row = _find_valid(session, secret, kind)
     if row is None:
         return None
-    reach = _reach(row)
-    reached = _reached(reach)
+    reach = _build_reach(row)
+    reached = _match_enrolments(reach)
     query = select(Person.operator, Enrolment, and_(*reached) if reached else true())
     query = query.outerjoin(Enrolment, Enrolment.person_id == Person.id).where(Person.id == row.person_id)
     known = session.execute(query.order_by(Enrolment.role != Role.INSTRUCTOR, Enrolment.id)).all()
@@ -249,55 +257,55 @@ def identify(session: Session, secret: str, kind: CredentialKind) -> Identity | 
     return Identity(
         row.id,
         row.person_id,
-        _name(row.person_id, [(each.name, each.written) for each in own]),
-        known[0][0] and reach.is_everywhere,
+        _choose_name(row.person_id, [(each.name, each.written) for each in own]),
+        known[0][0] and reach.is_unlimited,
         {each.course_id: each.role for each, is_reached in in_courses if is_reached},
         None if kind is CredentialKind.SESSION and not reach.scopes else reach.scopes,
         reach,
-        row.used_at is not None and row.used_at >= now(session) - _NOTED_EVERY,
+        row.used_at is not None and row.used_at >= now(session) - _USE_INTERVAL,
     )
 
 
-def note_use(session: Session, credential_id: str) -> None:
+def record_use(session: Session, credential_id: str) -> None:
     """Record the use of a token, at most once an hour."""
     at = now(session)
     row = session.get(Credential, credential_id)
-    if row is not None and (row.used_at is None or row.used_at < at - _NOTED_EVERY):
+    if row is not None and (row.used_at is None or row.used_at < at - _USE_INTERVAL):
         row.used_at = at
 
 
-def revoke(session: Session, credential_id: str, person_id: int, reach: Reach = EVERYWHERE) -> bool:
+def revoke_credential(session: Session, credential_id: str, person_id: int, reach: Reach = UNLIMITED_REACH) -> bool:
     """Revoke a credential. Returns False if this person does not have it within ``reach``."""
     one = (Credential.id == credential_id, Credential.person_id == person_id, Credential.revoked_at.is_(None))
-    return _revoke(session, *one, *_within(reach)) == 1
+    return _revoke(session, *one, *_match_credentials(reach)) == 1
 
 
-def revoke_all(session: Session, person_id: int, *, but: str = "", reach: Reach = EVERYWHERE) -> int:
+def revoke_all(session: Session, person_id: int, *, but: str = "", reach: Reach = UNLIMITED_REACH) -> int:
     """Revoke all links, sessions and tokens of a person within ``reach`` except one. Returns the number revoked."""
-    theirs = (Credential.person_id == person_id, Credential.id != but, *_counts(now(session)))
-    return _revoke(session, *theirs, *_within(reach))
+    theirs = (Credential.person_id == person_id, Credential.id != but, *_match_valid(now(session)))
+    return _revoke(session, *theirs, *_match_credentials(reach))
 
 
-def revoke_reaching(session: Session, person_id: int, course_id: int) -> int:
+def revoke_for_course(session: Session, person_id: int, course_id: int) -> int:
     """Revoke all credentials of a person that reach a course. Returns the number revoked."""
     reaches = or_(Credential.course_id.is_(None), Credential.course_id == course_id)
-    return _revoke(session, Credential.person_id == person_id, reaches, *_counts(now(session)))
+    return _revoke(session, Credential.person_id == person_id, reaches, *_match_valid(now(session)))
 
 
 def _revoke(session: Session, *which: ColumnElement[bool]) -> int:
     """Revoke credentials and everything made with them. Returns the number without what was made with them."""
     at = now(session)
     ended = session.execute(update(Credential).where(*which).values(revoked_at=at))
-    made = update(Credential).where(Credential.revoked_at.is_(None), _has_lost_token()).values(revoked_at=at)
+    made = update(Credential).where(Credential.revoked_at.is_(None), _match_revoked_parent()).values(revoked_at=at)
     while session.execute(made, execution_options={"synchronize_session": False}).rowcount:  # type: ignore[attr-defined]
         pass
     return int(ended.rowcount)  # type: ignore[attr-defined]
 
 
-def of_person(session: Session, person_id: int, reach: Reach = EVERYWHERE) -> list[CredentialLine]:
+def list_credentials(session: Session, person_id: int, reach: Reach = UNLIMITED_REACH) -> list[CredentialLine]:
     """Return a person's valid sessions and tokens within ``reach``, newest first."""
     of_kind = Credential.kind.in_([CredentialKind.SESSION, CredentialKind.TOKEN])
-    theirs = (Credential.person_id == person_id, of_kind, *_counts(now(session)), *_within(reach))
+    theirs = (Credential.person_id == person_id, of_kind, *_match_valid(now(session)), *_match_credentials(reach))
     return [
         CredentialLine(
             row.id, row.kind, row.name, tuple(row.scopes), row.course_id, row.created_at, row.expires_at, row.used_at
@@ -308,7 +316,7 @@ def of_person(session: Session, person_id: int, reach: Reach = EVERYWHERE) -> li
     ]
 
 
-def person_name(session: Session, person_id: int, course_id: int | None = None) -> str:
+def load_person_name(session: Session, person_id: int, course_id: int | None = None) -> str:
     """Return a person's name in the course; without a course, the name in any course, preferring those they teach.
 
     Falls back to the person's id.
@@ -317,20 +325,20 @@ def person_name(session: Session, person_id: int, course_id: int | None = None) 
     if course_id is not None:
         query = query.where(Enrolment.course_id == course_id)
     known = session.execute(query.order_by(Enrolment.role != Role.INSTRUCTOR, Enrolment.id)).all()
-    return _name(person_id, [(name, written) for name, written in known])
+    return _choose_name(person_id, [(name, written) for name, written in known])
 
 
-def _name(person_id: int, known: Sequence[tuple[str, str]]) -> str:
+def _choose_name(person_id: int, known: Sequence[tuple[str, str]]) -> str:
     """Return the first name among a person's enrolments, otherwise the first id."""
     names = [name for name, _ in known if name] or [written for _, written in known if written]
     return names[0] if names else f"person {person_id}"
 
 
-def _reach(row: Credential) -> Reach:
+def _build_reach(row: Credential) -> Reach:
     return Reach(row.course_id, row.role, row.platform_id, frozenset(row.scopes))
 
 
-def _columns(reach: Reach) -> dict[str, Any]:
+def _build_columns(reach: Reach) -> dict[str, Any]:
     return {
         "course_id": reach.course_id,
         "role": reach.role,
@@ -339,7 +347,7 @@ def _columns(reach: Reach) -> dict[str, Any]:
     }
 
 
-def _reached(reach: Reach) -> list[ColumnElement[bool]]:
+def _match_enrolments(reach: Reach) -> list[ColumnElement[bool]]:
     """Return the conditions for the enrolments within a credential's reach."""
     found: list[ColumnElement[bool]] = []
     if reach.course_id is not None:
@@ -352,7 +360,7 @@ def _reached(reach: Reach) -> list[ColumnElement[bool]]:
     return found
 
 
-def _within(reach: Reach) -> list[ColumnElement[bool]]:
+def _match_credentials(reach: Reach) -> list[ColumnElement[bool]]:
     """Return the conditions for credentials within this reach: only these may be viewed and revoked with it."""
     limits = (
         (Credential.course_id, reach.course_id),
@@ -362,50 +370,50 @@ def _within(reach: Reach) -> list[ColumnElement[bool]]:
     return [column == limit for column, limit in limits if limit is not None]
 
 
-def _counts(at: datetime) -> tuple[ColumnElement[bool], ...]:
+def _match_valid(at: datetime) -> tuple[ColumnElement[bool], ...]:
     is_unused = or_(Credential.kind != CredentialKind.LINK, Credential.used_at.is_(None))
-    return Credential.revoked_at.is_(None), Credential.expires_at > at, is_unused, ~_has_lost_token()
+    return Credential.revoked_at.is_(None), Credential.expires_at > at, is_unused, ~_match_revoked_parent()
 
 
-def _has_lost_token() -> ColumnElement[bool]:
+def _match_revoked_parent() -> ColumnElement[bool]:
     token = aliased(Credential)
     return exists().where(token.id == Credential.token_id, token.revoked_at.is_not(None))
 
 
-def _note_sign_in(session: Session, person_id: int, at: datetime) -> None:
+def _record_sign_in(session: Session, person_id: int, at: datetime) -> None:
     session.execute(update(Person).where(Person.id == person_id, Person.signed_in_at.is_(None)).values(signed_in_at=at))
 
 
 def _end_oldest_sessions(session: Session, person_id: int, at: datetime) -> None:
-    theirs = (Credential.person_id == person_id, Credential.kind == CredentialKind.SESSION, *_counts(at))
+    theirs = (Credential.person_id == person_id, Credential.kind == CredentialKind.SESSION, *_match_valid(at))
     newest = select(Credential.id).where(*theirs).order_by(Credential.created_at.desc(), Credential.id)
     kept = list(session.scalars(newest.limit(MOST_SESSIONS)))
     _revoke(session, *theirs, Credential.id.not_in(kept))
 
 
-def _valid(session: Session, secret: str, kind: CredentialKind) -> Credential | None:
+def _find_valid(session: Session, secret: str, kind: CredentialKind) -> Credential | None:
     if not secret.startswith(_PREFIXES[kind]) or len(secret) > 100:
         return None
-    mine = (Credential.sha256 == _sha256(secret), Credential.kind == kind)
-    return session.scalar(select(Credential).where(*mine, *_counts(now(session))))
+    mine = (Credential.sha256 == _hash_secret(secret), Credential.kind == kind)
+    return session.scalar(select(Credential).where(*mine, *_match_valid(now(session))))
 
 
-def _row(
+def _build_row(
     person_id: int, kind: CredentialKind, secret: str, at: datetime, expires_at: datetime, **columns: Any
 ) -> Credential:
     return Credential(
-        person_id=person_id, kind=kind, sha256=_sha256(secret), created_at=at, expires_at=expires_at, **columns
+        person_id=person_id, kind=kind, sha256=_hash_secret(secret), created_at=at, expires_at=expires_at, **columns
     )
 
 
-def _forget_expired(session: Session, at: datetime) -> None:
+def _delete_expired(session: Session, at: datetime) -> None:
     """Delete credentials that expired long ago.
 
     Tokens are kept, because stored replies refer to them. The activity log names people, not credentials.
     """
-    expired = (Credential.expires_at < at - _FORGOTTEN, Credential.kind != CredentialKind.TOKEN)
+    expired = (Credential.expires_at < at - _RETENTION, Credential.kind != CredentialKind.TOKEN)
     session.execute(delete(Credential).where(*expired))
 
 
-def _sha256(secret: str) -> str:
+def _hash_secret(secret: str) -> str:
     return hashlib.sha256(secret.encode()).hexdigest()

@@ -14,18 +14,18 @@ from urllib.parse import urlsplit
 from sqlalchemy import delete, or_, select
 from sqlalchemy.orm import Session
 
+from service.store.conditional_insert import insert_if_new
 from service.store.engine import now
-from service.store.inserting import insert_if_new
 from service.store.models import Course, Enrolment, Person
 from service.store.people import credentials
-from service.store.people.membership import is_from_platform, is_more_than, set_role
-from service.store.people.students import DEFAULT_COURSE, Students, course_of
+from service.store.people.membership import has_other_access, is_from_platform, set_role
+from service.store.people.students import DEFAULT_COURSE, Students, ensure_course
 from service.store.states import Role
 from service.store.web_tables import Credential, LtiCourse, LtiKey, LtiLaunch, LtiPerson, LtiPlatform
 from sim.errors import UsageError
 from submissions.student_identity import Student
 
-_LAUNCH_TAKES = timedelta(minutes=10)
+_LAUNCH_LIFETIME = timedelta(minutes=10)
 
 
 #: Longest id of a subject, context or deployment. Longer ones are rejected, because cut ones could collide.
@@ -60,10 +60,10 @@ class Platform(Registration):
 
     id: int = field(kw_only=True)
 
-    def may_be_asked(self, url: str) -> bool:
+    def has_registered_origin(self, url: str) -> bool:
         """Return whether the origin of this address is registered, in a platform address or as a service origin."""
-        origin = origin_of(url)
-        own = (origin_of(each) for each in (self.authorization_url, self.token_url, self.keys_url))
+        origin = parse_origin(url)
+        own = (parse_origin(each) for each in (self.authorization_url, self.token_url, self.keys_url))
         return origin is not None and origin in {*own, *self.service_origins}
 
 
@@ -77,7 +77,7 @@ class PendingLaunch:
 
 
 @dataclass(frozen=True, slots=True)
-class Launched:
+class LaunchResult:
     """The person and course of a launch."""
 
     person_id: int
@@ -94,7 +94,7 @@ class CourseLink:
     lineitems_url: str | None
 
 
-def origin_of(url: str) -> str | None:
+def parse_origin(url: str) -> str | None:
     """Return the scheme, host and port of a web address; None if it is not one."""
     try:
         parts = urlsplit(url)
@@ -107,7 +107,7 @@ def origin_of(url: str) -> str | None:
     return f"{parts.scheme}://{host}:{port}"
 
 
-def register(session: Session, asked: Registration) -> int:
+def register_platform(session: Session, asked: Registration) -> int:
     """Register a platform, or update the one with the same issuer and client. Returns its id.
 
     Raises UsageError for an id that is too long, and for an address without a host or that does not begin with https://
@@ -119,11 +119,11 @@ def register(session: Session, asked: Registration) -> int:
     deployments = sorted(asked.deployments)
     for deployment in deployments:
         _check_id("deployment", deployment)
-    origins = {origin_of(each): each for each in asked.service_origins}
+    origins = {parse_origin(each): each for each in asked.service_origins}
     if None in origins:
         raise UsageError(f"the service address is {origins[None]!r}, expected one like https://platform.example.org")
     for what, url in (("login", asked.authorization_url), ("token", asked.token_url), ("keys", asked.keys_url)):
-        if not url.startswith(("https://", "http://")) or origin_of(url) is None:
+        if not url.startswith(("https://", "http://")) or parse_origin(url) is None:
             raise UsageError(f"the {what} address is {url!r}, expected one like https://platform.example.org/path")
     values = {
         "name": asked.name,
@@ -143,9 +143,11 @@ def register(session: Session, asked: Registration) -> int:
     return row.id
 
 
-def platforms(session: Session) -> list[Platform]:
+def list_platforms(session: Session) -> list[Platform]:
     """Return all registered platforms, ordered by name."""
-    return [_platform(row) for row in session.scalars(select(LtiPlatform).order_by(LtiPlatform.name, LtiPlatform.id))]
+    return [
+        _build_platform(row) for row in session.scalars(select(LtiPlatform).order_by(LtiPlatform.name, LtiPlatform.id))
+    ]
 
 
 def find_platform(session: Session, issuer: str, client_id: str | None) -> Platform | None:
@@ -154,7 +156,7 @@ def find_platform(session: Session, issuer: str, client_id: str | None) -> Platf
     if client_id is not None:
         query = query.where(LtiPlatform.client_id == client_id)
     found = session.scalars(query.limit(2)).all()
-    return _platform(found[0]) if len(found) == 1 else None
+    return _build_platform(found[0]) if len(found) == 1 else None
 
 
 def begin_launch(session: Session, platform: Platform, target: str) -> tuple[str, str]:
@@ -162,7 +164,7 @@ def begin_launch(session: Session, platform: Platform, target: str) -> tuple[str
 
     At most ``MOST_PENDING`` launches of a platform are kept.
     """
-    _lock(session, platform)
+    _lock_platform(session, platform)
     at, of_platform = now(session), LtiLaunch.platform_id == platform.id
     newest_first = select(LtiLaunch.state_sha256).where(of_platform).order_by(LtiLaunch.expires_at.desc())
     too_old = or_(LtiLaunch.expires_at < at, LtiLaunch.state_sha256.in_(newest_first.offset(MOST_PENDING - 1)))
@@ -170,11 +172,11 @@ def begin_launch(session: Session, platform: Platform, target: str) -> tuple[str
     state, nonce = secrets.token_urlsafe(32), secrets.token_urlsafe(32)
     session.add(
         LtiLaunch(
-            state_sha256=_sha256(state),
+            state_sha256=_hash_text(state),
             platform_id=platform.id,
             nonce=nonce,
             target=target,
-            expires_at=at + _LAUNCH_TAKES,
+            expires_at=at + _LAUNCH_LIFETIME,
         )
     )
     return state, nonce
@@ -182,16 +184,16 @@ def begin_launch(session: Session, platform: Platform, target: str) -> tuple[str
 
 def take_launch(session: Session, state: str) -> PendingLaunch | None:
     """Return and delete the launch with this state; None if it does not exist or has expired."""
-    row = session.get(LtiLaunch, _sha256(state), with_for_update={"key_share": True})
+    row = session.get(LtiLaunch, _hash_text(state), with_for_update={"key_share": True})
     if row is None:
         return None
     session.delete(row)
     if row.expires_at <= now(session):
         return None
-    return PendingLaunch(_platform(session.get_one(LtiPlatform, row.platform_id)), row.nonce, row.target)
+    return PendingLaunch(_build_platform(session.get_one(LtiPlatform, row.platform_id)), row.nonce, row.target)
 
 
-def meet(
+def resolve_launch(
     session: Session,
     platform: Platform,
     deployment: str,
@@ -202,7 +204,7 @@ def meet(
     role: Role,
     members_url: str | None,
     lineitems_url: str | None,
-) -> Launched | None:
+) -> LaunchResult | None:
     """Return the person and course of a launch; enrols new members. An instructor's first launch creates the course.
 
     Returns None for a student in a context that no instructor has launched. A platform reaches only courses that were
@@ -212,8 +214,8 @@ def meet(
     """
     _check_id("deployment", deployment)
     _check_id("context", context)
-    _lock(session, platform)
-    link = _course_of_context(session, platform, deployment, context, subject)
+    _lock_platform(session, platform)
+    link = _find_context_course(session, platform, deployment, context, subject)
     if link is None:
         if role is not Role.INSTRUCTOR:
             return None
@@ -221,18 +223,20 @@ def meet(
             platform_id=platform.id,
             deployment=deployment,
             context=context,
-            course_id=_new_course(session, course_title),
+            course_id=_create_course(session, course_title),
         )
         session.add(link)
     if role is Role.INSTRUCTOR:
         link.members_url = members_url or link.members_url
         link.lineitems_url = lineitems_url or link.lineitems_url
     session.flush()
-    person_id = enrol(session, platform, link.course_id, subject, student, role)
-    return Launched(person_id, link.course_id, role)
+    person_id = enrol_subject(session, platform, link.course_id, subject, student, role)
+    return LaunchResult(person_id, link.course_id, role)
 
 
-def enrol(session: Session, platform: Platform, course_id: int, subject: str, student: Student, role: Role) -> int:
+def enrol_subject(
+    session: Session, platform: Platform, course_id: int, subject: str, student: Student, role: Role
+) -> int:
     """Enrol a platform's subject in the course with this role and return the person's id.
 
     Updates the role of the subject's existing enrolment. An older enrolment with the same id is reused only if it
@@ -243,13 +247,13 @@ def enrol(session: Session, platform: Platform, course_id: int, subject: str, st
     _check_id("subject", subject)
     if len(student.id) > _LONGEST_STUDENT:
         raise UsageError("the platform's user ID is longer than %(most)s characters", most=_LONGEST_STUDENT)
-    _lock(session, platform)
+    _lock_platform(session, platform)
     session.get_one(Course, course_id, with_for_update={"key_share": True})
     of_subject = (LtiPerson.platform_id == platform.id, LtiPerson.subject == subject)
     known = session.scalar(select(LtiPerson).where(*of_subject))
-    row = None if known is None else _enrolment_of(session, known.person_id, course_id)
+    row = None if known is None else _find_enrolment(session, known.person_id, course_id)
     if row is None:
-        row = _new_enrolment(session, course_id, student, None if known is None else known.person_id)
+        row = _create_enrolment(session, course_id, student, None if known is None else known.person_id)
         if known is None:
             session.add(LtiPerson(platform_id=platform.id, subject=subject, person_id=row.person_id))
     row.name, row.email = student.name or row.name, student.email or row.email
@@ -258,13 +262,13 @@ def enrol(session: Session, platform: Platform, course_id: int, subject: str, st
     return row.person_id
 
 
-def _new_enrolment(session: Session, course_id: int, student: Student, person_id: int | None) -> Enrolment:
+def _create_enrolment(session: Session, course_id: int, student: Student, person_id: int | None) -> Enrolment:
     """Return an unclaimed enrolment for the student, belonging to the given person or to a new one.
 
     Raises UsageError if another person has claimed the student's id.
     """
     row = session.get_one(Enrolment, Students(session, course_id).enrol(student, now(session)))
-    if not _is_nobodys(session, row):
+    if not _is_unclaimed(session, row):
         raise UsageError(
             "another person already has the ID '%(id)s' in this course; ask an operator of Robomark",
             id=student.id[:LONGEST_ID],
@@ -279,19 +283,19 @@ def _new_enrolment(session: Session, course_id: int, student: Student, person_id
     return row
 
 
-def _is_nobodys(session: Session, row: Enrolment) -> bool:
+def _is_unclaimed(session: Session, row: Enrolment) -> bool:
     """Return whether an enrolment is unclaimed: a student in this course only, who never signed in."""
     person = session.get_one(Person, row.person_id)
     has_signed_in = person.signed_in_at is not None or is_from_platform(session, person.id)
-    return not (has_signed_in or row.role is not Role.STUDENT or is_more_than(session, row))
+    return not (has_signed_in or row.role is not Role.STUDENT or has_other_access(session, row))
 
 
-def _enrolment_of(session: Session, person_id: int, course_id: int) -> Enrolment | None:
+def _find_enrolment(session: Session, person_id: int, course_id: int) -> Enrolment | None:
     in_course = (Enrolment.person_id == person_id, Enrolment.course_id == course_id)
     return session.scalar(select(Enrolment).where(*in_course).limit(1))
 
 
-def _course_of_context(
+def _find_context_course(
     session: Session, platform: Platform, deployment: str, context: str, subject: str
 ) -> LtiCourse | None:
     """Return the course of a deployment's context.
@@ -318,7 +322,7 @@ def _course_of_context(
     return unknown
 
 
-def _lock(session: Session, platform: Platform) -> None:
+def _lock_platform(session: Session, platform: Platform) -> None:
     """Lock the platform, so that concurrent launches of one subject or context do not both create it."""
     session.get_one(LtiPlatform, platform.id, with_for_update={"key_share": True})
 
@@ -328,15 +332,17 @@ def _check_id(kind: str, value: str) -> None:
         raise UsageError("the platform's %(kind)s ID is longer than %(most)s characters", kind=kind, most=LONGEST_ID)
 
 
-def course_link(session: Session, course_id: int) -> CourseLink | None:
+def find_course_link(session: Session, course_id: int) -> CourseLink | None:
     """Return the platform that launches the course; None if none does."""
     row = session.scalar(select(LtiCourse).where(LtiCourse.course_id == course_id).limit(1))
     if row is None:
         return None
-    return CourseLink(_platform(session.get_one(LtiPlatform, row.platform_id)), row.members_url, row.lineitems_url)
+    return CourseLink(
+        _build_platform(session.get_one(LtiPlatform, row.platform_id)), row.members_url, row.lineitems_url
+    )
 
 
-def subjects(session: Session, platform: Platform, course_id: int) -> dict[str, str]:
+def load_subjects(session: Session, platform: Platform, course_id: int) -> dict[str, str]:
     """Return the platform's subjects for the students of a course, by student id."""
     query = (
         select(Enrolment.student, LtiPerson.subject)
@@ -346,7 +352,7 @@ def subjects(session: Session, platform: Platform, course_id: int) -> dict[str, 
     return dict(session.execute(query).all())
 
 
-def private_keys(session: Session) -> list[tuple[str, str]]:
+def load_private_keys(session: Session) -> list[tuple[str, str]]:
     """Return the tool's own keys, newest first, as (id, private key in PEM)."""
     rows = session.scalars(select(LtiKey).order_by(LtiKey.created_at.desc(), LtiKey.id))
     return [(row.id, row.private_pem) for row in rows]
@@ -358,7 +364,7 @@ def add_private_key(session: Session, pem: str) -> None:
     session.flush()
 
 
-def _new_course(session: Session, title: str) -> int:
+def _create_course(session: Session, title: str) -> int:
     """Create a course with this name, or with a number appended if the name is taken.
 
     Never uses the name of the default course, even before it exists, because its instructors may become operators.
@@ -367,10 +373,10 @@ def _new_course(session: Session, title: str) -> int:
     while name == DEFAULT_COURSE or session.scalar(select(Course.id).where(Course.name == name)) is not None:
         number += 1
         name = f"{title} ({number})"
-    return course_of(session, name, now(session))
+    return ensure_course(session, name, now(session))
 
 
-def _platform(row: LtiPlatform) -> Platform:
+def _build_platform(row: LtiPlatform) -> Platform:
     return Platform(
         row.name,
         row.issuer,
@@ -384,5 +390,5 @@ def _platform(row: LtiPlatform) -> Platform:
     )
 
 
-def _sha256(text: str) -> str:
+def _hash_text(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()

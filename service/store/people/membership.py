@@ -13,12 +13,12 @@ from sqlalchemy.orm import Session, aliased
 from service.store.engine import now
 from service.store.models import Course, Enrolment, Person
 from service.store.people import credentials
-from service.store.people.students import Students, course_of
+from service.store.people.students import Students, ensure_course
 from service.store.states import Role
 from service.store.web_tables import Credential, LtiPerson
 from sim.errors import UsageError
-from submissions.names import shown_name
 from submissions.student_identity import Student
+from submissions.student_names import normalise_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,21 +52,21 @@ def make_instructor(session: Session, course: str, who: Student) -> Member:
     Raises UsageError if a student of the course has this id, because anyone who can sign in as that student would
     become an instructor.
     """
-    course_id, own = course_of(session, course, now(session)), shown_name(who.id)
+    course_id, own = ensure_course(session, course, now(session)), normalise_name(who.id)
     taken = select(Enrolment.role).where(Enrolment.course_id == course_id, Enrolment.student == own)
     if session.scalar(taken) is Role.STUDENT:
         raise UsageError(f"{own!r} is a student of this course, expected another id for an instructor")
-    return _make(session, course, who, Role.INSTRUCTOR)
+    return _enrol_member(session, course, who, Role.INSTRUCTOR)
 
 
 def set_role(session: Session, row: Enrolment, role: Role) -> None:
     """Set the role of a member. Losing the instructor role revokes the credentials that reach the course."""
     if row.role is Role.INSTRUCTOR and role is not Role.INSTRUCTOR:
-        credentials.revoke_reaching(session, row.person_id, row.course_id)
+        credentials.revoke_for_course(session, row.person_id, row.course_id)
     row.role = role
 
 
-def elsewhere(session: Session, enrolment_id: int) -> list[tuple[str, Member]]:
+def find_same_id_instructors(session: Session, enrolment_id: int) -> list[tuple[str, Member]]:
     """Return instructors with the same id in other courses who are different persons, with the course names."""
     own = session.get_one(Enrolment, enrolment_id)
     query = (
@@ -77,10 +77,10 @@ def elsewhere(session: Session, enrolment_id: int) -> list[tuple[str, Member]]:
         .where(Enrolment.person_id != own.person_id)
         .order_by(Course.name)
     )
-    return [(course, _line(enrolment, person)) for course, enrolment, person in session.execute(query)]
+    return [(course, _build_member(enrolment, person)) for course, enrolment, person in session.execute(query)]
 
 
-def enrolments(session: Session, person_id: int) -> list[tuple[str, Member]]:
+def load_enrolments(session: Session, person_id: int) -> list[tuple[str, Member]]:
     """Return the enrolments of a person, with the course names."""
     query = (
         select(Course.name, Enrolment, Person)
@@ -89,7 +89,7 @@ def enrolments(session: Session, person_id: int) -> list[tuple[str, Member]]:
         .where(Enrolment.person_id == person_id)
         .order_by(Course.name)
     )
-    return [(course, _line(enrolment, person)) for course, enrolment, person in session.execute(query)]
+    return [(course, _build_member(enrolment, person)) for course, enrolment, person in session.execute(query)]
 
 
 def is_from_platform(session: Session, person_id: int) -> bool:
@@ -97,7 +97,7 @@ def is_from_platform(session: Session, person_id: int) -> bool:
     return session.scalar(select(LtiPerson.id).where(LtiPerson.person_id == person_id).limit(1)) is not None
 
 
-def join(session: Session, person_id: int, other_id: int) -> None:
+def merge_persons(session: Session, person_id: int, other_id: int) -> None:
     """Merge two persons into one with all enrolments. Revokes all credentials of both, because their reach would grow.
 
     The caller must have locked both.
@@ -115,7 +115,7 @@ def join(session: Session, person_id: int, other_id: int) -> None:
 
 def make_student(session: Session, course: str, who: Student) -> Member:
     """Enrol a person as a student, replacing any earlier role in the course."""
-    return _make(session, course, who, Role.STUDENT)
+    return _enrol_member(session, course, who, Role.STUDENT)
 
 
 def make_operator(session: Session, person_id: int) -> None:
@@ -123,20 +123,20 @@ def make_operator(session: Session, person_id: int) -> None:
     session.get_one(Person, person_id).operator = True
 
 
-def member(session: Session, course: str, written: str) -> Member:
+def load_member(session: Session, course: str, written: str) -> Member:
     """Return a member of the course by id. Raises UsageError for an unknown course or person."""
-    return _member(session, Students(session, find_course(session, course)).find(written))
+    return _load_member_by_id(session, Students(session, find_course(session, course)).load_enrolment(written))
 
 
-def known(session: Session, course_id: int, who: Student) -> Member | None:
+def find_member(session: Session, course_id: int, who: Student) -> Member | None:
     """Return the member of the course with this id; None if there is none."""
-    enrolment_id = Students(session, course_id).known(who)
-    return None if enrolment_id is None else _member(session, enrolment_id)
+    enrolment_id = Students(session, course_id).find_enrolment(who)
+    return None if enrolment_id is None else _load_member_by_id(session, enrolment_id)
 
 
-def member_of(session: Session, row: Enrolment) -> Member:
+def load_enrolled_member(session: Session, row: Enrolment) -> Member:
     """Return the member of an enrolment."""
-    return _line(row, session.get_one(Person, row.person_id))
+    return _build_member(row, session.get_one(Person, row.person_id))
 
 
 def find_course(session: Session, name: str) -> int:
@@ -147,7 +147,7 @@ def find_course(session: Session, name: str) -> int:
     return course_id
 
 
-def members(session: Session, course_id: int) -> list[Member]:
+def list_members(session: Session, course_id: int) -> list[Member]:
     """Return all members of the course, ordered by id."""
     query = (
         select(Enrolment, Person)
@@ -155,10 +155,10 @@ def members(session: Session, course_id: int) -> list[Member]:
         .where(Enrolment.course_id == course_id)
         .order_by(Enrolment.student)
     )
-    return [_line(enrolment, person) for enrolment, person in session.execute(query)]
+    return [_build_member(enrolment, person) for enrolment, person in session.execute(query)]
 
 
-def members_after(session: Session, course_id: int, enrolment_id: int, limit: int) -> list[Member]:
+def list_members_after(session: Session, course_id: int, enrolment_id: int, limit: int) -> list[Member]:
     """Return at most ``limit`` members of the course who were enrolled after this enrolment."""
     query = (
         select(Enrolment, Person)
@@ -167,24 +167,24 @@ def members_after(session: Session, course_id: int, enrolment_id: int, limit: in
         .order_by(Enrolment.id)
         .limit(limit)
     )
-    return [_line(enrolment, person) for enrolment, person in session.execute(query)]
+    return [_build_member(enrolment, person) for enrolment, person in session.execute(query)]
 
 
-def students(session: Session, course_id: int) -> list[tuple[Member, bool]]:
-    """Return the students of the course, ordered by id, each with the result of ``is_more_than``."""
+def list_students(session: Session, course_id: int) -> list[tuple[Member, bool]]:
+    """Return the students of the course, ordered by id, each with the result of ``has_other_access``."""
     query = (
-        select(Enrolment, Person, _more_than())
+        select(Enrolment, Person, _match_other_access())
         .join(Person, Enrolment.person_id == Person.id)
         .where(Enrolment.course_id == course_id, Enrolment.role == Role.STUDENT)
         .order_by(Enrolment.student)
     )
-    return [(_line(enrolment, person), more) for enrolment, person, more in session.execute(query)]
+    return [(_build_member(enrolment, person), more) for enrolment, person, more in session.execute(query)]
 
 
-def is_more_than(session: Session, row: Enrolment) -> bool:
+def has_other_access(session: Session, row: Enrolment) -> bool:
     """Return whether the person of an enrolment is in other courses or is an operator."""
     query = (
-        select(_more_than())
+        select(_match_other_access())
         .select_from(Enrolment)
         .join(Person, Enrolment.person_id == Person.id)
         .where(Enrolment.id == row.id)
@@ -192,7 +192,7 @@ def is_more_than(session: Session, row: Enrolment) -> bool:
     return bool(session.scalar(query))
 
 
-def courses(session: Session) -> list[CourseLine]:
+def list_courses(session: Session) -> list[CourseLine]:
     """Return all courses, ordered by name."""
     instructors, students = (func.count().filter(Enrolment.role == role) for role in (Role.INSTRUCTOR, Role.STUDENT))
     query = select(Course.id, Course.name, instructors, students)
@@ -200,26 +200,26 @@ def courses(session: Session) -> list[CourseLine]:
     return [CourseLine(*row) for row in session.execute(query.order_by(Course.name))]
 
 
-def _more_than() -> ColumnElement[bool]:
+def _match_other_access() -> ColumnElement[bool]:
     other = aliased(Enrolment)
     return or_(Person.operator, exists().where(other.person_id == Enrolment.person_id, other.id != Enrolment.id))
 
 
-def _make(session: Session, course: str, who: Student, role: Role) -> Member:
+def _enrol_member(session: Session, course: str, who: Student, role: Role) -> Member:
     at = now(session)
-    enrolment_id = Students(session, course_of(session, course, at)).enrol(who, at)
+    enrolment_id = Students(session, ensure_course(session, course, at)).enrol(who, at)
     row = session.get_one(Enrolment, enrolment_id)
     set_role(session, row, role)
     row.name, row.email = who.name or row.name, who.email or row.email
     session.flush()
-    return _member(session, enrolment_id)
+    return _load_member_by_id(session, enrolment_id)
 
 
-def _member(session: Session, enrolment_id: int) -> Member:
-    return member_of(session, session.get_one(Enrolment, enrolment_id))
+def _load_member_by_id(session: Session, enrolment_id: int) -> Member:
+    return load_enrolled_member(session, session.get_one(Enrolment, enrolment_id))
 
 
-def _line(enrolment: Enrolment, person: Person) -> Member:
+def _build_member(enrolment: Enrolment, person: Person) -> Member:
     return Member(
         person.id,
         enrolment.id,

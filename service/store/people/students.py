@@ -1,6 +1,6 @@
 """Students of a course: lookup by id, enrolment of new students, rejection of ambiguous ids.
 
-``submissions.names`` defines the normal form of names; ``intake.py`` stores submissions.
+``submissions.student_names`` defines the normal form of names; ``intake.py`` stores submissions.
 """
 
 from __future__ import annotations
@@ -11,20 +11,20 @@ from datetime import datetime
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from service.store.inserting import insert_if_new
+from service.store.conditional_insert import insert_if_new
 from service.store.models import Course, Enrolment, Person
 from service.store.states import Role
 from sim.errors import UsageError
-from submissions.names import cannot_be_told, forms, shown_name
-from submissions.nearest import did_you_mean
-from submissions.raw_files import shown
+from submissions.raw_files import sanitise_name
 from submissions.student_identity import Student
+from submissions.student_names import compute_name_forms, describe_look_alikes, normalise_name
+from submissions.suggestions import suggest_name
 
 #: The course of an installation with a single course.
 DEFAULT_COURSE = "default"
 
 
-def course_of(session: Session, name: str, at: datetime) -> int:
+def ensure_course(session: Session, name: str, at: datetime) -> int:
     """Return the id of a course, creating it if necessary, and lock it: numbering attempts needs a single writer."""
     insert_if_new(session, Course, name=name, created_at=at)
     return session.scalars(select(Course.id).where(Course.name == name).with_for_update(key_share=True)).one()
@@ -44,28 +44,28 @@ class Students:
         An id that is not in normal form matches only the spelling that was enrolled first. Name and e-mail address are
         updated. Raises UsageError for an empty id, or one that is ambiguous.
         """
-        own, written = shown_name(student.id), unicodedata.normalize("NFC", student.id)
+        own, written = normalise_name(student.id), unicodedata.normalize("NFC", student.id)
         if not own:
             raise UsageError("the name of the student is empty, expected visible characters.")
-        found = self._enrolled(own)
+        found = self._find_row(own)
         if found is None:
-            others = self._near(own)
+            others = self._find_confusable(own)
             # Enrolments from before normal forms may have surrounding blanks.
-            same = [enrolment_id for other, enrolment_id in others.items() if shown_name(other) == own]
+            same = [enrolment_id for other, enrolment_id in others.items() if normalise_name(other) == own]
             if len(same) == 1:
-                self._tell(same[0], student)
+                self._update_contact(same[0], student)
                 return same[0]
             if not others:
-                return self._new(own, written, student, at)
+                return self._create_enrolment(own, written, student, at)
         else:
             others = {own: found.id}
             if written == own:
                 found.written = own
             if written == found.written:
-                self._tell(found.id, student)
+                self._update_contact(found.id, student)
                 return found.id
         raise UsageError(
-            f'"{shown(written)}" {cannot_be_told(list(others)[:3])}, who is in this course; '
+            f'"{sanitise_name(written)}" {describe_look_alikes(list(others)[:3])}, who is in this course; '
             "expected that name as it is written there, or another."
         )
 
@@ -74,36 +74,36 @@ class Students:
         row = self._session.get(Enrolment, enrolment_id)
         if row is None or row.course_id != self._course_id:
             return False
-        return shown_name(row.written) == shown_name(student.id)
+        return normalise_name(row.written) == normalise_name(student.id)
 
-    def known(self, student: Student) -> int | None:
+    def find_enrolment(self, student: Student) -> int | None:
         """Return the enrolment of the student with this normal form; None if there is none, or it is ambiguous."""
-        found = self._enrolled(shown_name(student.id))
+        found = self._find_row(normalise_name(student.id))
         return None if found is None else found.id
 
-    def find(self, written: str) -> int:
+    def load_enrolment(self, written: str) -> int:
         """Return the enrolment of the student with this id.
 
         Raises UsageError, with a similar id if there is one, for a student who is not in the course.
         """
-        found = self._enrolled(shown_name(written))
+        found = self._find_row(normalise_name(written))
         if found is not None:
             return found.id
         known = self._session.scalars(select(Enrolment.student).where(Enrolment.course_id == self._course_id))
-        hint = did_you_mean(written, known) or "; to enrol a student without submissions, use robomark course enrol"
-        raise UsageError(f"there is no student {shown(written)!r} in this course{hint}")
+        hint = suggest_name(written, known) or "; to enrol a student without submissions, use robomark course enrol"
+        raise UsageError(f"there is no student {sanitise_name(written)!r} in this course{hint}")
 
-    def _enrolled(self, own: str) -> Enrolment | None:
+    def _find_row(self, own: str) -> Enrolment | None:
         query = select(Enrolment).where(Enrolment.course_id == self._course_id, Enrolment.student == own)
         return self._session.scalars(query).one_or_none()
 
-    def _tell(self, enrolment_id: int, student: Student) -> None:
+    def _update_contact(self, enrolment_id: int, student: Student) -> None:
         row = self._session.get_one(Enrolment, enrolment_id)
         # A table uploaded by one instructor does not rename another instructor.
         if row.role is Role.STUDENT:
             row.name, row.email = student.name or row.name, student.email or row.email
 
-    def _new(self, own: str, written: str, student: Student, at: datetime) -> int:
+    def _create_enrolment(self, own: str, written: str, student: Student, at: datetime) -> int:
         person = Person(created_at=at)
         self._session.add(person)
         self._session.flush()
@@ -118,19 +118,23 @@ class Students:
         )
         self._session.add(row)
         self._session.flush()
-        self._note(own, row.id)
+        self._index_name(own, row.id)
         return row.id
 
-    def _near(self, name: str) -> dict[str, int]:
+    def _find_confusable(self, name: str) -> dict[str, int]:
         """Return the students that could be confused with this name, as a mapping of names to enrolments."""
         if self._by_form is None:
             self._by_form = {}
             query = select(Enrolment.student, Enrolment.id).where(Enrolment.course_id == self._course_id)
             for student, enrolment_id in self._session.execute(query):
-                self._note(student, enrolment_id)
-        return {other: which for form in sorted(forms(name)) for other, which in self._by_form.get(form, {}).items()}
+                self._index_name(student, enrolment_id)
+        return {
+            other: which
+            for form in sorted(compute_name_forms(name))
+            for other, which in self._by_form.get(form, {}).items()
+        }
 
-    def _note(self, name: str, enrolment_id: int) -> None:
+    def _index_name(self, name: str, enrolment_id: int) -> None:
         if self._by_form is not None:
-            for form in forms(name):
+            for form in compute_name_forms(name):
                 self._by_form.setdefault(form, {})[name] = enrolment_id

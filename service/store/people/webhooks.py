@@ -20,7 +20,7 @@ from service.store.web_tables import Delivery, Webhook
 from sim.errors import UsageError
 
 LONGEST_URL = 1000
-MOST = 20
+MOST_WEBHOOKS = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class DeliveryLine:
     error: str | None
 
 
-def create(session: Session, course_id: int, url: str, events: Collection[str]) -> tuple[WebhookLine, str]:
+def create_webhook(session: Session, course_id: int, url: str, events: Collection[str]) -> tuple[WebhookLine, str]:
     """Create a webhook and the secret that signs its deliveries, which is returned only once.
 
     Raises UsageError for an invalid address or event, or if the course has too many webhooks.
@@ -57,23 +57,23 @@ def create(session: Session, course_id: int, url: str, events: Collection[str]) 
     if not events or not set(events) <= set(known):
         raise UsageError(f"events: expected some of {', '.join(known)}")
     of_course = (Webhook.course_id == course_id, Webhook.revoked_at.is_(None))
-    if (session.scalar(select(func.count()).select_from(Webhook).where(*of_course)) or 0) >= MOST:
-        raise UsageError(f"this course has {MOST} webhooks; revoke one first")
+    if (session.scalar(select(func.count()).select_from(Webhook).where(*of_course)) or 0) >= MOST_WEBHOOKS:
+        raise UsageError(f"this course has {MOST_WEBHOOKS} webhooks; revoke one first")
     secret = secrets.token_hex(32)
     chosen = [event for event in known if event in events]
     row = Webhook(course_id=course_id, url=url, secret=secret, events=chosen, created_at=now(session))
     session.add(row)
     session.flush()
-    return _line(row), secret
+    return _build_line(row), secret
 
 
-def of_course(session: Session, course_id: int) -> list[WebhookLine]:
+def list_webhooks(session: Session, course_id: int) -> list[WebhookLine]:
     """Return the active webhooks of a course, oldest first."""
     mine = (Webhook.course_id == course_id, Webhook.revoked_at.is_(None))
-    return [_line(row) for row in session.scalars(select(Webhook).where(*mine).order_by(Webhook.created_at))]
+    return [_build_line(row) for row in session.scalars(select(Webhook).where(*mine).order_by(Webhook.created_at))]
 
 
-def revoke(session: Session, course_id: int, webhook_id: str) -> bool:
+def revoke_webhook(session: Session, course_id: int, webhook_id: str) -> bool:
     """Revoke a webhook and its pending deliveries. Returns False if the course does not have it."""
     row = session.get(Webhook, webhook_id)
     if row is None or row.course_id != course_id or row.revoked_at is not None:
@@ -84,7 +84,9 @@ def revoke(session: Session, course_id: int, webhook_id: str) -> bool:
     return True
 
 
-def deliveries(session: Session, course_id: int, limit: int, after: tuple[datetime, str] | None) -> list[DeliveryLine]:
+def list_deliveries(
+    session: Session, course_id: int, limit: int, after: tuple[datetime, str] | None
+) -> list[DeliveryLine]:
     """Return deliveries of a course, newest first, after the one with this time and id."""
     query = select(Delivery).join(Webhook, Delivery.webhook_id == Webhook.id).where(Webhook.course_id == course_id)
     if after is not None:
@@ -117,5 +119,5 @@ def _check_url(url: str) -> None:
         raise UsageError("url: expected neither a user nor a fragment in it")
 
 
-def _line(row: Webhook) -> WebhookLine:
+def _build_line(row: Webhook) -> WebhookLine:
     return WebhookLine(row.id, row.url, tuple(row.events), row.created_at)

@@ -9,10 +9,10 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.store.models import Batch, Course, Enrolment, Job
-from service.store.states import JobState, Lane
+from service.store.states import JobQueue, JobState
 
 #: Maximum number listed, newest first.
-MOST = 100
+MOST_LISTED = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,14 +23,14 @@ class DeadLetter:
     course: str
     batch_id: str | None
     batch: str  # its name
-    lane: Lane
+    lane: JobQueue
     error: str
     attempts: int
     worker: str
     finished_at: datetime | None
 
 
-def dead_letters(session: Session) -> list[DeadLetter]:
+def list_dead_letters(session: Session) -> list[DeadLetter]:
     """Return the failed jobs, newest first."""
     query = (
         select(Job, Course.name, Batch.name)
@@ -39,7 +39,7 @@ def dead_letters(session: Session) -> list[DeadLetter]:
         .outerjoin(Batch, Job.batch_id == Batch.id)
         .where(Job.state == JobState.DEAD)
         .order_by(Job.finished_at.desc(), Job.id)
-        .limit(MOST)
+        .limit(MOST_LISTED)
     )
     return [
         DeadLetter(

@@ -20,14 +20,14 @@ from service.store import outbox, phases
 from service.store.codec import encode
 from service.store.engine import Store, now, retry_conflicts
 from service.store.grades import overrides, plots, result_cache
-from service.store.installation import secret_of
-from service.store.locks import locked_jobs
+from service.store.installation import load_secret
+from service.store.locks import match_and_lock_jobs
 from service.store.models import Job
 from service.store.queue import workers
-from service.store.queue.scheduling import next_job
+from service.store.queue.scheduling import find_next_job
 from service.store.revision import needs_newer_code
 from service.store.states import CancelReason, JobState, PlotState
-from service.version import grader_sha256
+from service.version import hash_grader
 from sim.errors import Cancelled, HostError
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ TRANSITIONS = (
 )  # fmt: skip
 
 
-class Fenced(Cancelled):
+class LeaseLost(Cancelled):
     """The worker no longer owns the job: it was cancelled or claimed by another worker."""
 
 
@@ -83,7 +83,7 @@ class Claim:
 
 
 @dataclass(frozen=True, slots=True)
-class Retry:
+class RetryPolicy:
     """Retry policy after host faults. The delay starts at ``backoff_seconds`` and doubles."""
 
     backoff_seconds: float
@@ -102,43 +102,45 @@ def enqueue(session: Session, job: Job, at: datetime) -> str:
     return job.id
 
 
-def copy(session: Session, job_id: str, source_id: str, at: datetime) -> None:
+def copy_grade(session: Session, job_id: str, source_id: str, at: datetime) -> None:
     """Give a queued job the grade of an identical one. Raises HostError if it is not queued."""
-    values = result_cache.copied(session, source_id, job_id, at)
-    if not _make(session, COPY, (Job.id == job_id,), at, values):
+    values = result_cache.build_copied_values(session, source_id, job_id, at)
+    if not _apply_transition(session, COPY, (Job.id == job_id,), at, values):
         raise HostError(f"The job {job_id} cannot be given a grade: it does not wait")
     result_cache.copy_rows(session, source_id, job_id)
-    overrides.recount(session, job_id)
-    outbox.grade_copied(session, job_id)
+    overrides.recount_marks(session, job_id)
+    outbox.emit_grade_copied(session, job_id)
 
 
-def supersede(session: Session, submissions: Select[int], by: str, at: datetime) -> None:
+def supersede_jobs(session: Session, submissions: Select[int], by: str, at: datetime) -> None:
     """Cancel queued jobs of these submissions in favour of the job ``by``; regrades are not cancelled."""
     which = (Job.regrade_of.is_(None), Job.submission_id.in_(submissions))
     reason = {"error": f"superseded by {by}", "cancelled_for": CancelReason.SUPERSEDED, "superseded_by": by}
-    if _make(session, SUPERSEDE, which, at, reason):
-        outbox.superseded(session, submissions, at)
+    if _apply_transition(session, SUPERSEDE, which, at, reason):
+        outbox.emit_superseded_batches(session, submissions, at)
 
 
-def put_aside(session: Session, job_id: str, at: datetime) -> None:
+def put_aside_job(session: Session, job_id: str, at: datetime) -> None:
     """Cancel a queued job that is over a limit; it is graded only if staff ask for it."""
     sentence = "over a limit: it is graded when staff ask for it"
-    _make(session, PUT_ASIDE, (Job.id == job_id,), at, {"error": sentence, "cancelled_for": CancelReason.OVER_LIMIT})
+    _apply_transition(
+        session, PUT_ASIDE, (Job.id == job_id,), at, {"error": sentence, "cancelled_for": CancelReason.OVER_LIMIT}
+    )
 
 
-def ask_for(session: Session, job_id: str, at: datetime) -> bool:
+def queue_over_limit_job(session: Session, job_id: str, at: datetime) -> bool:
     """Queue a job that was over a limit. Return whether it was."""
     which = (Job.id == job_id, Job.cancelled_for == CancelReason.OVER_LIMIT)
-    return _make(session, ASK_FOR, which, at, {"error": None, "cancelled_for": None}) > 0
+    return _apply_transition(session, ASK_FOR, which, at, {"error": None, "cancelled_for": None}) > 0
 
 
 @retry_conflicts
-def claim(store: Store, worker: str, lease_seconds: float) -> Claim | None:
+def claim_job(store: Store, worker: str, lease_seconds: float) -> Claim | None:
     """Claim the next job; None if no job is due or the worker may not claim."""
     with store.transaction() as session:
         at = now(session)
         may_claim = not needs_newer_code(session) and not workers.is_in_quarantine(session, worker)
-        job_id = next_job(session, at, worker) if may_claim else None
+        job_id = find_next_job(session, at, worker) if may_claim else None
         if job_id is None:
             return None
         begun, most = session.execute(select(Job.attempt, Job.max_attempts).where(Job.id == job_id)).one()
@@ -153,11 +155,11 @@ def claim(store: Store, worker: str, lease_seconds: float) -> Claim | None:
             "process": os.getpid(),
             "progress": 0.0,
         }
-        return claimed if _make(session, CLAIM, (Job.id == job_id,), at, values) else None
+        return claimed if _apply_transition(session, CLAIM, (Job.id == job_id,), at, values) else None
 
 
 @retry_conflicts
-def heartbeat(store: Store, claim: Claim, lease_seconds: float, progress: float) -> None:
+def renew_lease(store: Store, claim: Claim, lease_seconds: float, progress: float) -> None:
     """Renew the lease and store the progress (0 to 1). Raises Fenced if the worker no longer owns the job."""
     with store.transaction() as session:
         at = now(session)
@@ -166,11 +168,11 @@ def heartbeat(store: Store, claim: Claim, lease_seconds: float, progress: float)
             "heartbeat_at": at,
             "progress": min(1.0, max(0.0, progress)),
         }
-        _make_held(session, HEARTBEAT, claim, at, values)
+        _apply_owned_transition(session, HEARTBEAT, claim, at, values)
 
 
 @retry_conflicts
-def finish(
+def finish_job(
     store: Store,
     claim: Claim,
     prepared: results.PreparedGrade,
@@ -197,13 +199,13 @@ def finish(
             phases.COMMITTED: at,
         }
         values = {
-            "phases": phases.written(moments),
+            "phases": phases.encode_times(moments),
             "graded_at": graded_at,
             "verdict": grade.verdict.value,
             "grader_version": grade.grader_version,
-            "grader_sha256": grader_sha256(),
+            "grader_sha256": hash_grader(),
             "secret_sha256": grade.secret_sha256,
-            "cache_key": result_cache.cache_key(session, claim.job_id, grader_sha256(), grade.secret_sha256),
+            "cache_key": result_cache.compute_cache_key(session, claim.job_id, hash_grader(), grade.secret_sha256),
             "sandbox": grade.sandbox,
             "missing": grade.missing,
             "notes": list(grade.notes),
@@ -212,88 +214,90 @@ def finish(
             "plots": PlotState.DUE,
             "plots_due_at": at,
         }
-        _refuse_quarantined(session, claim)
-        _make_held(session, FINISH, claim, at, values)
-        results.insert(session, claim.job_id, prepared, at)
-        overrides.recount(session, claim.job_id)
-        outbox.grade_finished(session, claim.job_id)
+        _check_not_quarantined(session, claim)
+        _apply_owned_transition(session, FINISH, claim, at, values)
+        results.insert_grade(session, claim.job_id, prepared, at)
+        overrides.recount_marks(session, claim.job_id)
+        outbox.emit_grade_finished(session, claim.job_id)
 
 
 @retry_conflicts
-def finish_from_cache(store: Store, claim: Claim) -> bool:
+def finish_job_from_cache(store: Store, claim: Claim) -> bool:
     """Finish the job with the grade of an identical one if there is one and a new run was not requested.
 
     Raises Fenced if the worker no longer owns the job.
     """
-    secret = secret_of(store)
+    secret = load_secret(store)
     with store.transaction() as session:
         if session.scalar(select(Job.forced).where(Job.id == claim.job_id)):
             return False
-        source = result_cache.find(
-            session, result_cache.cache_key(session, claim.job_id, grader_sha256(), secret.sha256)
+        source = result_cache.find_cached_grade(
+            session, result_cache.compute_cache_key(session, claim.job_id, hash_grader(), secret.sha256)
         )
         if source is None:
             return False
         at = now(session)
-        _make_held(session, FINISH, claim, at, result_cache.copied(session, source, claim.job_id, at))
+        _apply_owned_transition(
+            session, FINISH, claim, at, result_cache.build_copied_values(session, source, claim.job_id, at)
+        )
         result_cache.copy_rows(session, source, claim.job_id)
-        overrides.recount(session, claim.job_id)
-        outbox.grade_finished(session, claim.job_id)
+        overrides.recount_marks(session, claim.job_id)
+        outbox.emit_grade_finished(session, claim.job_id)
         return True
 
 
 @retry_conflicts
-def fail(store: Store, claim: Claim, reason: str, retry: Retry) -> JobState:
+def fail_job(store: Store, claim: Claim, reason: str, retry: RetryPolicy) -> JobState:
     """Handle a host fault: the job is queued for another attempt, or dead after the last one.
 
     Raises Fenced if the worker no longer owns the job.
     """
     with store.transaction() as session:
-        return fault(session, claim, reason, retry, now(session))
+        return apply_host_fault(session, claim, reason, retry, now(session))
 
 
-def fault(session: Session, claim: Claim, reason: str, retry: Retry, at: datetime) -> JobState:
+def apply_host_fault(session: Session, claim: Claim, reason: str, retry: RetryPolicy, at: datetime) -> JobState:
     """Handle a host fault within an open transaction, on behalf of a worker that is lost."""
     if claim.attempt >= claim.max_attempts:
         times = "once" if claim.attempt == 1 else f"{claim.attempt} times"
-        _make_held(session, GIVE_UP, claim, at, {"error": f"Tried {times}, the last time: {reason}"})
-        outbox.job_ended(session, claim.job_id)
+        _apply_owned_transition(session, GIVE_UP, claim, at, {"error": f"Tried {times}, the last time: {reason}"})
+        outbox.emit_job_ended(session, claim.job_id)
         return GIVE_UP.after
-    _make_held(session, TRY_AGAIN, claim, at, {"error": reason, "due_at": at + retry.wait(claim.attempt)})
+    _apply_owned_transition(session, TRY_AGAIN, claim, at, {"error": reason, "due_at": at + retry.wait(claim.attempt)})
     return TRY_AGAIN.after
 
 
 @retry_conflicts
-def give_up(store: Store, claim: Claim, reason: str) -> None:
+def give_up_job(store: Store, claim: Claim, reason: str) -> None:
     """Mark a job as dead without further attempts. Raises Fenced if the worker no longer owns it."""
     with store.transaction() as session:
-        _make_held(session, GIVE_UP, claim, now(session), {"error": reason})
-        outbox.job_ended(session, claim.job_id)
+        _apply_owned_transition(session, GIVE_UP, claim, now(session), {"error": reason})
+        outbox.emit_job_ended(session, claim.job_id)
 
 
 @retry_conflicts
 def release_worker(store: Store, worker: str) -> int:
     """Requeue all jobs of a worker that has ended. Return their number."""
     with store.transaction() as session:
-        return give_back(session, worker, now(session))
+        return requeue_worker_jobs(session, worker, now(session))
 
 
-def give_back(session: Session, worker: str, at: datetime) -> int:
+def requeue_worker_jobs(session: Session, worker: str, at: datetime) -> int:
     """Requeue all jobs of a worker without counting the attempt. Return their number."""
-    return _make(session, GIVE_BACK, (Job.worker == worker,), at, {"attempt": Job.attempt - 1})
+    return _apply_transition(session, GIVE_BACK, (Job.worker == worker,), at, {"attempt": Job.attempt - 1})
 
 
-def cancel(session: Session, batch_id: str, reason: str, at: datetime) -> int:
+def cancel_jobs(session: Session, batch_id: str, reason: str, at: datetime) -> int:
     """Cancel all unfinished jobs of a batch; a running job stops at its next heartbeat."""
-    ended = _make(session, CANCEL, (Job.batch_id == batch_id,), at, {"error": reason})
+    ended = _apply_transition(session, CANCEL, (Job.batch_id == batch_id,), at, {"error": reason})
     if ended:
-        outbox.batch_ended(session, batch_id)
+        outbox.emit_batch_finished(session, batch_id)
     return ended
 
 
-def retry(session: Session, which: tuple[ColumnElement[bool], ...], at: datetime) -> int:
+def retry_jobs(session: Session, which: tuple[ColumnElement[bool], ...], at: datetime) -> int:
     """Requeue the dead ones among these jobs, with all their attempts. Return their number."""
-    return _make(session, RETRY, which, at, {"attempt": 0, "error": None})
+    return _apply_transition(session, RETRY, which, at, {"attempt": 0, "error": None})
 
 
 def correct_clock(session: Session, at: datetime, longest_wait: Callable[[int], timedelta]) -> None:
@@ -320,11 +324,11 @@ def correct_clock(session: Session, at: datetime, longest_wait: Callable[[int], 
             held_back = (Job.id == job_id, Job.state == JobState.QUEUED)
             session.execute(update(Job).where(*held_back).values(due_at=latest, notified_at=None))
     notified = (Job.state == JobState.QUEUED, Job.notified_at > ahead)
-    session.execute(update(Job).where(locked_jobs(*notified), *notified).values(notified_at=None))
-    plots.correct_clock(session, at, ahead)
+    session.execute(update(Job).where(match_and_lock_jobs(*notified), *notified).values(notified_at=None))
+    plots.correct_due_times(session, at, ahead)
 
 
-def _arriving(state: JobState, at: datetime) -> dict[str, Any]:
+def _build_state_columns(state: JobState, at: datetime) -> dict[str, Any]:
     """Return the columns that every transition into a state sets."""
     match state:
         case JobState.QUEUED:
@@ -338,7 +342,7 @@ def _arriving(state: JobState, at: datetime) -> dict[str, Any]:
             return {"lease": None, "lease_until": None, "finished_at": at}
 
 
-def _make(
+def _apply_transition(
     session: Session,
     transition: Transition,
     which: tuple[ColumnElement[bool], ...],
@@ -346,24 +350,26 @@ def _make(
     values: dict[str, Any],
 ) -> int:
     """Apply the transition to those of these jobs that are in a valid state before it. Return their number."""
-    columns = {"state": transition.after} | _arriving(transition.after, at) | values
+    columns = {"state": transition.after} | _build_state_columns(transition.after, at) | values
     which = (*which, Job.state.in_(transition.before))
-    statement = update(Job).where(locked_jobs(*which), *which).values(**columns)
+    statement = update(Job).where(match_and_lock_jobs(*which), *which).values(**columns)
     options = {"synchronize_session": False}
     return cast("CursorResult[Any]", session.execute(statement, execution_options=options)).rowcount
 
 
-def _make_held(session: Session, transition: Transition, claim: Claim, at: datetime, values: dict[str, Any]) -> None:
+def _apply_owned_transition(
+    session: Session, transition: Transition, claim: Claim, at: datetime, values: dict[str, Any]
+) -> None:
     """Apply the transition to an owned job. Raises Fenced if the worker no longer owns it."""
-    if not _make(session, transition, (Job.id == claim.job_id, Job.lease == claim.lease), at, values):
+    if not _apply_transition(session, transition, (Job.id == claim.job_id, Job.lease == claim.lease), at, values):
         state = session.scalar(select(Job.state).where(Job.id == claim.job_id))
         if state is None:
             raise HostError(f"The job {claim.job_id} is gone from the database")
-        raise Fenced(f"The job {claim.job_id} is no longer this worker's: it is {state.value}")
+        raise LeaseLost(f"The job {claim.job_id} is no longer this worker's: it is {state.value}")
 
 
-def _refuse_quarantined(session: Session, claim: Claim) -> None:
+def _check_not_quarantined(session: Session, claim: Claim) -> None:
     held = (Job.id == claim.job_id, Job.lease == claim.lease, Job.state == JobState.RUNNING)
     worker = session.scalar(select(Job.worker).where(*held))
     if worker is not None and workers.is_in_quarantine(session, worker, lock=True):
-        raise Fenced(f"The job {claim.job_id} is no longer this worker's: the worker is in quarantine")
+        raise LeaseLost(f"The job {claim.job_id} is no longer this worker's: the worker is in quarantine")

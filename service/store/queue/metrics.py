@@ -18,24 +18,24 @@ from service.store import phases
 from service.store.engine import now
 from service.store.models import Batch, CriterionResultRow, Enrolment, Job, TrialRow, Worker
 from service.store.queue import workers
-from service.store.queue.scheduling import claimable
-from service.store.states import UNFINISHED, BatchState, JobState, Lane, PlotState
+from service.store.queue.scheduling import match_claimable_jobs
+from service.store.states import UNFINISHED, BatchState, JobQueue, JobState, PlotState
 
 #: Durations cover the newest jobs that ended within this time.
-TIMES_OVER = timedelta(hours=1)
-TIMES_MOST = 2000
-PACE_OVER = timedelta(minutes=5)
+TIMES_WINDOW = timedelta(hours=1)
+MOST_TIMES = 2000
+PACE_WINDOW = timedelta(minutes=5)
 #: Older starts are ignored when deciding whether the queue is stuck.
-_LATELY = timedelta(hours=1)
+_RECENT_PERIOD = timedelta(hours=1)
 
 
 @dataclass(frozen=True, slots=True)
 class QueueMetrics:
     """Queued jobs and the activity of the workers."""
 
-    jobs: Mapping[tuple[Lane, JobState], int]
-    claimable: Mapping[Lane, int]
-    oldest_seconds: Mapping[Lane, float]  # waiting time of the oldest claimable job
+    jobs: Mapping[tuple[JobQueue, JobState], int]
+    claimable: Mapping[JobQueue, int]
+    oldest_seconds: Mapping[JobQueue, float]  # waiting time of the oldest claimable job
     idle_seconds: float  # since a job last started or ended; infinite if none did in the last hour
     workers: Sequence[workers.WorkerLine]
     silent_seconds: Mapping[str, float]  # by worker, since last seen
@@ -60,7 +60,7 @@ class ServiceMetrics:
     times: Mapping[str, Sequence[float]]  # seconds by span, sorted
 
 
-def collect(session: Session) -> ServiceMetrics:
+def collect_service_metrics(session: Session) -> ServiceMetrics:
     """Collect all metrics."""
     verdicts = select(Job.verdict, func.count()).where(Job.verdict.is_not(None)).group_by(Job.verdict)
     # The last attempt of a graded or running job is not a fault.
@@ -77,7 +77,7 @@ def collect(session: Session) -> ServiceMetrics:
         select(*(count.scalar_subquery() for count in counts))
     ).one()
     return ServiceMetrics(
-        queue=collect_queue(session),
+        queue=collect_queue_metrics(session),
         verdicts={verdict: count for verdict, count in session.execute(verdicts) if verdict is not None},
         host_faults=faults or 0,
         unjudged=unjudged,
@@ -85,29 +85,31 @@ def collect(session: Session) -> ServiceMetrics:
         plots=dict(session.execute(plots).all()),
         paused_batches=paused,
         quarantined=quarantined,
-        times=_times(session),
+        times=_load_times(session),
     )
 
 
-def collect_queue(session: Session) -> QueueMetrics:
+def collect_queue_metrics(session: Session) -> QueueMetrics:
     """Collect only the metrics that show whether the queue is stuck."""
     at = now(session)
     by_state = select(Job.lane, Job.state, func.count()).group_by(Job.lane, Job.state)
-    waiting = select(Job.lane, func.count(), func.min(Job.queued_at)).where(*claimable(at)).group_by(Job.lane)
+    waiting = (
+        select(Job.lane, func.count(), func.min(Job.queued_at)).where(*match_claimable_jobs(at)).group_by(Job.lane)
+    )
     rows = session.execute(waiting).all()
-    seen = workers.known_workers(session)
+    seen = workers.load_workers(session)
     return QueueMetrics(
         jobs={(lane, state): count for lane, state, count in session.execute(by_state)},
         claimable={lane: count for lane, count, _ in rows},
         oldest_seconds={lane: max(0.0, (at - oldest).total_seconds()) for lane, _, oldest in rows},
-        idle_seconds=_idle_seconds(session, at),
+        idle_seconds=_measure_idle_seconds(session, at),
         workers=seen,
         silent_seconds={each.worker.name: max(0.0, (at - each.seen_at).total_seconds()) for each in seen},
     )
 
 
-def _idle_seconds(session: Session, at: datetime) -> float:
-    lately = Job.started_at > at - _LATELY
+def _measure_idle_seconds(session: Session, at: datetime) -> float:
+    lately = Job.started_at > at - _RECENT_PERIOD
     begun, ended = session.execute(select(func.max(Job.started_at), func.max(Job.finished_at)).where(lately)).one()
     moments = [moment for moment in (begun, ended) if moment is not None]
     return max(0.0, (at - max(moments)).total_seconds()) if moments else math.inf
@@ -121,7 +123,7 @@ class Pace:
     left: timedelta
 
 
-def pace(session: Session, batch_id: str) -> Pace | None:
+def estimate_pace(session: Session, batch_id: str) -> Pace | None:
     """Estimate the pace from the last minutes; None if nothing ended then, or nothing remains."""
     at = now(session)
     unfinished = (
@@ -139,18 +141,18 @@ def pace(session: Session, batch_id: str) -> Pace | None:
         waiting[course][batch] = count
     of_batch = func.sum(case((Job.batch_id == batch_id, 1), else_=0))
     # The start time is indexed.
-    ended = (Job.state == JobState.DONE, Job.finished_at > at - PACE_OVER, Job.started_at > at - _LATELY)
+    ended = (Job.state == JobState.DONE, Job.finished_at > at - PACE_WINDOW, Job.started_at > at - _RECENT_PERIOD)
     own, everybody, first = session.execute(
         select(of_batch, func.count(), func.min(Job.started_at)).where(*ended)
     ).one()
-    before = _graded_before_its_end(waiting, batch_id)
+    before = _count_jobs_before_end(waiting, batch_id)
     if not before or not own or first is None:
         return None
-    seconds = max(1.0, min((at - first).total_seconds(), PACE_OVER.total_seconds()))
+    seconds = max(1.0, min((at - first).total_seconds(), PACE_WINDOW.total_seconds()))
     return Pace(60 * own / seconds, timedelta(seconds=round(before * seconds / everybody)))
 
 
-def _graded_before_its_end(waiting: Mapping[int, Mapping[str | None, int]], batch_id: str) -> int:
+def _count_jobs_before_end(waiting: Mapping[int, Mapping[str | None, int]], batch_id: str) -> int:
     """Return the number of jobs, in all courses, that end before the batch does.
 
     Courses share the workers equally, and so do the batches of a course.
@@ -162,21 +164,21 @@ def _graded_before_its_end(waiting: Mapping[int, Mapping[str | None, int]], batc
     return sum(min(sum(batches.values()), of_course) for batches in waiting.values())
 
 
-def quantile(values: Sequence[float], share: float) -> float:
+def compute_quantile(values: Sequence[float], share: float) -> float:
     """Return the nearest-rank quantile of sorted values for a ``share`` of 0 to 1."""
     return values[max(0, min(len(values) - 1, round(share * len(values) + 0.5) - 1))]
 
 
-def _times(session: Session) -> dict[str, list[float]]:
+def _load_times(session: Session) -> dict[str, list[float]]:
     recent = (
         select(Job.phases)
-        .where(Job.finished_at > now(session) - TIMES_OVER, Job.state == JobState.DONE)
+        .where(Job.finished_at > now(session) - TIMES_WINDOW, Job.state == JobState.DONE)
         .order_by(Job.finished_at.desc())
-        .limit(TIMES_MOST)
+        .limit(MOST_TIMES)
     )
     times: dict[str, list[float]] = {span: [] for span in phases.SPANS}
     for stored in session.scalars(recent):
-        for span, duration in phases.durations(stored).items():
+        for span, duration in phases.compute_durations(stored).items():
             # A clock that was set back can give negative durations, which count as 0.
             times[span].append(max(0.0, duration.total_seconds()))
     return {span: sorted(found) for span, found in times.items()}

@@ -15,11 +15,11 @@ from sqlalchemy.orm import Session
 from service.store.engine import now
 from service.store.models import Enrolment, Job
 from service.store.queue import workers
-from service.store.queue.scheduling import claimable, recently_begun, shares
-from service.store.states import JobState, Lane
+from service.store.queue.scheduling import match_claimable_jobs, select_recent_jobs, select_shares
+from service.store.states import JobQueue, JobState
 
 #: Estimates use the mean of this number of recent gradings.
-_MEASURED = 20
+_MOST_MEASURED = 20
 #: Maximum progress shown for a grading that takes longer than usual.
 _MOST_PROGRESS = 0.95
 
@@ -38,18 +38,18 @@ class QueuePlace:
     progress: float = 0.0
 
 
-def queue_place(session: Session, job_id: str) -> QueuePlace:
+def estimate_place(session: Session, job_id: str) -> QueuePlace:
     """Return the place of one queued or running job."""
-    return queue_places(session, [job_id])[job_id]
+    return estimate_places(session, [job_id])[job_id]
 
 
-def queue_places(session: Session, job_ids: Collection[str]) -> dict[str, QueuePlace]:
+def estimate_places(session: Session, job_ids: Collection[str]) -> dict[str, QueuePlace]:
     """Return the places of several jobs, with the same number of statements."""
     at = now(session)
     jobs = session.scalars(select(Job).where(Job.id.in_(job_ids))).all()
-    lively = [seen.worker for seen in workers.known_workers(session) if seen.lately]
+    lively = [seen.worker for seen in workers.load_workers(session) if seen.lately]
     slots = sum(worker.concurrency for worker in lively)
-    before, each = _before(session, job_ids, at), _usual_seconds(session)
+    before, each = _count_jobs_before(session, job_ids, at), _measure_usual_seconds(session)
     places = {}
     for job in jobs:
         ahead = before[job.id] if job.state is JobState.QUEUED else 0
@@ -62,20 +62,20 @@ def queue_places(session: Session, job_ids: Collection[str]) -> dict[str, QueueP
     return places
 
 
-def _before(session: Session, job_ids: Collection[str], at: datetime) -> dict[str, int]:
+def _count_jobs_before(session: Session, job_ids: Collection[str], at: datetime) -> dict[str, int]:
     """Return the number of claimable jobs ahead of each of these jobs, by id."""
-    recent = recently_begun(at).cte("recent")
-    of_course = shares(recent.c.course_id)
-    of_batch, of_student = shares(recent.c.batch_id), shares(recent.c.enrolment_id)
+    recent = select_recent_jobs(at).cte("recent")
+    of_course = select_shares(recent.c.course_id)
+    of_batch, of_student = select_shares(recent.c.batch_id), select_shares(recent.c.enrolment_id)
     order = (
-        Job.lane == Lane.BATCH,
+        Job.lane == JobQueue.BATCH,
         func.coalesce(of_course.c.begun, 0),
         func.coalesce(of_batch.c.begun, 0),
         func.coalesce(of_student.c.begun, 0),
         Job.queued_at,
         Job.id,
     )
-    can_be_claimed, mine = and_(*claimable(at)), Job.id.in_(job_ids)
+    can_be_claimed, mine = and_(*match_claimable_jobs(at)), Job.id.in_(job_ids)
     earlier = func.sum(case((can_be_claimed, 1), else_=0)).over(order_by=order, rows=(None, -1))
     ranked = (
         select(Job.id, earlier.label("earlier"))
@@ -90,9 +90,9 @@ def _before(session: Session, job_ids: Collection[str], at: datetime) -> dict[st
     return dict(session.execute(query).all())
 
 
-def _usual_seconds(session: Session) -> float | None:
+def _measure_usual_seconds(session: Session) -> float | None:
     run = (Job.state == JobState.DONE, Job.copied_from.is_(None), Job.started_at.is_not(None))
-    query = select(Job.started_at, Job.finished_at).where(*run).order_by(Job.started_at.desc()).limit(_MEASURED)
+    query = select(Job.started_at, Job.finished_at).where(*run).order_by(Job.started_at.desc()).limit(_MOST_MEASURED)
     taken = [
         (finished - started).total_seconds() for started, finished in session.execute(query) if started and finished
     ]

@@ -11,18 +11,18 @@ from sqlalchemy import ColumnElement, Select, Subquery, and_, case, func, not_, 
 from sqlalchemy.orm import Session
 
 from service.store.models import Batch, Enrolment, Job
-from service.store.queue.workers import another_lives
-from service.store.states import BatchState, JobState, Lane
+from service.store.queue.workers import match_other_live_worker
+from service.store.states import BatchState, JobQueue, JobState
 
 #: Shares count only jobs started within this time, so earlier use is no disadvantage.
 SHARE_WINDOW = timedelta(seconds=60)
 #: One in this number of started jobs is from a batch, even if interactive jobs wait.
 BATCH_EVERY = 5
 #: Time for which a job that failed on one worker is reserved for the other workers.
-ELSEWHERE = timedelta(seconds=20)
+RESERVED_PERIOD = timedelta(seconds=20)
 
 
-def claimable(at: datetime) -> tuple[ColumnElement[bool], ...]:
+def match_claimable_jobs(at: datetime) -> tuple[ColumnElement[bool], ...]:
     """Return the conditions for a claimable job: it is queued and due, and its batch is open."""
     held_back = select(Batch.id).where(Batch.state != BatchState.OPEN)
     return (
@@ -32,7 +32,7 @@ def claimable(at: datetime) -> tuple[ColumnElement[bool], ...]:
     )
 
 
-def recently_begun(at: datetime) -> Select[Lane, int, str | None, int]:
+def select_recent_jobs(at: datetime) -> Select[JobQueue, int, str | None, int]:
     """Return a query for the queue, course, batch and student of every job that counts towards a share."""
     return (
         select(Job.lane, Enrolment.course_id, Job.batch_id, Job.enrolment_id)
@@ -41,29 +41,29 @@ def recently_begun(at: datetime) -> Select[Lane, int, str | None, int]:
     )
 
 
-def next_job(session: Session, at: datetime, worker: str) -> str | None:
+def find_next_job(session: Session, at: datetime, worker: str) -> str | None:
     """Return the id of the job that ``worker`` should claim next; None if no job is due.
 
     Interactive jobs come first, except for one job in five. Within a queue, the course with the fewest jobs started in
     the last minute comes first, then the batch, then the student, then the oldest job.
     """
     # A common table expression; without it SQLite would scan all jobs to count each share.
-    recent = recently_begun(at).cte("recent")
+    recent = select_recent_jobs(at).cte("recent")
     counted = session.execute(select(recent.c.lane, func.count()).group_by(recent.c.lane))
-    by_lane: dict[Lane, int] = dict(counted.all())
-    people, batches = by_lane.get(Lane.INTERACTIVE, 0), by_lane.get(Lane.BATCH, 0)
-    first = Lane.BATCH if people >= (BATCH_EVERY - 1) * (batches + 1) else Lane.INTERACTIVE
+    by_lane: dict[JobQueue, int] = dict(counted.all())
+    people, batches = by_lane.get(JobQueue.INTERACTIVE, 0), by_lane.get(JobQueue.BATCH, 0)
+    first = JobQueue.BATCH if people >= (BATCH_EVERY - 1) * (batches + 1) else JobQueue.INTERACTIVE
 
-    of_course = shares(recent.c.course_id)
-    of_batch = shares(recent.c.batch_id)
-    of_student = shares(recent.c.enrolment_id)
+    of_course = select_shares(recent.c.course_id)
+    of_batch = select_shares(recent.c.batch_id)
+    of_student = select_shares(recent.c.enrolment_id)
     query = (
         select(Job.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
         .outerjoin(of_course, of_course.c.share == Enrolment.course_id)
         .outerjoin(of_batch, of_batch.c.share == Job.batch_id)
         .outerjoin(of_student, of_student.c.share == Job.enrolment_id)
-        .where(*claimable(at), not_(_better_elsewhere(worker, at)))
+        .where(*match_claimable_jobs(at), not_(_match_better_elsewhere(worker, at)))
         .order_by(
             case((Job.lane == first, 0), else_=1),
             func.coalesce(of_course.c.begun, 0),
@@ -78,13 +78,13 @@ def next_job(session: Session, at: datetime, worker: str) -> str | None:
     return session.scalar(query)
 
 
-def _better_elsewhere(worker: str, at: datetime) -> ColumnElement[bool]:
+def _match_better_elsewhere(worker: str, at: datetime) -> ColumnElement[bool]:
     """Return the condition that a job failed with a host fault on this worker and another worker could try it."""
     # A stopped worker returns its jobs without a fault, and then no error is stored.
     failed_here = and_(Job.attempt > 0, Job.worker == worker, Job.error.is_not(None))
-    return and_(failed_here, Job.due_at > at - ELSEWHERE, another_lives(worker, at))
+    return and_(failed_here, Job.due_at > at - RESERVED_PERIOD, match_other_live_worker(worker, at))
 
 
-def shares(share: ColumnElement[str | None] | ColumnElement[int]) -> Subquery:
+def select_shares(share: ColumnElement[str | None] | ColumnElement[int]) -> Subquery:
     """Return a subquery that counts the recently started jobs of each course, batch or student."""
     return select(share.label("share"), func.count().label("begun")).group_by(share).subquery()

@@ -15,18 +15,18 @@ from sqlalchemy.orm import Session
 
 from service.store import audit
 from service.store.engine import Store, now, retry_conflicts
-from service.store.grades import current
+from service.store.grades import current_grades
 from service.store.locks import lock_jobs, lock_submissions
 from service.store.models import Batch, Job, SelfTest, SubmissionRow, Worker
 from service.store.queue import jobs
-from service.store.states import BatchState, Lane, Standing
-from service.version import GRADER_VERSION, grader_sha256
+from service.store.states import BatchState, JobQueue, Standing
+from service.version import GRADER_VERSION, hash_grader
 
-_FORGOTTEN = timedelta(days=30)
+_RETENTION = timedelta(days=30)
 
 
 @dataclass(frozen=True, slots=True)
-class Quarantined:
+class QuarantineEffects:
     """Effects of a quarantine: requeued jobs, suspect grades, and the jobs that repeat them."""
 
     taken_back: int
@@ -35,11 +35,11 @@ class Quarantined:
 
 
 @retry_conflicts
-def answered_rightly(store: Store, worker: str, process: int) -> None:
+def record_pass(store: Store, worker: str, process: int) -> None:
     """Record that this process of the worker passed the self-test now."""
     with store.transaction() as session:
         at = now(session)
-        _worker(session, worker, at).self_tested_at = at
+        _lock_worker(session, worker, at).self_tested_at = at
         query = select(SelfTest).where(SelfTest.worker == worker, SelfTest.process == process)
         row = session.scalar(query)
         if row is None:
@@ -49,7 +49,7 @@ def answered_rightly(store: Store, worker: str, process: int) -> None:
 
 
 @retry_conflicts
-def quarantine(store: Store, worker: str, reason: str) -> Quarantined:
+def quarantine_worker(store: Store, worker: str, reason: str) -> QuarantineEffects:
     """Quarantine a worker: it can neither claim nor finish jobs, and its doubtful grades are run again.
 
     The jobs that it owns are requeued. Grades since the last passed self-test of their process are kept, but marked as
@@ -57,42 +57,44 @@ def quarantine(store: Store, worker: str, reason: str) -> Quarantined:
     """
     with store.transaction() as session:
         at = now(session)
-        row = _worker(session, worker, at)
+        row = _lock_worker(session, worker, at)
         if row.quarantined_at is not None:
-            return Quarantined(0, (), ())
+            return QuarantineEffects(0, (), ())
         row.self_tested_at = row.quarantined_at = at
         row.reason = reason
         # A concurrent finish waits for this row, or is already committed and visible below.
         session.flush()
-        taken_back = jobs.give_back(session, worker, at)
+        taken_back = jobs.requeue_worker_jobs(session, worker, at)
         sentence = f"the worker {worker} was found to grade wrongly: {reason}"
-        suspects = _suspects(session, worker)
-        reruns = [_rerun(session, job) for job in suspects if job.standing is not Standing.KEPT]
+        suspects = _load_suspects(session, worker)
+        reruns = [_build_rerun(session, job) for job in suspects if job.standing is not Standing.KEPT]
         for job in suspects:
             job.suspect, job.standing = sentence, Standing.KEPT
             job.published_at = job.published_by = None
         session.flush()
         again = tuple(jobs.enqueue(session, job, at) for job in reruns)
         ids = tuple(job.id for job in suspects)
-        audit.note(session, worker, "quarantine", "worker", worker, reason=reason, suspect=list(ids), again=list(again))
-        return Quarantined(taken_back, ids, again)
+        audit.record_action(
+            session, worker, "quarantine", "worker", worker, reason=reason, suspect=list(ids), again=list(again)
+        )
+        return QuarantineEffects(taken_back, ids, again)
 
 
-def _worker(session: Session, name: str, at: datetime) -> Worker:
+def _lock_worker(session: Session, name: str, at: datetime) -> Worker:
     """Return the worker's row, locked, creating it if necessary."""
     row = session.scalar(select(Worker).where(Worker.name == name).with_for_update(key_share=True))
     if row is None:
-        _forget_old(session, at)
+        _delete_old(session, at)
         row = Worker(
-            name=name, grader_version=GRADER_VERSION, grader_sha256=grader_sha256(), first_at=at, self_tested_at=at
+            name=name, grader_version=GRADER_VERSION, grader_sha256=hash_grader(), first_at=at, self_tested_at=at
         )
         session.add(row)
         session.flush()
     return row
 
 
-def _forget_old(session: Session, at: datetime) -> None:
-    old = select(Worker.name).where(Worker.self_tested_at < at - _FORGOTTEN)
+def _delete_old(session: Session, at: datetime) -> None:
+    old = select(Worker.name).where(Worker.self_tested_at < at - _RETENTION)
     for statement in (
         delete(SelfTest).where(SelfTest.worker.in_(old)),
         delete(Worker).where(Worker.name.in_(old)),
@@ -100,7 +102,7 @@ def _forget_old(session: Session, at: datetime) -> None:
         session.execute(statement, execution_options={"synchronize_session": False})
 
 
-def _suspects(session: Session, worker: str) -> Sequence[Job]:
+def _load_suspects(session: Session, worker: str) -> Sequence[Job]:
     """Return the grades of the worker since its last passed self-test, with all their copies."""
     last = (
         select(SelfTest.right_at)
@@ -108,7 +110,7 @@ def _suspects(session: Session, worker: str) -> Sequence[Job]:
         .correlate(Job)
         .scalar_subquery()
     )
-    graded = (Job.worker == worker, *current.IS_TRUSTED, Job.copied_from.is_(None))
+    graded = (Job.worker == worker, *current_grades.IS_TRUSTED, Job.copied_from.is_(None))
     own = select(Job.id).where(*graded, or_(last.is_(None), Job.finished_at > last))
     ids = session.scalars(own).all()
     which = or_(Job.id.in_(ids), Job.copied_from.in_(ids))
@@ -118,7 +120,7 @@ def _suspects(session: Session, worker: str) -> Sequence[Job]:
     return session.scalars(query.execution_options(populate_existing=True)).all()
 
 
-def _rerun(session: Session, job: Job) -> Job:
+def _build_rerun(session: Session, job: Job) -> Job:
     """Create, without queueing, a new job that replaces a suspect one."""
     cancelled = job.batch_id is not None and session.get_one(Batch, job.batch_id).state is BatchState.CANCELLED
     return Job(
@@ -127,7 +129,7 @@ def _rerun(session: Session, job: Job) -> Job:
         enrolment_id=job.enrolment_id,
         # Jobs of a cancelled batch never start, but this one was graded before.
         batch_id=None if cancelled else job.batch_id,
-        lane=Lane(job.lane),
+        lane=JobQueue(job.lane),
         max_attempts=job.max_attempts,
         regrade_of=job.id,
         standing=job.standing,

@@ -15,8 +15,8 @@ from service.store.engine import Store, now, retry_conflicts
 from service.store.models import Heartbeat, Worker
 
 #: A worker with a heartbeat within this time is considered alive.
-LATELY = timedelta(seconds=30)
-_FORGOTTEN = timedelta(days=1)
+ALIVE_PERIOD = timedelta(seconds=30)
+_RETENTION = timedelta(days=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class WorkerLine:
 
 
 @dataclass(frozen=True, slots=True)
-class InQuarantine:
+class QuarantinedWorker:
     """A worker that failed a self-test, and the reason."""
 
     worker: str
@@ -51,13 +51,13 @@ class InQuarantine:
 
 
 @retry_conflicts
-def beat(store: Store, worker: WorkerDescription) -> None:
+def record_heartbeat(store: Store, worker: WorkerDescription) -> None:
     """Store the worker's heartbeat. Deletes workers that were last seen more than a day ago."""
     with store.transaction() as session:
         at = now(session)
         row = session.get(Heartbeat, worker.name)
         if row is None:
-            session.execute(delete(Heartbeat).where(Heartbeat.seen_at < at - _FORGOTTEN))
+            session.execute(delete(Heartbeat).where(Heartbeat.seen_at < at - _RETENTION))
             row = Heartbeat(worker=worker.name, started_at=at)
             session.add(row)
         row.host, row.concurrency = worker.host, worker.concurrency
@@ -67,13 +67,13 @@ def beat(store: Store, worker: WorkerDescription) -> None:
 
 
 @retry_conflicts
-def forget(store: Store, name: str) -> None:
+def delete_heartbeat(store: Store, name: str) -> None:
     """Delete the heartbeat of a worker that has exited."""
     with store.transaction() as session:
         session.execute(delete(Heartbeat).where(Heartbeat.worker == name))
 
 
-def known_workers(session: Session) -> list[WorkerLine]:
+def load_workers(session: Session) -> list[WorkerLine]:
     """Return all workers with a heartbeat, ordered by name."""
     at = now(session)
     rows = session.scalars(select(Heartbeat).order_by(Heartbeat.worker))
@@ -84,15 +84,15 @@ def known_workers(session: Session) -> list[WorkerLine]:
             ),
             row.started_at,
             row.seen_at,
-            row.seen_at > at - LATELY,
+            row.seen_at > at - ALIVE_PERIOD,
         )
         for row in rows
     ]
 
 
-def another_lives(worker: str, at: datetime) -> ColumnElement[bool]:
+def match_other_live_worker(worker: str, at: datetime) -> ColumnElement[bool]:
     """Return the condition that another worker was seen recently."""
-    return select(Heartbeat.worker).where(Heartbeat.worker != worker, Heartbeat.seen_at > at - LATELY).exists()
+    return select(Heartbeat.worker).where(Heartbeat.worker != worker, Heartbeat.seen_at > at - ALIVE_PERIOD).exists()
 
 
 def is_in_quarantine(session: Session, worker: str, *, lock: bool = False) -> bool:
@@ -104,11 +104,11 @@ def is_in_quarantine(session: Session, worker: str, *, lock: bool = False) -> bo
     return session.scalar(query.with_for_update(read=True) if lock else query) is not None
 
 
-def in_quarantine(session: Session) -> list[InQuarantine]:
+def list_quarantined_workers(session: Session) -> list[QuarantinedWorker]:
     """Return all quarantined workers, newest first."""
     query = select(Worker).where(Worker.quarantined_at.is_not(None)).order_by(Worker.quarantined_at.desc())
     return [
-        InQuarantine(row.name, row.quarantined_at, row.reason or "")
+        QuarantinedWorker(row.name, row.quarantined_at, row.reason or "")
         for row in session.scalars(query)
         if row.quarantined_at is not None
     ]

@@ -11,20 +11,20 @@ from pydantic import BaseModel, Field
 from service.operations import assignment_uploads, assignment_views, assignments
 from service.operations.assignment_uploads import UploadRequest
 from service.operations.types import Role
-from service.web.api.shapes import Shape, like
-from service.web.api_access import CallerInCourse, in_course
-from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
-from service.web.api_uploads import LARGEST_ASSIGNMENT, ZIP_BODY, Uploaded
+from service.web.api.shapes import Shape, build_example_config
+from service.web.api_access import CallerInCourse, require_role
+from service.web.api_routes import After, Limit, Listed, api_router, build_list_page, decode_cursor
+from service.web.api_uploads import LARGEST_ASSIGNMENT, ZIP_BODY, UploadedZip
 from service.web.context import Context
 from service.web.request_bodies import takes_upload
-from submissions.assignment.assignment_overview import overview
+from submissions.assignment.assignment_overview import read_overview
 from submissions.assignment.definition import Assignment
-from submissions.assignment.folder import assignment_folder, catalogue
+from submissions.assignment.folder import list_catalogue_ids, locate_assignment_folder
 from submissions.assignment.reader import find_in_catalogue
 
 router = api_router("assignments")
-Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
-Manages = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "manage"))]
+ReadAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "read"))]
+ManageAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "manage"))]
 AssignmentId = Annotated[str, Path(min_length=1, max_length=100)]
 _EXAMPLE = {"title": "Shape recognition", "max_marks": 12}
 _ASKED_EXAMPLE = {
@@ -55,7 +55,7 @@ class CatalogueShape(Shape):
     max_marks: float = Field(validation_alias="marks")
     trials: int
 
-    model_config = like(
+    model_config = build_example_config(
         id="shape-recognition",
         section="08.5 §5.2.1",
         topic="08",
@@ -77,7 +77,7 @@ class AssignmentShape(Shape):
     closed_at: datetime | None
     names_hidden: bool
 
-    model_config = like(
+    model_config = build_example_config(
         id="shape-recognition",
         version="3f9a1c20",
         open=True,
@@ -130,7 +130,7 @@ class AskedShape(Shape):
     scenarios: list[ScenarioShape]
     has_reference: bool = Field(description="Whether a reference solution can be graded as a preview.")
 
-    model_config = like(**_ASKED_EXAMPLE)
+    model_config = build_example_config(**_ASKED_EXAMPLE)
 
 
 class WholeAssignmentShape(AskedShape):
@@ -141,7 +141,7 @@ class WholeAssignmentShape(AskedShape):
     closed_at: datetime | None
     names_hidden: bool
 
-    model_config = like(
+    model_config = build_example_config(
         open=True, opened_at="2026-11-02T09:00:00Z", closed_at=None, names_hidden=False, **_ASKED_EXAMPLE
     )
 
@@ -151,7 +151,7 @@ class PreviewShape(Shape):
 
     job: str
 
-    model_config = like(job="7xk2v9q4m0ab")
+    model_config = build_example_config(job="7xk2v9q4m0ab")
 
 
 class NamesAsked(BaseModel):
@@ -162,7 +162,7 @@ class NamesAsked(BaseModel):
 
 @router.get("/courses/{course_id}/catalogue")
 def list_catalogue(
-    _here: Reads,
+    _here: ReadAccess,
     limit: Limit = 50,
     after: After = "",
     q: Annotated[
@@ -171,40 +171,46 @@ def list_catalogue(
     topic: Annotated[str, Query(max_length=10, description="Number of a part of the course materials.")] = "",
 ) -> Listed[CatalogueShape]:
     """List the assignments of the catalogue, which every course can use."""
-    place = place_after(after, str)
-    left = (overview(assignment_folder(each)) for each in catalogue() if place is None or each > place[0])
-    found = [each for each in left if each.says(q) and topic in ("", each.topic)][: limit + 1]
-    return page_of([CatalogueShape.model_validate(each) for each in found], limit, lambda each: [each.id])
+    place = decode_cursor(after, str)
+    left = (
+        read_overview(locate_assignment_folder(each))
+        for each in list_catalogue_ids()
+        if place is None or each > place[0]
+    )
+    found = [each for each in left if each.matches_text(q) and topic in ("", each.topic)][: limit + 1]
+    return build_list_page([CatalogueShape.model_validate(each) for each in found], limit, lambda each: [each.id])
 
 
 @router.get("/courses/{course_id}/catalogue/{assignment}")
-def one_of_catalogue(_here: Reads, assignment: AssignmentId) -> AskedShape:
+def one_of_catalogue(_here: ReadAccess, assignment: AssignmentId) -> AskedShape:
     """Return the task of an assignment of the catalogue, as a course would get it."""
-    return AskedShape(**_asked(find_in_catalogue(assignment)))
+    return AskedShape(**_build_assignment_fields(find_in_catalogue(assignment)))
 
 
 @router.get("/courses/{course_id}/assignments")
-def list_assignments(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[AssignmentShape]:
+def list_assignments(
+    here: ReadAccess, context: Context, limit: Limit = 50, after: After = ""
+) -> Listed[AssignmentShape]:
     """List the course's prepared and open assignments, by id."""
-    place = place_after(after, str)
-    found = assignment_views.list_prepared(context.service, here.acting, here.course_id)
+    place = decode_cursor(after, str)
+    found = assignment_views.list_prepared(context.service, here.actor, here.course_id)
     left = [AssignmentShape.model_validate(each) for each in found if place is None or each.assignment > place[0]]
-    return page_of(left[: limit + 1], limit, lambda each: [each.id])
+    return build_list_page(left[: limit + 1], limit, lambda each: [each.id])
 
 
 @router.post("/courses/{course_id}/assignments", status_code=201)
-def prepare(here: Manages, context: Context, asked: AssignmentAsked) -> AssignmentShape:
+def prepare(here: ManageAccess, context: Context, asked: AssignmentAsked) -> AssignmentShape:
     """Add an assignment of the catalogue to the course without opening it, or update it to the newest version."""
-    made = assignment_uploads.prepare_from_catalogue(context.service, here.acting, here.course_id, asked.assignment)
+    made = assignment_uploads.prepare_from_catalogue(context.service, here.actor, here.course_id, asked.assignment)
     return AssignmentShape.model_validate(made)
 
 
 @router.post("/courses/{course_id}/assignments/uploads", status_code=201, openapi_extra=ZIP_BODY)
 @takes_upload(LARGEST_ASSIGNMENT, Role.INSTRUCTOR)
 def upload(
-    here: Manages,
+    here: ManageAccess,
     context: Context,
-    sent: Uploaded,
+    sent: UploadedZip,
     replace: Annotated[bool, Query(description="Replace another assignment that students have already seen.")] = True,
 ) -> AssignmentShape:
     """Upload an assignment as a zip of its folder; its reference solution is graded as a preview.
@@ -212,16 +218,16 @@ def upload(
     It replaces an assignment with the same ID. If students have seen that one and `replace` is false, the response is
     409.
     """
-    made = assignment_uploads.upload(context.service, here.acting, here.course_id, UploadRequest(sent, replace))
+    made = assignment_uploads.upload(context.service, here.actor, here.course_id, UploadRequest(sent, replace))
     return AssignmentShape.model_validate(made)
 
 
 @router.get("/courses/{course_id}/assignments/{assignment}")
-def one_assignment(here: Reads, context: Context, assignment: AssignmentId) -> WholeAssignmentShape:
+def one_assignment(here: ReadAccess, context: Context, assignment: AssignmentId) -> WholeAssignmentShape:
     """Return the task of an assignment of the course, and whether it is open."""
-    line, found = assignment_views.load(context.service, here.acting, here.course_id, assignment)
+    line, found = assignment_views.load(context.service, here.actor, here.course_id, assignment)
     return WholeAssignmentShape(
-        **_asked(found),
+        **_build_assignment_fields(found),
         open=line.open,
         opened_at=line.opened_at,
         closed_at=line.closed_at,
@@ -230,40 +236,40 @@ def one_assignment(here: Reads, context: Context, assignment: AssignmentId) -> W
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/preview", status_code=201)
-def preview(here: Manages, context: Context, assignment: AssignmentId) -> PreviewShape:
+def preview(here: ManageAccess, context: Context, assignment: AssignmentId) -> PreviewShape:
     """Grade the reference solution as a submission of the token's owner. It belongs to no batch."""
-    return PreviewShape(job=assignment_uploads.preview(context.service, here.acting, here.course_id, assignment))
+    return PreviewShape(job=assignment_uploads.preview(context.service, here.actor, here.course_id, assignment))
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/open")
-def open_one(here: Manages, context: Context, assignment: AssignmentId) -> AssignmentShape:
+def open_one(here: ManageAccess, context: Context, assignment: AssignmentId) -> AssignmentShape:
     """Open an assignment: students can see it and submit."""
-    changed = assignments.open_for_students(context.service, here.acting, here.course_id, assignment)
+    changed = assignments.open_for_students(context.service, here.actor, here.course_id, assignment)
     return AssignmentShape.model_validate(changed)
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/close")
-def close_one(here: Manages, context: Context, assignment: AssignmentId) -> AssignmentShape:
+def close_one(here: ManageAccess, context: Context, assignment: AssignmentId) -> AssignmentShape:
     """Close an assignment for new submissions. Existing submissions are kept."""
-    changed = assignments.close(context.service, here.acting, here.course_id, assignment)
+    changed = assignments.close(context.service, here.actor, here.course_id, assignment)
     return AssignmentShape.model_validate(changed)
 
 
 @router.delete("/courses/{course_id}/assignments/{assignment}", status_code=204, response_class=Response)
-def remove(here: Manages, context: Context, assignment: AssignmentId) -> None:
+def remove(here: ManageAccess, context: Context, assignment: AssignmentId) -> None:
     """Remove an assignment from the course. This is possible only if students have not seen it."""
-    assignments.remove(context.service, here.acting, here.course_id, assignment)
+    assignments.remove(context.service, here.actor, here.course_id, assignment)
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/names")
-def hide_names(here: Manages, context: Context, assignment: AssignmentId, asked: NamesAsked) -> AssignmentShape:
+def hide_names(here: ManageAccess, context: Context, assignment: AssignmentId, asked: NamesAsked) -> AssignmentShape:
     """Hide or show the students' names during marking."""
     hidden = asked.names_hidden
-    changed = assignments.hide_names(context.service, here.acting, here.course_id, assignment, hidden=hidden)
+    changed = assignments.hide_names(context.service, here.actor, here.course_id, assignment, hidden=hidden)
     return AssignmentShape.model_validate(changed)
 
 
-def _asked(found: Assignment) -> dict[str, Any]:
+def _build_assignment_fields(found: Assignment) -> dict[str, Any]:
     runs = [trial.scenario.id for trial in found.trials()]
     return {
         "id": found.id,
@@ -286,5 +292,5 @@ def _asked(found: Assignment) -> dict[str, Any]:
             )
             for each in found.scenarios
         ],
-        "has_reference": assignment_uploads.reference_of(found) is not None,
+        "has_reference": assignment_uploads.find_reference_solution(found) is not None,
     }

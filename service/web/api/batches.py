@@ -10,20 +10,20 @@ from pydantic import Field
 
 from service.operations import batch_views as views
 from service.operations import batches as operations
-from service.operations.batches import Accepted, AlreadySubmitted, SubmitRequest
+from service.operations.batches import AcceptedSubmission, KnownSubmission, SubmitRequest
 from service.operations.types import Role
 from service.web.access import RowName
-from service.web.api.shapes import BATCH_EXAMPLE, BatchShape, JobShape, RefusalShape, Shape, like
-from service.web.api_access import CallerInCourse, in_course
-from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
-from service.web.api_uploads import LARGEST_BATCH, ZIP_BODY, Uploaded
+from service.web.api.shapes import BATCH_EXAMPLE, BatchShape, JobShape, RefusalShape, Shape, build_example_config
+from service.web.api_access import CallerInCourse, require_role
+from service.web.api_routes import After, Limit, Listed, api_router, build_list_page, decode_cursor
+from service.web.api_uploads import LARGEST_BATCH, ZIP_BODY, UploadedZip
 from service.web.batch_uploads import read_upload
 from service.web.context import Context
 from service.web.request_bodies import takes_upload
 
 router = api_router("batches")
-Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
-Submits = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "submit"))]
+ReadAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "read"))]
+SubmitAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "submit"))]
 
 
 class ProgressShape(Shape):
@@ -81,7 +81,7 @@ class WholeBatchShape(BatchShape):
     statistics: list[StatisticsShape]
     unpublished_regrades: int
 
-    model_config = like(
+    model_config = build_example_config(
         **BATCH_EXAMPLE,
         progress={"jobs": 20, "ended": 18, "partial": 0.7, "plots_due": 3},
         pace={"per_minute": 60, "left_seconds": 2},
@@ -118,7 +118,7 @@ class TakenShape(Shape):
     for_staff: list[ForStaffShape]
     refusals: list[RefusalShape]
 
-    model_config = like(
+    model_config = build_example_config(
         batch="0c5w1r8zt3ye",
         queued=19,
         copied=1,
@@ -135,7 +135,7 @@ class ControlledShape(Shape):
     waiting: int
     running: int
 
-    model_config = like(changed=True, waiting=12, running=2)
+    model_config = build_example_config(changed=True, waiting=12, running=2)
 
 
 class RetriedShape(Shape):
@@ -144,25 +144,25 @@ class RetriedShape(Shape):
     queued: int
     outdated: int
 
-    model_config = like(queued=2, outdated=0)
+    model_config = build_example_config(queued=2, outdated=0)
 
 
 @router.get("/courses/{course_id}/batches")
-def list_batches(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[BatchShape]:
+def list_batches(here: ReadAccess, context: Context, limit: Limit = 50, after: After = "") -> Listed[BatchShape]:
     """List the batches of the course, newest first."""
-    place = place_after(after, datetime, str)
+    place = decode_cursor(after, datetime, str)
     last = (place[0], place[1]) if place else None
-    found = views.list_batches(context.service, here.acting, here.course_id, limit + 1, last)
+    found = views.list_batches(context.service, here.actor, here.course_id, limit + 1, last)
     shown = [BatchShape.model_validate(line) for line in found]
-    return page_of(shown, limit, lambda each: [each.created_at, each.id])
+    return build_list_page(shown, limit, lambda each: [each.created_at, each.id])
 
 
 @router.post("/courses/{course_id}/batches", status_code=201, openapi_extra=ZIP_BODY)
 @takes_upload(LARGEST_BATCH, Role.INSTRUCTOR)
 def submit_batch(
-    here: Submits,
+    here: SubmitAccess,
     context: Context,
-    upload: Uploaded,
+    upload: UploadedZip,
     name: Annotated[str, Query(min_length=1, max_length=200, description="Name of the batch.")] = "upload",
     assignment: Annotated[
         str,
@@ -174,23 +174,23 @@ def submit_batch(
     again: Annotated[bool, Query(description="Grade submissions again that were already submitted.")] = False,
 ) -> TakenShape:
     """Upload a zip with one submission for each student, in the layout of `robomark batch submit`."""
-    contents = read_upload(context, here.acting, here.course_id, upload, assignment)
-    done = operations.submit(context.service, here.acting, here.course_id, SubmitRequest(name, contents, again))
+    contents = read_upload(context, here.actor, here.course_id, upload, assignment)
+    done = operations.submit(context.service, here.actor, here.course_id, SubmitRequest(name, contents, again))
     over = [job for job in done.jobs if job.staff_only]
     return TakenShape(
         batch=None if done.batch is None else done.batch.id,
         queued=done.queued,
         copied=done.copied,
-        known=[KnownShape.model_validate(each) for each in sorted(done.known, key=_by_student)],
-        for_staff=[ForStaffShape.model_validate(job) for job in sorted(over, key=_by_student)],
+        known=[KnownShape.model_validate(each) for each in sorted(done.known, key=_extract_student)],
+        for_staff=[ForStaffShape.model_validate(job) for job in sorted(over, key=_extract_student)],
         refusals=[RefusalShape.model_validate(refusal) for refusal in done.refusals],
     )
 
 
 @router.get("/courses/{course_id}/batches/{batch_id}")
-def one_batch(here: Reads, context: Context, batch_id: RowName) -> WholeBatchShape:
+def one_batch(here: ReadAccess, context: Context, batch_id: RowName) -> WholeBatchShape:
     """Return a batch with its progress and statistics."""
-    found = views.show_graded(context.service, here.acting, here.course_id, batch_id)
+    found = views.show_graded(context.service, here.actor, here.course_id, batch_id)
     pace = found.view.pace
     return WholeBatchShape(
         **BatchShape.model_validate(found.view.batch).model_dump(),
@@ -203,46 +203,46 @@ def one_batch(here: Reads, context: Context, batch_id: RowName) -> WholeBatchSha
 
 @router.get("/courses/{course_id}/batches/{batch_id}/grades")
 def batch_grades(
-    here: Reads, context: Context, batch_id: RowName, limit: Limit = 50, after: After = ""
+    here: ReadAccess, context: Context, batch_id: RowName, limit: Limit = 50, after: After = ""
 ) -> Listed[JobShape]:
     """List the submissions of a batch by student, each with its current grade or the reason for a missing grade.
 
     Submissions with hidden names come first, in an order that is independent of the names. For a batch of regrades,
     the grades are the new ones.
     """
-    place = place_after(after, str)
+    place = decode_cursor(after, str)
     last = place[0] if place else None
-    found = views.list_grades(context.service, here.acting, here.course_id, batch_id, limit + 1, last)
-    page = page_of(found, limit, lambda each: [each.id])
+    found = views.list_grades(context.service, here.actor, here.course_id, batch_id, limit + 1, last)
+    page = build_list_page(found, limit, lambda each: [each.id])
     return Listed(items=[JobShape.model_validate(each) for each in page.items], next=page.next)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/pause")
-def pause(here: Submits, context: Context, batch_id: RowName) -> ControlledShape:
+def pause(here: SubmitAccess, context: Context, batch_id: RowName) -> ControlledShape:
     """Pause a batch: start no more jobs. Running jobs continue."""
-    done = operations.pause(context.service, here.acting, here.course_id, batch_id)
+    done = operations.pause(context.service, here.actor, here.course_id, batch_id)
     return ControlledShape.model_validate(done)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/resume")
-def resume(here: Submits, context: Context, batch_id: RowName) -> ControlledShape:
+def resume(here: SubmitAccess, context: Context, batch_id: RowName) -> ControlledShape:
     """Resume a paused batch."""
-    done = operations.resume(context.service, here.acting, here.course_id, batch_id)
+    done = operations.resume(context.service, here.actor, here.course_id, batch_id)
     return ControlledShape.model_validate(done)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/cancel")
-def cancel(here: Submits, context: Context, batch_id: RowName) -> ControlledShape:
+def cancel(here: SubmitAccess, context: Context, batch_id: RowName) -> ControlledShape:
     """Cancel all unfinished jobs of a batch. Existing grades are kept."""
-    done = operations.cancel(context.service, here.acting, here.course_id, batch_id)
+    done = operations.cancel(context.service, here.actor, here.course_id, batch_id)
     return ControlledShape.model_validate(done)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/retry")
-def retry(here: Submits, context: Context, batch_id: RowName) -> RetriedShape:
+def retry(here: SubmitAccess, context: Context, batch_id: RowName) -> RetriedShape:
     """Queue the failed jobs of a batch again."""
-    return RetriedShape.model_validate(operations.retry(context.service, here.acting, here.course_id, batch_id))
+    return RetriedShape.model_validate(operations.retry(context.service, here.actor, here.course_id, batch_id))
 
 
-def _by_student(each: Accepted | AlreadySubmitted) -> str:
+def _extract_student(each: AcceptedSubmission | KnownSubmission) -> str:
     return each.student

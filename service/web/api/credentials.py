@@ -11,9 +11,9 @@ from pydantic import Field
 
 from service.operations import credentials
 from service.operations.types import CredentialKind
-from service.web.access import RowName, actor_from
-from service.web.api.shapes import Shape, like
-from service.web.api_access import Caller, with_scope
+from service.web.access import RowName, build_actor
+from service.web.api.shapes import Shape, build_example_config
+from service.web.api_access import Caller, require_scope
 from service.web.api_routes import Listed, api_router
 from service.web.context import Context
 
@@ -32,7 +32,7 @@ class CredentialShape(Shape):
     expires_at: datetime
     used_at: datetime | None
 
-    model_config = like(
+    model_config = build_example_config(
         id="7xk2v9q4m0ab",
         kind="token",
         name="marks to the office",
@@ -46,16 +46,16 @@ class CredentialShape(Shape):
 
 @router.get("/me/credentials")
 def list_credentials(
-    caller: Annotated[Caller, Depends(with_scope("read"))], context: Context
+    caller: Annotated[Caller, Depends(require_scope("read"))], context: Context
 ) -> Listed[CredentialShape]:
     """List the valid sessions and tokens of the token's owner that the token can access, newest first."""
-    found = credentials.list_credentials(context.service, actor_from(caller.identity))
+    found = credentials.list_credentials(context.service, build_actor(caller.identity))
     return Listed(items=[CredentialShape.model_validate(each) for each in found])
 
 
 @router.delete("/me/credentials/{credential_id}", status_code=204, response_class=Response)
 def end_credential(
-    caller: Annotated[Caller, Depends(with_scope("sign-in"))], context: Context, credential_id: RowName
+    caller: Annotated[Caller, Depends(require_scope("sign-in"))], context: Context, credential_id: RowName
 ) -> None:
     """End a session or a token of the token's owner. This can be the token of the request itself."""
-    credentials.end_credential(context.service, actor_from(caller.identity), credential_id)
+    credentials.end_credential(context.service, build_actor(caller.identity), credential_id)

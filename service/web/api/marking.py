@@ -14,28 +14,28 @@ from service.operations.appeals import LONGEST_TEXT
 from service.operations.grades import LONGEST_COMMENT, LONGEST_REASON, CommentRequest, MarksRequest
 from service.operations.types import Role
 from service.web.access import HIGHEST_NUMBER, RowName, RowNumber
-from service.web.api.shapes import Shape, like
-from service.web.api_access import CallerInCourse, in_course
-from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
+from service.web.api.shapes import Shape, build_example_config
+from service.web.api_access import CallerInCourse, require_role
+from service.web.api_routes import After, Limit, Listed, api_router, build_list_page, decode_cursor
 from service.web.context import Context, WebContext
 
 router = api_router("marking")
-Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
-Marks = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "mark"))]
-StudentReads = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "read"))]
-StudentSubmits = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "submit"))]
+ReadAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "read"))]
+MarkAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "mark"))]
+StudentReadAccess = Annotated[CallerInCourse, Depends(require_role(Role.STUDENT, "read"))]
+StudentSubmitAccess = Annotated[CallerInCourse, Depends(require_role(Role.STUDENT, "submit"))]
 CriterionId = Annotated[str, Path(min_length=1, max_length=200)]
-_SEEN = "ID of the last override that you read, 0 for none. If it has changed since, the response is 409."
+_SEEN_DESCRIPTION = "ID of the last override that you read, 0 for none. If it has changed since, the response is 409."
 
 
-def _owning(here: StudentSubmits, context: Context, submission_id: RowNumber) -> CallerInCourse:
-    appeals.show_own(context.service, here.acting, here.course_id, submission_id)
+def _require_owner(here: StudentSubmitAccess, context: Context, submission_id: RowNumber) -> CallerInCourse:
+    appeals.show_own(context.service, here.actor, here.course_id, submission_id)
     return here
 
 
 #: Checked before the body is read, so that only the submission's owner gets errors about the body.
-Owns = Annotated[CallerInCourse, Depends(_owning)]
-GRADE = "/courses/{course_id}/grades/{job_id}"
+OwnerAccess = Annotated[CallerInCourse, Depends(_require_owner)]
+GRADE_PATH = "/courses/{course_id}/grades/{job_id}"
 
 
 class OverrideShape(Shape):
@@ -89,7 +89,7 @@ class MarkingShape(Shape):
     comments: list[CommentShape]
     history: list[MarkingStepShape]
 
-    model_config = like(
+    model_config = build_example_config(
         criteria=[
             {
                 "criterion": "named",
@@ -117,7 +117,7 @@ class MarksAsked(BaseModel):
 
     marks: Decimal | None = Field(ge=0, le=10_000, examples=[5])
     reason: str = Field(min_length=1, max_length=LONGEST_REASON, examples=["The last one is named."])
-    seen: int | None = Field(None, ge=0, le=HIGHEST_NUMBER, description=_SEEN)
+    seen: int | None = Field(None, ge=0, le=HIGHEST_NUMBER, description=_SEEN_DESCRIPTION)
 
 
 class CommentAsked(BaseModel):
@@ -142,7 +142,7 @@ class AppealShape(Shape):
     answer: str | None
     answered_at: datetime | None
 
-    model_config = like(
+    model_config = build_example_config(
         id=1,
         submission_id=3,
         who="ada",
@@ -163,51 +163,51 @@ class TextAsked(BaseModel):
     text: str = Field(min_length=1, max_length=LONGEST_TEXT, examples=["Please look at the last shape again."])
 
 
-@router.get(GRADE + "/marking")
-def marking(here: Reads, context: Context, job_id: RowName) -> MarkingShape:
+@router.get(GRADE_PATH + "/marking")
+def marking(here: ReadAccess, context: Context, job_id: RowName) -> MarkingShape:
     """Return the marks of a grade before and after adjustments, and the comments on it."""
-    return MarkingShape.model_validate(grades.show_marking(context.service, here.acting, here.course_id, job_id))
+    return MarkingShape.model_validate(grades.show_marking(context.service, here.actor, here.course_id, job_id))
 
 
-@router.put(GRADE + "/marking/{criterion}")
+@router.put(GRADE_PATH + "/marking/{criterion}")
 def set_marks(
-    here: Marks, context: Context, job_id: RowName, criterion: CriterionId, asked: MarksAsked
+    here: MarkAccess, context: Context, job_id: RowName, criterion: CriterionId, asked: MarksAsked
 ) -> MarkingShape:
     """Adjust the marks of a criterion of this submission, or excuse it. Regrades keep the adjustment."""
     wanted = MarksRequest(criterion, asked.marks, asked.reason, asked.seen)
-    return MarkingShape.model_validate(grades.set_marks(context.service, here.acting, here.course_id, job_id, wanted))
+    return MarkingShape.model_validate(grades.set_marks(context.service, here.actor, here.course_id, job_id, wanted))
 
 
-@router.delete(GRADE + "/marking/{criterion}")
+@router.delete(GRADE_PATH + "/marking/{criterion}")
 def withdraw(
-    here: Marks,
+    here: MarkAccess,
     context: Context,
     job_id: RowName,
     criterion: CriterionId,
-    seen: Annotated[int | None, Query(ge=0, le=HIGHEST_NUMBER, description=_SEEN)] = None,
+    seen: Annotated[int | None, Query(ge=0, le=HIGHEST_NUMBER, description=_SEEN_DESCRIPTION)] = None,
 ) -> MarkingShape:
     """Remove the adjustment of a criterion. The grader's marks apply again."""
-    changed = grades.withdraw(context.service, here.acting, here.course_id, job_id, criterion, seen)
+    changed = grades.withdraw_override(context.service, here.actor, here.course_id, job_id, criterion, seen)
     return MarkingShape.model_validate(changed)
 
 
-@router.post(GRADE + "/comments", status_code=201)
-def comment(here: Marks, context: Context, job_id: RowName, asked: CommentAsked) -> MarkingShape:
+@router.post(GRADE_PATH + "/comments", status_code=201)
+def comment(here: MarkAccess, context: Context, job_id: RowName, asked: CommentAsked) -> MarkingShape:
     """Add a comment to the student."""
     wanted = CommentRequest(asked.text, asked.criterion)
-    return MarkingShape.model_validate(grades.comment(context.service, here.acting, here.course_id, job_id, wanted))
+    return MarkingShape.model_validate(grades.add_comment(context.service, here.actor, here.course_id, job_id, wanted))
 
 
-@router.delete(GRADE + "/comments/{comment_id}")
-def uncomment(here: Marks, context: Context, job_id: RowName, comment_id: RowNumber) -> MarkingShape:
+@router.delete(GRADE_PATH + "/comments/{comment_id}")
+def uncomment(here: MarkAccess, context: Context, job_id: RowName, comment_id: RowNumber) -> MarkingShape:
     """Remove a comment."""
-    changed = grades.withdraw_comment(context.service, here.acting, here.course_id, job_id, comment_id)
+    changed = grades.withdraw_comment(context.service, here.actor, here.course_id, job_id, comment_id)
     return MarkingShape.model_validate(changed)
 
 
 @router.get("/courses/{course_id}/appeals")
 def list_appeals(
-    here: Reads,
+    here: ReadAccess,
     context: Context,
     answered: Annotated[
         bool, Query(description="Return answered appeals, newest first; otherwise open appeals.")
@@ -216,37 +216,37 @@ def list_appeals(
     after: After = "",
 ) -> Listed[AppealShape]:
     """List appeals: the open ones, oldest first, or the answered ones, newest first."""
-    where = (context.service, here.acting, here.course_id)
+    where = (context.service, here.actor, here.course_id)
     if answered:
-        last = place_after(after, datetime, int)
+        last = decode_cursor(after, datetime, int)
         found = appeals.list_answered(*where, limit=limit + 1, after=last)
-        listed = page_of(found, limit, lambda each: [each.answered_at or each.asked_at, each.id])
+        listed = build_list_page(found, limit, lambda each: [each.answered_at or each.asked_at, each.id])
     else:
-        place = place_after(after, int)
+        place = decode_cursor(after, int)
         found = appeals.list_open(*where, limit=limit + 1, after=None if place is None else place[0])
-        listed = page_of(found, limit, lambda each: [each.id])
+        listed = build_list_page(found, limit, lambda each: [each.id])
     return Listed(items=[AppealShape.model_validate(each) for each in listed.items], next=listed.next)
 
 
 @router.post("/courses/{course_id}/appeals/{appeal_id}/answer", status_code=204)
-def answer(here: Marks, context: Context, appeal_id: RowNumber, asked: TextAsked) -> None:
+def answer(here: MarkAccess, context: Context, appeal_id: RowNumber, asked: TextAsked) -> None:
     """Answer an open appeal and close it."""
-    appeals.answer(context.service, here.acting, here.course_id, appeal_id, asked.text)
+    appeals.answer(context.service, here.actor, here.course_id, appeal_id, asked.text)
 
 
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}/appeals")
-def own_appeals(here: StudentReads, context: Context, submission_id: RowNumber) -> Listed[AppealShape]:
+def own_appeals(here: StudentReadAccess, context: Context, submission_id: RowNumber) -> Listed[AppealShape]:
     """List the appeals of the token's owner for a submission, with answers, newest first."""
-    return _own(context, here, submission_id)
+    return _list_own_appeals(context, here, submission_id)
 
 
 @router.post("/courses/{course_id}/mine/submissions/{submission_id}/appeals", status_code=201)
-def ask(here: Owns, context: Context, submission_id: RowNumber, asked: TextAsked) -> Listed[AppealShape]:
+def ask(here: OwnerAccess, context: Context, submission_id: RowNumber, asked: TextAsked) -> Listed[AppealShape]:
     """Appeal a grade."""
-    appeals.ask(context.service, here.acting, here.course_id, submission_id, asked.text)
-    return _own(context, here, submission_id)
+    appeals.submit(context.service, here.actor, here.course_id, submission_id, asked.text)
+    return _list_own_appeals(context, here, submission_id)
 
 
-def _own(context: WebContext, here: CallerInCourse, submission_id: int) -> Listed[AppealShape]:
-    found = appeals.show_own(context.service, here.acting, here.course_id, submission_id)
+def _list_own_appeals(context: WebContext, here: CallerInCourse, submission_id: int) -> Listed[AppealShape]:
+    found = appeals.show_own(context.service, here.actor, here.course_id, submission_id)
     return Listed(items=[AppealShape.model_validate(each) for each in found.appeals])

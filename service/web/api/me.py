@@ -8,9 +8,9 @@ from fastapi import Depends
 from pydantic import Field
 
 from service.operations import courses as own_courses
-from service.web.api.shapes import CourseShape, Shape, like
-from service.web.api_access import Called, Caller, with_scope
-from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
+from service.web.api.shapes import CourseShape, Shape, build_example_config
+from service.web.api_access import AuthenticatedCaller, Caller, require_scope
+from service.web.api_routes import After, Limit, Listed, api_router, build_list_page, decode_cursor
 from service.web.context import Context, WebContext
 
 router = api_router("me")
@@ -24,7 +24,7 @@ class MeShape(Shape):
     scopes: list[str] = Field(description="Scopes of the token.")
     courses: list[CourseShape]
 
-    model_config = like(
+    model_config = build_example_config(
         name="Grace Hopper",
         operator=False,
         scopes=["mark", "read"],
@@ -33,27 +33,27 @@ class MeShape(Shape):
 
 
 @router.get("/me")
-def me(caller: Called, context: Context) -> MeShape:
+def me(caller: AuthenticatedCaller, context: Context) -> MeShape:
     """Return the owner of the token, and its permissions."""
     identity = caller.identity
     return MeShape(
         name=identity.name,
         operator=identity.operator,
         scopes=sorted(identity.scopes or ()),
-        courses=_courses(context, caller),
+        courses=_list_courses(context, caller),
     )
 
 
 @router.get("/courses")
 def courses(
-    caller: Annotated[Caller, Depends(with_scope("read"))], context: Context, limit: Limit = 50, after: After = ""
+    caller: Annotated[Caller, Depends(require_scope("read"))], context: Context, limit: Limit = 50, after: After = ""
 ) -> Listed[CourseShape]:
     """List the courses in which the token's owner has a role, in the order of creation."""
-    place = place_after(after, int)
+    place = decode_cursor(after, int)
     beyond = 0 if place is None else place[0]
-    found = [each for each in _courses(context, caller) if each.id > beyond]
-    return page_of(found[: limit + 1], limit, lambda each: [each.id])
+    found = [each for each in _list_courses(context, caller) if each.id > beyond]
+    return build_list_page(found[: limit + 1], limit, lambda each: [each.id])
 
 
-def _courses(context: WebContext, caller: Caller) -> list[CourseShape]:
-    return [CourseShape.model_validate(each) for each in own_courses.list_own(context.service, caller.acting)]
+def _list_courses(context: WebContext, caller: Caller) -> list[CourseShape]:
+    return [CourseShape.model_validate(each) for each in own_courses.list_own(context.service, caller.actor)]

@@ -10,23 +10,23 @@ from pydantic import BaseModel, Field
 
 from service.operations import batches, courses, system
 from service.operations.courses import MemberRequest
-from service.operations.types import JobState, Lane
+from service.operations.types import JobQueue, JobState
 from service.web.api.batches import RetriedShape
-from service.web.api.shapes import Shape, example_of, like
-from service.web.api.sign_in_links import LinkShape, link_shape
-from service.web.api_access import Caller, operating
-from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, page_of, place_after
+from service.web.api.shapes import Shape, build_example_config, find_example
+from service.web.api.sign_in_links import LinkShape, to_link_shape
+from service.web.api_access import Caller, require_operator
+from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, build_list_page, decode_cursor
 from service.web.context import Context
 
 router = api_router("operator")
-Reads = Annotated[Caller, Depends(operating("read"))]
-Manages = Annotated[Caller, Depends(operating("manage"))]
+ReadAccess = Annotated[Caller, Depends(require_operator("read"))]
+ManageAccess = Annotated[Caller, Depends(require_operator("manage"))]
 
 
 class LaneShape(Shape):
     """Load of a job queue: numbers of queued and running jobs."""
 
-    lane: Lane
+    lane: JobQueue
     queued: int
     running: int
     oldest_seconds: float = Field(description="Waiting time of the oldest job that a worker can claim, in seconds.")
@@ -60,7 +60,7 @@ class ServiceShape(Shape):
     host_faults: int = Field(description="Number of grading attempts that failed because of the system, for all jobs.")
     paused_batches: int
 
-    model_config = like(
+    model_config = build_example_config(
         version="0.3.0",
         ready=True,
         lanes=[{"lane": "batch", "queued": 12, "running": 2, "oldest_seconds": 3.5}],
@@ -88,7 +88,7 @@ class WorkerShape(Shape):
     )
     problem: str = Field(description="Reason for a required restart; empty if there is no problem.")
 
-    model_config = like(
+    model_config = build_example_config(
         name="worker@host",
         host="host",
         concurrency=2,
@@ -108,13 +108,13 @@ class DeadShape(Shape):
     job_id: str
     course: str
     batch_id: str | None
-    lane: Lane
+    lane: JobQueue
     error: str
     attempts: int
     worker: str
     finished_at: datetime | None
 
-    model_config = like(
+    model_config = build_example_config(
         job_id="7xk2v9q4m0ab",
         course="TM129",
         batch_id="0c5w1r8zt3ye",
@@ -140,7 +140,7 @@ class NamedCourseShape(Shape):
     instructors: int
     students: int
 
-    model_config = like(id=1, name="TM129", instructors=2, students=180)
+    model_config = build_example_config(id=1, name="TM129", instructors=2, students=180)
 
 
 class InstructorAsked(BaseModel):
@@ -158,7 +158,7 @@ class SameIdShape(Shape):
     enrolment: int
     name: str
 
-    model_config = like(course="TM111", enrolment=4, name="Grace Hopper")
+    model_config = build_example_config(course="TM111", enrolment=4, name="Grace Hopper")
 
 
 class NewInstructorShape(Shape):
@@ -172,13 +172,13 @@ class NewInstructorShape(Shape):
         description="Other persons with the same ID, until an operator joins them with this person."
     )
 
-    model_config = like(id="grace", course=1, enrolment=9, link=example_of(LinkShape), elsewhere=[])
+    model_config = build_example_config(id="grace", course=1, enrolment=9, link=find_example(LinkShape), elsewhere=[])
 
 
 @router.get("/operator")
-def service(operator: Reads, context: Context) -> ServiceShape:
+def service(operator: ReadAccess, context: Context) -> ServiceShape:
     """Return the system status: queue lengths and the results of the system checks."""
-    view = system.show(context.service, operator.acting)
+    view = system.show(context.service, operator.actor)
     found = view.metrics
     return ServiceShape(
         version=view.version,
@@ -190,7 +190,7 @@ def service(operator: Reads, context: Context) -> ServiceShape:
                 running=found.queue.jobs.get((lane, JobState.RUNNING), 0),
                 oldest_seconds=found.queue.oldest_seconds.get(lane, 0.0),
             )
-            for lane in Lane
+            for lane in JobQueue
         ],
         findings=[FindingShape.model_validate(finding) for finding in view.findings],
         tryouts=TryoutLaneShape.model_validate(view.test_runs),
@@ -201,9 +201,9 @@ def service(operator: Reads, context: Context) -> ServiceShape:
 
 
 @router.get("/operator/workers")
-def list_workers(operator: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[WorkerShape]:
+def list_workers(operator: ReadAccess, context: Context, limit: Limit = 50, after: After = "") -> Listed[WorkerShape]:
     """List the workers, by name."""
-    place = place_after(after, str)
+    place = decode_cursor(after, str)
     shown = [
         WorkerShape(
             name=each.worker.name,
@@ -217,29 +217,29 @@ def list_workers(operator: Reads, context: Context, limit: Limit = 50, after: Af
             quarantine=None if quarantine is None else quarantine.reason,
             problem=each.worker.problem,
         )
-        for each, quarantine in system.list_workers(context.service, operator.acting)
+        for each, quarantine in system.list_workers(context.service, operator.actor)
         if place is None or each.worker.name > place[0]
     ]
-    return page_of(shown[: limit + 1], limit, lambda each: [each.name])
+    return build_list_page(shown[: limit + 1], limit, lambda each: [each.name])
 
 
 @router.get("/operator/courses")
-def list_courses(operator: Reads, context: Context) -> Listed[NamedCourseShape]:
+def list_courses(operator: ReadAccess, context: Context) -> Listed[NamedCourseShape]:
     """List all courses, by name."""
-    found = courses.list_courses(context.service, operator.acting)
+    found = courses.list_courses(context.service, operator.actor)
     return Listed(items=[NamedCourseShape.model_validate(each) for each in found])
 
 
 @router.post("/operator/courses", status_code=201, openapi_extra=dict(NO_KEY))
-def add_instructor(operator: Manages, context: Context, asked: InstructorAsked) -> NewInstructorShape:
+def add_instructor(operator: ManageAccess, context: Context, asked: InstructorAsked) -> NewInstructorShape:
     """Add an instructor to a course and return a single-use sign-in link. Creates the course if it does not exist."""
     request = MemberRequest(asked.course, asked.id, asked.name)
-    added = courses.add_member(context.service, operator.acting, request)
+    added = courses.add_member(context.service, operator.actor, request)
     return NewInstructorShape(
         id=added.member.id,
         course=added.member.course_id,
         enrolment=added.member.enrolment_id,
-        link=link_shape(context, added.secret),
+        link=to_link_shape(context, added.secret),
         elsewhere=[
             SameIdShape(course=name, enrolment=each.enrolment_id, name=each.name) for name, each in added.elsewhere
         ],
@@ -247,14 +247,14 @@ def add_instructor(operator: Manages, context: Context, asked: InstructorAsked) 
 
 
 @router.get("/operator/dead")
-def list_dead(operator: Reads, context: Context) -> Listed[DeadShape]:
+def list_dead(operator: ReadAccess, context: Context) -> Listed[DeadShape]:
     """List the newest failed jobs of all courses."""
-    found = system.list_failed(context.service, operator.acting)
+    found = system.list_failed(context.service, operator.actor)
     return Listed(items=[DeadShape.model_validate(each) for each in found])
 
 
 @router.post("/operator/retry")
-def retry(operator: Manages, context: Context, asked: RetryAsked | None = None) -> RetriedShape:
+def retry(operator: ManageAccess, context: Context, asked: RetryAsked | None = None) -> RetriedShape:
     """Queue the failed jobs of one batch or of all batches again."""
     batch_id = None if asked is None else asked.batch_id
-    return RetriedShape.model_validate(batches.retry_dead(context.service, operator.acting, batch_id))
+    return RetriedShape.model_validate(batches.retry_dead(context.service, operator.actor, batch_id))

@@ -12,14 +12,14 @@ from service.operations.people import JoinRequest, PersonView
 from service.operations.types import Role
 from service.web.access import RowNumber
 from service.web.api.credentials import CredentialShape
-from service.web.api.shapes import Shape, example_of, like
-from service.web.api_access import Caller, operating
+from service.web.api.shapes import Shape, build_example_config, find_example
+from service.web.api_access import Caller, require_operator
 from service.web.api_routes import api_router
 from service.web.context import Context
 
 router = api_router("operator")
-Reads = Annotated[Caller, Depends(operating("read"))]
-Manages = Annotated[Caller, Depends(operating("manage"))]
+ReadAccess = Annotated[Caller, Depends(require_operator("read"))]
+ManageAccess = Annotated[Caller, Depends(require_operator("manage"))]
 
 
 class PersonEnrolmentShape(Shape):
@@ -31,7 +31,7 @@ class PersonEnrolmentShape(Shape):
     name: str
     role: Role
 
-    model_config = like(enrolment=9, course="TM129", id="grace", name="Grace Hopper", role="instructor")
+    model_config = build_example_config(enrolment=9, course="TM129", id="grace", name="Grace Hopper", role="instructor")
 
 
 class PersonShape(Shape):
@@ -41,8 +41,10 @@ class PersonShape(Shape):
     credentials: list[CredentialShape]
     from_platform: bool = Field(description="Whether this person signs in through a learning platform.")
 
-    model_config = like(
-        enrolments=[example_of(PersonEnrolmentShape)], credentials=[example_of(CredentialShape)], from_platform=False
+    model_config = build_example_config(
+        enrolments=[find_example(PersonEnrolmentShape)],
+        credentials=[find_example(CredentialShape)],
+        from_platform=False,
     )
 
 
@@ -59,7 +61,7 @@ class SignedOutShape(Shape):
 
     ended: int
 
-    model_config = like(ended=3)
+    model_config = build_example_config(ended=3)
 
 
 class JoinAsked(BaseModel):
@@ -71,35 +73,35 @@ class JoinAsked(BaseModel):
 
 @router.get("/operator/people")
 def find(
-    operator: Reads,
+    operator: ReadAccess,
     context: Context,
     course: Annotated[str, Query(min_length=1, max_length=100)],
     id: Annotated[str, Query(min_length=1, max_length=200)],
 ) -> PersonShape:
     """Return the person with an ID in a course."""
-    actor = operator.acting
+    actor = operator.actor
     member = people.find(context.service, actor, course, id)
-    return _shape(people.show(context.service, actor, member.enrolment_id))
+    return _to_person_shape(people.show(context.service, actor, member.enrolment_id))
 
 
 @router.post("/operator/people/{member_id}/sign-out")
 def sign_out(
-    operator: Manages, context: Context, member_id: RowNumber, asked: SignOutAsked | None = None
+    operator: ManageAccess, context: Context, member_id: RowNumber, asked: SignOutAsked | None = None
 ) -> SignedOutShape:
     """End all links, sessions and tokens of a person."""
     release = asked is not None and asked.release
-    return SignedOutShape(ended=people.sign_out(context.service, operator.acting, member_id, release=release))
+    return SignedOutShape(ended=people.sign_out(context.service, operator.actor, member_id, release=release))
 
 
 @router.post("/operator/people/{member_id}/join")
-def join(operator: Manages, context: Context, member_id: RowNumber, asked: JoinAsked) -> PersonShape:
+def join(operator: ManageAccess, context: Context, member_id: RowNumber, asked: JoinAsked) -> PersonShape:
     """Merge two persons in different courses into one, and sign both out."""
-    actor = operator.acting
+    actor = operator.actor
     people.join(context.service, actor, JoinRequest(member_id, asked.other, asked.from_platform))
-    return _shape(people.show(context.service, actor, member_id))
+    return _to_person_shape(people.show(context.service, actor, member_id))
 
 
-def _shape(view: PersonView) -> PersonShape:
+def _to_person_shape(view: PersonView) -> PersonShape:
     return PersonShape(
         enrolments=[
             PersonEnrolmentShape(enrolment=each.enrolment_id, course=name, id=each.id, name=each.name, role=each.role)

@@ -9,24 +9,24 @@ from typing import Annotated, Literal
 from fastapi import Depends, Query
 from pydantic import Field
 
-from service.grading.statistics import PASS_SHARE
+from service.grading.class_statistics import PASS_SHARE
 from service.operations import batch_views, regrades
-from service.operations.batches import foresee
+from service.operations.batches import preview_submissions
 from service.operations.types import Role
 from service.web.access import RowName
 from service.web.api.batches import StatisticsShape
 from service.web.api.regrades import PublishedShape
-from service.web.api.shapes import BATCH_EXAMPLE, RefusalShape, Shape, example_of, like
-from service.web.api_access import CallerInCourse, in_course
+from service.web.api.shapes import BATCH_EXAMPLE, RefusalShape, Shape, build_example_config, find_example
+from service.web.api_access import CallerInCourse, require_role
 from service.web.api_routes import NO_KEY, api_router
-from service.web.api_uploads import LARGEST_BATCH, ZIP_BODY, Uploaded
+from service.web.api_uploads import LARGEST_BATCH, ZIP_BODY, UploadedZip
 from service.web.batch_uploads import read_upload
 from service.web.context import Context
 from service.web.request_bodies import takes_upload
 
 router = api_router("batches")
-Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
-Submits = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "submit"))]
+ReadAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "read"))]
+SubmitAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "submit"))]
 
 
 class ExpectedShape(Shape):
@@ -47,7 +47,7 @@ class PreflightShape(Shape):
     submissions: list[ExpectedShape]
     refusals: list[RefusalShape]
 
-    model_config = like(
+    model_config = build_example_config(
         submissions=[
             {
                 "student": "ada",
@@ -101,7 +101,7 @@ class OverviewShape(Shape):
 
     classes: list[ClassShape]
 
-    model_config = like(classes=[])
+    model_config = build_example_config(classes=[])
 
 
 class PublicationShape(Shape):
@@ -110,15 +110,15 @@ class PublicationShape(Shape):
     counts: PublishedShape
     students: int
 
-    model_config = like(counts=example_of(PublishedShape), students=19)
+    model_config = build_example_config(counts=find_example(PublishedShape), students=19)
 
 
 @router.post("/courses/{course_id}/batches/preflight", openapi_extra=ZIP_BODY | dict(NO_KEY))
 @takes_upload(LARGEST_BATCH, Role.INSTRUCTOR)
 def look_first(
-    here: Submits,
+    here: SubmitAccess,
     context: Context,
-    upload: Uploaded,
+    upload: UploadedZip,
     assignment: Annotated[
         str,
         Query(
@@ -128,17 +128,17 @@ def look_first(
     ] = "",
 ) -> PreflightShape:
     """Check a zip with a submission for each student, without submitting it."""
-    checked = read_upload(context, here.acting, here.course_id, upload, assignment)
+    checked = read_upload(context, here.actor, here.course_id, upload, assignment)
     return PreflightShape(
         submissions=[
             ExpectedShape(
-                student=each.asked.submission.student,
-                name=each.asked.student.name,
-                source=each.asked.source,
-                assignment=each.asked.assignment.id,
-                **asdict(each.ahead),
+                student=each.request.submission.student,
+                name=each.request.student.name,
+                source=each.request.source,
+                assignment=each.request.assignment.id,
+                **asdict(each.intake_preview),
             )
-            for each in foresee(context.service, here.acting, here.course_id, checked)
+            for each in preview_submissions(context.service, here.actor, here.course_id, checked)
         ],
         refusals=[RefusalShape.model_validate(refusal) for refusal in checked.refusals],
     )
@@ -146,7 +146,7 @@ def look_first(
 
 @router.get("/courses/{course_id}/batches/{batch_id}/overview")
 def show_overview(
-    here: Reads,
+    here: ReadAccess,
     context: Context,
     batch_id: RowName,
     at_least: Annotated[
@@ -154,7 +154,7 @@ def show_overview(
     ] = int(PASS_SHARE * 100),
 ) -> OverviewShape:
     """Return statistics of a batch: marks, criteria, causes of lost marks, outliers and missing submissions."""
-    found = batch_views.show_overview(context.service, here.acting, here.course_id, batch_id, Decimal(at_least) / 100)
+    found = batch_views.show_overview(context.service, here.actor, here.course_id, batch_id, Decimal(at_least) / 100)
     return OverviewShape(
         classes=[
             ClassShape(
@@ -171,7 +171,7 @@ def show_overview(
 
 
 @router.get("/courses/{course_id}/batches/{batch_id}/publish")
-def would_publish(here: Reads, context: Context, batch_id: RowName) -> PublicationShape:
+def would_publish(here: ReadAccess, context: Context, batch_id: RowName) -> PublicationShape:
     """Return the effect of publishing the batch now, without publishing it."""
-    found = regrades.preview(context.service, here.acting, here.course_id, batch_id)
+    found = regrades.preview_publication(context.service, here.actor, here.course_id, batch_id)
     return PublicationShape.model_validate(found)

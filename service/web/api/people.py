@@ -14,24 +14,24 @@ from service.operations import people, people_views, policies
 from service.operations.policies import ExtensionRequest, PolicyLimits
 from service.operations.types import JobState, Role
 from service.web.access import RowNumber
-from service.web.api.shapes import Shape, like
-from service.web.api_access import CallerInCourse, in_course
-from service.web.api_routes import After, Limit, Listed, api_router, page_of, place_after
+from service.web.api.shapes import Shape, build_example_config
+from service.web.api_access import CallerInCourse, require_role
+from service.web.api_routes import After, Limit, Listed, api_router, build_list_page, decode_cursor
 from service.web.context import Context
 from submissions.student_identity import Student
 
 router = api_router("people")
-Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
-Manages = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "manage"))]
+ReadAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "read"))]
+ManageAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "manage"))]
 
 
-def _of_these_times(moment: datetime) -> datetime:
+def _check_year(moment: datetime) -> datetime:
     if not 2000 <= moment.year < 2200:
         raise ValueError("expected a moment of these centuries")
     return moment
 
 
-Moment = Annotated[AwareDatetime, AfterValidator(_of_these_times)]
+Moment = Annotated[AwareDatetime, AfterValidator(_check_year)]
 
 
 class MemberShape(Shape):
@@ -43,7 +43,9 @@ class MemberShape(Shape):
     email: str
     role: Role
 
-    model_config = like(enrolment=7, id="ada", name="Ada Lovelace", email="ada@example.org", role="student")
+    model_config = build_example_config(
+        enrolment=7, id="ada", name="Ada Lovelace", email="ada@example.org", role="student"
+    )
 
 
 class GradingShape(Shape):
@@ -66,7 +68,7 @@ class ExtensionShape(Shape):
     due_at: datetime | None
     more_attempts: int
 
-    model_config = like(assignment="shape-recognition", due_at="2026-12-07T17:00:00Z", more_attempts=1)
+    model_config = build_example_config(assignment="shape-recognition", due_at="2026-12-07T17:00:00Z", more_attempts=1)
 
 
 class StudentShape(MemberShape):
@@ -76,7 +78,7 @@ class StudentShape(MemberShape):
     some_hidden: bool = Field(description="Whether the course has assignments with hidden names.")
     extensions: list[ExtensionShape]
 
-    model_config = like(
+    model_config = build_example_config(
         enrolment=7,
         id="ada",
         name="Ada Lovelace",
@@ -107,7 +109,7 @@ class EnrolledShape(Shape):
 
     students: int
 
-    model_config = like(students=1)
+    model_config = build_example_config(students=1)
 
 
 class PolicyShape(Shape):
@@ -121,7 +123,9 @@ class PolicyShape(Shape):
     )
     cool_down_seconds: float = Field(0.0, ge=0, le=600_000, description="Minimum time between submissions, in seconds.")
 
-    model_config = like(assignment="", due_at="2026-11-30T17:00:00Z", late_days=2, attempts=5, cool_down_seconds=600)
+    model_config = build_example_config(
+        assignment="", due_at="2026-11-30T17:00:00Z", late_days=2, attempts=5, cool_down_seconds=600
+    )
 
 
 class PolicyAsked(PolicyShape):
@@ -147,32 +151,32 @@ class LimitsShape(Shape):
     attempts: int | None
     cool_down_seconds: float
 
-    model_config = like(
+    model_config = build_example_config(
         due_at="2026-12-07T17:00:00Z", closed_at="2026-12-09T17:00:00Z", late_days=2, attempts=6, cool_down_seconds=600
     )
 
 
 @router.get("/courses/{course_id}/people")
-def list_people(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[MemberShape]:
+def list_people(here: ReadAccess, context: Context, limit: Limit = 50, after: After = "") -> Listed[MemberShape]:
     """List the members of the course, in the order of enrolment."""
-    place = place_after(after, int)
-    actor, start = here.acting, 0 if place is None else place[0]
+    place = decode_cursor(after, int)
+    actor, start = here.actor, 0 if place is None else place[0]
     found = people_views.list_members_after(context.service, actor, here.course_id, start, limit + 1)
-    return page_of([MemberShape.model_validate(each) for each in found], limit, lambda each: [each.enrolment])
+    return build_list_page([MemberShape.model_validate(each) for each in found], limit, lambda each: [each.enrolment])
 
 
 @router.post("/courses/{course_id}/people", status_code=201)
-def enrol(here: Manages, context: Context, asked: EnrolAsked) -> EnrolledShape:
+def enrol(here: ManageAccess, context: Context, asked: EnrolAsked) -> EnrolledShape:
     """Enrol students. The names and e-mail addresses of enrolled students are updated."""
     students = [Student(each.id, each.name, each.email) for each in asked.students]
-    people.enrol(context.service, here.acting, here.course_id, students)
+    people.enrol(context.service, here.actor, here.course_id, students)
     return EnrolledShape(students=len(asked.students))
 
 
 @router.get("/courses/{course_id}/people/{enrolment_id}")
-def one_student(here: Reads, context: Context, enrolment_id: RowNumber) -> StudentShape:
+def one_student(here: ReadAccess, context: Context, enrolment_id: RowNumber) -> StudentShape:
     """Return a student with extensions and submissions. Submissions to assignments with hidden names are omitted."""
-    view = people_views.show_student(context.service, here.acting, here.course_id, enrolment_id)
+    view = people_views.show_student(context.service, here.actor, here.course_id, enrolment_id)
     return StudentShape.model_validate(
         asdict(view.member)
         | {"gradings": view.gradings, "some_hidden": view.some_hidden, "extensions": view.extensions}
@@ -181,50 +185,52 @@ def one_student(here: Reads, context: Context, enrolment_id: RowNumber) -> Stude
 
 @router.get("/courses/{course_id}/people/{enrolment_id}/limits/{assignment}")
 def limits(
-    here: Reads,
+    here: ReadAccess,
     context: Context,
     enrolment_id: RowNumber,
     assignment: Annotated[str, Path(min_length=1, max_length=100)],
 ) -> LimitsShape:
     """Return the limits of one student for an assignment: the policy with the student's extension."""
-    found = policies.show_limits(context.service, here.acting, here.course_id, enrolment_id, assignment)
+    found = policies.show_limits(context.service, here.actor, here.course_id, enrolment_id, assignment)
     return LimitsShape.model_validate(found)
 
 
 @router.post("/courses/{course_id}/people/{enrolment_id}/extensions", status_code=201)
-def extend(here: Manages, context: Context, enrolment_id: RowNumber, asked: ExtensionAsked) -> LimitsShape:
+def extend(here: ManageAccess, context: Context, enrolment_id: RowNumber, asked: ExtensionAsked) -> LimitsShape:
     """Allow one student more time or attempts."""
     request = ExtensionRequest(asked.assignment, asked.due_at, asked.more_attempts)
-    found = policies.extend(context.service, here.acting, here.course_id, enrolment_id, request)
+    found = policies.extend(context.service, here.actor, here.course_id, enrolment_id, request)
     return LimitsShape.model_validate(found)
 
 
 @router.get("/courses/{course_id}/policies")
-def list_policies(here: Reads, context: Context, limit: Limit = 50, after: After = "") -> Listed[PolicyShape]:
+def list_policies(here: ReadAccess, context: Context, limit: Limit = 50, after: After = "") -> Listed[PolicyShape]:
     """List the policies: deadline and attempts, by assignment."""
-    place = place_after(after, str)
-    found = policies.list_policies(context.service, here.acting, here.course_id)
-    left = [_policy(name, allowed) for name, allowed in sorted(found.items()) if place is None or name > place[0]]
-    return page_of(left[: limit + 1], limit, lambda each: [each.assignment])
+    place = decode_cursor(after, str)
+    found = policies.list_policies(context.service, here.actor, here.course_id)
+    left = [
+        _to_policy_shape(name, allowed) for name, allowed in sorted(found.items()) if place is None or name > place[0]
+    ]
+    return build_list_page(left[: limit + 1], limit, lambda each: [each.assignment])
 
 
 @router.put("/courses/{course_id}/policies")
-def set_policy(here: Manages, context: Context, asked: PolicyAsked) -> PolicyShape:
+def set_policy(here: ManageAccess, context: Context, asked: PolicyAsked) -> PolicyShape:
     """Set the policy of an assignment. Without an assignment, set the course's default policy."""
     allowed = PolicyLimits(asked.due_at, asked.late_days, asked.attempts, asked.cool_down_seconds)
-    policies.set_policy(context.service, here.acting, here.course_id, asked.assignment, allowed)
-    return _policy(asked.assignment, allowed)
+    policies.set_policy(context.service, here.actor, here.course_id, asked.assignment, allowed)
+    return _to_policy_shape(asked.assignment, allowed)
 
 
 @router.delete("/courses/{course_id}/policies", status_code=204, response_class=Response)
 def drop_policy(
-    here: Manages, context: Context, assignment: Annotated[str, Query(min_length=1, max_length=100)]
+    here: ManageAccess, context: Context, assignment: Annotated[str, Query(min_length=1, max_length=100)]
 ) -> None:
     """Remove the policy of an assignment; the course's default policy applies."""
-    policies.drop_policy(context.service, here.acting, here.course_id, assignment)
+    policies.drop_policy(context.service, here.actor, here.course_id, assignment)
 
 
-def _policy(assignment: str, allowed: PolicyLimits) -> PolicyShape:
+def _to_policy_shape(assignment: str, allowed: PolicyLimits) -> PolicyShape:
     return PolicyShape(
         assignment=assignment,
         due_at=allowed.due_at,

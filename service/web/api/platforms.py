@@ -10,25 +10,25 @@ from pydantic import BaseModel, Field
 from service.operations import platforms
 from service.operations.platforms import Registration
 from service.operations.types import Role
-from service.web.api.shapes import Shape, like
-from service.web.api_access import Caller, CallerInCourse, in_course, operating
-from service.web.api_routes import Described, Listed, api_router
+from service.web.api.shapes import Shape, build_example_config
+from service.web.api_access import Caller, CallerInCourse, require_operator, require_role
+from service.web.api_routes import Listed, ResponseDescriptions, api_router
 from service.web.context import Context
 
 router = api_router("platforms")
-OperatorReads = Annotated[Caller, Depends(operating("read"))]
-OperatorManages = Annotated[Caller, Depends(operating("manage"))]
-Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
-Manages = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "manage"))]
+OperatorReadAccess = Annotated[Caller, Depends(require_operator("read"))]
+OperatorManageAccess = Annotated[Caller, Depends(require_operator("manage"))]
+ReadAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "read"))]
+ManageAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "manage"))]
 Address = Annotated[str, Field(min_length=1, max_length=1000)]
-Registered = Annotated[str, Field(min_length=1, max_length=platforms.LONGEST_REGISTERED)]
-_SILENT: Described = {
+RegisteredText = Annotated[str, Field(min_length=1, max_length=platforms.LONGEST_REGISTERED)]
+_PLATFORM_ERRORS: ResponseDescriptions = {
     502: {
         "content": {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}},
         "description": "The platform did not complete the request.",
     }
 }
-_MOODLE = {
+_MOODLE_EXAMPLE = {
     "name": "Moodle",
     "issuer": "https://moodle.example.org",
     "client_id": "a1b2c3",
@@ -52,19 +52,19 @@ class PlatformShape(Shape):
     keys_url: str
     service_origins: list[str] = Field(description="Other addresses of its services for members and marks.")
 
-    model_config = like(id=1, **_MOODLE, service_origins=[])
+    model_config = build_example_config(id=1, **_MOODLE_EXAMPLE, service_origins=[])
 
 
 class PlatformAsked(BaseModel):
     """A learning platform to register. It replaces a registration with the same issuer and client ID."""
 
-    name: str = Field(min_length=1, max_length=200, examples=[_MOODLE["name"]])
-    issuer: Registered = Field(examples=[_MOODLE["issuer"]])
-    client_id: Registered = Field(examples=[_MOODLE["client_id"]])
-    deployments: list[Address] = Field(min_length=1, max_length=100, examples=[_MOODLE["deployments"]])
-    authorization_url: Address = Field(examples=[_MOODLE["authorization_url"]])
-    token_url: Address = Field(examples=[_MOODLE["token_url"]])
-    keys_url: Address = Field(examples=[_MOODLE["keys_url"]])
+    name: str = Field(min_length=1, max_length=200, examples=[_MOODLE_EXAMPLE["name"]])
+    issuer: RegisteredText = Field(examples=[_MOODLE_EXAMPLE["issuer"]])
+    client_id: RegisteredText = Field(examples=[_MOODLE_EXAMPLE["client_id"]])
+    deployments: list[Address] = Field(min_length=1, max_length=100, examples=[_MOODLE_EXAMPLE["deployments"]])
+    authorization_url: Address = Field(examples=[_MOODLE_EXAMPLE["authorization_url"]])
+    token_url: Address = Field(examples=[_MOODLE_EXAMPLE["token_url"]])
+    keys_url: Address = Field(examples=[_MOODLE_EXAMPLE["keys_url"]])
     service_origins: list[Address] = Field(
         [],
         max_length=20,
@@ -80,7 +80,7 @@ class CoursePlatformShape(Shape):
     members: bool = Field(description="Whether the platform provides the list of its members.")
     marks: bool = Field(description="Whether the platform accepts marks.")
 
-    model_config = like(name="Moodle", members=True, marks=True)
+    model_config = build_example_config(name="Moodle", members=True, marks=True)
 
 
 class EnrolledMembersShape(Shape):
@@ -89,7 +89,7 @@ class EnrolledMembersShape(Shape):
     members: int
     refused: list[str]
 
-    model_config = like(members=20, refused=[])
+    model_config = build_example_config(members=20, refused=[])
 
 
 class MarksOfAsked(BaseModel):
@@ -103,43 +103,43 @@ class SentShape(Shape):
 
     sent: int
 
-    model_config = like(sent=18)
+    model_config = build_example_config(sent=18)
 
 
 @router.get("/operator/platforms")
-def list_platforms(operator: OperatorReads, context: Context) -> Listed[PlatformShape]:
+def list_platforms(operator: OperatorReadAccess, context: Context) -> Listed[PlatformShape]:
     """List the registered platforms, by name."""
-    found = platforms.list_platforms(context.service, operator.acting)
+    found = platforms.list_platforms(context.service, operator.actor)
     return Listed(items=[PlatformShape.model_validate(each) for each in found])
 
 
 @router.post("/operator/platforms", status_code=201)
-def register(operator: OperatorManages, context: Context, asked: PlatformAsked) -> Listed[PlatformShape]:
+def register(operator: OperatorManageAccess, context: Context, asked: PlatformAsked) -> Listed[PlatformShape]:
     """Register a platform, or update the one with the same issuer and client ID. Returns all registered platforms."""
     lists = {"deployments": tuple(asked.deployments), "service_origins": tuple(asked.service_origins)}
     request = Registration(**(asked.model_dump() | lists))
-    found = platforms.register(context.service, operator.acting, request)
+    found = platforms.register(context.service, operator.actor, request)
     return Listed(items=[PlatformShape.model_validate(each) for each in found])
 
 
 @router.get("/courses/{course_id}/platform")
-def course_platform(here: Reads, context: Context) -> CoursePlatformShape:
+def course_platform(here: ReadAccess, context: Context) -> CoursePlatformShape:
     """Return the platform from which the course is launched, if there is one."""
-    link = platforms.show_course_platform(context.service, here.acting, here.course_id).link
+    link = platforms.show_course_platform(context.service, here.actor, here.course_id).link
     if link is None:
         return CoursePlatformShape(name=None, members=False, marks=False)
     marks = link.lineitems_url is not None
     return CoursePlatformShape(name=link.platform.name, members=link.members_url is not None, marks=marks)
 
 
-@router.post("/courses/{course_id}/platform/members", responses=_SILENT)
-def enrol_members(here: Manages, context: Context) -> EnrolledMembersShape:
+@router.post("/courses/{course_id}/platform/members", responses=_PLATFORM_ERRORS)
+def enrol_members(here: ManageAccess, context: Context) -> EnrolledMembersShape:
     """Enrol all members of the course on the platform."""
-    enrolled = platforms.enrol_members(context.service, here.acting, here.course_id)
+    enrolled = platforms.enrol_members(context.service, here.actor, here.course_id)
     return EnrolledMembersShape.model_validate(enrolled)
 
 
-@router.post("/courses/{course_id}/platform/marks", responses=_SILENT)
-def pass_back(here: Manages, context: Context, asked: MarksOfAsked) -> SentShape:
+@router.post("/courses/{course_id}/platform/marks", responses=_PLATFORM_ERRORS)
+def pass_back(here: ManageAccess, context: Context, asked: MarksOfAsked) -> SentShape:
     """Send the published marks of an assignment to the platform's gradebook."""
-    return SentShape(sent=platforms.pass_back(context.service, here.acting, here.course_id, asked.assignment))
+    return SentShape(sent=platforms.pass_back(context.service, here.actor, here.course_id, asked.assignment))

@@ -11,16 +11,16 @@ from service.operations import privacy
 from service.operations.privacy import StudentData
 from service.operations.types import Role
 from service.web.access import RowNumber
-from service.web.api.grades import ZIP
-from service.web.api.shapes import Shape, like
-from service.web.api_access import CallerInCourse, in_course
+from service.web.api.grades import ZIP_RESPONSES
+from service.web.api.shapes import Shape, build_example_config
+from service.web.api_access import CallerInCourse, require_role
 from service.web.api_routes import api_router
-from service.web.attachments import attachment
+from service.web.attachments import respond_with_attachment
 from service.web.context import Context
 
 router = api_router("privacy")
-Manages = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "manage"))]
-Reads = Annotated[CallerInCourse, Depends(in_course(Role.STUDENT, "read"))]
+ManageAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "manage"))]
+ReadAccess = Annotated[CallerInCourse, Depends(require_role(Role.STUDENT, "read"))]
 
 
 class ErasedShape(Shape):
@@ -29,32 +29,32 @@ class ErasedShape(Shape):
     submissions: int
     grades: int
 
-    model_config = like(submissions=4, grades=5)
+    model_config = build_example_config(submissions=4, grades=5)
 
 
-@router.get("/courses/{course_id}/mine/data", responses=ZIP, response_class=Response)
-def own_data(here: Reads, context: Context) -> Response:
+@router.get("/courses/{course_id}/mine/data", responses=ZIP_RESPONSES, response_class=Response)
+def own_data(here: ReadAccess, context: Context) -> Response:
     """Return the data of the token's owner in the course, as a zip of JSON, submissions and reports.
 
     Contains only the parts that the owner can see as a student.
     """
-    return _zip(privacy.export_own(context.service, here.acting, here.course_id))
+    return _respond_with_zip(privacy.export_own(context.service, here.actor, here.course_id))
 
 
-@router.get("/courses/{course_id}/people/{enrolment_id}/data", responses=ZIP, response_class=Response)
-def data(here: Manages, context: Context, enrolment_id: RowNumber) -> Response:
+@router.get("/courses/{course_id}/people/{enrolment_id}/data", responses=ZIP_RESPONSES, response_class=Response)
+def data(here: ManageAccess, context: Context, enrolment_id: RowNumber) -> Response:
     """Return the data of a student of the course, as visible to the student.
 
     Assignments with hidden names are omitted.
     """
-    return _zip(privacy.export_student(context.service, here.acting, here.course_id, enrolment_id))
+    return _respond_with_zip(privacy.export_student(context.service, here.actor, here.course_id, enrolment_id))
 
 
 @router.delete("/courses/{course_id}/people/{student_id}")
-def erase(here: Manages, context: Context, student_id: RowNumber) -> ErasedShape:
+def erase(here: ManageAccess, context: Context, student_id: RowNumber) -> ErasedShape:
     """Permanently delete a student's submissions, grades, recordings and personal data from the course."""
-    return ErasedShape.model_validate(privacy.erase_student(context.service, here.acting, here.course_id, student_id))
+    return ErasedShape.model_validate(privacy.erase_student(context.service, here.actor, here.course_id, student_id))
 
 
-def _zip(data: StudentData) -> Response:
-    return attachment(data.zip, f"student-{data.enrolment_id}.zip", "application/zip")
+def _respond_with_zip(data: StudentData) -> Response:
+    return respond_with_attachment(data.zip, f"student-{data.enrolment_id}.zip", "application/zip")

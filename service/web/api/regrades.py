@@ -15,25 +15,25 @@ from service.operations.exports import ExportRequest, download
 from service.operations.types import JobState, Role, Standing
 from service.reports.formats import FORMATS
 from service.web.access import RowName
-from service.web.api.shapes import Shape, like
-from service.web.api_access import CallerInCourse, in_course
-from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, page_of, place_after
+from service.web.api.shapes import Shape, build_example_config
+from service.web.api_access import CallerInCourse, require_role
+from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, build_list_page, decode_cursor
 from service.web.api_uploads import LARGEST_TABLE
-from service.web.attachments import attachment
+from service.web.attachments import respond_with_attachment
 from service.web.context import Context, WebContext
 from service.web.request_bodies import takes_upload
 
 router = api_router("batches")
-Reads = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "read"))]
-Marks = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "mark"))]
-_FILE: dict[int | str, dict[str, Any]] = {
+ReadAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "read"))]
+MarkAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "mark"))]
+_FILE_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {"description": "The file.", "content": {"*/*": {"schema": {"type": "string", "format": "binary"}}}}
 }
-_CSV = {"requestBody": {"required": True, "content": {"text/csv": {"schema": {"type": "string"}}}}, **NO_KEY}
-Form = Annotated[
+_CSV_BODY = {"requestBody": {"required": True, "content": {"text/csv": {"schema": {"type": "string"}}}}, **NO_KEY}
+FormatName = Annotated[
     str, Query(alias="format", max_length=40, description=f"One of {', '.join(sorted(FORMATS))}.", examples=["csv"])
 ]
-Published = Annotated[bool, Query(description="Export only published grades.")]
+PublishedOnly = Annotated[bool, Query(description="Export only published grades.")]
 
 
 class RegradeAsked(BaseModel):
@@ -55,7 +55,7 @@ class RegradedShape(Shape):
     other_assignment: int
     unfinished: int
 
-    model_config = like(batch_id="4pd83mzs7k1h", jobs=20, other_assignment=0, unfinished=0)
+    model_config = build_example_config(batch_id="4pd83mzs7k1h", jobs=20, other_assignment=0, unfinished=0)
 
 
 class RegradedOneShape(Shape):
@@ -63,7 +63,7 @@ class RegradedOneShape(Shape):
 
     job: str
 
-    model_config = like(job="4pd83mzs7k1h")
+    model_config = build_example_config(job="4pd83mzs7k1h")
 
 
 class CriterionChangeShape(Shape):
@@ -91,7 +91,7 @@ class ChangeShape(Shape):
     criteria: list[CriterionChangeShape]
     reason: str
 
-    model_config = like(
+    model_config = build_example_config(
         student="ada",
         job_id="7xk2v9q4m0ab",
         before_id="9c0e2b7h5rtw",
@@ -125,76 +125,83 @@ class PublishedShape(Shape):
     staff_only: int
     unjudged: int
 
-    model_config = like(published=19, replaced=0, unfinished=0, dead=1, staff_only=0, unjudged=0)
+    model_config = build_example_config(published=19, replaced=0, unfinished=0, dead=1, staff_only=0, unjudged=0)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/regrades", status_code=201)
-def regrade(here: Marks, context: Context, batch_id: RowName, asked: RegradeAsked | None = None) -> RegradedShape:
+def regrade(here: MarkAccess, context: Context, batch_id: RowName, asked: RegradeAsked | None = None) -> RegradedShape:
     """Grade a batch again. The old grades apply until you publish the new ones."""
     name = "" if asked is None else asked.assignment
-    made = operations.regrade_batch(context.service, here.acting, here.course_id, batch_id, name)
+    made = operations.regrade_batch(context.service, here.actor, here.course_id, batch_id, name)
     return RegradedShape.model_validate(made)
 
 
 @router.get("/courses/{course_id}/batches/{batch_id}/changes")
 def changes(
-    here: Reads, context: Context, batch_id: RowName, limit: Limit = 50, after: After = ""
+    here: ReadAccess, context: Context, batch_id: RowName, limit: Limit = 50, after: After = ""
 ) -> Listed[ChangeShape]:
     """List the changes of a batch of regrades, by student; empty for other batches."""
-    place = place_after(after, str)
-    found = operations.list_changes(context.service, here.acting, here.course_id, batch_id)
+    place = decode_cursor(after, str)
+    found = operations.list_changes(context.service, here.actor, here.course_id, batch_id)
     ids = [each.job_id for each in found]
     start = 0 if place is None else ids.index(place[0]) + 1 if place[0] in ids else len(ids)
-    page = page_of(found[start : start + limit + 1], limit, lambda each: [each.job_id])
+    page = build_list_page(found[start : start + limit + 1], limit, lambda each: [each.job_id])
     return Listed(items=[ChangeShape.model_validate(each) for each in page.items], next=page.next)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/publish")
-def publish(here: Marks, context: Context, batch_id: RowName, asked: PublishAsked | None = None) -> PublishedShape:
+def publish(here: MarkAccess, context: Context, batch_id: RowName, asked: PublishAsked | None = None) -> PublishedShape:
     """Publish the newest grades of a batch. They become the current grades, and students can see them."""
     anyway = asked is not None and asked.anyway
-    done = operations.publish(context.service, here.acting, here.course_id, batch_id, anyway=anyway)
+    done = operations.publish(context.service, here.actor, here.course_id, batch_id, anyway=anyway)
     return PublishedShape.model_validate(done)
 
 
 @router.post("/courses/{course_id}/grades/{job_id}/publish")
-def publish_one(here: Marks, context: Context, job_id: RowName, asked: PublishAsked | None = None) -> PublishedShape:
+def publish_one(
+    here: MarkAccess, context: Context, job_id: RowName, asked: PublishAsked | None = None
+) -> PublishedShape:
     """Publish the newest grade of a submission. It becomes the current grade, and the student can see it."""
     anyway = asked is not None and asked.anyway
-    done = operations.publish_one(context.service, here.acting, here.course_id, job_id, anyway=anyway)
+    done = operations.publish_one(context.service, here.actor, here.course_id, job_id, anyway=anyway)
     return PublishedShape.model_validate(done)
 
 
 @router.post("/courses/{course_id}/grades/{job_id}/regrades", status_code=201)
-def regrade_one(here: Marks, context: Context, job_id: RowName, asked: RegradeAsked | None = None) -> RegradedOneShape:
+def regrade_one(
+    here: MarkAccess, context: Context, job_id: RowName, asked: RegradeAsked | None = None
+) -> RegradedOneShape:
     """Grade a submission again. The old grade applies until you publish the new one."""
     name = "" if asked is None else asked.assignment
-    return RegradedOneShape(job=operations.regrade_one(context.service, here.acting, here.course_id, job_id, name))
+    return RegradedOneShape(job=operations.regrade_one(context.service, here.actor, here.course_id, job_id, name))
 
 
 @router.post("/courses/{course_id}/grades/{job_id}/over-limit", status_code=204)
-def grade_over_limit(here: Marks, context: Context, job_id: RowName) -> None:
+def grade_over_limit(here: MarkAccess, context: Context, job_id: RowName) -> None:
     """Grade a submission that was not graded because it exceeds a limit."""
-    operations.grade_over_limit(context.service, here.acting, here.course_id, job_id)
+    operations.grade_over_limit(context.service, here.actor, here.course_id, job_id)
 
 
-@router.get("/courses/{course_id}/batches/{batch_id}/export", responses=_FILE, response_class=Response)
+@router.get("/courses/{course_id}/batches/{batch_id}/export", responses=_FILE_RESPONSES, response_class=Response)
 def export(
-    here: Reads, context: Context, batch_id: RowName, form: Form = "csv", published: Published = False
+    here: ReadAccess, context: Context, batch_id: RowName, form: FormatName = "csv", published: PublishedOnly = False
 ) -> Response:
     """Export the grades of a batch in a format of `robomark batch export`.
 
     Formats that are not tables return a zip with one file for each grade.
     """
-    return _file(context, here, batch_id, ExportRequest(form, published))
+    return _respond_with_export(context, here, batch_id, ExportRequest(form, published))
 
 
 @router.post(
-    "/courses/{course_id}/batches/{batch_id}/worksheet", responses=_FILE, response_class=Response, openapi_extra=_CSV
+    "/courses/{course_id}/batches/{batch_id}/worksheet",
+    responses=_FILE_RESPONSES,
+    response_class=Response,
+    openapi_extra=_CSV_BODY,
 )
 @takes_upload(LARGEST_TABLE, Role.INSTRUCTOR)
 async def worksheet(
-    request: Request, here: Reads, context: Context, batch_id: RowName, published: Published = False
+    request: Request, here: ReadAccess, context: Context, batch_id: RowName, published: PublishedOnly = False
 ) -> Response:
     """Return the uploaded Moodle grading worksheet with the grades filled in. Stored data does not change."""
     given = await request.body()
@@ -203,9 +210,9 @@ async def worksheet(
     except UnicodeDecodeError:
         raise HTTPException(422, "The worksheet is not in UTF-8; upload the original file from Moodle.") from None
     asked = ExportRequest("moodle-worksheet", published, text)
-    return await run_in_threadpool(_file, context, here, batch_id, asked)
+    return await run_in_threadpool(_respond_with_export, context, here, batch_id, asked)
 
 
-def _file(context: WebContext, here: CallerInCourse, batch_id: str, asked: ExportRequest) -> Response:
-    made = download(context.service, here.acting, here.course_id, batch_id, asked)
-    return attachment(made.data, made.name, made.media_type)
+def _respond_with_export(context: WebContext, here: CallerInCourse, batch_id: str, asked: ExportRequest) -> Response:
+    made = download(context.service, here.actor, here.course_id, batch_id, asked)
+    return respond_with_attachment(made.data, made.name, made.media_type)

@@ -21,7 +21,7 @@ class Shape(BaseModel):
     model_config = ConfigDict(from_attributes=True)
 
 
-def like(**example: Any) -> ConfigDict:
+def build_example_config(**example: Any) -> ConfigDict:
     """Return the configuration of a model with an example."""
     return ConfigDict(from_attributes=True, json_schema_extra={"examples": [example]})
 
@@ -42,7 +42,7 @@ BATCH_EXAMPLE: Mapping[str, Any] = MappingProxyType(
 )
 
 
-def example_of(shape: type[Shape]) -> Any:
+def find_example(shape: type[Shape]) -> Any:
     """Return the example of a model."""
     extra: Any = shape.model_config["json_schema_extra"]
     return extra["examples"][0]
@@ -55,7 +55,7 @@ class CourseShape(Shape):
     name: str
     role: Role
 
-    model_config = like(id=1, name="TM129", role="instructor")
+    model_config = build_example_config(id=1, name="TM129", role="instructor")
 
 
 class RefusalShape(Shape):
@@ -97,7 +97,7 @@ class JobShape(Shape):
     )
     unjudged: int = Field(description="Number of criteria that could not be judged and need review.")
 
-    model_config = like(
+    model_config = build_example_config(
         id="7xk2v9q4m0ab",
         student="ada",
         name="Ada Lovelace",
@@ -136,7 +136,7 @@ class BatchShape(Shape):
     web_assignment: str | None = Field(description="The assignment, for a batch of web submissions; null otherwise.")
     takes_in: bool = Field(description="Whether the assignment is open for more submissions.")
 
-    model_config = like(**BATCH_EXAMPLE)
+    model_config = build_example_config(**BATCH_EXAMPLE)
 
 
 class CriterionShape(Shape):

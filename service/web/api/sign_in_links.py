@@ -12,23 +12,23 @@ from service.operations import sign_in_links
 from service.operations.sign_in_links import StudentLink
 from service.operations.types import Role
 from service.web.access import RowNumber
-from service.web.api.shapes import Shape, like
-from service.web.api_access import CallerInCourse, in_course
+from service.web.api.shapes import Shape, build_example_config
+from service.web.api_access import CallerInCourse, require_role
 from service.web.api_routes import NO_KEY, api_router
 from service.web.context import Context, WebContext
 
 router = api_router("people")
-Manages = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "manage"))]
-_WHERE = "Null unless ROBOMARK_PUBLIC_URL is set."
+ManageAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "manage"))]
+_URL_DESCRIPTION = "Null unless ROBOMARK_PUBLIC_URL is set."
 
 
 class LinkShape(Shape):
     """A single-use sign-in link. It is returned only once."""
 
     path: str
-    url: str | None = Field(description=_WHERE)
+    url: str | None = Field(description=_URL_DESCRIPTION)
 
-    model_config = like(path="/sign-in/rml_...", url="https://robomark.example.org/sign-in/rml_...")
+    model_config = build_example_config(path="/sign-in/rml_...", url="https://robomark.example.org/sign-in/rml_...")
 
 
 class LinksAsked(BaseModel):
@@ -45,7 +45,7 @@ class StudentLinkShape(Shape):
     name: str
     email: str
     path: str | None
-    url: str | None = Field(description=_WHERE)
+    url: str | None = Field(description=_URL_DESCRIPTION)
     expires_at: datetime | None
     reason: str = Field(description="Reason for a missing link; empty if there is a link.")
 
@@ -55,7 +55,7 @@ class StudentLinksShape(Shape):
 
     links: list[StudentLinkShape]
 
-    model_config = like(
+    model_config = build_example_config(
         links=[
             {
                 "enrolment": 7,
@@ -72,28 +72,28 @@ class StudentLinksShape(Shape):
 
 
 @router.post("/courses/{course_id}/people/links", status_code=201, openapi_extra=dict(NO_KEY))
-def links(here: Manages, context: Context, asked: LinksAsked | None = None) -> StudentLinksShape:
+def links(here: ManageAccess, context: Context, asked: LinksAsked | None = None) -> StudentLinksShape:
     """Create sign-in links for the students of the course, by ID. Earlier links become invalid."""
     days = sign_in_links.DAYS if asked is None else asked.days
-    made = sign_in_links.make_links(context.service, here.acting, here.course_id, days)
-    return StudentLinksShape(links=[_told(context, each) for each in made])
+    made = sign_in_links.make_links(context.service, here.actor, here.course_id, days)
+    return StudentLinksShape(links=[_to_student_link_shape(context, each) for each in made])
 
 
 @router.post("/courses/{course_id}/people/{enrolment_id}/link", status_code=201, openapi_extra=dict(NO_KEY))
-def link(here: Manages, context: Context, enrolment_id: RowNumber) -> LinkShape:
+def link(here: ManageAccess, context: Context, enrolment_id: RowNumber) -> LinkShape:
     """Create a sign-in link for a student of the course. Instructors get theirs from an operator."""
-    secret = sign_in_links.make_students_link(context.service, here.acting, here.course_id, enrolment_id)
-    return link_shape(context, secret)
+    secret = sign_in_links.make_students_link(context.service, here.actor, here.course_id, enrolment_id)
+    return to_link_shape(context, secret)
 
 
-def link_shape(context: WebContext, secret: str) -> LinkShape:
+def to_link_shape(context: WebContext, secret: str) -> LinkShape:
     """Return a sign-in link as the response model."""
     path, public = f"/sign-in/{secret}", context.settings.public_url
     return LinkShape(path=path, url=f"{public}{path}" if public else None)
 
 
-def _told(context: WebContext, each: StudentLink) -> StudentLinkShape:
-    shown = None if each.secret is None else link_shape(context, each.secret)
+def _to_student_link_shape(context: WebContext, each: StudentLink) -> StudentLinkShape:
+    shown = None if each.secret is None else to_link_shape(context, each.secret)
     return StudentLinkShape(
         enrolment=each.student.enrolment_id,
         id=each.student.id,

@@ -13,13 +13,13 @@ from service.operations import webhooks
 from service.operations.types import Role
 from service.operations.webhooks import WebhookEvent
 from service.web.access import RowName
-from service.web.api.shapes import Shape, like
-from service.web.api_access import CallerInCourse, in_course
-from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, page_of, place_after
+from service.web.api.shapes import Shape, build_example_config
+from service.web.api_access import CallerInCourse, require_role
+from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, build_list_page, decode_cursor
 from service.web.context import Context
 
 router = api_router("webhooks")
-Manages = Annotated[CallerInCourse, Depends(in_course(Role.INSTRUCTOR, "manage"))]
+ManageAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "manage"))]
 
 
 class WebhookShape(Shape):
@@ -30,7 +30,7 @@ class WebhookShape(Shape):
     events: list[WebhookEvent]
     created_at: datetime
 
-    model_config = like(
+    model_config = build_example_config(
         id="5h2n8q0v3w7x",
         url="https://hooks.example.org/robomark",
         events=["grade.finished"],
@@ -43,7 +43,7 @@ class NewWebhookShape(WebhookShape):
 
     secret: str = Field(description="Shown only once.")
 
-    model_config = like(
+    model_config = build_example_config(
         id="5h2n8q0v3w7x",
         url="https://hooks.example.org/robomark",
         events=["grade.finished"],
@@ -73,7 +73,7 @@ class DeliveryShape(Shape):
     delivered_at: datetime | None
     error: str | None
 
-    model_config = like(
+    model_config = build_example_config(
         id="1d6f9k2m4p8r",
         webhook_id="5h2n8q0v3w7x",
         event="grade.finished",
@@ -86,29 +86,33 @@ class DeliveryShape(Shape):
 
 
 @router.get("/courses/{course_id}/webhooks")
-def list_webhooks(here: Manages, context: Context) -> Listed[WebhookShape]:
+def list_webhooks(here: ManageAccess, context: Context) -> Listed[WebhookShape]:
     """List the webhooks of the course."""
-    found = webhooks.list_webhooks(context.service, here.acting, here.course_id)
+    found = webhooks.list_webhooks(context.service, here.actor, here.course_id)
     return Listed(items=[WebhookShape.model_validate(each) for each in found])
 
 
 @router.post("/courses/{course_id}/webhooks", status_code=201, openapi_extra=dict(NO_KEY))
-def create(here: Manages, context: Context, asked: WebhookAsked) -> NewWebhookShape:
+def create(here: ManageAccess, context: Context, asked: WebhookAsked) -> NewWebhookShape:
     """Create a webhook. Its secret is returned only once, so this route ignores idempotency keys."""
-    line, secret = webhooks.create(context.service, here.acting, here.course_id, asked.url, asked.events)
+    line, secret = webhooks.create(context.service, here.actor, here.course_id, asked.url, asked.events)
     return NewWebhookShape(**WebhookShape.model_validate(line).model_dump(), secret=secret)
 
 
 @router.delete("/courses/{course_id}/webhooks/{webhook_id}", status_code=204, response_class=Response)
-def revoke(here: Manages, context: Context, webhook_id: RowName) -> None:
+def revoke(here: ManageAccess, context: Context, webhook_id: RowName) -> None:
     """Remove a webhook and cancel its pending deliveries."""
-    webhooks.revoke(context.service, here.acting, here.course_id, webhook_id)
+    webhooks.revoke(context.service, here.actor, here.course_id, webhook_id)
 
 
 @router.get("/courses/{course_id}/deliveries")
-def list_deliveries(here: Manages, context: Context, limit: Limit = 50, after: After = "") -> Listed[DeliveryShape]:
+def list_deliveries(
+    here: ManageAccess, context: Context, limit: Limit = 50, after: After = ""
+) -> Listed[DeliveryShape]:
     """List recent and pending deliveries to the course's webhooks, newest first."""
-    place = place_after(after, datetime, str)
+    place = decode_cursor(after, datetime, str)
     after_that = (place[0], place[1]) if place else None
-    found = webhooks.list_deliveries(context.service, here.acting, here.course_id, limit + 1, after_that)
-    return page_of([DeliveryShape.model_validate(each) for each in found], limit, lambda each: [each.made_at, each.id])
+    found = webhooks.list_deliveries(context.service, here.actor, here.course_id, limit + 1, after_that)
+    return build_list_page(
+        [DeliveryShape.model_validate(each) for each in found], limit, lambda each: [each.made_at, each.id]
+    )

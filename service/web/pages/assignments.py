@@ -13,40 +13,40 @@ from fastapi import Path as InPath
 from fastapi.responses import RedirectResponse, Response
 
 from service.operations import assignment_uploads, assignment_views, assignments, policies
-from service.operations.assignment_uploads import StudentsKnowAnother, UploadRequest
+from service.operations.assignment_uploads import AssignmentAlreadySeen, UploadRequest
 from service.operations.assignments import CourseAssignment
 from service.operations.policies import PolicyLimits
 from service.operations.types import Role
-from service.web.access import InCourse, Instructing
+from service.web.access import CourseInstructor, ReaderInCourse
 from service.web.api_uploads import LARGEST_ASSIGNMENT
-from service.web.attachments import attachment
+from service.web.attachments import respond_with_attachment
 from service.web.context import Context, WebContext
-from service.web.kept_uploads import file_name
-from service.web.language import language_of
-from service.web.moments import written_moment
-from service.web.rendering import page
+from service.web.date_times import parse_date_time
+from service.web.language import detect_language
+from service.web.pending_uploads import clean_file_name
+from service.web.rendering import render_page
 from service.web.request_bodies import takes_upload
 from sim.errors import UsageError
-from submissions.assignment.export import write_new
-from submissions.assignment.folder import FILE_NAME, catalogue
-from submissions.raw_files import SentFile
+from submissions.assignment.export import create_assignment
+from submissions.assignment.folder import FILE_NAME, list_catalogue_ids
+from submissions.raw_files import UploadedFile
 
 router = APIRouter(prefix="/courses/{course_id}")
-Done = Annotated[str, Query(max_length=20)]
+DoneAction = Annotated[str, Query(max_length=20)]
 AssignmentId = Annotated[str, InPath(pattern="^[a-z0-9][a-z0-9_-]*$", max_length=80)]
 
 
 @router.get("/assignments")
-def list_assignments(request: Request, here: Instructing, context: Context, done: Done = "") -> Response:
+def list_assignments(request: Request, here: CourseInstructor, context: Context, done: DoneAction = "") -> Response:
     """Show the assignments of the course and the ways to add one."""
-    return _list(request, here, context, done=done)
+    return _render_list(request, here, context, done=done)
 
 
 @router.post("/assignments")
-def prepare(here: Instructing, context: Context, assignment: Annotated[str, Form(max_length=100)]) -> Response:
+def prepare(here: CourseInstructor, context: Context, assignment: Annotated[str, Form(max_length=100)]) -> Response:
     """Add an assignment from the catalogue in its current version."""
-    return _to(
-        here, assignment_uploads.prepare_from_catalogue(context.service, here.acting, here.course_id, assignment)
+    return _redirect_to_assignment(
+        here, assignment_uploads.prepare_from_catalogue(context.service, here.actor, here.course_id, assignment)
     )
 
 
@@ -54,53 +54,60 @@ def prepare(here: Instructing, context: Context, assignment: Annotated[str, Form
 @takes_upload(LARGEST_ASSIGNMENT, Role.INSTRUCTOR)
 def upload(
     request: Request,
-    here: Instructing,
+    here: CourseInstructor,
     context: Context,
     file: Annotated[UploadFile, File()],
     replace: Annotated[bool, Form()] = False,
 ) -> Response:
     """Add an assignment from an uploaded zip of its folder, and grade its reference solution as a preview."""
-    sent = SentFile(file.filename or "", file.file)
+    sent = UploadedFile(file.filename or "", file.file)
     try:
         if not sent.flat_name.lower().endswith(".zip"):
             raise UsageError(f"expected a .zip of an assignment's folder, with its {FILE_NAME}")
         with tempfile.TemporaryDirectory(prefix="robomark-assignment-") as folder:
-            path = Path(folder) / file_name(sent)
+            path = Path(folder) / clean_file_name(sent)
             with path.open("xb") as sink:
                 shutil.copyfileobj(sent.stream, sink)
             asked = UploadRequest(path, replace)
-            return _to(here, assignment_uploads.upload(context.service, here.acting, here.course_id, asked))
+            return _redirect_to_assignment(
+                here, assignment_uploads.upload(context.service, here.actor, here.course_id, asked)
+            )
     except UsageError as error:
-        asks, told = isinstance(error, StudentsKnowAnother), language_of(request).tell(error.said).splitlines()
-        return _list(request, here, context, refused=told, asks_to_replace=asks, status_code=422)
+        asks, told = (
+            isinstance(error, AssignmentAlreadySeen),
+            detect_language(request).translate_sentence(error.message).splitlines(),
+        )
+        return _render_list(request, here, context, refused=told, asks_to_replace=asks, status_code=422)
 
 
 @router.get("/assignments/uploads")
-def to_list(here: Instructing) -> Response:
+def redirect_to_list(here: CourseInstructor) -> Response:
     """Redirect to the list, for readers who open the upload address in the browser."""
-    return RedirectResponse(_path(here, ""), 303)
+    return RedirectResponse(_build_path(here, ""), 303)
 
 
 @router.get("/assignments/uploads/my-assignment.zip")
-def commented_example(here: Instructing) -> Response:
+def download_example(here: CourseInstructor) -> Response:
     """Return the folder of a commented example assignment as a zip."""
     with tempfile.TemporaryDirectory(prefix="robomark-assignment-") as folder:
-        write_new(Path(folder) / "zip" / "my-assignment")
+        create_assignment(Path(folder) / "zip" / "my-assignment")
         zipped = shutil.make_archive(f"{folder}/made", "zip", f"{folder}/zip")
-        return attachment(Path(zipped).read_bytes(), "my-assignment.zip", "application/zip")
+        return respond_with_attachment(Path(zipped).read_bytes(), "my-assignment.zip", "application/zip")
 
 
 @router.get("/assignments/{assignment}")
-def show(request: Request, here: Instructing, context: Context, assignment: AssignmentId, done: Done = "") -> Response:
+def show_assignment(
+    request: Request, here: CourseInstructor, context: Context, assignment: AssignmentId, done: DoneAction = ""
+) -> Response:
     """Show an assignment with its task, its state and its policy."""
-    view = assignment_views.show(context.service, here.acting, here.course_id, assignment)
-    return page(
+    view = assignment_views.show(context.service, here.actor, here.course_id, assignment)
+    return render_page(
         request,
         here.reader,
         "assignment.html",
         here=here,
         line=view.line,
-        found=view.found,
+        found=view.assignment,
         own_policy=view.own_policy,
         policy=view.policy,
         previews=view.previews,
@@ -112,42 +119,46 @@ def show(request: Request, here: Instructing, context: Context, assignment: Assi
 
 
 @router.post("/assignments/{assignment}/open")
-def open_one(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
+def open_assignment(here: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
     """Open an assignment: students see it and can submit to it."""
-    return _to(here, assignments.open_for_students(context.service, here.acting, here.course_id, assignment))
+    return _redirect_to_assignment(
+        here, assignments.open_for_students(context.service, here.actor, here.course_id, assignment)
+    )
 
 
 @router.post("/assignments/{assignment}/close")
-def close_one(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
+def close_assignment(here: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
     """Close an assignment: students can no longer submit to it."""
-    return _to(here, assignments.close(context.service, here.acting, here.course_id, assignment))
+    return _redirect_to_assignment(here, assignments.close(context.service, here.actor, here.course_id, assignment))
 
 
 @router.post("/assignments/{assignment}/remove")
-def remove(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
+def remove(here: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
     """Remove an assignment that no student has seen from the course."""
-    assignments.remove(context.service, here.acting, here.course_id, assignment)
-    return RedirectResponse(_path(here, ""), 303)
+    assignments.remove(context.service, here.actor, here.course_id, assignment)
+    return RedirectResponse(_build_path(here, ""), 303)
 
 
 @router.post("/assignments/{assignment}/names")
 def hide_names(
-    here: Instructing, context: Context, assignment: AssignmentId, hidden: Annotated[bool, Form()] = False
+    here: CourseInstructor, context: Context, assignment: AssignmentId, hidden: Annotated[bool, Form()] = False
 ) -> Response:
     """Hide or show the students' names for all instructors of the course."""
-    return _to(here, assignments.hide_names(context.service, here.acting, here.course_id, assignment, hidden=hidden))
+    return _redirect_to_assignment(
+        here, assignments.hide_names(context.service, here.actor, here.course_id, assignment, hidden=hidden)
+    )
 
 
 @router.post("/assignments/{assignment}/preview")
-def preview(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
+def preview(here: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
     """Grade the catalogue's reference solution as the instructor's own submission."""
-    job_id = assignment_uploads.preview(context.service, here.acting, here.course_id, assignment)
+    job_id = assignment_uploads.preview(context.service, here.actor, here.course_id, assignment)
     return RedirectResponse(f"/courses/{here.course_id}/grades/{job_id}", 303)
 
 
 @router.post("/policy")
 def set_policy(
-    here: Instructing,
+    here: CourseInstructor,
     context: Context,
     assignment: Annotated[str, Form(max_length=100)] = "",
     due: Annotated[str, Form(max_length=40)] = "",
@@ -156,21 +167,21 @@ def set_policy(
     cool_down: Annotated[float, Form(ge=0, le=10_000)] = 0.0,
 ) -> Response:
     """Set deadline and attempts for one assignment, or the default for assignments without a policy."""
-    allowed = PolicyLimits(written_moment(due), late_days, int(attempts) if attempts else None, cool_down * 60)
-    policies.set_policy(context.service, here.acting, here.course_id, assignment, allowed)
-    return RedirectResponse(f"{_path(here, assignment)}?done=policy", 303)
+    allowed = PolicyLimits(parse_date_time(due), late_days, int(attempts) if attempts else None, cool_down * 60)
+    policies.set_policy(context.service, here.actor, here.course_id, assignment, allowed)
+    return RedirectResponse(f"{_build_path(here, assignment)}?done=policy", 303)
 
 
 @router.post("/assignments/{assignment}/no-policy")
-def drop_policy(here: Instructing, context: Context, assignment: AssignmentId) -> Response:
+def drop_policy(here: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
     """Delete an assignment's own policy, so that the course's default applies."""
-    policies.drop_policy(context.service, here.acting, here.course_id, assignment)
-    return RedirectResponse(f"{_path(here, assignment)}?done=policy", 303)
+    policies.drop_policy(context.service, here.actor, here.course_id, assignment)
+    return RedirectResponse(f"{_build_path(here, assignment)}?done=policy", 303)
 
 
-def _list(
+def _render_list(
     request: Request,
-    here: InCourse,
+    here: ReaderInCourse,
     context: WebContext,
     *,
     done: str = "",
@@ -178,15 +189,15 @@ def _list(
     asks_to_replace: bool = False,
     status_code: int = 200,
 ) -> Response:
-    view = assignment_views.show_all(context.service, here.acting, here.course_id)
-    return page(
+    view = assignment_views.show_all(context.service, here.actor, here.course_id)
+    return render_page(
         request,
         here.reader,
         "assignments.html",
         status_code=status_code,
         here=here,
         prepared=view.prepared,
-        catalogue=len(catalogue()),
+        catalogue=len(list_catalogue_ids()),
         policies=view.policies,
         policy=view.policy,
         refused=refused or [],
@@ -196,9 +207,9 @@ def _list(
     )
 
 
-def _to(here: InCourse, made: CourseAssignment) -> Response:
-    return RedirectResponse(_path(here, made.assignment), 303)
+def _redirect_to_assignment(here: ReaderInCourse, made: CourseAssignment) -> Response:
+    return RedirectResponse(_build_path(here, made.assignment), 303)
 
 
-def _path(here: InCourse, assignment: str) -> str:
+def _build_path(here: ReaderInCourse, assignment: str) -> str:
     return f"/courses/{here.course_id}/assignments{f'/{assignment}' if assignment else ''}"

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Form, Query, Request
 from fastapi.responses import RedirectResponse, Response
 
-from service.grading.statistics import PASS_SHARE
+from service.grading.class_statistics import PASS_SHARE
 from service.language import translatable
 from service.operations import batch_views as views
 from service.operations import batches as operations
@@ -23,17 +23,17 @@ from service.operations.batch_views import (
     STATES,
     BatchLine,
     BatchView,
-    TableAsked,
     TableLine,
+    TableRequest,
     TableView,
 )
 from service.operations.types import BatchState, JobState
 from service.reports.formats import FORMATS
-from service.reports.verdict_sentences import verdict_words
-from service.web.access import InCourse, Instructing, RowName
+from service.reports.verdict_sentences import describe_verdict
+from service.web.access import CourseInstructor, ReaderInCourse, RowName
 from service.web.context import Context, WebContext
-from service.web.language import language_of
-from service.web.rendering import page
+from service.web.language import detect_language
+from service.web.rendering import render_page
 from sim.recording import Verdict
 
 router = APIRouter(prefix="/courses/{course_id}/batches/{batch_id}")
@@ -66,9 +66,9 @@ _ACTIONS = {
 
 
 @router.get("")
-def submissions(
+def show_submissions(
     request: Request,
-    here: Instructing,
+    here: CourseInstructor,
     context: Context,
     batch_id: RowName,
     state: Annotated[str, Query(max_length=20)] = "",
@@ -79,12 +79,12 @@ def submissions(
 ) -> Response:
     """Show the submissions of a batch. The table can be sorted, filtered, searched and paged."""
     column = sort.removeprefix("-")
-    asked = TableAsked(
+    asked = TableRequest(
         state if state in STATES else "", q, column if column in SORTS else "student", sort.startswith("-"), number
     )
-    view, shown = _batch(here, context, batch_id)
-    table, remarked = views.table_page(context.service, here.acting, here.course_id, view.lines, asked)
-    return page(
+    view, shown = _load_batch(here, context, batch_id)
+    table, remarked = views.show_table_page(context.service, here.actor, here.course_id, view.lines, asked)
+    return render_page(
         request,
         here.reader,
         "batch_table.html",
@@ -92,21 +92,21 @@ def submissions(
         table=table,
         asked=asked,
         remarked=remarked,
-        columns=_columns(view.lines),
-        verdicts={each.value: verdict_words(each, language_of(request)).short for each in Verdict},
+        columns=_choose_columns(view.lines),
+        verdicts={each.value: describe_verdict(each, detect_language(request)).short for each in Verdict},
         entry=next((each for each in view.history if each.action == done in _ACTIONS), None),
-        formats=sorted(name for name, each in FORMATS.items() if each.filled_in is None),
+        formats=sorted(name for name, each in FORMATS.items() if each.worksheet is None),
     )
 
 
 @router.get("/progress")
-def progress(request: Request, here: Instructing, context: Context, batch_id: RowName) -> Response:
+def show_progress(request: Request, here: CourseInstructor, context: Context, batch_id: RowName) -> Response:
     """Return the part of the page that shows the progress.
 
     The page requests it repeatedly until the batch is finished.
     """
-    far = _far(here, views.show_progress(context.service, here.acting, here.course_id, batch_id))
-    answer = page(request, here.reader, "batch_progress.html", **far)
+    far = _build_progress_context(here, views.show_progress(context.service, here.actor, here.course_id, batch_id))
+    answer = render_page(request, here.reader, "batch_progress.html", **far)
     if not far["goes_on"]:
         answer.headers["hx-refresh"] = "true"
     return answer
@@ -115,16 +115,16 @@ def progress(request: Request, here: Instructing, context: Context, batch_id: Ro
 @router.get("/overview")
 def show_overview(
     request: Request,
-    here: Instructing,
+    here: CourseInstructor,
     context: Context,
     batch_id: RowName,
     at_least: Annotated[int, Query(alias="pass", ge=0, le=100)] = int(PASS_SHARE * 100),
 ) -> Response:
     """Show the results of a batch: marks, criteria, causes, students to review and missing students."""
-    table, shown = _batch(here, context, batch_id)
-    found = views.show_overview_of(context.service, here.acting, here.course_id, table, Decimal(at_least) / 100)
+    table, shown = _load_batch(here, context, batch_id)
+    found = views.show_overview_of_table(context.service, here.actor, here.course_id, table, Decimal(at_least) / 100)
     lines = found.lines
-    return page(
+    return render_page(
         request,
         here.reader,
         "batch_overview.html",
@@ -141,100 +141,100 @@ def show_overview(
 @router.get("/changes")
 def show_changes(
     request: Request,
-    here: Instructing,
+    here: CourseInstructor,
     context: Context,
     batch_id: RowName,
     number: Annotated[int, Query(alias="page", ge=1, le=10_000)] = 1,
 ) -> Response:
     """Show the changes by a regrade, with reasons."""
-    _, shown = _batch(here, context, batch_id)
-    found = views.changes_page(context.service, here.acting, here.course_id, batch_id, number)
-    return page(request, here.reader, "batch_changes.html", **shown, found=found, changes=found.changes)
+    _, shown = _load_batch(here, context, batch_id)
+    found = views.show_changes_page(context.service, here.actor, here.course_id, batch_id, number)
+    return render_page(request, here.reader, "batch_changes.html", **shown, found=found, changes=found.changes)
 
 
 @router.post("/pause")
-def pause(here: Instructing, context: Context, batch_id: RowName) -> Response:
+def pause(here: CourseInstructor, context: Context, batch_id: RowName) -> Response:
     """Pause a batch."""
-    operations.pause(context.service, here.acting, here.course_id, batch_id)
-    return _back(here, batch_id, "pause")
+    operations.pause(context.service, here.actor, here.course_id, batch_id)
+    return _redirect_to_batch(here, batch_id, "pause")
 
 
 @router.post("/resume")
-def resume(here: Instructing, context: Context, batch_id: RowName) -> Response:
+def resume(here: CourseInstructor, context: Context, batch_id: RowName) -> Response:
     """Resume a paused batch."""
-    operations.resume(context.service, here.acting, here.course_id, batch_id)
-    return _back(here, batch_id, "resume")
+    operations.resume(context.service, here.actor, here.course_id, batch_id)
+    return _redirect_to_batch(here, batch_id, "resume")
 
 
 @router.post("/cancel")
-def cancel(here: Instructing, context: Context, batch_id: RowName) -> Response:
+def cancel(here: CourseInstructor, context: Context, batch_id: RowName) -> Response:
     """Cancel the jobs of a batch that are not finished."""
-    operations.cancel(context.service, here.acting, here.course_id, batch_id)
-    return _back(here, batch_id, "cancel")
+    operations.cancel(context.service, here.actor, here.course_id, batch_id)
+    return _redirect_to_batch(here, batch_id, "cancel")
 
 
 @router.post("/retry")
-def retry(here: Instructing, context: Context, batch_id: RowName) -> Response:
+def retry(here: CourseInstructor, context: Context, batch_id: RowName) -> Response:
     """Requeue the failed jobs of a batch."""
-    operations.retry(context.service, here.acting, here.course_id, batch_id)
-    return _back(here, batch_id, "retry")
+    operations.retry(context.service, here.actor, here.course_id, batch_id)
+    return _redirect_to_batch(here, batch_id, "retry")
 
 
 @router.get("/publish")
-def before_publishing(request: Request, here: Instructing, context: Context, batch_id: RowName) -> Response:
+def preview_publication(request: Request, here: CourseInstructor, context: Context, batch_id: RowName) -> Response:
     """Show how many grades publishing would release and hold back."""
-    _, shown = _batch(here, context, batch_id)
-    publication = regrade_operations.preview(context.service, here.acting, here.course_id, batch_id)
-    return page(request, here.reader, "batch_publish.html", **shown, publication=publication)
+    _, shown = _load_batch(here, context, batch_id)
+    publication = regrade_operations.preview_publication(context.service, here.actor, here.course_id, batch_id)
+    return render_page(request, here.reader, "batch_publish.html", **shown, publication=publication)
 
 
 @router.post("/publish")
 def publish(
-    here: Instructing, context: Context, batch_id: RowName, anyway: Annotated[bool, Form()] = False
+    here: CourseInstructor, context: Context, batch_id: RowName, anyway: Annotated[bool, Form()] = False
 ) -> Response:
     """Make the newest grades of a batch the current grades, and release them to the students."""
-    regrade_operations.publish(context.service, here.acting, here.course_id, batch_id, anyway=anyway)
-    return _back(here, batch_id, "publish")
+    regrade_operations.publish(context.service, here.actor, here.course_id, batch_id, anyway=anyway)
+    return _redirect_to_batch(here, batch_id, "publish")
 
 
 @router.post("/regrade")
 def regrade(
-    here: Instructing,
+    here: CourseInstructor,
     context: Context,
     batch_id: RowName,
     assignment: Annotated[str, Form(max_length=100)] = "",
 ) -> Response:
     """Regrade a batch, against the course's current assignment or the one used before."""
-    made = regrade_operations.regrade_batch(context.service, here.acting, here.course_id, batch_id, assignment)
+    made = regrade_operations.regrade_batch(context.service, here.actor, here.course_id, batch_id, assignment)
     return RedirectResponse(f"/courses/{here.course_id}/batches/{made.batch_id}/changes", 303)
 
 
-def _back(here: InCourse, batch_id: str, done: str) -> Response:
+def _redirect_to_batch(here: ReaderInCourse, batch_id: str, done: str) -> Response:
     return RedirectResponse(f"/courses/{here.course_id}/batches/{batch_id}?done={done}", 303)
 
 
-def _batch(here: InCourse, context: WebContext, batch_id: str) -> tuple[TableView, dict[str, Any]]:
+def _load_batch(here: ReaderInCourse, context: WebContext, batch_id: str) -> tuple[TableView, dict[str, Any]]:
     """Return the table of a batch and the template variables that all its pages need."""
-    found = views.show_table(context.service, here.acting, here.course_id, batch_id)
+    found = views.show_table(context.service, here.actor, here.course_id, batch_id)
     graded = [each for each in found.lines if views.is_graded(each)]
     return found, {
         "lines": found.lines,
         "assignments": sorted({each.assignment for each in found.lines if each.id}),
-        "nameless": found.nameless,
+        "nameless": found.has_hidden_names,
         "waiting_regrades": found.waiting_regrades,
         "history": found.history,
         "to_publish": sum(each.published_at is None for each in graded),
         "actions": _ACTIONS,
-        **_far(here, found.view),
+        **_build_progress_context(here, found.view),
     }
 
 
-def _counts(line: BatchLine) -> dict[str, int]:
+def _count_states(line: BatchLine) -> dict[str, int]:
     counts = {state.value: line.states.get(state, 0) for state in JobState} | {REFUSED: len(line.refusals)}
     return {state: count for state, count in counts.items() if count}
 
 
-def _far(here: InCourse, view: BatchView) -> dict[str, Any]:
+def _build_progress_context(here: ReaderInCourse, view: BatchView) -> dict[str, Any]:
     line, far = view.batch, view.progress
     return {
         "here": here,
@@ -244,13 +244,13 @@ def _far(here: InCourse, view: BatchView) -> dict[str, Any]:
         "pace": view.pace,
         "goes_on": far.ended < far.jobs,
         "path": f"/courses/{here.course_id}/batches/{line.id}",
-        "counts": _counts(line),
+        "counts": _count_states(line),
         "states": _STATES,
         "BatchState": BatchState,
     }
 
 
-def _columns(lines: Sequence[TableLine]) -> dict[str, str]:
+def _choose_columns(lines: Sequence[TableLine]) -> dict[str, str]:
     """Return the titles of the columns with useful data, by sort key."""
     several = len({line.assignment for line in lines}) > 1
     named = any(line.name not in ("", line.student) for line in lines)

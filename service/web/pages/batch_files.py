@@ -13,9 +13,9 @@ from fastapi.responses import Response
 
 from service.operations.exports import ExportRequest, download
 from service.operations.types import Role
-from service.web.access import InCourse, Instructing, RowName
+from service.web.access import CourseInstructor, ReaderInCourse, RowName
 from service.web.api_uploads import LARGEST_TABLE
-from service.web.attachments import attachment
+from service.web.attachments import respond_with_attachment
 from service.web.context import Context, WebContext
 from service.web.request_bodies import takes_upload
 from sim.errors import UsageError
@@ -27,20 +27,20 @@ _WORKSHEET = "moodle-worksheet"
 
 @router.get("/export")
 def export(
-    here: Instructing,
+    here: CourseInstructor,
     context: Context,
     batch_id: RowName,
     form: Annotated[str, Query(alias="format", max_length=40)] = "csv",
     published: Annotated[bool, Query()] = False,
 ) -> Response:
     """Return the current grades in the requested format."""
-    return _file(here, context, batch_id, ExportRequest(form, published))
+    return _respond_with_export(here, context, batch_id, ExportRequest(form, published))
 
 
 @router.post("/worksheet")
 @takes_upload(LARGEST_TABLE, Role.INSTRUCTOR)
-def worksheet(
-    here: Instructing,
+def fill_worksheet(
+    here: CourseInstructor,
     context: Context,
     batch_id: RowName,
     file: Annotated[UploadFile, File()],
@@ -51,11 +51,11 @@ def worksheet(
         given = file.file.read().decode("utf-8")
     except UnicodeDecodeError:
         raise UsageError("the worksheet is not in UTF-8; upload the original file from Moodle") from None
-    return _file(here, context, batch_id, ExportRequest(_WORKSHEET, published, given))
+    return _respond_with_export(here, context, batch_id, ExportRequest(_WORKSHEET, published, given))
 
 
-def _file(here: InCourse, context: WebContext, batch_id: str, asked: ExportRequest) -> Response:
-    made = download(context.service, here.acting, here.course_id, batch_id, asked)
+def _respond_with_export(here: ReaderInCourse, context: WebContext, batch_id: str, asked: ExportRequest) -> Response:
+    made = download(context.service, here.actor, here.course_id, batch_id, asked)
     # Excel recognises UTF-8 only by a byte order mark. Moodle's worksheet stays as Moodle wrote it.
     mark = codecs.BOM_UTF8 if asked.form in _TABLES else b""
-    return attachment(mark + made.data, made.name, made.media_type)
+    return respond_with_attachment(mark + made.data, made.name, made.media_type)

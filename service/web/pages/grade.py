@@ -11,23 +11,23 @@ from fastapi import APIRouter, Form, Request
 from fastapi.responses import RedirectResponse, Response
 
 from service.operations import grade_views, regrades
-from service.web.access import Instructing, RowName
+from service.web.access import CourseInstructor, RowName
 from service.web.context import Context
-from service.web.language import language_of
-from service.web.rendering import page, wants_part
+from service.web.language import detect_language
+from service.web.rendering import is_htmx_request, render_page
 
 router = APIRouter(prefix="/courses/{course_id}/grades/{job_id}")
 
 
 @router.get("")
-def grade(request: Request, here: Instructing, context: Context, job_id: RowName, done: str = "") -> Response:
+def show_grade(request: Request, here: CourseInstructor, context: Context, job_id: RowName, done: str = "") -> Response:
     """Show the report of one submission, or the progress while it is being graded."""
-    asked = (context.service, here.acting, here.course_id, job_id)
-    if wants_part(request) and grade_views.show_state(*asked).ended:
+    asked = (context.service, here.actor, here.course_id, job_id)
+    if is_htmx_request(request) and grade_views.show_state(*asked).ended:
         return Response(headers={"hx-refresh": "true"})
-    found = grade_views.show_grade(*asked, language_of(request))
+    found = grade_views.show_grade(*asked, detect_language(request))
     newest_first = list(reversed(found.history))
-    return page(
+    return render_page(
         request,
         here.reader,
         "grade.html",
@@ -39,31 +39,33 @@ def grade(request: Request, here: Instructing, context: Context, job_id: RowName
         gradings=found.gradings,
         attempts=found.attempts,
         history=newest_first,
-        beside=found.beside,
+        beside=found.neighbours,
         batch_id=found.batch_id,
-        put_aside=found.put_aside,
+        put_aside=found.awaits_approval,
         told=next((entry for entry in newest_first if entry.action == done == "publish"), None),
     )
 
 
 @router.post("/publish")
-def publish(here: Instructing, context: Context, job_id: RowName, anyway: Annotated[bool, Form()] = False) -> Response:
+def publish(
+    here: CourseInstructor, context: Context, job_id: RowName, anyway: Annotated[bool, Form()] = False
+) -> Response:
     """Make the newest grade of this submission the current grade, and release it to the student."""
-    regrades.publish_one(context.service, here.acting, here.course_id, job_id, anyway=anyway)
+    regrades.publish_one(context.service, here.actor, here.course_id, job_id, anyway=anyway)
     return RedirectResponse(f"/courses/{here.course_id}/grades/{job_id}?done=publish", 303)
 
 
 @router.post("/regrade")
 def regrade(
-    here: Instructing, context: Context, job_id: RowName, assignment: Annotated[str, Form(max_length=100)] = ""
+    here: CourseInstructor, context: Context, job_id: RowName, assignment: Annotated[str, Form(max_length=100)] = ""
 ) -> Response:
     """Regrade this submission, against the assignment's current version or the one used before."""
-    made = regrades.regrade_one(context.service, here.acting, here.course_id, job_id, assignment)
+    made = regrades.regrade_one(context.service, here.actor, here.course_id, job_id, assignment)
     return RedirectResponse(f"/courses/{here.course_id}/grades/{made}", 303)
 
 
 @router.post("/grade-over-limit")
-def grade_over_limit(here: Instructing, context: Context, job_id: RowName) -> Response:
+def grade_over_limit(here: CourseInstructor, context: Context, job_id: RowName) -> Response:
     """Grade a submission that was not graded because it exceeds a limit."""
-    regrades.grade_over_limit(context.service, here.acting, here.course_id, job_id)
+    regrades.grade_over_limit(context.service, here.actor, here.course_id, job_id)
     return RedirectResponse(f"/courses/{here.course_id}/grades/{job_id}", 303)

@@ -15,8 +15,8 @@ from fastapi.responses import RedirectResponse, Response
 from service.operations import launches
 from service.operations.launches import LaunchRequest, UnknownPlatform
 from service.web.context import Context, WebContext
-from service.web.pages.home import course_path
-from service.web.pages.sign_in import inside, set_session
+from service.web.pages.home import build_course_path
+from service.web.pages.sign_in import sanitize_target, set_session_cookie
 from sim.errors import UsageError
 
 cross_site_router = APIRouter()
@@ -28,7 +28,7 @@ Text = Annotated[str, Form(max_length=_LONGEST)]
 
 
 @cross_site_router.get("/lti/keys")
-def keys(context: Context) -> dict[str, Any]:
+def list_keys(context: Context) -> dict[str, Any]:
     """Return the public keys of this installation."""
     return launches.list_keys(context.service)
 
@@ -44,7 +44,7 @@ def login_by_link(
     client_id: Annotated[str, Query(max_length=_LONGEST)] = "",
 ) -> Response:
     """Start a launch from a link."""
-    return _begin(request, context, iss, login_hint, target_link_uri, lti_message_hint, client_id)
+    return _begin_launch(request, context, iss, login_hint, target_link_uri, lti_message_hint, client_id)
 
 
 @cross_site_router.post("/lti/login")
@@ -58,11 +58,11 @@ def login(
     client_id: Text = "",
 ) -> Response:
     """Start a launch from a form."""
-    return _begin(request, context, iss, login_hint, target_link_uri, lti_message_hint, client_id)
+    return _begin_launch(request, context, iss, login_hint, target_link_uri, lti_message_hint, client_id)
 
 
 @cross_site_router.post("/lti/launch")
-def end_launch(
+def complete_launch(
     request: Request,
     context: Context,
     state: Text = "",
@@ -77,14 +77,14 @@ def end_launch(
     if not began_here or not hmac.compare_digest(began_here.encode(), state.encode()):
         raise UsageError("this launch started in another browser or has expired; open the link in the course again")
     done = launches.complete(context.service, state, id_token)
-    target = done.target if done.target != "/" else course_path(done.launched.course_id, done.launched.role)
+    target = done.target if done.target != "/" else build_course_path(done.launched.course_id, done.launched.role)
     answer = RedirectResponse(target, 303)
-    set_session(answer, context, done.session)
+    set_session_cookie(answer, context, done.session)
     answer.delete_cookie(_STATE_COOKIE, path="/lti", secure=True, httponly=True, samesite="none")
     return answer
 
 
-def _begin(
+def _begin_launch(
     request: Request,
     context: WebContext,
     issuer: str,
@@ -95,7 +95,7 @@ def _begin(
 ) -> Response:
     start = context.settings.public_url or str(request.base_url).rstrip("/")
     # Accept only local paths, so that the link's author cannot redirect to another site.
-    path = inside(target.removeprefix(start)) if target.startswith(f"{start}/") else "/"
+    path = sanitize_target(target.removeprefix(start)) if target.startswith(f"{start}/") else "/"
     try:
         begun = launches.begin(context.service, LaunchRequest(issuer, client_id, login_hint, message_hint, start, path))
     except UnknownPlatform:

@@ -9,28 +9,28 @@ from fastapi.responses import RedirectResponse, Response
 
 from service.operations import grade_views, grades
 from service.operations.grades import LONGEST_COMMENT, LONGEST_REASON, CommentRequest, MarksRequest
-from service.web.access import HIGHEST_NUMBER, InCourse, Instructing, RowName, SentRowNumber
+from service.web.access import HIGHEST_NUMBER, CourseInstructor, ReaderInCourse, RowName, SentRowNumber
 from service.web.context import Context
-from service.web.rendering import page
+from service.web.rendering import render_page
 
 router = APIRouter(prefix="/courses/{course_id}/grades/{job_id}/marking")
 Criterion = Annotated[str, Form(max_length=200)]
 Reason = Annotated[str, Form()]
 #: Id of the criterion's override when the form was shown; 0 if there was none.
-Seen = Annotated[int | None, Form(ge=0, le=HIGHEST_NUMBER)]
+SeenOverrideId = Annotated[int | None, Form(ge=0, le=HIGHEST_NUMBER)]
 
 
 @router.get("")
-def marking(request: Request, here: Instructing, context: Context, job_id: RowName) -> Response:
+def show_marking(request: Request, here: CourseInstructor, context: Context, job_id: RowName) -> Response:
     """Show the criteria of a grade with their forms, the comments and the activity log."""
-    found = grades.show_marking(context.service, here.acting, here.course_id, job_id)
-    return page(
+    found = grades.show_marking(context.service, here.actor, here.course_id, job_id)
+    return render_page(
         request,
         here.reader,
         "marking.html",
         here=here,
         marking=found,
-        beside=grade_views.show_neighbours(context.service, here.acting, here.course_id, job_id),
+        beside=grade_views.show_neighbours(context.service, here.actor, here.course_id, job_id),
         longest_reason=LONGEST_REASON,
         longest_comment=LONGEST_COMMENT,
     )
@@ -38,56 +38,63 @@ def marking(request: Request, here: Instructing, context: Context, job_id: RowNa
 
 @router.post("/set")
 def set_marks(
-    here: Instructing,
+    here: CourseInstructor,
     context: Context,
     job_id: RowName,
     criterion: Criterion,
     reason: Reason = "",
     marks: Annotated[str, Form(max_length=20)] = "",
-    seen: Seen = None,
+    seen: SeenOverrideId = None,
 ) -> Response:
     """Set the marks of a criterion. Fails if another person changed them since the form was shown."""
     asked = MarksRequest(criterion, marks, reason, seen)
-    grades.set_marks(context.service, here.acting, here.course_id, job_id, asked)
-    return _to_marking(here, job_id)
+    grades.set_marks(context.service, here.actor, here.course_id, job_id, asked)
+    return _redirect_to_marking(here, job_id)
 
 
 @router.post("/excuse")
-def excuse(
-    here: Instructing, context: Context, job_id: RowName, criterion: Criterion, reason: Reason = "", seen: Seen = None
+def excuse_criterion(
+    here: CourseInstructor,
+    context: Context,
+    job_id: RowName,
+    criterion: Criterion,
+    reason: Reason = "",
+    seen: SeenOverrideId = None,
 ) -> Response:
     """Excuse a criterion. Fails if another person changed it since the form was shown."""
     asked = MarksRequest(criterion, None, reason, seen)
-    grades.set_marks(context.service, here.acting, here.course_id, job_id, asked)
-    return _to_marking(here, job_id)
+    grades.set_marks(context.service, here.actor, here.course_id, job_id, asked)
+    return _redirect_to_marking(here, job_id)
 
 
 @router.post("/withdraw")
-def withdraw(here: Instructing, context: Context, job_id: RowName, criterion: Criterion, seen: Seen = None) -> Response:
+def withdraw_override(
+    here: CourseInstructor, context: Context, job_id: RowName, criterion: Criterion, seen: SeenOverrideId = None
+) -> Response:
     """Restore the grader's marks of a criterion. Fails if another person changed them since the form was shown."""
-    grades.withdraw(context.service, here.acting, here.course_id, job_id, criterion, seen)
-    return _to_marking(here, job_id)
+    grades.withdraw_override(context.service, here.actor, here.course_id, job_id, criterion, seen)
+    return _redirect_to_marking(here, job_id)
 
 
 @router.post("/comment")
-def comment(
-    here: Instructing,
+def add_comment(
+    here: CourseInstructor,
     context: Context,
     job_id: RowName,
     text: Annotated[str, Form()] = "",
     criterion: Criterion = "",
 ) -> Response:
     """Write a comment for the student."""
-    grades.comment(context.service, here.acting, here.course_id, job_id, CommentRequest(text, criterion))
-    return _to_marking(here, job_id)
+    grades.add_comment(context.service, here.actor, here.course_id, job_id, CommentRequest(text, criterion))
+    return _redirect_to_marking(here, job_id)
 
 
 @router.post("/uncomment")
-def uncomment(here: Instructing, context: Context, job_id: RowName, comment_id: SentRowNumber) -> Response:
+def withdraw_comment(here: CourseInstructor, context: Context, job_id: RowName, comment_id: SentRowNumber) -> Response:
     """Withdraw a comment."""
-    grades.withdraw_comment(context.service, here.acting, here.course_id, job_id, comment_id)
-    return _to_marking(here, job_id)
+    grades.withdraw_comment(context.service, here.actor, here.course_id, job_id, comment_id)
+    return _redirect_to_marking(here, job_id)
 
 
-def _to_marking(here: InCourse, job_id: str) -> Response:
+def _redirect_to_marking(here: ReaderInCourse, job_id: str) -> Response:
     return RedirectResponse(f"/courses/{here.course_id}/grades/{job_id}/marking", 303)

@@ -14,36 +14,38 @@ from service.language import translatable
 from service.operations import batches, people, system
 from service.operations import courses as course_operations
 from service.operations.courses import MemberRequest
-from service.operations.types import JobState, Lane
-from service.web.access import Operating, RowNumberAfter, SentRowName
+from service.operations.types import JobQueue, JobState
+from service.web.access import OperatorReader, RowNumberAfter, SentRowName
 from service.web.context import Context
-from service.web.made_links import LinkWord, made_link, new_word, secret_word
-from service.web.rendering import page, wants_part
+from service.web.created_links import LinkWord, derive_secret, find_created_link, generate_word
+from service.web.rendering import is_htmx_request, render_page
 
 router = APIRouter()
-_LANES = {
-    Lane.INTERACTIVE: translatable("interactive: single submissions"),
-    Lane.BATCH: translatable("batch: whole classes"),
+_QUEUE_TITLES = {
+    JobQueue.INTERACTIVE: translatable("interactive: single submissions"),
+    JobQueue.BATCH: translatable("batch: whole classes"),
 }
-_TRYOUTS = translatable("test runs: programs that run without marks")
+_TEST_RUNS_TITLE = translatable("test runs: programs that run without marks")
 
 
 @router.get("/operator")
-def operation(request: Request, reader: Operating, context: Context) -> Response:
+def show_status(request: Request, reader: OperatorReader, context: Context) -> Response:
     """Show the system status: queues, workers and failed jobs."""
-    view = system.show(context.service, reader.acting)
+    view = system.show(context.service, reader.actor)
     lanes = [
         (
-            _LANES[lane],
+            _QUEUE_TITLES[lane],
             view.metrics.queue.jobs.get((lane, JobState.QUEUED), 0),
             view.metrics.queue.jobs.get((lane, JobState.RUNNING), 0),
             round(view.metrics.queue.oldest_seconds.get(lane, 0.0)),
         )
-        for lane in Lane
+        for lane in JobQueue
     ]
-    lanes.append((_TRYOUTS, view.test_runs.queued, view.test_runs.running, round(view.test_runs.oldest_seconds)))
-    template = "operator_state.html" if wants_part(request) else "operator.html"
-    return page(
+    lanes.append(
+        (_TEST_RUNS_TITLE, view.test_runs.queued, view.test_runs.running, round(view.test_runs.oldest_seconds))
+    )
+    template = "operator_state.html" if is_htmx_request(request) else "operator.html"
+    return render_page(
         request,
         reader,
         template,
@@ -58,38 +60,38 @@ def operation(request: Request, reader: Operating, context: Context) -> Response
 
 
 @router.post("/operator/retry")
-def retry(reader: Operating, context: Context, batch_id: SentRowName = "") -> Response:
+def retry(reader: OperatorReader, context: Context, batch_id: SentRowName = "") -> Response:
     """Requeue the failed jobs of one batch or of all batches."""
-    batches.retry_dead(context.service, reader.acting, batch_id or None)
+    batches.retry_dead(context.service, reader.actor, batch_id or None)
     return RedirectResponse("/operator", 303)
 
 
 @router.get("/operator/courses")
-def courses(
+def list_courses(
     request: Request,
-    reader: Operating,
+    reader: OperatorReader,
     context: Context,
     link: LinkWord = "",
     added: RowNumberAfter = 0,
 ) -> Response:
     """Show the courses, a form to add an instructor, and the link of the newly added one."""
-    actor, made = reader.acting, made_link(request, context, reader, link)
+    actor, made = reader.actor, find_created_link(request, context, reader, link)
     listed = course_operations.list_courses(context.service, actor)
     elsewhere = people.show(context.service, actor, added).elsewhere if added else ()
     template = "operator_courses.html"
-    return page(request, reader, template, courses=listed, made=made, added=added, elsewhere=elsewhere)
+    return render_page(request, reader, template, courses=listed, made=made, added=added, elsewhere=elsewhere)
 
 
 @router.post("/operator/courses")
 def add_instructor(
-    reader: Operating,
+    reader: OperatorReader,
     context: Context,
     course: Annotated[str, Form(min_length=1, max_length=100)],
     who: Annotated[str, Form(min_length=1, max_length=100)],
     name: Annotated[str, Form(max_length=200)] = "",
 ) -> Response:
     """Add an instructor, create the course if it does not exist, and show the operator a sign-in link."""
-    word = new_word()
-    asked = MemberRequest(course, who, name, word=secret_word(reader, word))
-    member = course_operations.add_member(context.service, reader.acting, asked).member
+    word = generate_word()
+    asked = MemberRequest(course, who, name, word=derive_secret(reader, word))
+    member = course_operations.add_member(context.service, reader.actor, asked).member
     return RedirectResponse(f"/operator/courses?link={word}&added={member.enrolment_id}", 303)

@@ -10,9 +10,9 @@ from fastapi.responses import RedirectResponse, Response
 
 from service.operations import people
 from service.operations.people import JoinRequest
-from service.web.access import Operating, RowNumber, SentRowNumber
+from service.web.access import OperatorReader, RowNumber, SentRowNumber
 from service.web.context import Context
-from service.web.rendering import page
+from service.web.rendering import render_page
 
 router = APIRouter(prefix="/operator/people")
 CourseName = Annotated[str, Query(max_length=100)]
@@ -20,18 +20,20 @@ Id = Annotated[str, Query(max_length=200)]
 
 
 @router.get("")
-def find(request: Request, reader: Operating, context: Context, course: CourseName = "", who: Id = "") -> Response:
+def find_person(
+    request: Request, reader: OperatorReader, context: Context, course: CourseName = "", who: Id = ""
+) -> Response:
     """Show a form that finds a person by course and id."""
     if not course or not who:
-        return page(request, reader, "operator_people.html")
-    found = people.find(context.service, reader.acting, course.strip(), who.strip())
+        return render_page(request, reader, "operator_people.html")
+    found = people.find(context.service, reader.actor, course.strip(), who.strip())
     return RedirectResponse(f"/operator/people/{found.enrolment_id}", 303)
 
 
 @router.get("/{member_id}")
-def show(
+def show_person(
     request: Request,
-    reader: Operating,
+    reader: OperatorReader,
     context: Context,
     member_id: RowNumber,
     course: CourseName = "",
@@ -39,32 +41,32 @@ def show(
     ended: Annotated[int | None, Query(ge=0, le=1_000_000)] = None,
 ) -> Response:
     """Show a person. With a course and an id, also show the person to join them with."""
-    actor = reader.acting
+    actor = reader.actor
     view = people.show(context.service, actor, member_id)
     other = None
     if course and who:
         found = people.find(context.service, actor, course.strip(), who.strip())
         other = people.show(context.service, actor, found.enrolment_id)
-    return page(request, reader, "operator_person.html", view=view, other=other, ended=ended)
+    return render_page(request, reader, "operator_person.html", view=view, other=other, ended=ended)
 
 
 @router.post("/{member_id}/sign-out")
 def sign_out(
-    reader: Operating, context: Context, member_id: RowNumber, release: Annotated[bool, Form()] = False
+    reader: OperatorReader, context: Context, member_id: RowNumber, release: Annotated[bool, Form()] = False
 ) -> Response:
     """End all links, sessions and tokens of a person."""
-    ended = people.sign_out(context.service, reader.acting, member_id, release=release)
+    ended = people.sign_out(context.service, reader.actor, member_id, release=release)
     return RedirectResponse(f"/operator/people/{member_id}?{urlencode({'ended': ended})}", 303)
 
 
 @router.post("/{member_id}/join")
 def join(
-    reader: Operating,
+    reader: OperatorReader,
     context: Context,
     member_id: RowNumber,
     other_id: SentRowNumber,
     from_platform: Annotated[bool, Form()] = False,
 ) -> Response:
     """Join the two persons that the page shows."""
-    people.join(context.service, reader.acting, JoinRequest(member_id, other_id, from_platform))
+    people.join(context.service, reader.actor, JoinRequest(member_id, other_id, from_platform))
     return RedirectResponse(f"/operator/people/{member_id}", 303)

@@ -9,30 +9,32 @@ from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
 from service.operations import own_views
-from service.web.access import RowNumber, Studying
-from service.web.attachments import attachment
+from service.web.access import CourseStudent, RowNumber
+from service.web.attachments import respond_with_attachment
 from service.web.context import Context
-from service.web.language import language_of
-from service.web.pages.mine import curve
-from service.web.rendering import page, wants_part
+from service.web.language import detect_language
+from service.web.pages.own_assignments import compute_marks_curve
+from service.web.rendering import is_htmx_request, render_page
 
 router = APIRouter()
 
 
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}")
-def own_submission(request: Request, here: Studying, context: Context, submission_id: RowNumber) -> Response:
+def show_own_submission(request: Request, here: CourseStudent, context: Context, submission_id: RowNumber) -> Response:
     """Show the progress or the report of a submission.
 
     Requests from htmx get only the progress, or an instruction to reload the page when grading has ended.
     """
-    asked = (context.service, here.acting, here.course_id, submission_id)
-    if wants_part(request):
+    asked = (context.service, here.actor, here.course_id, submission_id)
+    if is_htmx_request(request):
         part = own_views.show_submission(*asked)
         if part.place is None:
             return Response(headers={"hx-refresh": "true"})
-        return page(request, here.reader, "own_progress.html", here=here, found=part.submission, place=part.place)
-    found = own_views.show_submission_report(*asked, language_of(request))
-    return page(
+        return render_page(
+            request, here.reader, "own_progress.html", here=here, found=part.submission, place=part.place
+        )
+    found = own_views.show_submission_report(*asked, detect_language(request))
+    return render_page(
         request,
         here.reader,
         "own_submission.html",
@@ -42,7 +44,7 @@ def own_submission(request: Request, here: Studying, context: Context, submissio
         attempts=found.attempts,
         counting=found.counting,
         is_open=found.is_open,
-        curve=curve(found.attempts),
+        curve=compute_marks_curve(found.attempts),
         allowance=found.allowance,
         appeals=found.appeals,
         report=found.report,
@@ -50,7 +52,7 @@ def own_submission(request: Request, here: Studying, context: Context, submissio
 
 
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}/files")
-def own_files(here: Studying, context: Context, submission_id: RowNumber) -> Response:
+def download_own_files(here: CourseStudent, context: Context, submission_id: RowNumber) -> Response:
     """Return the submitted files as a zip that can be submitted again."""
-    found = own_views.show_files(context.service, here.acting, here.course_id, submission_id)
-    return attachment(found.data, found.name, "application/zip")
+    found = own_views.show_files(context.service, here.actor, here.course_id, submission_id)
+    return respond_with_attachment(found.data, found.name, "application/zip")

@@ -18,20 +18,20 @@ from service.operations import people, people_views, policies, sign_in_links
 from service.operations.errors import Conflict
 from service.operations.policies import ExtensionRequest
 from service.operations.types import Role
-from service.reports.formats.csv_output import csv_text
-from service.web.access import InCourse, Instructing, RowNumber
+from service.reports.formats.csv_output import render_safe_csv
+from service.web.access import CourseInstructor, ReaderInCourse, RowNumber
 from service.web.api_uploads import LARGEST_TABLE
-from service.web.attachments import attachment
+from service.web.attachments import respond_with_attachment
 from service.web.context import Context, WebContext
-from service.web.kept_uploads import file_name
-from service.web.language import language_of
-from service.web.made_links import LinkWord, made_link, new_word, secret_word, sign_in_address
-from service.web.moments import written_moment
-from service.web.rendering import page
+from service.web.created_links import LinkWord, build_sign_in_url, derive_secret, find_created_link, generate_word
+from service.web.date_times import parse_date_time
+from service.web.language import detect_language
+from service.web.pending_uploads import clean_file_name
+from service.web.rendering import render_page
 from service.web.request_bodies import takes_upload
 from sim.errors import UsageError
-from submissions.raw_files import SentFile
-from submissions.student_identity import Student, read_people, students_of
+from submissions.raw_files import UploadedFile
+from submissions.student_identity import Student, list_known_students, read_people
 
 router = APIRouter(prefix="/courses/{course_id}/people")
 _LONGEST = 200
@@ -40,7 +40,7 @@ _LONGEST = 200
 @router.get("")
 def list_people(
     request: Request,
-    here: Instructing,
+    here: CourseInstructor,
     context: Context,
     q: Annotated[str, Query(max_length=100)] = "",
     number: Annotated[int, Query(alias="page", ge=1, le=10_000)] = 1,
@@ -48,13 +48,13 @@ def list_people(
     removed: Annotated[str, Query(max_length=_LONGEST)] = "",
 ) -> Response:
     """Show everybody in the course, and forms to enrol students."""
-    return _list(request, here, context, text=q, number=number, enrolled=enrolled, removed=removed)
+    return _render_list(request, here, context, text=q, number=number, enrolled=enrolled, removed=removed)
 
 
 @router.post("")
-def add(
+def enrol_student(
     request: Request,
-    here: Instructing,
+    here: CourseInstructor,
     context: Context,
     who: Annotated[str, Form(min_length=1, max_length=_LONGEST)],
     name: Annotated[str, Form(max_length=_LONGEST)] = "",
@@ -62,59 +62,63 @@ def add(
 ) -> Response:
     """Enrol one student. An existing student stays unchanged."""
     try:
-        enrolment_id = people.enrol_new(context.service, here.acting, here.course_id, Student(who, name, email))
+        enrolment_id = people.enrol_new(context.service, here.actor, here.course_id, Student(who, name, email))
     except Conflict as error:
-        return _list(request, here, context, refused=error, status_code=422)
+        return _render_list(request, here, context, refused=error, status_code=422)
     return RedirectResponse(f"/courses/{here.course_id}/people/{enrolment_id}", 303)
 
 
 @router.post("/table")
 @takes_upload(LARGEST_TABLE, Role.INSTRUCTOR)
-def add_table(request: Request, here: Instructing, context: Context, file: Annotated[UploadFile, File()]) -> Response:
+def enrol_table(
+    request: Request, here: CourseInstructor, context: Context, file: Annotated[UploadFile, File()]
+) -> Response:
     """Enrol all students of an uploaded table."""
     with tempfile.TemporaryDirectory(prefix="robomark-people-") as folder:
-        path = Path(folder) / file_name(SentFile(file.filename or "people.csv", file.file))
+        path = Path(folder) / clean_file_name(UploadedFile(file.filename or "people.csv", file.file))
         with path.open("xb") as sink:
             shutil.copyfileobj(file.file, sink)
         try:
-            listed = students_of(read_people(path))
+            listed = list_known_students(read_people(path))
         except UsageError as error:
-            return _list(request, here, context, refused=error, status_code=422)
-    enrolled = people.enrol(context.service, here.acting, here.course_id, listed)
+            return _render_list(request, here, context, refused=error, status_code=422)
+    enrolled = people.enrol(context.service, here.actor, here.course_id, listed)
     return RedirectResponse(f"/courses/{here.course_id}/people?enrolled={len(set(enrolled))}", 303)
 
 
 @router.get("/table")
-def to_list(here: Instructing) -> Response:
+def redirect_to_list(here: CourseInstructor) -> Response:
     """Redirect to the list, for readers who open the upload address in the browser."""
     return RedirectResponse(f"/courses/{here.course_id}/people", 303)
 
 
 @router.post("/links")
-def links(
+def create_links(
     request: Request,
-    here: Instructing,
+    here: CourseInstructor,
     context: Context,
     days: Annotated[int, Form(ge=1, le=sign_in_links.MOST_DAYS)] = sign_in_links.DAYS,
 ) -> Response:
     """Return a table with a new sign-in link for each student, to be sent to them."""
-    made = sign_in_links.make_links(context.service, here.acting, here.course_id, days)
+    made = sign_in_links.make_links(context.service, here.actor, here.course_id, days)
     rows = [["id", "name", "email", "link", "expires", "reason"]]
     for each in made:
-        link = sign_in_address(request, context, each.secret) if each.secret else ""
+        link = build_sign_in_url(request, context, each.secret) if each.secret else ""
         until = each.expires_at.astimezone().isoformat(timespec="minutes") if each.expires_at else ""
         rows.append([each.student.id, each.student.name, each.student.email, link, until, each.reason])
-    return attachment(csv_text(rows).encode("utf-8-sig"), f"links {here.course}.csv", "text/csv; charset=utf-8")
+    return respond_with_attachment(
+        render_safe_csv(rows).encode("utf-8-sig"), f"links {here.course}.csv", "text/csv; charset=utf-8"
+    )
 
 
 @router.get("/{enrolment_id}")
-def show(
-    request: Request, here: Instructing, context: Context, enrolment_id: RowNumber, link: LinkWord = ""
+def show_student(
+    request: Request, here: CourseInstructor, context: Context, enrolment_id: RowNumber, link: LinkWord = ""
 ) -> Response:
     """Show a student's submissions and extensions, and a newly created sign-in link."""
-    view = people_views.show_student(context.service, here.acting, here.course_id, enrolment_id)
-    made = made_link(request, context, here.reader, link)
-    return page(
+    view = people_views.show_student(context.service, here.actor, here.course_id, enrolment_id)
+    made = find_created_link(request, context, here.reader, link)
+    return render_page(
         request,
         here.reader,
         "person.html",
@@ -132,30 +136,30 @@ def show(
 
 
 @router.get("/{enrolment_id}/link")
-def to_student(here: Instructing, enrolment_id: RowNumber) -> Response:
+def redirect_to_student(here: CourseInstructor, enrolment_id: RowNumber) -> Response:
     """Redirect to the student's page, for readers who open the address that creates links."""
     return RedirectResponse(f"/courses/{here.course_id}/people/{enrolment_id}", 303)
 
 
 @router.post("/{enrolment_id}/link")
-def link(here: Instructing, context: Context, enrolment_id: RowNumber) -> Response:
+def create_link(here: CourseInstructor, context: Context, enrolment_id: RowNumber) -> Response:
     """Create a sign-in link for a student. The student's page shows it to its creator."""
-    word, actor = new_word(), here.acting
-    made_of = secret_word(here.reader, word)
+    word, actor = generate_word(), here.actor
+    made_of = derive_secret(here.reader, word)
     sign_in_links.make_students_link(context.service, actor, here.course_id, enrolment_id, word=made_of)
     return RedirectResponse(f"/courses/{here.course_id}/people/{enrolment_id}?link={word}", 303)
 
 
 @router.post("/{enrolment_id}/remove")
-def remove(here: Instructing, context: Context, enrolment_id: RowNumber) -> Response:
+def remove(here: CourseInstructor, context: Context, enrolment_id: RowNumber) -> Response:
     """Remove a student who has submitted nothing from the course."""
-    who = people.remove(context.service, here.acting, here.course_id, enrolment_id)
+    who = people.remove(context.service, here.actor, here.course_id, enrolment_id)
     return RedirectResponse(f"/courses/{here.course_id}/people?{urlencode({'removed': who[:_LONGEST]})}", 303)
 
 
 @router.post("/{enrolment_id}/extensions")
 def extend(
-    here: Instructing,
+    here: CourseInstructor,
     context: Context,
     enrolment_id: RowNumber,
     assignment: Annotated[str, Form(max_length=100)] = "",
@@ -163,14 +167,14 @@ def extend(
     more_attempts: Annotated[int, Form(ge=0, le=1000)] = 0,
 ) -> Response:
     """Give a student more time or attempts. This replaces an earlier extension for the same assignment."""
-    asked = ExtensionRequest(assignment, written_moment(due), more_attempts)
-    policies.extend(context.service, here.acting, here.course_id, enrolment_id, asked)
+    asked = ExtensionRequest(assignment, parse_date_time(due), more_attempts)
+    policies.extend(context.service, here.actor, here.course_id, enrolment_id, asked)
     return RedirectResponse(f"/courses/{here.course_id}/people/{enrolment_id}", 303)
 
 
-def _list(
+def _render_list(
     request: Request,
-    here: InCourse,
+    here: ReaderInCourse,
     context: WebContext,
     *,
     text: str = "",
@@ -180,8 +184,8 @@ def _list(
     refused: UsageError | None = None,
     status_code: int = 200,
 ) -> Response:
-    view = people_views.search_members(context.service, here.acting, here.course_id, text, number)
-    return page(
+    view = people_views.search_members(context.service, here.actor, here.course_id, text, number)
+    return render_page(
         request,
         here.reader,
         "people.html",
@@ -189,7 +193,7 @@ def _list(
         here=here,
         view=view,
         text=text,
-        refused="" if refused is None else language_of(request).tell(refused.said),
+        refused="" if refused is None else detect_language(request).translate_sentence(refused.message),
         enrolled=enrolled,
         removed=removed,
         days=sign_in_links.DAYS,

@@ -9,30 +9,30 @@ from fastapi.responses import RedirectResponse, Response
 
 from service.operations import platforms as operations
 from service.operations.platforms import EnrolledMembers, Registration
-from service.web.access import InCourse, Instructing, Operating
+from service.web.access import CourseInstructor, OperatorReader, ReaderInCourse
 from service.web.context import Context, WebContext
-from service.web.rendering import page
+from service.web.rendering import render_page
 
 router = APIRouter()
 Address = Annotated[str, Form(min_length=1, max_length=1000)]
-Registered = Annotated[str, Form(min_length=1, max_length=operations.LONGEST_REGISTERED)]
+RegisteredText = Annotated[str, Form(min_length=1, max_length=operations.LONGEST_REGISTERED)]
 
 
 @router.get("/operator/platforms")
-def platforms(request: Request, reader: Operating, context: Context) -> Response:
+def list_platforms(request: Request, reader: OperatorReader, context: Context) -> Response:
     """Show the registered platforms, the values for a platform's administrator, and a form to register one."""
-    registered = operations.list_platforms(context.service, reader.acting)
+    registered = operations.list_platforms(context.service, reader.actor)
     start = context.settings.public_url or str(request.base_url).rstrip("/")
-    return page(request, reader, "platforms.html", platforms=registered, start=start)
+    return render_page(request, reader, "platforms.html", platforms=registered, start=start)
 
 
 @router.post("/operator/platforms")
 def register(
-    reader: Operating,
+    reader: OperatorReader,
     context: Context,
     name: Annotated[str, Form(min_length=1, max_length=200)],
-    issuer: Registered,
-    client_id: Registered,
+    issuer: RegisteredText,
+    client_id: RegisteredText,
     deployments: Address,
     authorization_url: Address,
     token_url: Address,
@@ -43,42 +43,42 @@ def register(
     listed, origins = (each.replace(",", " ").split() for each in (deployments, service_origins))
     addresses = (authorization_url, token_url, keys_url)
     asked = Registration(name, issuer, client_id, tuple(listed), *addresses, tuple(origins))
-    operations.register(context.service, reader.acting, asked)
+    operations.register(context.service, reader.actor, asked)
     return RedirectResponse("/operator/platforms", 303)
 
 
 @router.get("/courses/{course_id}/platform")
-def course_platform(request: Request, here: Instructing, context: Context) -> Response:
+def show_course_platform(request: Request, here: CourseInstructor, context: Context) -> Response:
     """Show the course's platform, with buttons to fetch members and send marks."""
-    return _course_page(request, here, context)
+    return _render_course_platform(request, here, context)
 
 
 @router.post("/courses/{course_id}/platform/members")
-def fetch_members(request: Request, here: Instructing, context: Context) -> Response:
+def fetch_members(request: Request, here: CourseInstructor, context: Context) -> Response:
     """Enrol all members of the course on the platform."""
-    enrolled = operations.enrol_members(context.service, here.acting, here.course_id)
-    return _course_page(request, here, context, enrolled=enrolled)
+    enrolled = operations.enrol_members(context.service, here.actor, here.course_id)
+    return _render_course_platform(request, here, context, enrolled=enrolled)
 
 
 @router.post("/courses/{course_id}/platform/marks")
 def pass_back(
-    request: Request, here: Instructing, context: Context, assignment: Annotated[str, Form(max_length=200)]
+    request: Request, here: CourseInstructor, context: Context, assignment: Annotated[str, Form(max_length=200)]
 ) -> Response:
     """Send the published marks of an assignment to the platform's gradebook."""
-    sent = operations.pass_back(context.service, here.acting, here.course_id, assignment)
-    return _course_page(request, here, context, sent=sent)
+    sent = operations.pass_back(context.service, here.actor, here.course_id, assignment)
+    return _render_course_platform(request, here, context, sent=sent)
 
 
-def _course_page(
+def _render_course_platform(
     request: Request,
-    here: InCourse,
+    here: ReaderInCourse,
     context: WebContext,
     *,
     enrolled: EnrolledMembers | None = None,
     sent: int | None = None,
 ) -> Response:
-    view = operations.show_course_platform(context.service, here.acting, here.course_id)
-    return page(
+    view = operations.show_course_platform(context.service, here.actor, here.course_id)
+    return render_page(
         request,
         here.reader,
         "course_platform.html",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from brick_link import link
-from ev3dev2.single_motor import LargeMotor, Motor, not_negative
-from ev3dev2.speeds import Speed, whole
+from ev3dev2.single_motor import LargeMotor, Motor, check_not_negative
+from ev3dev2.speeds import Speed, round_to_whole
 
 
 class MotorSet:
@@ -18,11 +18,11 @@ class MotorSet:
         for motor in self.motors.values():
             motor.reset()
 
-    def _chosen(self, motors: Iterable[Motor] | None) -> Iterable[Motor]:
+    def _select_motors(self, motors: Iterable[Motor] | None) -> Iterable[Motor]:
         return self.motors.values() if motors is None else motors
 
     def off(self, motors: Iterable[Motor] | None = None, brake: bool = True) -> None:
-        for motor in self._chosen(motors):
+        for motor in self._select_motors(motors):
             motor.stop()
 
     def stop(self, motors: Iterable[Motor] | None = None, brake: bool = True) -> None:
@@ -48,7 +48,7 @@ class MoveTank(MotorSet):
         self, left_speed: Speed, right_speed: Speed, degrees: float, brake: bool = True, block: bool = True
     ) -> None:
         """Turn the faster wheel by ``degrees`` and the other in proportion."""
-        left, right = self._speeds(left_speed, right_speed)
+        left, right = self._convert_speeds(left_speed, right_speed)
         self._move_degrees(left, right, degrees, block)
 
     def on_for_rotations(
@@ -59,15 +59,15 @@ class MoveTank(MotorSet):
     def on_for_seconds(
         self, left_speed: Speed, right_speed: Speed, seconds: float, brake: bool = True, block: bool = True
     ) -> None:
-        left, right = self._speeds(left_speed, right_speed)
+        left, right = self._convert_speeds(left_speed, right_speed)
         self._move_seconds(left, right, seconds, block)
 
     def on(self, left_speed: Speed, right_speed: Speed) -> None:
-        left, right = self._speeds(left_speed, right_speed)
+        left, right = self._convert_speeds(left_speed, right_speed)
         self._move(left, right)
 
-    def _speeds(self, left: Speed, right: Speed) -> tuple[int, int]:
-        return self.left_motor._native(left), self.right_motor._native(right)
+    def _convert_speeds(self, left: Speed, right: Speed) -> tuple[int, int]:
+        return self.left_motor._to_native_speed(left), self.right_motor._to_native_speed(right)
 
     def _move_degrees(self, left: int, right: int, degrees: float, block: bool) -> None:
         if degrees == 0 or (left == 0 and right == 0):
@@ -76,29 +76,29 @@ class MoveTank(MotorSet):
             left_degrees, right_degrees = degrees, abs(right / left * degrees)
         else:
             left_degrees, right_degrees = abs(left / right * degrees), degrees
-        self.left_motor._aim(left_degrees, left)
-        self.right_motor._aim(right_degrees, right)
+        self.left_motor._set_relative_target(left_degrees, left)
+        self.right_motor._set_relative_target(right_degrees, right)
         self.left_motor.run_to_rel_pos()
         self.right_motor.run_to_rel_pos()
         if block:
-            self._block()
+            self._wait_until_done()
 
     def _move_seconds(self, left: int, right: int, seconds: float, block: bool) -> None:
-        not_negative(seconds)
-        self.left_motor._tell(speed_sp=left, time_sp=float(seconds), command="run-timed")
-        self.right_motor._tell(speed_sp=right, time_sp=float(seconds), command="run-timed")
+        check_not_negative(seconds)
+        self.left_motor._set_motor(speed_sp=left, time_sp=float(seconds), command="run-timed")
+        self.right_motor._set_motor(speed_sp=right, time_sp=float(seconds), command="run-timed")
         if block:
-            self._block()
+            self._wait_until_done()
 
     def _move(self, left: int, right: int) -> None:
         link.run_forever(self.left_motor.address, left)
         link.run_forever(self.right_motor.address, right)
 
-    def _block(self) -> None:
+    def _wait_until_done(self) -> None:
         # The motors are started one after the other, as in the original. The second motor has often stopped before the
         # wait for its start begins, so that the wait times out.
-        self.left_motor._block()
-        self.right_motor._block()
+        self.left_motor._wait_until_done()
+        self.right_motor._wait_until_done()
 
 
 class MoveSteering(MoveTank):
@@ -109,10 +109,10 @@ class MoveSteering(MoveTank):
         if not -100 <= steering <= 100:
             raise ValueError(f"{steering} is an invalid steering, must be between -100 and 100 (inclusive)")
         # As in the original, each wheel's speed is rounded after the steering is applied.
-        outer = self.left_motor._exact(speed)
+        outer = self.left_motor._to_degrees_per_second(speed)
         inner = outer * (50 - abs(steering)) / 50
         left, right = (outer, inner) if steering >= 0 else (inner, outer)
-        return whole(left), whole(right)
+        return round_to_whole(left), round_to_whole(right)
 
     def on_for_degrees(  # type: ignore[override]
         self, steering: float, speed: Speed, degrees: float, brake: bool = True, block: bool = True

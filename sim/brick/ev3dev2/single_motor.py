@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from brick_link import MOST_UNITS, link, number
-from ev3dev2.speeds import Speed, SpeedValue, whole
+from brick_link import MOST_UNITS, link, to_plain_number
+from ev3dev2.speeds import Speed, SpeedValue, round_to_whole
 
 OUTPUT_A = "outA"
 OUTPUT_B = "outB"
@@ -58,13 +58,13 @@ class Motor:
         self.address = address
         self._stop_action: str | None = None
 
-    def _tell(self, **fields: Any) -> None:
+    def _set_motor(self, **fields: Any) -> None:
         link.set_motor(self.address, **fields)
 
-    def _see(self, what: str) -> Any:
+    def _read_state(self, what: str) -> Any:
         return link.ask({"do": "motor_state", "port": self.address})[what]
 
-    def _has(self, state: str) -> bool:
+    def _has_state(self, state: str) -> bool:
         return state in link.ask({"do": "paid_motor", "port": self.address})["state"]
 
     @property
@@ -73,29 +73,29 @@ class Motor:
 
     @command.setter
     def command(self, value: str) -> None:
-        self._tell(command="" if value == self.COMMAND_STOP else value)
+        self._set_motor(command="" if value == self.COMMAND_STOP else value)
 
     @property
     def position(self) -> float:
         """Degrees on the encoder."""
-        return number(self._see("position"))
+        return to_plain_number(self._read_state("position"))
 
     @position.setter
     def position(self, value: float) -> None:
-        self._tell(position=int(value))
+        self._set_motor(position=int(value))
 
     @property
     def position_sp(self) -> float:
-        return number(self._see("position_sp"))
+        return to_plain_number(self._read_state("position_sp"))
 
     @position_sp.setter
     def position_sp(self, value: float) -> None:
-        self._tell(position_sp=int(value))
+        self._set_motor(position_sp=int(value))
 
     @property
     def speed(self) -> float:
         """Degrees per second."""
-        return number(self._see("speed"))
+        return to_plain_number(self._read_state("speed"))
 
     @property
     def duty_cycle(self) -> float:
@@ -103,11 +103,11 @@ class Motor:
 
     @property
     def speed_sp(self) -> float:
-        return number(self._see("speed_sp"))
+        return to_plain_number(self._read_state("speed_sp"))
 
     @speed_sp.setter
     def speed_sp(self, value: float) -> None:
-        self._tell(speed_sp=int(value))
+        self._set_motor(speed_sp=int(value))
 
     @property
     def duty_cycle_sp(self) -> float:
@@ -124,20 +124,20 @@ class Motor:
 
     @time_sp.setter
     def time_sp(self, value: float) -> None:
-        self._tell(time_sp=float(value))
+        self._set_motor(time_sp=float(value))
 
     @property
     def polarity(self) -> str:
-        return str(self._see("polarity"))
+        return str(self._read_state("polarity"))
 
     @polarity.setter
     def polarity(self, value: str) -> None:
-        self._tell(polarity=str(value))
+        self._set_motor(polarity=str(value))
 
     @property
     def state(self) -> str:
         """``running`` or nothing."""
-        return str(self._see("state"))
+        return str(self._read_state("state"))
 
     @property
     def stop_action(self) -> str:
@@ -151,23 +151,23 @@ class Motor:
 
     @property
     def is_running(self) -> bool:
-        return self._has(self.STATE_RUNNING)
+        return self._has_state(self.STATE_RUNNING)
 
     @property
     def is_ramping(self) -> bool:
-        return self._has(self.STATE_RAMPING)
+        return self._has_state(self.STATE_RAMPING)
 
     @property
     def is_holding(self) -> bool:
-        return self._has(self.STATE_HOLDING)
+        return self._has_state(self.STATE_HOLDING)
 
     @property
     def is_overloaded(self) -> bool:
-        return self._has(self.STATE_OVERLOADED)
+        return self._has_state(self.STATE_OVERLOADED)
 
     @property
     def is_stalled(self) -> bool:
-        return self._has(self.STATE_STALLED)
+        return self._has_state(self.STATE_STALLED)
 
     def _set(self, fields: Mapping[str, Any]) -> None:
         for name, value in fields.items():
@@ -176,7 +176,7 @@ class Motor:
     def reset(self, **fields: Any) -> None:
         """Stop the motor. Its position does not change."""
         self._set(fields)
-        self._tell(command="reset")
+        self._set_motor(command="reset")
 
     def run_direct(self, **fields: Any) -> None:
         """Apply only the set points; the simulator does not have this command."""
@@ -184,23 +184,23 @@ class Motor:
 
     def run_forever(self, **fields: Any) -> None:
         self._set(fields)
-        self._tell(command="run-forever")
+        self._set_motor(command="run-forever")
 
     def run_timed(self, **fields: Any) -> None:
         self._set(fields)
-        self._tell(command="run-timed")
+        self._set_motor(command="run-timed")
 
     def run_to_abs_pos(self, **fields: Any) -> None:
         self._set(fields)
-        self._tell(command="run-to-abs-pos")
+        self._set_motor(command="run-to-abs-pos")
 
     def run_to_rel_pos(self, **fields: Any) -> None:
         self._set(fields)
-        self._tell(command="run-to-rel-pos")
+        self._set_motor(command="run-to-rel-pos")
 
     def stop(self, **fields: Any) -> None:
         self._set(fields)
-        self._tell(command="")
+        self._set_motor(command="")
 
     def wait(self, cond: Callable[[str], bool], timeout: float | None = None) -> bool:
         """Poll every 10 ms until ``cond(state)`` is true. Return False after ``timeout`` milliseconds."""
@@ -212,19 +212,19 @@ class Motor:
         return True
 
     def wait_until_not_moving(self, timeout: float | None = None) -> bool:
-        return self._until("still", timeout)
+        return self._wait_for_state("still", timeout)
 
     def wait_until(self, s: str, timeout: float | None = None) -> bool:
         if s == self.STATE_RUNNING:
-            return self._until(s, timeout)
+            return self._wait_for_state(s, timeout)
         return self.wait(lambda state: s in state, timeout)
 
     def wait_while(self, s: str, timeout: float | None = None) -> bool:
         if s == self.STATE_RUNNING:
-            return self._until("still", timeout)
+            return self._wait_for_state("still", timeout)
         return self.wait(lambda state: s not in state, timeout)
 
-    def _until(self, state: str, timeout: float | None) -> bool:
+    def _wait_for_state(self, state: str, timeout: float | None) -> bool:
         return bool(
             link.ask(
                 {
@@ -237,7 +237,7 @@ class Motor:
             )
         )
 
-    def _exact(self, speed: Speed) -> float:
+    def _to_degrees_per_second(self, speed: Speed) -> float:
         """Return degrees per second for a SpeedValue, or for a number in per cent."""
         if isinstance(speed, SpeedValue):
             return speed.to_native_units(self)
@@ -245,46 +245,46 @@ class Motor:
             raise Exception(f"Invalid Speed Percentage. {speed} is not between -100 and 100")
         return speed / 100 * self.max_speed
 
-    def _native(self, speed: Speed) -> int:
+    def _to_native_speed(self, speed: Speed) -> int:
         """Return whole degrees per second."""
-        return whole(self._exact(speed))
+        return round_to_whole(self._to_degrees_per_second(speed))
 
-    def _aim(self, degrees: float, speed: int) -> None:
+    def _set_relative_target(self, degrees: float, speed: int) -> None:
         """Set the target of a relative move; a negative speed reverses the direction."""
-        self._tell(position_sp=whole(degrees if speed >= 0 else -degrees), speed_sp=abs(speed))
+        self._set_motor(position_sp=round_to_whole(degrees if speed >= 0 else -degrees), speed_sp=abs(speed))
 
     def on_for_rotations(self, speed: Speed, rotations: float, brake: bool = True, block: bool = True) -> None:
         self.on_for_degrees(speed, rotations * 360, brake, block)
 
     def on_for_degrees(self, speed: Speed, degrees: float, brake: bool = True, block: bool = True) -> None:
-        self._aim(degrees, self._native(speed))
+        self._set_relative_target(degrees, self._to_native_speed(speed))
         self.run_to_rel_pos()
         if block:
-            self._block()
+            self._wait_until_done()
 
     def on_to_position(self, speed: Speed, position: float, brake: bool = True, block: bool = True) -> None:
-        self._tell(position_sp=whole(position), speed_sp=self._native(speed))
+        self._set_motor(position_sp=round_to_whole(position), speed_sp=self._to_native_speed(speed))
         self.run_to_abs_pos()
         if block:
-            self._block()
+            self._wait_until_done()
 
     def on_for_seconds(self, speed: Speed, seconds: float, brake: bool = True, block: bool = True) -> None:
-        not_negative(seconds)
-        self._tell(speed_sp=self._native(speed), time_sp=float(seconds))
+        check_not_negative(seconds)
+        self._set_motor(speed_sp=self._to_native_speed(speed), time_sp=float(seconds))
         self.run_timed()
         if block:
-            self._block()
+            self._wait_until_done()
 
     def on(self, speed: Speed, brake: bool = True, block: bool = False) -> None:
-        self._tell(speed_sp=self._native(speed))
+        self._set_motor(speed_sp=self._to_native_speed(speed))
         self.run_forever()
         if block:
-            self._block()
+            self._wait_until_done()
 
     def off(self, brake: bool = True) -> None:
         self.stop()
 
-    def _block(self) -> None:
+    def _wait_until_done(self) -> None:
         self.wait_until(self.STATE_RUNNING, WAIT_RUNNING_TIMEOUT)
         self.wait_until_not_moving()
 
@@ -297,6 +297,6 @@ class MediumMotor(Motor):
     """Medium motor; all motors of the simulator are the same."""
 
 
-def not_negative(seconds: float) -> None:
+def check_not_negative(seconds: float) -> None:
     if seconds < 0:
         raise ValueError(f"seconds is negative ({seconds})")

@@ -15,12 +15,12 @@ class Sound:
 
     def speak(self, text: object, espeak_opts: str = "", volume: int = 100, play_type: int = 0) -> None:
         """Say ``text``. With PLAY_WAIT_FOR_COMPLETE, return when the speech has ended."""
-        link.tell({"do": "say", "text": str(text)})
+        link.notify({"do": "say", "text": str(text)})
         if play_type == self.PLAY_WAIT_FOR_COMPLETE:
             link.ask({"do": "until_said"})
         while play_type == self.PLAY_LOOP:
             link.ask({"do": "until_said"})
-            link.tell({"do": "say", "text": str(text)})
+            link.notify({"do": "say", "text": str(text)})
 
     def set_volume(self, pct: float, channel: object = None) -> None:
         self._volume = pct / 100

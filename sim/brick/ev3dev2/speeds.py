@@ -96,6 +96,6 @@ class SpeedDPM(_SpeedRate):
 Speed = float | SpeedValue
 
 
-def whole(value: float) -> int:
+def round_to_whole(value: float) -> int:
     """Round to the nearest whole number, halves upwards, like the simulator's ``int(round(x))``."""
     return math.floor(value + 0.5)

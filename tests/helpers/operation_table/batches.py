@@ -159,8 +159,8 @@ ROWS = {
     "similar": _read(similarity.show_similar, "batches/{batch_id}/similar", {}, "batch similar {batch_id}", _STUDENTS),
     "similar in no such batch": _read(similarity.show_similar, "batches/nothing/similar", {},
         "batch similar nothing", _STUDENTS, _NOTHING),
-    "preview a publication": _read(regrades.preview, "batches/{batch_id}/publish", {},
+    "preview a publication": _read(regrades.preview_publication, "batches/{batch_id}/publish", {},
         "batch publish-preview {batch_id}", ("2",)),
-    "preview the publication of no such batch": _read(regrades.preview, "batches/nothing/publish", {},
+    "preview the publication of no such batch": _read(regrades.preview_publication, "batches/nothing/publish", {},
         "batch publish-preview nothing", ("2",), _NOTHING),
 }  # fmt: skip

@@ -18,8 +18,8 @@ from service.operations import (
     sign_in_links,
     webhooks,
 )
-from submissions.assignment.export import write_new
-from submissions.roster import moment
+from submissions.assignment.export import create_assignment
+from submissions.roster import parse_time
 from zips import zipped
 
 DUE = "2030-01-02T10:00"
@@ -33,7 +33,7 @@ _NO_PAGE = "a program that receives events also sets them up"
 
 def _extension(refused: tuple[int, str] | None = None, who: str = "ada", **asked: Any) -> Row:
     assignment, due, more = asked.get("assignment", ""), asked.get("due", ""), asked.get("more", 0)
-    api = {"assignment": assignment, "due_at": moment(due).isoformat() if due else None, "more_attempts": more}
+    api = {"assignment": assignment, "due_at": parse_time(due).isoformat() if due else None, "more_attempts": more}
     words = (f"-a {assignment} " if assignment else "") + (f"--due {due} " if due else "")
     return Row(
         policies.extend,
@@ -46,7 +46,7 @@ def _extension(refused: tuple[int, str] | None = None, who: str = "ada", **asked
 
 def _policy(refused: tuple[int, str] | None = None, assignment: str = "", due: str = DUE) -> Row:
     numbers, named = {"late_days": 2, "attempts": 3}, f"-a {assignment}" if assignment else ""
-    sent = {"assignment": assignment, "due_at": moment(due).isoformat(), "cool_down_seconds": 600, **numbers}
+    sent = {"assignment": assignment, "due_at": parse_time(due).isoformat(), "cool_down_seconds": 600, **numbers}
     return Row(
         policies.set_policy,
         ("policy", {"assignment": assignment, "due": due, "cool_down": 10, **numbers}),
@@ -191,7 +191,7 @@ def _own_assignment() -> bytes:
     """Return a zip of an assignment that an instructor wrote."""
     with TemporaryDirectory() as made:
         folder = Path(made) / "mine"
-        write_new(folder)
+        create_assignment(folder)
         return zipped({f"mine/{each.name}": each.read_bytes() for each in folder.iterdir() if each.is_file()})
 
 

@@ -39,7 +39,7 @@ def _excuse(criterion: str, seen: int, refused: tuple[int, str] | None = None, s
 
 def _withdraw(seen: int, refused: tuple[int, str] | None = None, state: str = "marked") -> Row:
     return Row(
-        grades.withdraw,
+        grades.withdraw_override,
         ("grades/{job_id}/marking/withdraw", {"criterion": _CRITERION, "seen": seen}),
         ("DELETE", f"grades/{{job_id}}/marking/{_CRITERION}?seen={seen}", None),
         f"mark withdraw {{job_id}} {_CRITERION} --seen {seen}",
@@ -50,7 +50,7 @@ def _withdraw(seen: int, refused: tuple[int, str] | None = None, state: str = "m
 
 def _comment(text: str, criterion: str = "", refused: tuple[int, str] | None = None, job: str = "{job_id}") -> Row:
     return Row(
-        grades.comment,
+        grades.add_comment,
         (f"grades/{job}/marking/comment", {"text": text, "criterion": criterion}),
         ("POST", f"grades/{job}/comments", {"text": text, "criterion": criterion}),
         f"mark comment {job} '{text}' --criterion '{criterion}'",
@@ -84,7 +84,7 @@ def _answer(
 
 def _ask(state: str, refused: tuple[int, str] | None = None) -> Row:
     return Row(
-        appeals.ask,
+        appeals.submit,
         ("mine/submissions/1/appeal", {"text": "And now?"}),
         ("POST", "mine/submissions/1/appeals", {"text": "And now?"}),
         alone=_STUDENTS,

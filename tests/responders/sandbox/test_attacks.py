@@ -30,14 +30,14 @@ from battery import (
     run,
     unread,
 )
-from responders.sandbox import private_folders, reading_dates, zygote
+from responders.sandbox import access_times, private_folders, zygote
+from responders.sandbox.access_times import read_beforehand
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.reading_dates import read_beforehand
-from responders.sandbox.zygote import Isolation, Role
+from responders.sandbox.zygote import ChildRole, Isolation
 
 ATTACKS = attacks()
 MEMORIES = memories()
-ENCLOSED: list[tuple[str, Role]] = [
+ENCLOSED: list[tuple[str, ChildRole]] = [
     ("full", "robot"),
     ("full", "responder with libraries"),
     ("full-1", "robot"),
@@ -73,7 +73,7 @@ def sandboxes() -> Iterator[dict[str, Sandboxes]]:
 @pytest.fixture(scope="module")
 def wrapped(sandboxes: dict[str, Sandboxes]) -> Sandboxes:
     """Return sandboxes with bubblewrap around the zygote, if this machine supports it."""
-    reason = sandboxes["bubblewrap"].why_no_bubblewrap()
+    reason = sandboxes["bubblewrap"].check_bubblewrap()
     if reason is not None:
         pytest.skip(f"bubblewrap does not work here: {reason}")
     return sandboxes["bubblewrap"]
@@ -93,14 +93,14 @@ def own_user() -> Iterator[Sandboxes]:
         with pytest.MonkeyPatch.context() as patch:
             patch.setenv("ROBOMARK_SELF_TEST", SECRET)
             patch.setattr(sys, "executable", SYSTEM_PYTHON)
-            assert "own user" in made.check()
+            assert "own user" in made.check_isolation()
         yield made
 
 
 @pytest.mark.parametrize(("setting", "role"), OLD_KERNEL_LONG, ids=lambda value: value)
 @pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: attack.id)
 def test_the_sandbox_holds(
-    attack: Attack, setting: str, role: Role, sandboxes: dict[str, Sandboxes], tmp_path: Path, victim: Victim
+    attack: Attack, setting: str, role: ChildRole, sandboxes: dict[str, Sandboxes], tmp_path: Path, victim: Victim
 ) -> None:
     """The child has a writable folder, which is more than a robot program gets."""
     with decoys(tmp_path, victim) as targets:
@@ -181,21 +181,21 @@ def tree(monkeypatch: pytest.MonkeyPatch, read: set[str]) -> Iterator[Path]:
 
     with tempfile.TemporaryDirectory() as made:
         folder = readable_tree(Path(made))
-        monkeypatch.setattr(zygote, "_package_folder", lambda name: folder / name)
-        monkeypatch.setattr(reading_dates, "read_beforehand", read_the_rest)
+        monkeypatch.setattr(zygote, "_find_package_folder", lambda name: folder / name)
+        monkeypatch.setattr(access_times, "read_beforehand", read_the_rest)
         yield folder
 
 
-def _remembered(attack: Attack, sandbox: Isolation, tree: Path, role: Role = "robot") -> str:
+def _remembered(attack: Attack, sandbox: Isolation, tree: Path, role: ChildRole = "robot") -> str:
     with Sandboxes(sandbox) as sandboxes:
-        sandboxes.check(role)
+        sandboxes.check_isolation(role)
         unread(tree)
-        assert (sandboxes.remembers() is None) == sandbox.doorkeeper
+        assert (sandboxes.check_data_leaks() is None) == sandbox.doorkeeper
         more = tree / ("sim/brick" if role == "robot" else "responders/kit") / "more"
         return remembered(sandboxes, role, attack, {"readable": str(more), "links": str(tree / "links")})
 
 
-def _leaves_nothing(attack: Attack, sandbox: Isolation, tree: Path, role: Role = "robot") -> bool:
+def _leaves_nothing(attack: Attack, sandbox: Isolation, tree: Path, role: ChildRole = "robot") -> bool:
     """Return whether the attack fails in one of two runs. Pure guesses fail this test by chance once in 462 runs."""
     return any(_remembered(attack, sandbox, tree, role).startswith("blocked") for _ in range(2))
 
@@ -206,7 +206,7 @@ def _leaves_nothing(attack: Attack, sandbox: Isolation, tree: Path, role: Role =
     ids=lambda value: value,
 )
 @pytest.mark.parametrize("attack", MEMORIES, ids=lambda attack: attack.id)
-def test_a_trial_leaves_nothing_for_another(attack: Attack, setting: str, role: Role, tree: Path) -> None:
+def test_a_trial_leaves_nothing_for_another(attack: Attack, setting: str, role: ChildRole, tree: Path) -> None:
     assert _leaves_nothing(attack, SETTINGS[setting], tree, role)
 
 
@@ -260,7 +260,7 @@ def test_numbers_are_left_out_where_they_go_on(tree: Path, monkeypatch: pytest.M
     attack = next(attack for attack in MEMORIES if attack.name == "number_of_own_files")
     monkeypatch.setattr(tempfile, "tempdir", "/dev/shm")
     assert _leaves_nothing(attack, SETTINGS["full"], tree)
-    monkeypatch.setattr(private_folders, "_NUMBERS", 1)
+    monkeypatch.setattr(private_folders, "_INODES_PER_TRIAL", 1)
     _assert_leaves_something(attack, SETTINGS["full"], tree)
 
 

@@ -15,19 +15,21 @@ from pathlib import Path
 import pytest
 
 from builders import echo
-from responders.code import Code
-from responders.sandbox import reading_dates
+from responders.sandbox import access_times
 from responders.sandbox.inside import grants
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.zygote import Isolation
-from service.doctor import examine
+from responders.source_file import SourceFile
+from service.doctor import examine_machine
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from service.settings import Settings
 from sim.errors import HostError
 from submissions.submission import Submission
 
-_SUBMISSION = Submission("ada", Code("robot.py", "pass"), Code("responder.py", "def responder(m): return m"))
+_SUBMISSION = Submission(
+    "ada", SourceFile("robot.py", "pass"), SourceFile("responder.py", "def responder(m): return m")
+)
 _WEEK = 7 * 86400
 
 #: Refuses filters with a listener, as inside a container that already has such a filter, then continues.
@@ -50,18 +52,18 @@ with Sandboxes() as sandboxes:
 #: A container can have devices on a mount that records access times. No way of reading a device records one.
 _USE_A_DEVICE = """
 import os, sys
-from responders.sandbox import reading_dates
+from responders.sandbox import access_times
 device = sys.argv[1] + "/null"
 os.utime(device, (0, 0))
 with open(device, "r+b", buffering=0) as file:
     file.read(1), file.write(b"x"), os.pread(file.fileno(), 1, 0)
-print(os.stat(device).st_atime_ns, reading_dates.read_beforehand([device]))
+print(os.stat(device).st_atime_ns, access_times.read_beforehand([device]))
 """
 _READ = """
 import sys
-from responders.sandbox import reading_dates
+from responders.sandbox import access_times
 from responders.sandbox.inside import grants
-print(reading_dates.read_beforehand([sys.argv[1]]))
+print(access_times.read_beforehand([sys.argv[1]]))
 """
 
 
@@ -100,7 +102,7 @@ def test_what_was_read_beforehand_is_not_dated_again(readable: Path) -> None:
     _age(readable)
     if _dates(readable) == dated:
         pytest.skip("nothing is dated on this file system")
-    assert reading_dates.read_beforehand([str(readable)]) is None
+    assert access_times.read_beforehand([str(readable)]) is None
     before = _dates(readable)
     time.sleep(0.02)
     _read_all(readable)
@@ -109,11 +111,11 @@ def test_what_was_read_beforehand_is_not_dated_again(readable: Path) -> None:
 
 def test_a_file_from_the_future_is_dated_at_each_reading(readable: Path) -> None:
     os.utime(readable / "file", (time.time(), time.time() + _WEEK))
-    if reading_dates.read_beforehand([str(readable)]) is None:
+    if access_times.read_beforehand([str(readable)]) is None:
         pytest.skip("nothing is dated on this file system")
     # The kernel dates by a clock that ticks every few milliseconds.
     time.sleep(0.02)
-    assert "dated in the future" in str(reading_dates.read_beforehand([str(readable)]))
+    assert "dated in the future" in str(access_times.read_beforehand([str(readable)]))
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount")
@@ -141,12 +143,12 @@ def _in_a_mount(option: str, code: str, folder: Path, first: str = "true") -> st
 
 
 def test_this_machine_forgets(tmp_path: Path) -> None:
-    listed = Path(grants.listable([])[0])
+    listed = Path(grants.list_listable_folders([])[0])
     os.utime(listed, (0, listed.stat().st_mtime))
     with Sandboxes(Isolation(bubblewrap=False)) as sandboxes:
-        assert sandboxes.remembers() is None
+        assert sandboxes.check_data_leaks() is None
     assert listed.stat().st_atime > listed.stat().st_ctime
-    found = {finding.what: finding for finding in examine(Settings(home=tmp_path))}
+    found = {finding.what: finding for finding in examine_machine(Settings(home=tmp_path))}
     assert (found["between trials"].well, found["between trials"].sentence) == (
         True,
         "no data remains between trials",
@@ -155,8 +157,8 @@ def test_this_machine_forgets(tmp_path: Path) -> None:
 
 def test_without_a_doorkeeper_the_sandbox_stands_and_the_reason_is_told() -> None:
     with Sandboxes(Isolation(doorkeeper=False, bubblewrap=False)) as sandboxes:
-        assert "doorkeeper" not in sandboxes.check()
-        assert "not asked for" in str(sandboxes.remembers())
+        assert "doorkeeper" not in sandboxes.check_isolation()
+        assert "not asked for" in str(sandboxes.check_data_leaks())
     ran = subprocess.run([sys.executable, "-c", _NOBODY_ANSWERS + _CHECK], capture_output=True, text=True, check=True)
     sandbox, reason = ran.stdout.splitlines()
     assert "seccomp" in sandbox
@@ -179,11 +181,11 @@ def test_nothing_hidden_is_graded_where_a_trial_could_leave_something() -> None:
 def test_what_is_read_is_read_again_after_half_a_day(monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[float] = []
     clock = [time.time()]
-    monkeypatch.setattr(reading_dates, "read_beforehand", lambda *_: read.append(clock[0]))
+    monkeypatch.setattr(access_times, "read_beforehand", lambda *_: read.append(clock[0]))
     monkeypatch.setattr("responders.sandbox.manager.time.time", lambda: clock[0])
     with Sandboxes(Isolation(bubblewrap=False)) as sandboxes:
         for hours in (0, 1, 10, 2, 20, -100):
             clock[0] += 3600 * hours
-            assert sandboxes.remembers() is None
+            assert sandboxes.check_data_leaks() is None
     start = read[0]
     assert [round((when - start) / 3600) for when in read] == [0, 13, 33, -67]

@@ -8,18 +8,18 @@ from typing import cast
 from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.running_child import ChildLimits
-from responders.sandbox.zygote import FULL
+from responders.sandbox.zygote import FULL_ISOLATION
 
 
 class Noted:
     """Replaces a group and records the requests."""
 
-    joining: tuple[str, ...] = ()
+    command_prefix: tuple[str, ...] = ()
 
     def __init__(self) -> None:
         self.rooms: list[int] = []
 
-    def make_room(self, limits_bytes: int) -> None:
+    def adjust_memory_limit(self, limits_bytes: int) -> None:
         self.rooms.append(limits_bytes >> 20)
 
     def watch(self) -> Callable[[], bool]:
@@ -31,7 +31,7 @@ class Noted:
 
 def test_there_is_room_for_those_that_live_at_once() -> None:
     group = Noted()
-    with Sandboxes(FULL, cast(ControlGroup, group)) as sandboxes:
+    with Sandboxes(FULL_ISOLATION, cast(ControlGroup, group)) as sandboxes:
         first = sandboxes.spawn("robot", ChildLimits(1, 100 << 20))
         second = sandboxes.spawn("robot", ChildLimits(1, 70 << 20))
         first.close()

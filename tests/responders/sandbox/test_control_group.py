@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.harness.process_tree import descendants
+from benchmarks.harness.process_tree import find_descendants
 from builders import settings_in
 from memory_group import MemoryGroup, memory_group
 from paths import HELPERS
@@ -54,7 +54,7 @@ class Tree:
         (group / "cgroup.subtree_control").write_text("")
 
     def why_not(self) -> str | None:
-        return control_group.why_not(self.proc)
+        return control_group.check_available(self.proc)
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ class Tree:
 def test_a_group_is_found_and_divided(own: str, root: str, before: str, tmp_path: Path) -> None:
     tree = Tree(tmp_path, own, root, before)
     assert tree.why_not() is None
-    assert control_group.divide(tree.proc) is None
+    assert control_group.divide_group(tree.proc) is None
     assert (tree.own / "robomark-service" / "cgroup.procs").read_text() == "0"
     assert (tree.own / "cgroup.subtree_control").read_text() == "+io +memory +pids"
 
@@ -80,7 +80,7 @@ def test_whoever_was_started_by_one_that_divided_divides_nothing_anew(tmp_path: 
     for file in ("cgroup.controllers", "cgroup.procs", "cgroup.subtree_control"):
         (tree.own.parent / "made-up" / file).rename(tree.own.parent / file)
     (tree.own / "cgroup.procs").write_text("1\n2\n")
-    assert control_group.divide(tree.proc) is None
+    assert control_group.divide_group(tree.proc) is None
     assert not (tree.own / "robomark-service").exists()
     assert (tree.own.parent / "cgroup.subtree_control").read_text() == "+io +memory +pids"
 
@@ -106,8 +106,8 @@ def test_what_keeps_it_from_being_divided_is_named(file: str, text: str | None, 
     else:
         (tmp_path / file).write_text(text.replace("this", str(os.getpid())))
     assert reason in str(tree.why_not())
-    assert control_group.divide(tree.proc) == tree.why_not()
-    assert control_group.for_this_process(256, tree.proc) is None
+    assert control_group.divide_group(tree.proc) == tree.why_not()
+    assert control_group.create_slot_group(256, tree.proc) is None
     assert not (tree.own / "robomark-service").exists()
 
 
@@ -115,7 +115,7 @@ def test_a_process_goes_back_when_the_kernel_does_not_divide(tmp_path: Path) -> 
     tree = Tree(tmp_path)
     (tree.own / "cgroup.subtree_control").unlink()
     (tree.own / "cgroup.subtree_control").mkdir()
-    assert "cannot be divided: Is a directory" in str(control_group.divide(tree.proc))
+    assert "cannot be divided: Is a directory" in str(control_group.divide_group(tree.proc))
     assert (tree.own / "cgroup.procs").read_text() == "0"
 
 
@@ -143,7 +143,7 @@ def test_limits_that_not_every_kernel_has_are_done_without(file: str, needed: bo
 def test_a_slot_has_room_for_what_the_assignment_allows(slot: Path) -> None:
     group = ControlGroup(slot, 1000)
     for limits_mb, room_mb in ((640, 1040), (8192, 8592), (100, 1000)):
-        group.make_room(limits_mb << 20)
+        group.adjust_memory_limit(limits_mb << 20)
         assert (slot / "memory.max").read_text() == str(room_mb << 20)
 
 
@@ -160,7 +160,7 @@ def test_only_a_kill_for_its_own_limit_is_its_own_fault(killed: int, full: int, 
     events = "low 0\nhigh 0\nmax 77\noom {}\noom_kill {}\noom_group_kill 0\n"
     slot.mkdir()
     (slot / "memory.events").write_text(events.format(5, 2))
-    watch = ControlGroup(slot, 1536).watch()
+    watch = ControlGroup(slot, 1536).watch_memory_kills()
     (slot / "memory.events").write_text(events.format(full, killed))
     assert watch() is overran
 
@@ -304,14 +304,14 @@ def test_a_worker_divides_its_group_and_leaves_nothing_that_grows(tmp_path: Path
 
         def sandbox() -> list[str]:
             with store.reading() as session:
-                return [seen.worker.sandbox for seen in workers.known_workers(session)]
+                return [seen.worker.sandbox for seen in workers.load_workers(session)]
 
         with _worker(broker.settings, group.folder) as worker:
             assert "control group" in until(sandbox)[0]
             (killed,) = until(
-                lambda: slots() & {group.folder / f"robomark-slot-{pid}" for pid in descendants(worker.pid)}
+                lambda: slots() & {group.folder / f"robomark-slot-{pid}" for pid in find_descendants(worker.pid)}
             )
-            below = descendants(worker.pid)
+            below = find_descendants(worker.pid)
             worker.kill()
         until(lambda: not any(alive(pid) for pid in below))
         assert killed.exists()
@@ -328,7 +328,7 @@ def _worker(settings: Settings, folder: Path) -> Iterator[subprocess.Popen[bytes
     with (settings.home / "worker.log").open("ab") as log:
         process = subprocess.Popen(
             [sys.executable, "-m", "service.queue.worker"],
-            env=os.environ | settings.environment(),
+            env=os.environ | settings.to_environment(),
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,

@@ -15,7 +15,7 @@ from sklearn.ensemble import RandomForestClassifier
 
 from battery import run_text
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.zygote import Isolation, Role
+from responders.sandbox.zygote import ChildRole, Isolation
 
 _DATA = """
 import numpy as np
@@ -46,7 +46,7 @@ _MODELS = {
 @pytest.fixture(scope="module", params=["bare", "bubblewrap"])
 def sandboxes(request: pytest.FixtureRequest) -> Iterator[Sandboxes]:
     with Sandboxes(Isolation(bubblewrap=request.param == "bubblewrap")) as made:
-        reason = made.why_no_bubblewrap("responder with libraries")
+        reason = made.check_bubblewrap("responder with libraries")
         if request.param == "bubblewrap" and reason is not None:
             pytest.skip(f"bubblewrap does not work here: {reason}")
         yield made
@@ -54,7 +54,7 @@ def sandboxes(request: pytest.FixtureRequest) -> Iterator[Sandboxes]:
 
 @pytest.fixture
 def empty(sandboxes: Sandboxes) -> Iterator[Path]:
-    with sandboxes.private_folder() as folder:
+    with sandboxes.open_private_folder() as folder:
         yield folder
 
 
@@ -141,7 +141,7 @@ def test_it_works(text: str, said: list[str], sandboxes: Sandboxes, folder: Path
 
 
 @pytest.mark.parametrize("role", ["robot", "responder", "responder with libraries"])
-def test_the_standard_library_can_be_imported_late(role: Role, sandboxes: Sandboxes, empty: Path) -> None:
+def test_the_standard_library_can_be_imported_late(role: ChildRole, sandboxes: Sandboxes, empty: Path) -> None:
     """Covers every importable module of the standard library, except those that draw or need a display."""
     left_out = {"antigravity", "this", "idlelib", "tkinter", "turtle", "turtledemo", "lib2to3", "ensurepip", "test"}
     names = sorted(sys.stdlib_module_names - left_out)
@@ -160,7 +160,7 @@ for name in {names!r}:
 
 
 def _says(
-    sandboxes: Sandboxes, folder: Path, text: str, said: list[str], role: Role = "responder with libraries"
+    sandboxes: Sandboxes, folder: Path, text: str, said: list[str], role: ChildRole = "responder with libraries"
 ) -> None:
     lines, stop = run_text(sandboxes, role, text + "\ndef responder(text): return text\n", folder)
     assert (lines, stop) == (said, None)

@@ -15,7 +15,7 @@ from battery import SYSTEM_PYTHON, run_text
 from responders.sandbox import manager
 from responders.sandbox.inside import grants
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.zygote import NONE, Isolation
+from responders.sandbox.zygote import NO_ISOLATION, Isolation
 
 _SANDBOX = Path(manager.__file__).parent
 
@@ -39,7 +39,7 @@ folder, landlock, seccomp, changes = sys.argv[2], int(sys.argv[3]), int(sys.argv
 lockdown.drop_capabilities()
 lockdown.forbid_new_privileges()
 if landlock:
-    lockdown.restrict_files(lockdown.reading_rules(lockdown.Grants((folder,))), landlock)
+    lockdown.restrict_files(lockdown.build_reading_rules(lockdown.Grants((folder,))), landlock)
 if seccomp:
     lockdown.restrict_system_calls()
 for name, change in changes.items():
@@ -90,7 +90,7 @@ import ctypes
 sets = ctypes.create_string_buffer(24)
 print(ctypes.CDLL(None).syscall(125, (0x20080522).to_bytes(8, "little"), sets), sets.raw == bytes(24))
 """
-    with Sandboxes(NONE) as sandboxes, sandboxes.private_folder() as folder:
+    with Sandboxes(NO_ISOLATION) as sandboxes, sandboxes.open_private_folder() as folder:
         assert run_text(sandboxes, "robot", text, folder) == (["0 True"], None)
 
 
@@ -106,8 +106,8 @@ print(os.getuid(), os.geteuid(), os.getgid(), os.getegid())
 print(open("given.txt").read())
 open("logger.txt", "w").write("mine")
 """
-    with Sandboxes(Isolation(bubblewrap=bubblewrap)) as sandboxes, sandboxes.private_folder() as folder:
-        stamp = sandboxes.check()
+    with Sandboxes(Isolation(bubblewrap=bubblewrap)) as sandboxes, sandboxes.open_private_folder() as folder:
+        stamp = sandboxes.check_isolation()
         (folder / "given.txt").write_text("given")
         (folder / "given.txt").chmod(0o600)
         said, stop = run_text(sandboxes, "robot", text, folder)
@@ -125,8 +125,8 @@ def test_a_folder_that_others_cannot_enter_is_not_open_to_them() -> None:
         module.touch()
         for path in (outer, inner, module):
             path.chmod(0o755)
-        assert grants.open_to_others((str(module), str(inner), str(inner / "missing.py")))
+        assert grants.is_open_to_others((str(module), str(inner), str(inner / "missing.py")))
         for path in (outer, module):
             path.chmod(0o700)
-            assert not grants.open_to_others((str(module), str(inner)))
+            assert not grants.is_open_to_others((str(module), str(inner)))
             path.chmod(0o755)

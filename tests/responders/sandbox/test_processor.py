@@ -20,7 +20,7 @@ WHERE = "import os\nprint(sorted(os.sched_getaffinity(0)))\n"
 
 def _where(sandboxes: Sandboxes) -> str:
     """Return the processors that a child may use."""
-    with sandboxes.private_folder() as folder:
+    with sandboxes.open_private_folder() as folder:
         said, _ = run_text(sandboxes, "robot", WHERE, folder)
     return said[-1]
 

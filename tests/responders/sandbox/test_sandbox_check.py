@@ -21,7 +21,7 @@ from service.grading.trial_runner import TrialRunner
 @pytest.mark.parametrize("role", ["robot", "responder", "responder with libraries"])
 def test_every_attempt_is_refused_here(role: str) -> None:
     with Sandboxes() as sandboxes:
-        said = sandboxes.check(role)  # type: ignore[arg-type]
+        said = sandboxes.check_isolation(role)  # type: ignore[arg-type]
     assert re.fullmatch(
         r"Landlock \d+, seccomp, doorkeeper, (own user, )?(bubblewrap, )?(fixed addresses, )?process limits, "
         r"policy [0-9a-f]{8} \(battery .*\)",
@@ -32,7 +32,7 @@ def test_every_attempt_is_refused_here(role: str) -> None:
 
 def test_the_battery_notices_a_layer_that_does_not_stand() -> None:
     with Sandboxes(Isolation(seccomp=False)) as sandboxes:
-        said = sandboxes.check()
+        said = sandboxes.check_isolation()
     refused = re.search(r"(\d+) of (\d+) refused", said)
     assert refused is not None
     assert int(refused[1]) < int(refused[2])
@@ -44,28 +44,28 @@ def test_each_recording_says_what_stood(runner: TrialRunner) -> None:
 
 def test_bubblewrap_is_used_where_it_works_and_done_without_where_not(monkeypatch: pytest.MonkeyPatch) -> None:
     with Sandboxes() as sandboxes:
-        works = sandboxes.why_no_bubblewrap() is None
-        assert ("bubblewrap" in sandboxes.check()) == works
+        works = sandboxes.check_bubblewrap() is None
+        assert ("bubblewrap" in sandboxes.check_isolation()) == works
         assert (_number_of_the_zygote(sandboxes) == 2) == works
     for program, reason in ((None, "not installed"), ("/bin/false", "status 1"), ("/bin/true", "cannot be seen")):
         monkeypatch.setattr(bubblewrap, "_PROGRAM", program)
         with Sandboxes() as sandboxes:
-            assert reason in str(sandboxes.why_no_bubblewrap())
-            assert "bubblewrap" not in sandboxes.check()
+            assert reason in str(sandboxes.check_bubblewrap())
+            assert "bubblewrap" not in sandboxes.check_isolation()
             assert _number_of_the_zygote(sandboxes) != 2
 
 
 def test_addresses_are_as_fixed_in_bubblewrap_as_without_it() -> None:
     def has_fixed_addresses(isolation: Isolation) -> bool:
         with Sandboxes(isolation) as sandboxes:
-            return "fixed addresses" in sandboxes.check()
+            return "fixed addresses" in sandboxes.check_isolation()
 
     assert has_fixed_addresses(Isolation()) == has_fixed_addresses(Isolation(bubblewrap=False))
 
 
 def _number_of_the_zygote(sandboxes: Sandboxes) -> int:
     """Return the process id that the child sees: in a new namespace 2, after the doorkeeper."""
-    with sandboxes.private_folder() as folder:
+    with sandboxes.open_private_folder() as folder:
         said, stop = run_text(sandboxes, "robot", "import os; print(os.getppid())", folder)
     assert stop is None
     return int(said[0])
@@ -88,6 +88,6 @@ def test_a_child_gets_a_private_folder_and_no_other(tmp_path: Path) -> None:
 def test_a_folder_of_folders_that_was_tidied_away_is_made_again() -> None:
     with Sandboxes() as sandboxes:
         for _ in range(2):
-            with sandboxes.private_folder() as folder:
+            with sandboxes.open_private_folder() as folder:
                 assert run_text(sandboxes, "robot", "open('x', 'w'); print('ok')", folder) == (["ok"], None)
             shutil.rmtree(folder.parent)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.harness.process_tree import command_line
+from benchmarks.harness.process_tree import read_command_line
 from paths import HELPERS
 from processes import alive, until
 from responders.sandbox import zygote
@@ -45,7 +45,7 @@ def test_a_zygote_that_is_closed_before_its_first_child_ends_silently(
     is_ready: bool, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with Sandboxes() as sandboxes:
-        unused = sandboxes._zygote("robot")
+        unused = sandboxes._provide_zygote("robot")
         unused.begin()
         assert unused._process is not None
         process = unused._process
@@ -157,7 +157,7 @@ def _state(pid: int) -> tuple[int | None, list[int], int]:
 
 def _zygotes(worker: int) -> set[int]:
     """Return the children of ``worker`` that are zygotes, or that contain one in bubblewrap."""
-    return {pid for pid in _children(worker) if "inside.zygote" in command_line(pid)}
+    return {pid for pid in _children(worker) if "inside.zygote" in read_command_line(pid)}
 
 
 def _parents() -> Iterator[tuple[int, int]]:
@@ -189,11 +189,11 @@ def test_what_children_import_is_compiled_once_and_kept(tmp_path: Path, monkeypa
     for source in sources:
         source.write_text("value = 1\n")
     kept = [Path(importlib.util.cache_from_source(source)) for source in sources]
-    zygote.keep_bytecode(tmp_path)
+    zygote.compile_bytecode(tmp_path)
     before = [each.read_bytes() for each in kept]
     sources[0].write_text("value = 'another'\n")
     os.utime(kept[0], (1, 1))
-    zygote.keep_bytecode.cache_clear()
-    zygote.keep_bytecode(tmp_path)
+    zygote.compile_bytecode.cache_clear()
+    zygote.compile_bytecode(tmp_path)
     assert b"another" in kept[0].read_bytes()
     assert kept[1].read_bytes() == before[1]

@@ -19,11 +19,11 @@ from report_builders import row_of
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.reports.formats.csv_output import marks_csv
-from service.reports.formats.json_output import json_text
-from service.reports.formats.text import plain_text
-from service.reports.html import report
-from service.reports.view import staff_view, student_view
+from service.reports.formats.csv_output import render_marks_csv
+from service.reports.formats.json_output import render_json
+from service.reports.formats.text import render_plain_text
+from service.reports.html import render_report_page
+from service.reports.view import build_staff_view, build_student_view
 from sim.recording import Pose, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.bundle import read_submission
@@ -160,17 +160,21 @@ def test_what_staff_are_told_no_student_reads(tmp_path: Path, runner: TrialRunne
     result = graded(case, tmp_path, runner)
     words = "line 1 has gc"
     for staff in (
-        plain_text(staff_view(result)),
-        json_text(staff_view(result)),
-        marks_csv([row_of(result).shown(staff_view)]),
-        report(staff_view(result), {}),
+        render_plain_text(build_staff_view(result)),
+        render_json(build_staff_view(result)),
+        render_marks_csv([row_of(result).apply_view(build_staff_view)]),
+        render_report_page(build_staff_view(result), {}),
     ):
         assert words in staff
-    assert words not in report(student_view(result), {})
-    shown = student_view(result)
+    assert words not in render_report_page(build_student_view(result), {})
+    shown = build_student_view(result)
     assert all(
         words not in text
-        for text in (plain_text(shown), json_text(shown), marks_csv([row_of(result).shown(student_view)]))
+        for text in (
+            render_plain_text(shown),
+            render_json(shown),
+            render_marks_csv([row_of(result).apply_view(build_student_view)]),
+        )
     )
 
 

@@ -8,10 +8,17 @@ from collections.abc import Callable, Sequence
 import pytest
 
 from filter_machine import AARCH64, I386, X86_64, decide, listed
-from responders.sandbox.inside.system_calls import ALLOWED, PATHS, asking, instructions, packed, program
+from responders.sandbox.inside.system_calls import (
+    ALLOWED,
+    PATH_ARGUMENTS,
+    build_filter,
+    build_path_filter,
+    pack_filter,
+    pack_instructions,
+)
 
 PID = 54321
-FILTER = program(PID)
+FILTER = pack_filter(PID)
 #: Signals that only other processes send, and no queued ones.
 SIGNALS = set(range(32)) - {9}
 X32 = 1 << 30
@@ -171,11 +178,11 @@ def test_whoever_names_a_path_has_to_ask() -> None:
         for name, decision in CALLS.values()
         if decision in ("allow", "some") and any(word in name for word in words)
     }
-    asked = {CALLS[number][0] for number in range(601) if decide(asking(), number) == "ask"}
-    assert asked == naming - {"fstat", "ftruncate"} == {CALLS[number][0] for number in PATHS}
-    assert {decide(asking(), number) for number in range(601) if number not in PATHS} == {"allow"}
+    asked = {CALLS[number][0] for number in range(601) if decide(build_path_filter(), number) == "ask"}
+    assert asked == naming - {"fstat", "ftruncate"} == {CALLS[number][0] for number in PATH_ARGUMENTS}
+    assert {decide(build_path_filter(), number) for number in range(601) if number not in PATH_ARGUMENTS} == {"allow"}
 
 
 @pytest.mark.parametrize("pid", [1, 255, 256, 65_535, PID, 4_194_304])
 def test_a_filter_that_was_made_ready_is_that_of_its_process(pid: int) -> None:
-    assert program(pid) == packed(instructions(pid))
+    assert pack_filter(pid) == pack_instructions(build_filter(pid))

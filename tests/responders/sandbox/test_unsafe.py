@@ -13,12 +13,12 @@ from builders import settings_in
 from command import robomark
 from processes import robomark as robomark_meanwhile
 from processes import until
-from service.queue.alive import worker_lives
-from submissions.assignment.examples import examples
+from service.queue.live_workers import is_worker_running
+from submissions.assignment.examples import locate_examples
 
 _STAMP = "process limits only"
 _FLAG = "--unsafe-no-sandbox"
-_REFERENCE = examples("echo-responder") / "reference"
+_REFERENCE = locate_examples("echo-responder") / "reference"
 
 
 @pytest.mark.parametrize("flags", [(), (_FLAG,)], ids=["sandbox", "none"])
@@ -53,7 +53,7 @@ def test_a_worker_without_sandbox_says_so_in_every_grade(tmp_path: Path) -> None
         folder = tmp_path / f"class{number}"
         shutil.copytree(_REFERENCE, folder / f"student{number}")
         with robomark_meanwhile("worker", *flags, **home) as worker:
-            until(lambda: worker_lives(settings))
+            until(lambda: is_worker_running(settings))
             submitted = robomark("batch", "submit", folder, "-a", "echo-responder", "--wait", **home)
             worker.terminate()
             worker.wait()

@@ -18,12 +18,12 @@ from sqlalchemy import func, select
 
 from batch_command import Ended, robomark
 from command import COMMAND
-from service.reports.written import file_stem
+from service.reports.output_files import build_file_stem
 from service.settings import Settings
 from service.store.engine import open_store
 from service.store.models import Job
 from service.store.states import JobState
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended, Path]
     """Return a home after a batch of two good submissions and a bad row, the output, and the reports' folder."""
     folder = tmp_path_factory.mktemp("batch") / "class"
     for name in ("reference", "flawed"):
-        shutil.copytree(examples("echo-responder") / name, folder / name)
+        shutil.copytree(locate_examples("echo-responder") / name, folder / name)
     with (folder / "reference" / "robot.py").open("a") as program:
         # A robot that does not move has no drawing.
         program.write("tank_drive.on_for_seconds(SpeedPercent(20), SpeedPercent(20), 0.5)\n")
@@ -44,7 +44,7 @@ def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended, Path]
 
 def test_a_batch_is_of_the_course_that_is_named_and_listed_there(tmp_path: Path) -> None:
     folder = tmp_path / "class"
-    shutil.copytree(examples("echo-responder") / "flawed", folder / "ada")
+    shutil.copytree(locate_examples("echo-responder") / "flawed", folder / "ada")
     home = tmp_path / "home"
     mistyped = robomark(home, "batch", "submit", folder, "-a", "echo-responder", "--course", "night")
     assert (mistyped.status, "there is no course called 'night'" in mistyped.err) == (2, True)
@@ -69,7 +69,7 @@ def test_submit_and_wait_ends_with_marks_and_reports(graded: tuple[Path, Ended, 
     assert "1 submission was rejected" in ended.err
     assert re.search(r"^\[red\]odd\.txt +\S", ended.out, re.MULTILINE)
     assert re.search(r"^reference +echo-responder +10 / 10 +finished +\w{12}$", ended.out, re.MULTILINE)
-    odd = f"{file_stem('[red]odd.txt', 'refused')}.html"
+    odd = f"{build_file_stem('[red]odd.txt', 'refused')}.html"
     assert {path.name for path in reports.iterdir()} == {"flawed.html", "index.html", "reference.html", odd}
     assert "data:image/png;base64," in (reports / "reference.html").read_text()
     assert f"report: {reports / 'index.html'}" in ended.err
@@ -153,7 +153,7 @@ def test_backup_is_a_whole_database(graded: tuple[Path, Ended, Path], tmp_path: 
 
 def test_a_stopped_wait_gives_back_what_was_begun(tmp_path: Path) -> None:
     own = tmp_path / "class" / "spinner"
-    shutil.copytree(examples("echo-responder") / "reference", own)
+    shutil.copytree(locate_examples("echo-responder") / "reference", own)
     (own / "robot.py").write_text("while True:\n    pass\n")
     home = tmp_path / "home"
     submit = [*COMMAND, "batch", "submit", str(own.parent), "-a", "echo-responder", "--wait"]

@@ -17,18 +17,18 @@ from sqlalchemy import select, update
 import acting
 from batch_command import Ended, robomark
 from builders import asked_already, grading_request, settings_in
-from service.commands.batch.waiting import Waiting
-from service.operations.batches import Controlled
+from service.commands.batch.batch_waiter import BatchWaiter
+from service.operations.batches import BatchControlResult
 from service.queue.celery_app import make_celery
-from service.queue.embedded import EmbeddedServices
+from service.queue.embedded_services import EmbeddedServices
 from service.queue.notifier import Notifier
 from service.reports.formats import FORMATS
-from service.reports.written import file_stem
+from service.reports.output_files import build_file_stem
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
 from service.store.models import CriterionResultRow, Job, TrialRow
-from service.store.states import JobState, Lane
-from submissions.assignment.examples import examples
+from service.store.states import JobQueue, JobState
+from submissions.assignment.examples import locate_examples
 
 SPIN = "while True:\n    pass\n"
 
@@ -38,7 +38,7 @@ def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, Ended]
     """Return a home after a roster of two good rows and one of each bad kind, the roster, and the command's output."""
     folder = tmp_path_factory.mktemp("class")
     for name in ("reference", "flawed"):
-        shutil.copytree(examples("echo-responder") / name, folder / name)
+        shutil.copytree(locate_examples("echo-responder") / name, folder / name)
     roster = folder / "roster.csv"
     (folder / "broken.zip").write_bytes(b"PK\3\4 and no more")
     rows = ["student;file;assignment", "=1/2 🤖;reference;", "bob;flawed;", "eve;nowhere.zip;"]
@@ -81,10 +81,10 @@ def test_a_file_for_each_submission(graded: tuple[Path, Path, Ended], tmp_path: 
     exported = robomark(home, "batch", "export", _batch(ended), "--format", form, "--output", out)
     refused = ["line 4: eve", "line 5: bob", "line 6: mia", "line 7: kim"] if FORMATS[form].refusal else []
     assert (exported.status, exported.out.split()[0]) == (0, str(2 + len(refused)))
-    odd = f"{file_stem('=1/2 🤖')}{FORMATS[form].suffix}"
+    odd = f"{build_file_stem('=1/2 🤖')}{FORMATS[form].suffix}"
     assert odd.startswith("1-2~")
     names = {odd, f"bob{FORMATS[form].suffix}"}
-    names |= {f"{file_stem(source, 'refused')}{FORMATS[form].suffix}" for source in refused}
+    names |= {f"{build_file_stem(source, 'refused')}{FORMATS[form].suffix}" for source in refused}
     assert {path.name for path in out.iterdir()} == names
     text = (out / odd).read_text()
     if form == "junit":
@@ -125,10 +125,10 @@ def test_a_worker_honours_pause_and_cancel(tmp_path: Path) -> None:
         notifier = Notifier(make_celery(services.settings), store, services.settings)
 
         def grade(batch: str, count: int) -> None:
-            notifier.grade(Lane.BATCH, count)
-            Waiting(
+            notifier.grade(JobQueue.BATCH, count)
+            BatchWaiter(
                 acting.service_on(store), acting.machine(), notifier, batch, Console(quiet=True), services.ensure
-            ).for_marks()
+            ).wait_for_marks()
 
         paused = accept_batch(store, "paused", [grading_request("ada")], [], max_attempts=2).id
         acting.pause(store, paused)
@@ -142,12 +142,12 @@ def test_a_worker_honours_pause_and_cancel(tmp_path: Path) -> None:
         spinning = accept_batch(
             store, "spinning", [grading_request(name, SPIN) for name in "xyz"], [], max_attempts=2
         ).id
-        notifier.grade(Lane.BATCH, 3)
+        notifier.grade(JobQueue.BATCH, 3)
         until = time.monotonic() + 60
         while JobState.RUNNING not in _states(store, spinning):
             assert time.monotonic() < until
             time.sleep(0.05)
-        assert acting.cancel(store, spinning) == Controlled(True, 2, 1)
+        assert acting.cancel(store, spinning) == BatchControlResult(True, 2, 1)
         after = accept_batch(store, "after", [grading_request("eve")], [], max_attempts=2).id
         grade(after, 1)
         assert _states(store, spinning) == [JobState.CANCELLED] * 3
@@ -165,7 +165,7 @@ def test_a_changed_assignment_is_regraded_shown_and_published_when_told(
     home, _, ended = graded
     batch = _batch(ended)
     changed = tmp_path / "echo-responder"
-    shutil.copytree(examples("echo-responder").parent, changed, ignore=shutil.ignore_patterns("examples"))
+    shutil.copytree(locate_examples("echo-responder").parent, changed, ignore=shutil.ignore_patterns("examples"))
     text = (changed / "assignment.toml").read_text()
     (changed / "assignment.toml").write_text(text.replace("marks = 4", "marks = 6"))
     regraded = robomark(home, "batch", "regrade", batch, "-a", changed, "--wait")

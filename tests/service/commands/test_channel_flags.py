@@ -11,15 +11,15 @@ import pytest
 from command import robomark
 from replays import data_of
 from responders.channel import Channel
-from service.commands.options import ChannelFlags, changed
-from submissions.assignment.examples import examples
+from service.commands.options import ChannelFlags, apply_channel_flags
+from submissions.assignment.examples import locate_examples
 
-ECHO = examples("json-queue") / "reference"
+ECHO = locate_examples("json-queue") / "reference"
 BEACON = Channel(loss=0.2, link="infrared", beacon=(500.0, 500.0), range=300)
 
 
 def test_without_flags_nothing_changes() -> None:
-    assert changed(BEACON, ChannelFlags().given()) is BEACON
+    assert apply_channel_flags(BEACON, ChannelFlags().to_table()) is BEACON
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ def test_without_flags_nothing_changes() -> None:
     ],
 )
 def test_flags_change_what_they_name_and_nothing_else(before: Channel, flags: dict[str, Any], after: Channel) -> None:
-    assert changed(before, ChannelFlags(**flags).given()) == after
+    assert apply_channel_flags(before, ChannelFlags(**flags).to_table()) == after
 
 
 def test_a_run_shows_what_was_lost(tmp_path: Path) -> None:

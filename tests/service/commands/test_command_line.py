@@ -21,7 +21,7 @@ from service.reports.formats import FORMATS
 from service.settings import Settings
 from service.store.grades import results
 from service.store.queue import jobs
-from submissions.assignment.folder import assignment_folder
+from submissions.assignment.folder import locate_assignment_folder
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,7 @@ def test_text_is_printed_whatever_the_locale(tmp_path: Path) -> None:
 
 
 def test_a_title_is_no_markup_and_no_escape(tmp_path: Path) -> None:
-    text = (assignment_folder("echo-responder") / "assignment.toml").read_text()
+    text = (locate_assignment_folder("echo-responder") / "assignment.toml").read_text()
     title = 'title = "Echo what the robot says"'
     assert title in text
     (tmp_path / "assignment.toml").write_text(text.replace(title, r'title = "[/] [bold]x \u001b[31m"'))
@@ -142,9 +142,9 @@ def test_what_only_asks_imports_nothing_heavy(tmp_path: Path) -> None:
     """Each line runs in a separate process, forked from one that has imported none of our modules."""
     with opened(Settings(home=tmp_path)) as store:
         graded = accept_one(store).job_id
-        claim = jobs.claim(store, "worker", 60)
+        claim = jobs.claim_job(store, "worker", 60)
         assert claim is not None
-        jobs.finish(store, claim, results.prepare(faulty_grade()), datetime.now(UTC))
+        jobs.finish_job(store, claim, results.prepare_grade(faulty_grade()), datetime.now(UTC))
     asking = {**_ASKING, f"show {graded}": _HEAVY | {"pydantic"}}
     ended = subprocess.run(
         [sys.executable, "-c", _LOADED, *asking],

@@ -10,26 +10,28 @@ from typing import Any
 import pytest
 
 import report_builders
-from benchmarks.harness.postgresql_server import fresh_database
+from benchmarks.harness.postgresql_server import create_database
 from builders import grading_request
 from command import robomark
 from service.settings import Settings
-from service.store.batches.intake import accept_new
+from service.store.batches.intake import accept_new_submissions
 from service.store.engine import open_store
 from service.store.grades import results
-from service.store.installation import secret_of
+from service.store.installation import load_secret
 from service.store.queue import jobs
 
 
 def _graded_batch(settings: Settings) -> str:
     with open_store(settings) as store:
-        accepted = accept_new(store, "spring", [grading_request("ada"), grading_request("bob")], [], max_attempts=3)
+        accepted = accept_new_submissions(
+            store, "spring", [grading_request("ada"), grading_request("bob")], [], max_attempts=3
+        )
         assert accepted.batch is not None
         grade = replace(
-            report_builders.shape_grade(), sandbox="Landlock 7, policy 0", secret_sha256=secret_of(store).sha256
+            report_builders.shape_grade(), sandbox="Landlock 7, policy 0", secret_sha256=load_secret(store).sha256
         )
-        while (claim := jobs.claim(store, "worker", 60)) is not None:
-            jobs.finish(store, claim, results.prepare(grade), datetime.now(UTC))
+        while (claim := jobs.claim_job(store, "worker", 60)) is not None:
+            jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
         return accepted.batch.id
 
 
@@ -44,7 +46,7 @@ def elsewhere(service_settings: Settings, request: pytest.FixtureRequest, tmp_pa
     """Return another empty database of the same kind."""
     if service_settings.database.startswith("sqlite"):
         return f"sqlite:///{tmp_path / 'elsewhere.db'}"
-    return fresh_database(request.getfixturevalue("postgresql"))
+    return create_database(request.getfixturevalue("postgresql"))
 
 
 @pytest.mark.long

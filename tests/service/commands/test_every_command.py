@@ -26,18 +26,18 @@ from service.command_table import COMMANDS, Command, CommandGroup
 from service.settings import Settings
 from service.store.batches.intake import accept_batch
 from service.store.courses import open_assignments
-from service.store.courses.versions import freeze
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.engine import now, open_store
 from service.store.grades import appeals, comments, overrides, results
-from service.store.installation import secret_of
+from service.store.installation import load_secret
 from service.store.models import Job
 from service.store.outbox import WebhookEvent
 from service.store.people import webhooks
 from service.store.people.membership import make_instructor
 from service.store.queue import jobs
 from service.store.states import JobState
-from submissions.assignment.examples import examples
-from submissions.student_identity import Refusal, Student
+from submissions.assignment.examples import locate_examples
+from submissions.student_identity import RejectedSubmission, Student
 
 
 def _all() -> Iterator[tuple[tuple[str, ...], Command]]:
@@ -179,30 +179,30 @@ def test_every_command_that_is_listed_can_be_loaded_and_is_listed_whole() -> Non
 def home(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
     """Return a home with a batch of two graded submissions, one waiting and one refused, and the ids in it."""
     folder = tmp_path_factory.mktemp("home")
-    refused = [Refusal("[red]odd.txt", f"is {_LONG} and no submission", Student("eve"))]
+    refused = [RejectedSubmission("[red]odd.txt", f"is {_LONG} and no submission", Student("eve"))]
     with open_store(Settings(home=folder)) as store:
         requests = [grading_request(student, assignment=echo()) for student in ("ada", "bob", "cyd")]
         batch = accept_batch(store, "class", requests, refused, max_attempts=2)
         with store.transaction() as session:
-            open_assignments.prepare(session, 1, freeze(echo()))
+            open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
             for course, who in (("default", "linus"), ("other", "tess")):
                 make_instructor(session, course, Student(who))
         grades = []
         for grade in (shape_grade(wrong=2), faulty_grade()):
-            claim = jobs.claim(store, "worker", 60)
+            claim = jobs.claim_job(store, "worker", 60)
             assert claim is not None
             with store.reading() as session:
                 at = now(session)
-            own = replace(grade, secret_sha256=secret_of(store).sha256)
-            jobs.finish(store, claim, results.prepare(own), at)
+            own = replace(grade, secret_sha256=load_secret(store).sha256)
+            jobs.finish_job(store, claim, results.prepare_grade(own), at)
             grades.append(claim.job_id)
         with store.transaction() as session:
             overrides.set_marks(session, grades[0], "names-the-right-shape", Decimal(6), "seen again", "staff")
-            comments.comment(session, grades[0], "", "Well done.", "staff")
-            appeals.ask(session, session.get_one(Job, grades[0]).submission_id, "Why?")
+            comments.add_comment(session, grades[0], "", "Well done.", "staff")
+            appeals.open_appeal(session, session.get_one(Job, grades[0]).submission_id, "Why?")
             (waiting,) = session.scalars(select(Job.id).where(Job.state == JobState.QUEUED))
-            jobs.put_aside(session, waiting, now(session))
-            hook, _ = webhooks.create(session, 1, "https://hooks.example.org/", [WebhookEvent.BATCH_FINISHED])
+            jobs.put_aside_job(session, waiting, now(session))
+            hook, _ = webhooks.create_webhook(session, 1, "https://hooks.example.org/", [WebhookEvent.BATCH_FINISHED])
     return folder, {"BATCH": batch.id, "GRADE": grades[0], "OVER": waiting, "HOOK": hook.id}
 
 
@@ -245,7 +245,7 @@ def _ended(folder: Path, database: Path, *words: str, **environment: Any) -> sub
     with closing(sqlite3.connect(Settings(home=home).database.removeprefix("sqlite:///"))) as connection, connection:
         at = "strftime('%Y-%m-%d %H:%M:%f000', 'now')"
         connection.execute(f"UPDATE job SET queued_at = {at}, due_at = {at} WHERE state = 'queued'")
-    shutil.copytree(examples("echo-responder") / "reference", folder / "new" / "dan")
+    shutil.copytree(locate_examples("echo-responder") / "reference", folder / "new" / "dan")
     (folder / "robot.py").write_text("print('hello')\n")
     (folder / "people.csv").write_text("id,name,email\nada,Ada Lovelace,ada@example.org\n")
     ended = robomark(*words, folder=folder, ROBOMARK_HOME=str(home), **environment)

@@ -20,10 +20,10 @@ from service.settings import Settings
 from service.store.engine import open_store
 from service.store.queue import workers
 from service.store.queue.workers import WorkerDescription
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 
 ECHO = "echo-responder"
-REFERENCE = examples(ECHO) / "reference"
+REFERENCE = locate_examples(ECHO) / "reference"
 WORKSHEET = """\
 Identifier,Full name,Email address,Status,Grade,Maximum Grade,Last modified (grade),Feedback comments
 Participant 500000,Ada Lovelace,ada@uni.example,Submitted,,10.00,-,
@@ -96,7 +96,7 @@ def test_submitting_says_whether_a_worker_runs(download: Path, tmp_path: Path) -
     assert "no worker is running; start one with robomark worker" in alone.err
     with open_store(Settings(home=home)) as store:
         for name in ("one", "two"):
-            workers.beat(store, WorkerDescription(name, "here", 3, "0", "all"))
+            workers.record_heartbeat(store, WorkerDescription(name, "here", 3, "0", "all"))
     helped = robomark(home, "batch", "submit", download, "-a", ECHO, "--again")
     assert "2 workers grade them, concurrency 6" in helped.err
 

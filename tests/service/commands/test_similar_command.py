@@ -12,20 +12,20 @@ import pytest
 
 import report_builders
 from batch_command import robomark
-from benchmarks.harness.copyists import COPYISTS
+from benchmarks.harness.disguises import DISGUISES
 from builders import opened, settings_in
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.commands.batch.similar import similar
-from service.report_files import write_batch
+from service.report_files import write_batch_reports
 from service.reports.formats import FORMATS
 from service.store.batches import batches
 from service.store.batches.intake import accept_batch
-from service.store.batches.similarities import similarities
+from service.store.batches.similarities import find_similar_submissions
 from service.store.engine import Store
 from service.store.grades import results
 from service.store.queue import jobs
 from sim.errors import UsageError
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
 from submissions.grading_request import GradingRequest
 from submissions.submission import Submission
@@ -33,20 +33,20 @@ from submissions.submission import Submission
 ASSIGNMENT = "rules-without-a-network"
 
 
-def source(name: str, file: str) -> Code:
-    return Code(file, (examples(ASSIGNMENT) / name / file).read_text(encoding="utf-8"))
+def source(name: str, file: str) -> SourceFile:
+    return SourceFile(file, (locate_examples(ASSIGNMENT) / name / file).read_text(encoding="utf-8"))
 
 
 def submitted() -> list[Submission]:
     """Return submissions: Ada and zebedee share a responder except for formatting; the others have little in common."""
     program = source("reference", "robot.py")
     ada = Submission("ada", program, source("reference", "responder.py"))
-    copy = COPYISTS["all of it"](source("reference", "responder.py").text)
+    copy = DISGUISES["apply all"](source("reference", "responder.py").text)
     own = [
-        Submission(f"s{number}", program, Code("responder.py", f"def responder(text):\n    return {number}\n"))
+        Submission(f"s{number}", program, SourceFile("responder.py", f"def responder(text):\n    return {number}\n"))
         for number in range(8)
     ]
-    return [ada, Submission("zebedee", program, Code("responder.py", copy)), *own]
+    return [ada, Submission("zebedee", program, SourceFile("responder.py", copy)), *own]
 
 
 @pytest.fixture(scope="module")
@@ -58,21 +58,21 @@ def graded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Sto
     with opened(settings_in(home)) as store:
         batch = accept_batch(store, "<class>", requests, [], max_attempts=2).id
         for number, _ in enumerate(requests):
-            claim = jobs.claim(store, "worker", 60)
+            claim = jobs.claim_job(store, "worker", 60)
             assert claim is not None
             with store.reading() as session:
-                student = batches.job_line(session, claim.job_id).student
+                student = batches.load_job_line(session, claim.job_id).student
             seconds = 30 if student in ("ada", "zebedee") else 40 + number
             grade = replace(report_builders.line_follower_grade(seconds), student=student)
-            jobs.finish(store, claim, results.prepare(grade), datetime.now(UTC))
+            jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
         yield home, store, batch
 
 
 def test_who_wrote_and_did_the_same_is_one_pair_with_all_its_evidence(graded: tuple[Path, Store, str]) -> None:
     _, store, batch = graded
     with store.reading() as session:
-        lines = batches.job_lines(session, batch)
-    (found,) = similarities(store, lines)
+        lines = batches.load_job_lines(session, batch)
+    (found,) = find_similar_submissions(store, lines)
     (pair,) = found.pairs
     assert pair.students == ("ada", "zebedee")
     assert [each.files for each in pair.sources] == [("responder.py", "responder.py")]
@@ -81,7 +81,7 @@ def test_who_wrote_and_did_the_same_is_one_pair_with_all_its_evidence(graded: tu
         ("with-obstacle", "path"),
     }
     assert found.too_short == tuple(f"s{number}" for number in range(8))
-    given = similarities(store, lines, examples(ASSIGNMENT) / "reference" / "responder.py")
+    given = find_similar_submissions(store, lines, locate_examples(ASSIGNMENT) / "reference" / "responder.py")
     assert [each.sources for each in given[0].pairs] == [()]
 
 
@@ -113,12 +113,12 @@ def test_json_is_all_that_is_printed(graded: tuple[Path, Store, str]) -> None:
 def test_no_report_and_no_format_has_anything_of_it(graded: tuple[Path, Store, str], tmp_path: Path) -> None:
     _, store, batch = graded
     with store.reading() as session:
-        lines = batches.job_lines(session, batch)
-        grades = [results.load(session, line.id) for line in lines]
+        lines = batches.load_job_lines(session, batch)
+        grades = [results.load_grade(session, line.id) for line in lines]
     for line, grade in zip(lines, grades, strict=True):
         if line.student == "ada":
             told = [form.document(grade) for form in FORMATS.values() if form.document is not None]
-            write_batch(store, "class", [line], [], tmp_path)
+            write_batch_reports(store, "class", [line], [], tmp_path)
             told += [path.read_text(encoding="utf-8") for path in tmp_path.iterdir()]
             assert len(told) > 3
             assert not any("zebedee" in text for text in told)

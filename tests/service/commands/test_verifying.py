@@ -7,16 +7,16 @@ from decimal import Decimal
 
 import pytest
 
-from responders.code import Code
-from service.commands import verifying
-from service.commands.verifying import _cause_of, _compare_marks, _compared
+from responders.source_file import SourceFile
+from service.commands import verification
+from service.commands.verification import _compare_marks, _compare_trials, _find_cause
 from service.grading.grade import Grade, TrialResult
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from sim.recording import Line, Verdict
+from sim.recording import TimedText, Verdict
 from submissions.assignment.reader import find_assignment
 from submissions.grading_request import GradingRequest
-from submissions.seeds import PUBLIC
+from submissions.seeds import PUBLIC_SECRET
 from submissions.submission import Submission
 
 
@@ -34,20 +34,22 @@ def _stored_otherwise(graded: Grade) -> list[tuple[TrialResult, TrialResult]]:
     ],
 )
 def test_a_trial_that_differs_is_repeated_in_fresh_processes(program: str, cause: str, runner: TrialRunner) -> None:
-    request = GradingRequest(Submission("ada", Code("robot.py", program)), find_assignment("say-tm129"), "ada")
+    request = GradingRequest(Submission("ada", SourceFile("robot.py", program)), find_assignment("say-tm129"), "ada")
     again = grade(request.submission, request.assignment, runner=runner)
-    assert _cause_of(_stored_otherwise(again), [], again, request, PUBLIC) == cause
-    assert _cause_of(list(zip(again.trials, again.trials, strict=True)), [], again, request, PUBLIC) is None
+    assert _find_cause(_stored_otherwise(again), [], again, request, PUBLIC_SECRET) == cause
+    assert _find_cause(list(zip(again.trials, again.trials, strict=True)), [], again, request, PUBLIC_SECRET) is None
 
 
 def _graded(runner: TrialRunner) -> tuple[GradingRequest, Grade]:
-    request = GradingRequest(Submission("ada", Code("robot.py", "say('ok')")), find_assignment("say-tm129"), "ada")
+    request = GradingRequest(
+        Submission("ada", SourceFile("robot.py", "say('ok')")), find_assignment("say-tm129"), "ada"
+    )
     return request, grade(request.submission, request.assignment, runner=runner)
 
 
 def _cut(trial: TrialResult, *said: str) -> TrialResult:
     """Return the trial as if a limit had ended it after this speech."""
-    spoken = tuple(Line(0.0, text) for text in said)
+    spoken = tuple(TimedText(0.0, text) for text in said)
     recording = replace(trial.recording, sha256="0" * 64, verdict=Verdict.CPU_LIMIT, spoken=spoken, faults=())
     return replace(trial, recording=recording)
 
@@ -62,7 +64,7 @@ def test_a_trial_that_was_cut_has_to_begin_alike(
     trial = _graded(runner)[1].trials[0]
     other = _cut(trial, *after)
     other = replace(other, recording=replace(other.recording, sha256="1" * 64))
-    assert _compared(_cut(trial, *before), other) == compared
+    assert _compare_trials(_cut(trial, *before), other) == compared
 
 
 def test_only_criteria_that_look_at_a_cut_trial_may_differ(runner: TrialRunner) -> None:
@@ -88,13 +90,13 @@ def test_a_limit_hides_no_chance_of_a_program(
         return replace(again, criteria=tuple(replace(each, marks=Decimal(marks)) for each in again.criteria))
 
     grades = iter(map(with_marks, others))
-    monkeypatch.setattr(verifying, "_grade_again", lambda *args, **named: next(grades))
+    monkeypatch.setattr(verification, "_grade_again", lambda *args, **named: next(grades))
     rows = [(_cut(each), each) for each in again.trials]
     marks = ["cut by a limit"] * len(again.criteria)
-    assert _cause_of(rows, marks, with_marks(5), request, PUBLIC) == cause
+    assert _find_cause(rows, marks, with_marks(5), request, PUBLIC_SECRET) == cause
 
 
 def test_marks_that_differ_have_a_cause_without_trials(runner: TrialRunner) -> None:
     request, again = _graded(runner)
-    assert _cause_of([], ["differs"], again, request, PUBLIC) == "grader"
-    assert _cause_of([], ["same"], again, request, PUBLIC) is None
+    assert _find_cause([], ["differs"], again, request, PUBLIC_SECRET) == "grader"
+    assert _find_cause([], ["same"], again, request, PUBLIC_SECRET) is None

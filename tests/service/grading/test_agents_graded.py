@@ -10,30 +10,30 @@ from typing import Any
 import pytest
 
 from notebook_builder import notebook
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.judging.judge import judge
 from service.grading.run_plan import plan_run
-from service.grading.static_analysis import plain_trial
+from service.grading.static_analysis import to_json_trial
 from service.grading.trial_runner import TrialRunner
-from service.reports.faults import fault_groups
-from service.reports.formats.json_output import json_document
-from service.reports.page import page_of
-from service.reports.plots.sequence import Step, conversation
-from service.reports.view import staff_view
-from service.store.grades.recordings import from_bytes, keep, to_bytes
+from service.reports.faults import group_faults
+from service.reports.formats.json_output import build_json_document
+from service.reports.page import build_page
+from service.reports.plots.sequence import Step, build_conversation
+from service.reports.view import build_staff_view
+from service.store.grades.recordings import encode_within_limit, from_bytes, to_bytes
 from sim.errors import UsageError
 from sim.recording import AgentMessage, AgentOutput, Verdict
 from submissions.assignment.definition import Assignment
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 from submissions.criteria import SCHEMAS
 from submissions.submission import Submission
 
 ASSIGNMENT = find_assignment("parser-agent-and-logger")
-REFERENCE = read_submission(examples(ASSIGNMENT.id) / "reference", asked=ASSIGNMENT.parts)
+REFERENCE = read_submission(locate_examples(ASSIGNMENT.id) / "reference", asked=ASSIGNMENT.parts)
 
 
 @pytest.fixture(scope="module")
@@ -78,13 +78,15 @@ def test_a_given_agent_sees_given_files_alone_and_no_process_sees_anothers_text(
     plan = plan_run(submission, given)
     assert sorted(plan.agents["parser"].files) == ["table.csv"]
     assert sorted(plan.agents["agent"].files) == ["own.csv", "table.csv"]
-    assert plan.answers is not None
-    assert sorted(plan.answers.files) == ["own.csv", "table.csv"]
+    assert plan.responder is not None
+    assert sorted(plan.responder.files) == ["own.csv", "table.csv"]
 
 
 def as_notebook(folder: Path, *first: str, leave_out: str = "") -> Submission:
     """Return the reference as a notebook: each agent in a cell that writes its file, the responder in the last cell."""
-    sources = {path.name: path.read_text() for path in sorted((examples(ASSIGNMENT.id) / "reference").glob("*.py"))}
+    sources = {
+        path.name: path.read_text() for path in sorted((locate_examples(ASSIGNMENT.id) / "reference").glob("*.py"))
+    }
     responder = sources.pop("responder.py")
     sources.pop(leave_out, None)
     agents = [f"%%writefile {name}\n{text}" for name, text in sources.items()]
@@ -159,7 +161,7 @@ def test_criteria_look_at_a_pair_of_agents(
 
 def test_what_agents_say_is_in_reports_and_exports(full: Grade) -> None:
     recording = full.trials[0].recording
-    page = page_of(staff_view(full), REFERENCE)
+    page = build_page(build_staff_view(full), REFERENCE)
     scene = page.scenes[0]
     assert [line.sender for line in scene.messages[:4]] == [
         "robot",
@@ -169,10 +171,10 @@ def test_what_agents_say_is_in_reports_and_exports(full: Grade) -> None:
     ]
     outputs = {each.title: each.text for each in scene.outputs}
     assert "Received message: PY::0" in outputs["Log file of the agent logger (logger.txt)"]
-    (trial,) = json_document(staff_view(full))["trials"]
+    (trial,) = build_json_document(build_staff_view(full))["trials"]
     assert trial["agent_messages"][2]["text"] == "0"
-    assert len(plain_trial(full.trials[0])["agent_messages"]) == len(recording.agent_messages) == 24
-    told = conversation(recording)
+    assert len(to_json_trial(full.trials[0])["agent_messages"]) == len(recording.agent_messages) == 24
+    told = build_conversation(recording)
     assert told.parties == ("robot", "responder", "parser", "agent", "logger")
     first = [(step.source, step.target, step.kind) for step in told.steps[:4] if isinstance(step, Step)]
     assert first == [
@@ -187,17 +189,17 @@ def test_an_agent_of_any_name_has_a_lane(full: Grade) -> None:
     recording = full.trials[0].recording
     asked = AgentMessage(0.0, "responder", "translator", "PY::0", 0)
     other = replace(recording, agent_messages=(asked,), agent_outputs=(AgentOutput("translator", "", ""),))
-    assert conversation(other).parties == ("robot", "responder", "translator")
+    assert build_conversation(other).parties == ("robot", "responder", "translator")
 
 
 def test_a_fault_is_told_with_the_agents_own_line(runner: TrialRunner) -> None:
     files = {**REFERENCE.files, "parser.py": b"def parser(text):\n    return 1 / 0\n"}
     submission = replace(REFERENCE, files=MappingProxyType(files))
     result = grade(submission, ASSIGNMENT, runner=runner)
-    group = fault_groups(result, submission)[0]
+    group = group_faults(result, submission)[0]
     assert group.where == "Agent parser (parser.py), line 2"
     assert [line.text for line in group.excerpt if line.marked] == ["    return 1 / 0"]
-    assert "One of your agents raised an error" in page_of(staff_view(result), submission).words.happened
+    assert "One of your agents raised an error" in build_page(build_staff_view(result), submission).words.happened
 
 
 def test_recordings_with_agents_are_kept_and_cut_like_others(full: Grade) -> None:
@@ -207,7 +209,7 @@ def test_recordings_with_agents_are_kept_and_cut_like_others(full: Grade) -> Non
     assert again.agent_outputs == recording.agent_outputs
     flood = tuple(replace(recording.agent_messages[0], text=f"{n:x}" * 40) for n in range(20_000))
     outputs = tuple(replace(each, log="".join(map(str, range(200_000)))) for each in recording.agent_outputs)
-    cut = keep(replace(recording, agent_messages=flood, agent_outputs=outputs), 60_000).recording
+    cut = encode_within_limit(replace(recording, agent_messages=flood, agent_outputs=outputs), 60_000).recording
     assert len(cut.agent_messages) < 20_000
     assert all(len(each.log) <= 2000 for each in cut.agent_outputs)
     assert cut.sha256 == recording.sha256
@@ -218,11 +220,13 @@ def test_avoided_modules_are_avoided_by_agents_too() -> None:
         {"id": "s", "title": "S", "marks": "1", "check": "source", "part": "responder", "avoids": ["import sklearn"]}
     )
     plan = plan_run(REFERENCE, replace(ASSIGNMENT, criteria=(*ASSIGNMENT.criteria, avoids)))
-    assert {name: each.limits.without for name, each in plan.agents.items()} == dict.fromkeys(plan.agents, ("sklearn",))
+    assert {name: each.limits.excluded_modules for name, each in plan.agents.items()} == dict.fromkeys(
+        plan.agents, ("sklearn",)
+    )
 
 
 def test_a_submission_without_an_agent_is_refused(tmp_path: Path) -> None:
     files = {name: data for name, data in REFERENCE.files.items() if name != "logger.py"}
-    lacking = Submission("ada", responder=Code("responder.py", "x = 1"), files=MappingProxyType(files))
+    lacking = Submission("ada", responder=SourceFile("responder.py", "x = 1"), files=MappingProxyType(files))
     with pytest.raises(UsageError, match=r"no agent logger; parser-agent-and-logger asks for logger\.py"):
         plan_run(lacking, ASSIGNMENT)

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from judging import criterion
-from responders.code import Code
 from responders.sandbox.meter import JobMeter
+from responders.source_file import SourceFile
 from service.grading.grade import CriterionResult
 from service.grading.grader import grade
 from service.grading.judging.code import judge_source
@@ -21,7 +21,7 @@ from sim.recording import Pose
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.criteria import Criterion
 from submissions.magics import split_program
-from submissions.plain_cells import python_of
+from submissions.notebook_python import extract_python
 from submissions.submission import Cell, Notebook, Submission
 
 
@@ -31,7 +31,7 @@ def without_robot(*criteria: Criterion) -> Assignment:
 
 def answers(text: str, runner: TrialRunner, **rules: Any) -> SourceAnswers:
     asked = Assignment("a", "A", WorldSpec(), Parts("student", "none"), (), (criterion("source", **rules),))
-    plan = plan_run(Submission("ada", program=Code("robot.py", text)), asked)
+    plan = plan_run(Submission("ada", program=SourceFile("robot.py", text)), asked)
     return analyse(plan, (), runner, JobMeter()).answers["c"]
 
 
@@ -233,7 +233,7 @@ def test_files_beside_the_responder_are_read_too(helper: str, words: str, runner
     rules = criterion("source", part="responder", avoids=["import sklearn"])
     submission = Submission(
         "ada",
-        responder=Code("responder.py", "import helper\ndef responder(text): return text"),
+        responder=SourceFile("responder.py", "import helper\ndef responder(text): return text"),
         files={"helper.py": helper.encode(), "notes.txt": b"import sklearn"},
     )
     result = grade(submission, without_robot(rules), runner=runner).criteria[0]
@@ -276,7 +276,7 @@ def test_text_of_a_notebook_is_its_plain_cells() -> None:
         "%%capture out\nimport math\n%time import json",
     )
     notebook = Notebook("a.ipynb", tuple(Cell(number, text) for number, text in enumerate(cells, 1)))
-    text = python_of(notebook)
+    text = extract_python(notebook)
     compile(text, "a", "exec")
     assert "say" not in text
     assert "import re" in text
@@ -290,7 +290,7 @@ def driven_by(text: str, runner: TrialRunner, *, visibility: str = "visible", **
     scenario = Scenario("s", (Pose(200, 600, 0),), seconds=5, visibility=visibility)  # type: ignore[arg-type]
     asked = criterion("source", **rules)
     drives = Assignment("a", "A", WorldSpec(), Parts("student", "none"), (scenario,), (asked,))
-    program = Code("robot.py", f"%%sim_magic_preloaded\n{text}")
+    program = SourceFile("robot.py", f"%%sim_magic_preloaded\n{text}")
     files = {"helper.py": b"def twice(go):\n    for _ in range(2):\n        go()\n"}
     return grade(Submission("ada", program=program, files=files), drives, runner=runner).criteria[0]
 
@@ -356,7 +356,7 @@ def test_only_what_was_run_and_is_not_the_submissions_own_is_used(
 def test_what_a_called_function_uses_is_what_it_ran(text: str, holds: bool, runner: TrialRunner) -> None:
     rule = criterion("source", part="responder", uses=["MLPClassifier"])
     called = criterion("functions", function="f", calls=[{"returns": 1}]).model_copy(update={"id": "f"})
-    submission = Submission("ada", responder=Code("responder.py", text))
+    submission = Submission("ada", responder=SourceFile("responder.py", text))
     result = grade(submission, without_robot(rule, called), runner=runner)
     assert [each.marks == 4 for each in result.criteria] == [holds, True], result.criteria[0].message
 
@@ -377,7 +377,7 @@ def test_rules_about_code_tell_nothing_about_hidden_calls(
     rule = criterion("source", part="responder", uses=["while"])
     asked = [{"arguments": [number], "returns": 0, "hidden": hidden} for number, hidden in calls]
     called = criterion("functions", function="f", calls=asked).model_copy(update={"id": "f"})
-    submission = Submission("ada", responder=Code("responder.py", text))
+    submission = Submission("ada", responder=SourceFile("responder.py", text))
     result = grade(submission, without_robot(rule, called), runner=runner)
     assert [each.marks == 4 for each in result.criteria] == [holds, True], result.criteria[0].message
 
@@ -394,7 +394,7 @@ def test_looking_at_statements_changes_no_recording(runner: TrialRunner) -> None
     rules = criterion("source", uses=["for"]), criterion("finishes")
     found = [
         grade(
-            Submission("ada", program=Code("robot.py", text)),
+            Submission("ada", program=SourceFile("robot.py", text)),
             Assignment("a", "A", WorldSpec(), Parts("student", "none"), (scenario,), (rule,)),
             runner=runner,
         )

@@ -14,14 +14,14 @@ import pytest
 from driving import along, driven, rest, spin, straight
 from judging import criterion, judged, recorded
 from paths import DATA
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grade import CriterionResult
 from service.grading.grader import grade
 from service.grading.judging import collecting, patterns
 from service.grading.judging.judge import judge
 from service.grading.trial_runner import TrialRunner
-from sim.recording import Datum, Image, Line, Message, Pose, Recording
-from submissions.assignment.examples import examples
+from sim.recording import DatalogEntry, Image, Message, Pose, Recording, TimedText
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 from submissions.submission import Submission
@@ -110,7 +110,7 @@ def test_what_does_not_do_what_was_asked_gets_little(
     name: str, robot: str, responder: str, most: str, before: str, runner: TrialRunner
 ) -> None:
     submission = Submission(
-        "x", Code("robot.py", _BEGIN + robot), Code("responder.py", responder) if responder else None
+        "x", SourceFile("robot.py", _BEGIN + robot), SourceFile("responder.py", responder) if responder else None
     )
     graded = grade(submission, find_assignment(name), runner=runner)
     assert graded.marks <= Decimal(most) < Decimal(before), [result.message for result in graded.criteria]
@@ -186,13 +186,13 @@ def test_what_was_seen_from_many_sides_is_one_thing(
     asked = replace(asked, criteria=(only,))
     submission = read_submission(DATA / "evidence" / folder, asked=asked.parts)
     if answers == "the network":
-        responder = (examples(name) / "reference" / "responder.py").read_text()
-        submission = replace(submission, responder=Code("responder.py", responder))
+        responder = (locate_examples(name) / "reference" / "responder.py").read_text()
+        submission = replace(submission, responder=SourceFile("responder.py", responder))
     graded = grade(submission, asked, runner=runner)
     assert graded.marks == Decimal(now), graded.criteria[0].message
     # Without the countermeasure, patterns differ by the robot's position, or always, and the marks are much higher.
-    monkeypatch.setattr(patterns, "part_at", lambda recording, side, pose: (pose.x, pose.y))
-    monkeypatch.setattr(collecting, "_different", lambda found, recording: found)
+    monkeypatch.setattr(patterns, "locate_part", lambda recording, side, pose: (pose.x, pose.y))
+    monkeypatch.setattr(collecting, "_drop_repeated_pairs", lambda found, recording: found)
     (once,) = judge(asked, graded.trials)
     assert once.marks == Decimal(before), once.message
 
@@ -285,7 +285,7 @@ def test_an_event_is_not_said_where_another_belongs() -> None:
     asked = criterion("events", sensor="middle", source="speech", events=[here, there], over="mean")
 
     def said(*lines: tuple[float, str]) -> CriterionResult:
-        return judged(asked, replace(run, spoken=tuple(Line(t, text) for t, text in lines)))
+        return judged(asked, replace(run, spoken=tuple(TimedText(t, text) for t, text in lines)))
 
     assert said((1.0, "1"), (3.0, "2")).marks == 4
     assert said((1.0, "1"), (1.8, "nearly 2"), (3.0, "2"), (3.5, "2")).marks == 4  # between the places
@@ -297,10 +297,10 @@ def test_an_event_is_not_said_where_another_belongs() -> None:
 
 def test_a_reading_that_is_printed_again_is_one_sample() -> None:
     run = driven(rest(90))
-    repeated = tuple(Datum(0.5 + n / 1000, "Light_left", 255.0 - n / 10, None) for n in range(10))
+    repeated = tuple(DatalogEntry(0.5 + n / 1000, "Light_left", 255.0 - n / 10, None) for n in range(10))
     asked = criterion("datalog", series="Light_left", measured="left light", at_least=10, over="mean")
     assert judged(asked, replace(run, datalog=repeated)).marks == Decimal("0.40")
-    read = tuple(Datum(0.5 + n / 100, "Light_left", 255.0, None) for n in range(10))
+    read = tuple(DatalogEntry(0.5 + n / 100, "Light_left", 255.0, None) for n in range(10))
     assert judged(asked, replace(run, datalog=read)).marks == 4
 
 
@@ -327,7 +327,7 @@ def test_what_belongs_to_other_poses_is_not_reported_as_well() -> None:
     asked = criterion("reports", expected=[["rows", 7], ["rows", 9], ["rows", 11]])
 
     def told(*texts: str) -> CriterionResult:
-        runs = (recorded(printed=(Line(1.0, text),)) for text in texts)
+        runs = (recorded(printed=(TimedText(1.0, text),)) for text in texts)
         return judged(asked, *runs, poses=places)
 
     assert told("rows 7 columns 9", "columns 11, rows 9", "rows 11 of 20").marks == 4

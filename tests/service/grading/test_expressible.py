@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from driving import driven, passes, rest, spin, straight
 from judging import criterion, judged, lines, recorded, talk
-from sim.recording import Line, Message
+from sim.recording import Message, TimedText
 
 ASKED = talk(("PY::0", "zero"), ("PY::1", "one"))
 
@@ -122,7 +122,7 @@ STOP = (Message(2.0, "robot", "PY::near", 2.0), Message(2.0, "responder", "pleas
     ],
 )
 def test_the_end_may_be_asked_relative_to_an_event(since: dict[str, Any], words: str) -> None:
-    recording = recorded(messages=STOP, spoken=(Line(0.0, "there"),))
+    recording = recorded(messages=STOP, spoken=(TimedText(0.0, "there"),))
     result = judged(criterion("pose", since=since), recording)
     assert (result.marks == 4, words in result.message) == (not words, True), result.message
 

@@ -10,16 +10,16 @@ import pytest
 from pydantic import ValidationError
 
 from judging import criterion
-from responders.code import Code
 from responders.function_calls import FunctionCall, call_functions
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.running_child import ChildLimits
+from responders.source_file import SourceFile
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.reports.formats.json_output import json_text
-from service.reports.html import report
-from service.reports.view import student_view
+from service.reports.formats.json_output import render_json
+from service.reports.html import render_report_page
+from service.reports.view import build_student_view
 from sim.recording import Verdict
 from submissions.assignment.definition import Assignment, Parts, WorldSpec
 from submissions.assignment.limits import Limits
@@ -36,7 +36,7 @@ def without_robot(*criteria: Criterion) -> Assignment:
 
 
 def graded(text: str, runner: TrialRunner, *criteria: Criterion) -> Grade:
-    submission = Submission("ada", responder=Code("responder.py", text))
+    submission = Submission("ada", responder=SourceFile("responder.py", text))
     return grade(submission, without_robot(*criteria), runner=runner)
 
 
@@ -70,7 +70,7 @@ def graded(text: str, runner: TrialRunner, *criteria: Criterion) -> Grade:
 def test_what_a_function_returns(keys: dict[str, Any], text: str, marks: int, runner: TrialRunner) -> None:
     asked = criterion("functions", function="f", calls=[keys])
     result = grade(
-        Submission("ada", responder=Code("responder.py", text)),
+        Submission("ada", responder=SourceFile("responder.py", text)),
         Assignment("a", "A", WorldSpec(), Parts("none", "student"), (), (asked,), limits=Limits(responder_cpu=0.5)),
         runner=runner,
     )
@@ -107,7 +107,7 @@ def test_same_functions_give_the_same_values(runner: TrialRunner) -> None:
 def test_what_the_module_prints_counts_against_its_output(runner: TrialRunner) -> None:
     text = "def f():\n    for _ in range(100): print('x' * 100)\n    return 1\n"
     called = call_functions(
-        Code("responder.py", text), {}, [FunctionCall("f")], LIMITS, 5000, runner._sandboxes, 1, JobMeter()
+        SourceFile("responder.py", text), {}, [FunctionCall("f")], LIMITS, 5000, runner._sandboxes, 1, JobMeter()
     )
     fault = called.returned[0].fault
     assert fault is not None
@@ -163,8 +163,10 @@ def test_what_is_done_with_a_hidden_argument_is_not_told(leak: str, runner: Tria
 
     def read(hidden: int) -> str:
         calls = [SQUARES[0], {"arguments": [hidden], "returns": "never", "hidden": True}]
-        found = student_view(graded(text, runner, criterion("functions", function="f", calls=calls)))
-        return json_text(found) + report(found, {}, Submission("ada", responder=Code("responder.py", text)))
+        found = build_student_view(graded(text, runner, criterion("functions", function="f", calls=calls)))
+        return render_json(found) + render_report_page(
+            found, {}, Submission("ada", responder=SourceFile("responder.py", text))
+        )
 
     assert read(3) == read(7)
 
@@ -220,7 +222,7 @@ def test_accuracy_is_measured_on_what_we_pass(
     (tmp_path / "assignment.toml").write_text(_TABLE)
     (tmp_path / "letters.csv").write_text(_LETTERS)
     asked = read_assignment(tmp_path)
-    result = grade(Submission("ada", responder=Code("responder.py", text)), asked, runner=runner).criteria[0]
+    result = grade(Submission("ada", responder=SourceFile("responder.py", text)), asked, runner=runner).criteria[0]
     assert str(result.marks) == marks
     assert words in result.message
 

@@ -16,13 +16,13 @@ from judging import START, criterion, recorded, talk
 from report_builders import row_of
 from service.grading.grade import Grade, TrialResult
 from service.grading.judging.judge import judge
-from service.grading.judging.outcome import in_steps
-from service.reports.formats.gradescope import gradescope_text
-from service.reports.formats.json_output import json_text
-from service.reports.formats.moodle import moodle_csv
-from service.reports.formats.text import plain_text
-from service.reports.html import report
-from service.reports.view import gradebook_view, staff_view, student_view
+from service.grading.judging.outcome import round_to_steps
+from service.reports.formats.gradescope import render_gradescope
+from service.reports.formats.json_output import render_json
+from service.reports.formats.moodle import render_moodle_csv
+from service.reports.formats.text import render_plain_text
+from service.reports.html import render_report_page
+from service.reports.view import build_gradebook_view, build_staff_view, build_student_view
 from sim.recording import Image, Pose, Recording
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.submission import Submission
@@ -61,13 +61,13 @@ def _graded(check: str, keys: Mapping[str, Any], good: int, visibility: str = "h
 
 
 def _read_by_students(graded: Grade) -> dict[str, str]:
-    view = student_view(graded)
+    view = build_student_view(graded)
     return {
-        "page": report(view, {}, Submission("ada")),
-        "json": json_text(view),
-        "text": plain_text(view),
-        "gradescope": gradescope_text(gradebook_view(graded)),
-        "moodle": moodle_csv([row_of(graded).shown(gradebook_view)]),
+        "page": render_report_page(view, {}, Submission("ada")),
+        "json": render_json(view),
+        "text": render_plain_text(view),
+        "gradescope": render_gradescope(build_gradebook_view(graded)),
+        "moodle": render_moodle_csv([row_of(graded).apply_view(build_gradebook_view)]),
         "view": repr(view),
         "marks": str(graded.marks),
     }
@@ -77,7 +77,7 @@ def _read_by_students(graded: Grade) -> dict[str, str]:
 def test_one_hidden_trial_more_within_a_step_is_not_seen(check: str, keys: Mapping[str, Any]) -> None:
     one, other = (_graded(check, keys, good) for good in (31, 32))
     assert _read_by_students(one) == _read_by_students(other)
-    assert json_text(staff_view(one)) != json_text(staff_view(other))
+    assert render_json(build_staff_view(one)) != render_json(build_staff_view(other))
 
 
 @pytest.mark.parametrize(("check", "keys"), _CRITERIA)
@@ -95,7 +95,7 @@ def test_marks_over_visible_trials_are_exact() -> None:
 
 @given(st.fractions(0, 1))
 def test_a_share_is_rounded_to_the_nearest_step(share: Fraction) -> None:
-    rounded = in_steps(share)
+    rounded = round_to_steps(share)
     assert (rounded * 20).denominator == 1
     assert (rounded == 1) is (share == 1)
     assert abs(rounded - share) <= Fraction(1, 40) or share > Fraction(39, 40)

@@ -15,19 +15,19 @@ import pytest
 
 from builders import echo, grading_request
 from report_builders import row_of
-from responders.code import Code
 from responders.sandbox.meter import JobMeter
+from responders.source_file import SourceFile
 from service.grading import grader
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.reports.formats.gradescope import gradescope_text
-from service.reports.formats.json_output import json_text
-from service.reports.formats.moodle import moodle_csv
-from service.reports.formats.text import plain_text
-from service.reports.html import report
-from service.reports.plots.drawn import draw_all
-from service.reports.view import gradebook_view, student_view
+from service.reports.formats.gradescope import render_gradescope
+from service.reports.formats.json_output import render_json
+from service.reports.formats.moodle import render_moodle_csv
+from service.reports.formats.text import render_plain_text
+from service.reports.html import render_report_page
+from service.reports.plots.grade_plots import draw_all_plots
+from service.reports.view import build_gradebook_view, build_student_view
 from sim.recording import Pose
 from submissions.assignment.definition import Assignment, Parts, Scenario, Training, WorldSpec
 from submissions.assignment.limits import Limits
@@ -73,13 +73,13 @@ def asked() -> Assignment:
 
 def students(graded: Grade, submission: Submission, plots: Mapping[str, bytes]) -> dict[str, str]:
     """Return everything that a student can read about a grade."""
-    view = student_view(graded)
+    view = build_student_view(graded)
     return {
-        "report": report(student_view(graded), plots, submission),
-        "json": json_text(view),
-        "text": plain_text(view),
-        "gradescope": gradescope_text(gradebook_view(graded)),
-        "moodle": moodle_csv([row_of(graded).shown(gradebook_view)]),
+        "report": render_report_page(build_student_view(graded), plots, submission),
+        "json": render_json(view),
+        "text": render_plain_text(view),
+        "gradescope": render_gradescope(build_gradebook_view(graded)),
+        "moodle": render_moodle_csv([row_of(graded).apply_view(build_gradebook_view)]),
         "view": repr(view),
     }
 
@@ -110,7 +110,7 @@ def told_apart(runner: TrialRunner, submission: Submission, asked: Assignment, *
     assert [result.marks for result in first.criteria] == [result.marks for result in second.criteria]
     # The hidden trials differ.
     assert chosen(first) != chosen(second)
-    pages = [students(graded, submission, draw_all(graded) if draw else {}) for graded in (first, second)]
+    pages = [students(graded, submission, draw_all_plots(graded) if draw else {}) for graded in (first, second)]
     assert pages[0] == pages[1]
 
 
@@ -184,23 +184,23 @@ def channels(known: Mapping[str, str]) -> list[Any]:
 
 @pytest.mark.parametrize("channel", channels(PROGRAMS))
 def test_what_a_program_does_in_hidden_trials_is_not_told(runner: TrialRunner, asked: Assignment, channel: str) -> None:
-    program = Code("robot.py", f"{SEES}{PROGRAMS[channel]}\n")
-    told_apart(runner, Submission("s", program, Code("responder.py", ANSWERS)), asked)
+    program = SourceFile("robot.py", f"{SEES}{PROGRAMS[channel]}\n")
+    told_apart(runner, Submission("s", program, SourceFile("responder.py", ANSWERS)), asked)
 
 
 @pytest.mark.parametrize("channel", channels(RESPONDERS))
 def test_what_a_responder_does_in_hidden_trials_is_not_told(
     runner: TrialRunner, asked: Assignment, channel: str
 ) -> None:
-    responder = Code("responder.py", f"{LOOKS}{RESPONDERS[channel]}\n")
-    told_apart(runner, Submission("s", Code("robot.py", SENDS), responder), asked)
+    responder = SourceFile("responder.py", f"{LOOKS}{RESPONDERS[channel]}\n")
+    told_apart(runner, Submission("s", SourceFile("robot.py", SENDS), responder), asked)
 
 
 @pytest.mark.long
 def test_plots_for_students_are_of_visible_trials(runner: TrialRunner, asked: Assignment) -> None:
     few = replace(asked, scenarios=tuple(replace(each, poses=each.poses[:1]) for each in asked.scenarios))
-    responder = Code("responder.py", LOOKS + RESPONDERS["which answers are given"])
-    told_apart(runner, Submission("s", Code("robot.py", SENDS), responder), few, draw=True)
+    responder = SourceFile("responder.py", LOOKS + RESPONDERS["which answers are given"])
+    told_apart(runner, Submission("s", SourceFile("robot.py", SENDS), responder), few, draw=True)
 
 
 CELLS = (
@@ -255,7 +255,7 @@ def training() -> Assignment:
 def test_what_a_model_does_with_hidden_images_is_not_told(
     runner: TrialRunner, training: Assignment, channel: str
 ) -> None:
-    model = Code("responder.py", MODEL.replace("{}", MODELS[channel]))
+    model = SourceFile("responder.py", MODEL.replace("{}", MODELS[channel]))
     told_apart(runner, Submission("s", None, model), training)
 
 
@@ -271,7 +271,7 @@ def _with_hidden(count: int, *, first: bool) -> Assignment:
 def test_visible_trials_are_run_in_an_order_of_their_own(seed: int) -> None:
     def order(assignment: Assignment) -> list[int]:
         trials = tuple(assignment.trials())
-        run = [trials[number] for number in grader._run_order(trials, seed)]
+        run = [trials[number] for number in grader._choose_run_order(trials, seed)]
         assert [trial.scenario.visibility for trial in run[4:]] == ["hidden"] * (len(run) - 4)
         return [trial.index for trial in run[:4]]
 
@@ -284,9 +284,9 @@ def test_visible_trials_may_compute_as_long_however_many_are_hidden(
     limits: list[float] = []
 
     class Watched(JobMeter):
-        def child_ended(self, cpu_seconds: float, sleep_seconds: float) -> None:
+        def charge_child(self, cpu_seconds: float, sleep_seconds: float) -> None:
             limits.append(self.limits.cpu_seconds)
-            super().child_ended(cpu_seconds, sleep_seconds)
+            super().charge_child(cpu_seconds, sleep_seconds)
 
     monkeypatch.setattr(grader, "JobMeter", Watched)
     found = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from running import run_program
-from service.grading import hint_moments
+from service.grading import hint_failure_lines
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Pose
 from submissions.criteria.stopping import StopOn
@@ -19,4 +19,4 @@ def test_a_required_place_may_lie_beside_the_floor(
 ) -> None:
     recording = run_program(runner, "tank_drive.on_for_seconds(10, 10, 0.1)", Pose(300, 500, 0))
     criterion = StopOn.model_construct(near=place)
-    assert bool(hint_moments._required(criterion, recording)) is known
+    assert bool(hint_failure_lines._describe_required_reading(criterion, recording)) is known

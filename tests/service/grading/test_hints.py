@@ -20,21 +20,21 @@ from paths import DATA, ROOT
 from report_builders import line_follower_recording
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.hint_clues import clues_of
+from service.grading.hint_clues import collect_clues
 from service.grading.hint_names import PRELOADED
-from service.grading.hints import near_misses
-from service.grading.judging import bounded
+from service.grading.hints import collect_near_misses
+from service.grading.judging import limited_judging
 from service.grading.run_plan import plan_run
 from service.grading.trial_runner import TrialRunner
 from service.reports.formats import FORMATS
-from service.reports.formats.rich_text import rich_report
-from service.reports.html import report
+from service.reports.formats.rich_text import render_rich_report
+from service.reports.html import render_report_page
 from service.reports.rows import TableRow
-from service.reports.view import staff_view, student_view
+from service.reports.view import build_staff_view, build_student_view
 from sim.errors import UsageError
-from sim.recording import Line
+from sim.recording import TimedText
 from submissions.assignment.definition import Assignment
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 from submissions.student_identity import Student
@@ -78,7 +78,7 @@ def written(case: Mapping[str, Any], folder: Path) -> Path:
         if "text" in change:
             text = change["text"]
         else:
-            reference = examples(case["assignment"]) / "reference" / part
+            reference = locate_examples(case["assignment"]) / "reference" / part
             text = reference.read_text("utf-8") if reference.exists() else ""
         if "from" in change:
             assert change["from"] in text
@@ -119,8 +119,8 @@ def test_every_format_begins_with_the_cause(runner: TrialRunner, tmp_path: Path)
     assert cause in hint
     row = TableRow(Student("ada"), "ada.zip", graded.assignment, graded)
     shown = Console(width=400, record=True, file=io.StringIO())
-    shown.print(rich_report(staff_view(graded)))
-    told = {"terminal": shown.export_text(), "page": unescape(report(student_view(graded), {}))}
+    shown.print(render_rich_report(build_staff_view(graded)))
+    told = {"terminal": shown.export_text(), "page": unescape(render_report_page(build_student_view(graded), {}))}
     for name, form in FORMATS.items():
         if form.document is not None:
             told[f"{name} document"] = unescape(form.document(graded)).replace('\\"', '"')
@@ -226,12 +226,12 @@ def test_searching_for_hints_takes_time_that_grows_with_the_length(tmp_path: Pat
         (tmp_path / "responder.py").write_text("def responder(text):\n" + "    print(text)\n" * lines)
         asked = find_assignment("echo-responder")
         submission = read_submission(tmp_path, asked=asked.parts)
-        clues = clues_of(submission, plan_run(submission, asked), (), ())
-        said = tuple(Line(0.0, f"P Y : :{number}") for number in range(lines))
+        clues = collect_clues(submission, plan_run(submission, asked), (), ())
+        said = tuple(TimedText(0.0, f"P Y : :{number}") for number in range(lines))
         recording = replace(line_follower_recording(1), printed=said, spoken=said)
         lost = tuple(each for each in asked.criteria)
         began = time.process_time()
-        near_misses(replace(clues, recordings=(recording,), lost=lost))
+        collect_near_misses(replace(clues, recordings=(recording,), lost=lost))
         return time.process_time() - began
 
     short = max(cost(100), 0.002)
@@ -253,11 +253,11 @@ def test_rules_that_fail_cost_neither_marks_nor_the_job(
     rules: Callable[[object], tuple[str, ...]], little: bool, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = find_assignment("echo-responder")
-    submission = read_submission(examples("echo-responder") / "flawed", asked=asked.parts)
+    submission = read_submission(locate_examples("echo-responder") / "flawed", asked=asked.parts)
     whole = grade(submission, asked, runner=runner)
-    monkeypatch.setattr("service.grading.hints.near_misses", rules)
-    monkeypatch.setattr(bounded, "_GUARD", replace(bounded._GUARD, cpu_seconds=0.1))
+    monkeypatch.setattr("service.grading.hints.collect_near_misses", rules)
+    monkeypatch.setattr(limited_judging, "_SMALL_LIMITS", replace(limited_judging._SMALL_LIMITS, cpu_seconds=0.1))
     if not little:
-        monkeypatch.setattr(bounded, "_LITTLE", -1)
+        monkeypatch.setattr(limited_judging, "_SMALL_INPUT", -1)
     without = grade(submission, asked, runner=runner)
     assert (without.marks, without.hints) == (whole.marks, ())

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from judging import criterion, judged, lines, recorded, talk
-from service.grading.judging.answers import NOTHING, at_path, parsed, same_value
+from service.grading.judging.answers import MISSING, find_at_path, is_same_value, parse_json_answer
 from sim.recording import Fault, Message, Pose, Verdict
 
 pytestmark = pytest.mark.fast
@@ -214,18 +214,18 @@ def test_messages_that_the_channel_lost_or_doubled_are_no_fault_of_the_responder
 
 @pytest.mark.parametrize("text", ["JSON::", "JSON::" + "[" * 100_000, "JSON::" + "1" * 10_000, "JSON::NaN", "hello"])
 def test_hostile_answers_are_nothing(text: str) -> None:
-    assert parsed(text) is NOTHING
+    assert parse_json_answer(text) is MISSING
 
 
 def test_paths_and_values() -> None:
     value = {"a": [{"b": None}], "c.d": 1}
-    assert at_path(value, "a.0.b") is None
-    assert at_path(value, "a.-1.b") is None
+    assert find_at_path(value, "a.0.b") is None
+    assert find_at_path(value, "a.-1.b") is None
     for missing in ("a.1", "a.x", "a.0.b.c", "", "a..b", "c.d", "a.9999999999"):
-        assert at_path(value, missing) is NOTHING
-    assert same_value({"x": [1, None]}, {"x": [1.0, None]})
-    assert not same_value({"x": 1}, {"x": 1, "y": 2})
-    assert not same_value("1", 1)
+        assert find_at_path(value, missing) is MISSING
+    assert is_same_value({"x": [1, None]}, {"x": [1.0, None]})
+    assert not is_same_value({"x": 1}, {"x": 1, "y": 2})
+    assert not is_same_value("1", 1)
 
 
 @pytest.mark.parametrize(

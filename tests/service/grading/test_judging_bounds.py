@@ -18,22 +18,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from judging import START, criterion, recorded
-from responders.code import Code
+from responders.source_file import SourceFile
 from rows import quick_first
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.grader import grade
-from service.grading.judging import bounded
-from service.grading.judging.bounded import Bounds, bounds_for, judge_within
+from service.grading.judging import limited_judging
 from service.grading.judging.judge import judge, judge_one
-from service.grading.judging.judges import StaticAnalysis
+from service.grading.judging.judge_declaration import StaticAnalysis
+from service.grading.judging.limited_judging import JudgingLimits, compute_judging_limits, judge_within_limits
 from service.grading.trial_runner import TrialRunner
-from service.reports.plots.sequence import MOST_CALL_STEPS, Gap, conversation
+from service.reports.plots.sequence import MOST_CALL_STEPS, Gap, build_conversation
 from sim.errors import Cancelled, HostError
-from sim.recording import Call, Image, Line, Message, Verdict
+from sim.recording import Call, Image, Message, TimedText, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.assignment.reader import read_assignment
 from submissions.criteria import SCHEMAS
-from submissions.criteria.expressions import found_in, usable
+from submissions.criteria.expressions import check_pattern, has_match
 from submissions.submission import Submission
 
 pytestmark = pytest.mark.fast
@@ -78,7 +78,7 @@ _CRITERIA: Sequence[tuple[str, dict[str, Any]]] = [
 @pytest.mark.parametrize("name", quick_first(_TEXTS, quick=2))
 def test_hostile_texts_are_judged_in_little_time(name: str) -> None:
     texts = _TEXTS[name]
-    lines = tuple(Line(3 * n / len(texts), text) for n, text in enumerate(texts))
+    lines = tuple(TimedText(3 * n / len(texts), text) for n, text in enumerate(texts))
     messages: list[Message] = []
     for line in lines:
         messages.append(Message(line.t, "robot", f"PY::{line.text}", line.t))
@@ -180,7 +180,7 @@ def test_hostile_programs_are_graded_in_little_time(name: str, runner: TrialRunn
     (tmp_path / "assignment.toml").write_text(_HARD_ASSIGNMENT)
     (tmp_path / "echo.py").write_text("def responder(text):\n    return text[4:]\n")
     asked = read_assignment(tmp_path)
-    program = Code("robot.py", _STORY.format(lines=_PROGRAMS[name]))
+    program = SourceFile("robot.py", _STORY.format(lines=_PROGRAMS[name]))
     begin = time.process_time()
     graded = grade(Submission("ada", program, None), asked, runner=runner)
     assert time.process_time() - begin < 30
@@ -233,18 +233,18 @@ _PATTERNS = [
 @given(st.text(st.sampled_from("aAbBxéÉ١1.-_]\\ \n\t\u2003\x85e0²"), max_size=6), st.booleans())
 def test_patterns_mean_what_they_mean_in_python(pattern: str, text: str, ignore_case: bool) -> None:
     flags = re.IGNORECASE if ignore_case else 0
-    assert found_in(text, pattern, ignore_case) == bool(re.search(pattern, text, flags))
+    assert has_match(text, pattern, ignore_case) == bool(re.search(pattern, text, flags))
 
 
 def test_the_very_end_is_told_from_the_end_of_a_line() -> None:
-    assert found_in("ab", r"b\Z", False)
-    assert not found_in("ab\ncd", r"b\Z", False)
-    assert not found_in("ab\ncd", "b$", False)
+    assert has_match("ab", r"b\Z", False)
+    assert not has_match("ab\ncd", r"b\Z", False)
+    assert not has_match("ab\ncd", "b$", False)
 
 
 def test_patterns_are_tried_on_what_is_no_text() -> None:
-    assert found_in("a\ud800b", "^a.b$", False)
-    assert not found_in("a" * 60_000 + "!", usable(r"^(\w+\s?)+$"), False)
+    assert has_match("a\ud800b", "^a.b$", False)
+    assert not has_match("a" * 60_000 + "!", check_pattern(r"^(\w+\s?)+$"), False)
 
 
 def _sleeps() -> None:
@@ -301,9 +301,9 @@ _APART: Sequence[tuple[Callable[[], None], str]] = [
     (_is_killed, "its process was ended by signal 9"),
     (_computes_in_c, "it took more than 1 s of computing"),
 ]
-_LITTLE = recorded(printed=(Line(0.0, "x"),))
-_MUCH = recorded(printed=(Line(0.0, "x"), Line(0.1, "y" * 100_000)))
-_SMALL = Bounds(1.0, 60.0, 64 << 20)
+_LITTLE = recorded(printed=(TimedText(0.0, "x"),))
+_MUCH = recorded(printed=(TimedText(0.0, "x"), TimedText(0.1, "y" * 100_000)))
+_SMALL = JudgingLimits(1.0, 60.0, 64 << 20)
 
 
 def _criteria(*ids: str) -> Assignment:
@@ -318,8 +318,8 @@ def _spoil(monkeypatch: pytest.MonkeyPatch, spoilt: Mapping[str, Callable[[], No
             spoilt[asked.id]()
         return judge_one(asked, *rest)
 
-    monkeypatch.setattr(bounded, "judge_one", judge_or_not)
-    monkeypatch.setattr(bounded, "_GUARD", replace(_SMALL, cpu_seconds=0.2, seconds=0.5))
+    monkeypatch.setattr(limited_judging, "judge_one", judge_or_not)
+    monkeypatch.setattr(limited_judging, "_SMALL_LIMITS", replace(_SMALL, cpu_seconds=0.2, seconds=0.5))
 
 
 def _children() -> set[str]:
@@ -339,7 +339,7 @@ def test_a_criterion_that_cannot_be_judged_spoils_no_other(
     _spoil(monkeypatch, {"bad": misbehave})
     trials = _trials(_LITTLE if run == "little" else _MUCH)
     bounds = replace(_SMALL, seconds=2.0) if misbehave is _sleeps else _SMALL
-    before, bad, after = judge_within(bounds, _criteria("before", "bad", "after"), trials, StaticAnalysis())
+    before, bad, after = judge_within_limits(bounds, _criteria("before", "bad", "after"), trials, StaticAnalysis())
     assert [result.marks for result in (before, bad, after)] == [2, 0, 2]
     assert bad.max_marks == 2
     assert bad.message == "This criterion could not be judged. Staff will review it."
@@ -353,7 +353,7 @@ def test_a_criterion_that_cannot_be_judged_spoils_no_other(
 
 def test_many_misbehave_and_each_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     _spoil(monkeypatch, {"a": _raises, "c": _aborts, "d": _eats, "e": _is_killed})
-    results = judge_within(_SMALL, _criteria(*"abcdef"), _trials(_MUCH), StaticAnalysis())
+    results = judge_within_limits(_SMALL, _criteria(*"abcdef"), _trials(_MUCH), StaticAnalysis())
     assert [result.id for result in results] == list("abcdef")
     assert [bool(result.unjudged) for result in results] == [True, False, True, True, True, False]
 
@@ -362,7 +362,7 @@ def test_a_rank_of_what_could_not_be_judged_is_not_judged_either(monkeypatch: py
     lap = SCHEMAS["finishes"].model_validate({"id": "lap", "title": "L", "marks": 2, "check": "finishes"})
     rank = criterion("ranking", of="lap", measure="time", steps=[[50, 1.0]])
     _spoil(monkeypatch, {"lap": _raises})
-    ranked, _ = judge_within(_SMALL, _asking(rank, lap), _trials(_LITTLE), StaticAnalysis())
+    ranked, _ = judge_within_limits(_SMALL, _asking(rank, lap), _trials(_LITTLE), StaticAnalysis())
     assert ranked.marks == 0
     assert ranked.unjudged == "lap, which it ranks, could not be judged"
 
@@ -374,8 +374,8 @@ def test_what_comes_back_is_what_was_judged(monkeypatch: pytest.MonkeyPatch) -> 
     run = recorded(messages=messages, images=images)
     asked = _asking(criterion("classification", labels=["a"]))
     plain = judge(asked, _trials(run))
-    monkeypatch.setattr(bounded, "_LITTLE", -1)
-    apart = judge_within(_SMALL, asked, _trials(run), StaticAnalysis())
+    monkeypatch.setattr(limited_judging, "_SMALL_INPUT", -1)
+    apart = judge_within_limits(_SMALL, asked, _trials(run), StaticAnalysis())
     assert apart == plain
     assert [prediction.image is image for prediction, image in zip(apart[0].predictions, images, strict=True)] == [
         True
@@ -384,7 +384,7 @@ def test_what_comes_back_is_what_was_judged(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_what_a_machine_spoilt_is_not_judged() -> None:
     with pytest.raises(HostError, match="has to be run again"):
-        judge_within(_SMALL, _criteria("a"), _trials(recorded(verdict=Verdict.HOST_ERROR)), StaticAnalysis())
+        judge_within_limits(_SMALL, _criteria("a"), _trials(recorded(verdict=Verdict.HOST_ERROR)), StaticAnalysis())
 
 
 def test_whoever_waits_may_stop_the_judging(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -395,12 +395,12 @@ def test_whoever_waits_may_stop_the_judging(monkeypatch: pytest.MonkeyPatch) -> 
 
     before = _children()
     with pytest.raises(Cancelled):
-        judge_within(_SMALL, _criteria("bad"), _trials(_MUCH), StaticAnalysis(), heartbeat)
+        judge_within_limits(_SMALL, _criteria("bad"), _trials(_MUCH), StaticAnalysis(), heartbeat)
     assert _children() == before
 
 
 def test_bounds_grow_with_what_there_is_to_judge() -> None:
-    one, many = bounds_for(_trials(_LITTLE)), bounds_for(_trials(*[_LITTLE] * 500))
+    one, many = compute_judging_limits(_trials(_LITTLE)), compute_judging_limits(_trials(*[_LITTLE] * 500))
     assert 10 < one.cpu_seconds < 20
     assert many.cpu_seconds > 500
 
@@ -411,7 +411,7 @@ def test_a_grade_says_that_staff_have_to_look(
     _spoil(monkeypatch, {"number": _raises})
     (tmp_path / "assignment.toml").write_text(_HARD_ASSIGNMENT)
     (tmp_path / "echo.py").write_text("def responder(text):\n    return text\n")
-    program = Code("robot.py", _STORY.format(lines="print('1 2 3!')"))
+    program = SourceFile("robot.py", _STORY.format(lines="print('1 2 3!')"))
     graded = grade(Submission("ada", program, None), read_assignment(tmp_path), runner=runner)
     assert graded.notes == ("1 of 6 criteria could not be judged; staff will review them",)
     assert {result.id: result.marks for result in graded.criteria} | {"number": 0} == {
@@ -422,6 +422,6 @@ def test_a_grade_says_that_staff_have_to_look(
 
 def test_of_one_message_only_the_first_calls_are_drawn() -> None:
     calls = tuple(Call(0, n % 1000, "responder", "parser", "a", "b") for n in range(10_000))
-    told = conversation(recorded(messages=(Message(0, "robot", "PY::0", 0),), calls=calls))
+    told = build_conversation(recorded(messages=(Message(0, "robot", "PY::0", 0),), calls=calls))
     assert len(told.steps) < MOST_CALL_STEPS + 5
     assert sum(step.count for step in told.steps if isinstance(step, Gap)) == 20_000 - MOST_CALL_STEPS

@@ -9,7 +9,7 @@ import pytest
 
 from judging import criterion, judged, recorded
 from service.grading.grade import CriterionResult
-from sim.recording import Fault, Line, LossReason, Message, Recording, Verdict
+from sim.recording import Fault, LossReason, Message, Recording, TimedText, Verdict
 
 pytestmark = pytest.mark.fast
 
@@ -200,7 +200,7 @@ def test_in_reach() -> None:
 
 
 def believed(*told: tuple[float, str], messages: tuple[Message, ...] = (), **keys: Any) -> CriterionResult:
-    run = recorded(end_t=20.0, printed=tuple(Line(t, text) for t, text in told), messages=messages or LATE)
+    run = recorded(end_t=20.0, printed=tuple(TimedText(t, text) for t, text in told), messages=messages or LATE)
     return judged(criterion("fresh_answers", after="Answer:", path="saw", over="mean", **keys), run)
 
 

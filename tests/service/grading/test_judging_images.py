@@ -7,12 +7,12 @@ from decimal import Decimal
 import pytest
 
 from judging import START, criterion, judged, lines, recorded, talk
-from models.intervals import wilson
-from service.grading.grade import Shown, TrialResult
+from models.intervals import compute_wilson_interval
+from service.grading.grade import TrialResult, VisibleFeedback
 from service.grading.judging.judge import judge
-from service.grading.judging.truths import NO_IMAGE
+from service.grading.judging.true_labels import NO_IMAGE
 from sim.errors import HostError
-from sim.recording import Image, Line, Pose, Recording, Verdict
+from sim.recording import Image, Pose, Recording, TimedText, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 
 pytestmark = pytest.mark.fast
@@ -108,23 +108,23 @@ def test_what_the_robot_says_can_be_the_answer() -> None:
     [(0, 0, 0, 1), (6, 6, 0.6097, 1), (0, 6, 0, 0.3903), (4, 6, 0.3000, 0.9032), (90, 100, 0.8256, 0.9448)],
 )
 def test_wilson_interval(right: int, count: int, low: float, high: float) -> None:
-    assert wilson(right, count) == pytest.approx((low, high), abs=5e-5)
+    assert compute_wilson_interval(right, count) == pytest.approx((low, high), abs=5e-5)
 
 
 def test_hidden_trials_are_counted_but_not_told() -> None:
     for asked in (criterion("says", equals="secret"), criterion("classification")):
         result = judged(asked, imaged(SQUARE, "diamond", spoken="no"), recorded(), visibility="hidden")
         assert "scenario s" in result.message  # for staff
-        assert result.shown == Shown("Marked in trials that are not shown.")
+        assert result.shown == VisibleFeedback("Marked in trials that are not shown.")
 
 
 def test_of_a_criterion_with_hidden_trials_only_the_visible_ones_are_told() -> None:
-    asked, wrong = criterion("says", equals="secret"), recorded(spoken=(Line(1.0, "469"),))
+    asked, wrong = criterion("says", equals="secret"), recorded(spoken=(TimedText(1.0, "469"),))
     scenarios = (Scenario("s", (START,)), Scenario("t", (START,), visibility="hidden"))
     assignment = Assignment("a", "A", WorldSpec(), Parts(), scenarios, (asked,))
     told = []
-    for recording in (wrong, recorded(spoken=(Line(1.0, "secret"),))):
-        shown = TrialResult("s", 0, 1, 0, 0, "visible", recorded(spoken=(Line(1.0, "secret"),)))
+    for recording in (wrong, recorded(spoken=(TimedText(1.0, "secret"),))):
+        shown = TrialResult("s", 0, 1, 0, 0, "visible", recorded(spoken=(TimedText(1.0, "secret"),)))
         (result,) = judge(assignment, (shown, TrialResult("t", 0, 1, 0, 0, "hidden", recording)))
         assert ("469" in result.message) is (recording is wrong)
         told.append(result.shown)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from driving import driven, measured, passes, rest, spin, straight
 from judging import criterion, judged
-from service.grading.judging.drawing import between, legs_of
-from service.grading.judging.moves import moves_of
+from service.grading.judging.drawing import compute_turn_angle, find_legs
+from service.grading.judging.moves import split_moves
 from sim.recording import Pose
 
 pytestmark = pytest.mark.fast
@@ -53,14 +53,14 @@ def test_wheels_that_did_not_carry_the_robot_are_told() -> None:
 
 def test_moves_are_parted_by_rests_and_by_kind() -> None:
     run = driven(straight(100), rest(4), straight(50), rest(2), straight(50), spin(90), rest(), straight(-60))
-    made = moves_of(run)
+    made = split_moves(run)
     assert [round(move.distance) for move in made] == [100, 100, 0, 60]
     assert [round(move.turn) for move in made] == [0, 0, 90, 0]
     assert made[3].forward == pytest.approx(-60)
 
 
 def test_a_short_slip_into_a_bend_is_no_move_of_its_own() -> None:
-    assert len(moves_of(driven(straight(50), (5.0, 1.0, 4), straight(50)))) == 1
+    assert len(split_moves(driven(straight(50), (5.0, 1.0, 4), straight(50)))) == 1
 
 
 RIGHT_ANGLE = [
@@ -280,8 +280,8 @@ def test_what_is_wrong_with_a_drawing_is_told() -> None:
 def test_only_what_the_pen_draws_are_legs() -> None:
     moves = (straight(200), rest(), spin(90), rest(), straight(200))
     lifted = driven(*moves, pen=((0, True), (45, False)))
-    assert [round(leg.length) for leg in legs_of(lifted, pen=True)] == [200]
-    assert [round(leg.length) for leg in legs_of(lifted, pen=False)] == [200, 200]
+    assert [round(leg.length) for leg in find_legs(lifted, pen=True)] == [200]
+    assert [round(leg.length) for leg in find_legs(lifted, pen=False)] == [200, 200]
 
 
 def lifted_between(first: Sequence[Any], between_them: Sequence[Any], second: Sequence[Any]) -> Any:
@@ -311,7 +311,7 @@ BEND = ((5.0, 2.0, 35), (5.0, -2.0, 35))
     ],
 )
 def test_only_what_goes_on_in_one_line_is_one_leg(run: Any, lengths: list[int]) -> None:
-    assert [leg.length for leg in legs_of(run, pen=True)] == pytest.approx(lengths, abs=1)
+    assert [leg.length for leg in find_legs(run, pen=True)] == pytest.approx(lengths, abs=1)
 
 
 @given(st.lists(st.tuples(st.integers(40, 200), st.sampled_from((0, 30, 100))), min_size=1, max_size=5))
@@ -326,7 +326,7 @@ def test_each_stroke_of_a_hatching_is_a_leg(strokes: list[tuple[int, int]]) -> N
         pen.append((sum(ticks for _, _, ticks in moves), False))
         moves += [spin(90), straight(aside), spin(-90), straight(40)]
     run = driven(*moves, pen=tuple(pen))
-    assert [leg.length for leg in legs_of(run, pen=True)] == pytest.approx([5 * round(mm / 5) for mm, _ in strokes])
+    assert [leg.length for leg in find_legs(run, pen=True)] == pytest.approx([5 * round(mm / 5) for mm, _ in strokes])
 
 
 @given(st.integers(3, 8), st.integers(60, 400), st.sampled_from((-1, 1)), st.integers(0, 359))
@@ -337,9 +337,12 @@ def test_regular_polygons_are_recognised_in_any_direction(sides: int, side: int,
     moves = [part for _ in range(sides) for part in ((side / 30, 0.0, 30), rest(), turn, rest())]
     run = driven(*moves, start=Pose(1000, 500, heading))
     assert passes(criterion("drawing", legs=sides, angle=angle, angle_within=0.1, closes=True, shortest=50), run)
-    legs = legs_of(run, pen=True)
+    legs = find_legs(run, pen=True)
     assert [leg.length for leg in legs] == pytest.approx([side] * sides, abs=1e-6)
-    turned = sum(between(one.direction, other.direction) for one, other in zip(legs, [*legs[1:], legs[0]], strict=True))
+    turned = sum(
+        compute_turn_angle(one.direction, other.direction)
+        for one, other in zip(legs, [*legs[1:], legs[0]], strict=True)
+    )
     assert turned == pytest.approx(way * 360, abs=1e-6)
 
 

@@ -14,11 +14,16 @@ from pydantic import ValidationError
 
 from driving import along, driven, measured, passes, rest, spin, straight
 from judging import criterion, judged
-from service.grading.judging.geometry import Along, covered, distance_to, positions
-from service.grading.judging.geometry import along as along_line
-from service.grading.judging.line import Crossing, whole_laps
-from service.grading.judging.point import rounds
-from sim.floors.centrelines import centrelines
+from service.grading.judging.geometry import (
+    LineProgress,
+    compute_positions,
+    measure_area_distance,
+    measure_covered_share,
+)
+from service.grading.judging.geometry import track_line_progress as along_line
+from service.grading.judging.line import Crossing, find_complete_laps
+from service.grading.judging.point import compute_rounds
+from sim.floors.centrelines import load_centrelines
 from sim.recording import Pose, Touch
 from submissions.criteria.line import Laps
 from submissions.criteria.places import Area, LineToFollow
@@ -33,7 +38,9 @@ points = st.tuples(coordinates, coordinates)
 @settings(deadline=None)
 def test_a_bar_without_length_is_a_circle(point: tuple[float, float], radius: float) -> None:
     circle, bar = Area(circle=(3, 4, radius)), Area(bar=(3, 4, 3, 4, radius))
-    assert distance_to(circle, np.array([point])) == pytest.approx(distance_to(bar, np.array([point])))
+    assert measure_area_distance(circle, np.array([point])) == pytest.approx(
+        measure_area_distance(bar, np.array([point]))
+    )
 
 
 @given(points)
@@ -43,19 +50,21 @@ def test_a_rectangle_is_a_polygon_whichever_way_round(point: tuple[float, float]
     corners = ((-100, -50), (200, -50), (200, 80), (-100, 80))
     here = np.array([point])
     for turned in (corners, corners[::-1], corners[2:] + corners[:2]):
-        assert distance_to(Area(polygon=turned), here) == pytest.approx(distance_to(rectangle, here))
+        assert measure_area_distance(Area(polygon=turned), here) == pytest.approx(
+            measure_area_distance(rectangle, here)
+        )
     inside = -100 < point[0] < 200 and -50 < point[1] < 80
-    assert (distance_to(rectangle, here)[0] < 0) == inside
+    assert (measure_area_distance(rectangle, here)[0] < 0) == inside
 
 
 @given(points, st.floats(0, 2 * math.pi))
 @settings(deadline=None)
 def test_distance_is_how_far_one_must_go_to_the_edge(point: tuple[float, float], direction: float) -> None:
     shape = Area(polygon=((0, 0), (300, 40), (250, 260), (120, 90), (-60, 200)))
-    distance = float(distance_to(shape, np.array([point]))[0])
+    distance = float(measure_area_distance(shape, np.array([point]))[0])
     step = abs(distance) * 0.999
     moved = np.array([[point[0] + step * math.cos(direction), point[1] + step * math.sin(direction)]])
-    assert float(distance_to(shape, moved)[0]) * distance >= 0
+    assert float(measure_area_distance(shape, moved)[0]) * distance >= 0
 
 
 @pytest.mark.parametrize(
@@ -188,15 +197,15 @@ def test_closest(moves: Any, keys: dict[str, Any], good: bool) -> None:
 def test_winding_of_circles(whole: int, way: int, part: float, centre: tuple[float, float], radius: float) -> None:
     angles = np.linspace(0, way * (whole + part) * 2 * math.pi, 400)
     path = np.column_stack([centre[0] + radius * np.cos(angles), centre[1] + radius * np.sin(angles)])
-    assert rounds(path, *centre)[-1] == pytest.approx(way * (whole + part))
-    assert abs(rounds(path, centre[0] + 2 * radius, centre[1])[-1]) < 0.5
+    assert compute_rounds(path, *centre)[-1] == pytest.approx(way * (whole + part))
+    assert abs(compute_rounds(path, centre[0] + 2 * radius, centre[1])[-1]) < 0.5
 
 
 @given(st.lists(points, min_size=2, max_size=30))
 @settings(max_examples=50, deadline=None)
 def test_winding_of_a_path_there_and_back_is_nothing(path: list[tuple[float, float]]) -> None:
     there_and_back = np.array(path + path[::-1])
-    assert rounds(there_and_back, 700, 700)[-1] == pytest.approx(0, abs=1e-9)
+    assert compute_rounds(there_and_back, 700, 700)[-1] == pytest.approx(0, abs=1e-9)
 
 
 def loop(side: float, turn: float = 90, rounds_of_it: int = 1) -> list[Any]:
@@ -222,7 +231,7 @@ def test_circuits(moves: list[Any], keys: dict[str, Any], good: bool) -> None:
 
 def wavy(offset: float = 0.0, speed: float = 4.0) -> Any:
     """Return a run up the line of the test floor at x 141, ``offset`` mm to its left."""
-    line = np.array(centrelines()["Line_Following_Test/141"])
+    line = np.array(load_centrelines()["Line_Following_Test/141"])
     lengths = np.concatenate([[0], np.hypot(*np.diff(line, axis=0).T)]).cumsum()
     places = np.arange(60, lengths[-1], speed)
     x, y = np.interp(places, lengths, line[:, 0]), np.interp(places, lengths, line[:, 1])
@@ -325,7 +334,7 @@ def test_what_is_driven_of_a_circle_is_covered(part: float, off: float, way: int
     radius = 300 + way * off
     found = along_line(course, radius * np.column_stack([np.cos(angles), np.sin(angles)]), 50)
     assert found is not None
-    assert covered(found, 50, 0, found.length) == pytest.approx(part, abs=0.01)
+    assert measure_covered_share(found, 50, 0, found.length) == pytest.approx(part, abs=0.01)
     assert np.abs(found.offset).max() == pytest.approx(off if way else 0, abs=0.2)
     assert found.length == pytest.approx(2 * math.pi * 300, rel=1e-3)
 
@@ -362,7 +371,7 @@ def test_laps_are_those_that_an_exhaustive_search_finds(ways: list[tuple[int, bo
     crossings = [Crossing(float(row), row, float(at)) for row, at in enumerate(progress)]
     offsets = np.zeros((len(progress) - 1) * 2 + 1)
     offsets[1::2] = [100 if leaves else 0 for _, leaves in ways]
-    found = Along(0, np.repeat(progress, 2)[:-1], offsets, 1000)
+    found = LineProgress(0, np.repeat(progress, 2)[:-1], offsets, 1000)
     crossings = [Crossing(each.t, 2 * each.row, each.progress) for each in crossings]
     clean = [
         (first.t, last.t)
@@ -377,7 +386,7 @@ def test_laps_are_those_that_an_exhaustive_search_finds(ways: list[tuple[int, bo
     )
     asked = criterion("laps", **CIRCUIT)
     assert isinstance(asked, Laps)
-    laps, _ = whole_laps(asked, found, crossings)
+    laps, _ = find_complete_laps(asked, found, crossings)
     assert len(laps) == most
     assert min((seconds for seconds, _ in laps), default=0) == min((b - a for a, b in clean), default=0)
 
@@ -441,13 +450,13 @@ def test_what_is_no_line_is_refused(table: dict[str, Any]) -> None:
 
 
 def test_named_lines_start_where_the_robots_start() -> None:
-    starts = {name: line[0] for name, line in centrelines().items()}
+    starts = {name: line[0] for name, line in load_centrelines().items()}
     for name in ("141", "440", "771", "1076", "1453", "1821"):
         x, y = starts[f"Line_Following_Test/{name}"]
         assert abs(x - int(name)) <= 2
         assert round(y) == 46
     assert LineToFollow(on="Thruxton_Circuit").length() == pytest.approx(3850, rel=0.01)
-    assert all(0 <= y <= 1143 for line in centrelines().values() for _, y in line)
+    assert all(0 <= y <= 1143 for line in load_centrelines().values() for _, y in line)
 
 
 @pytest.mark.parametrize(
@@ -472,7 +481,7 @@ def test_named_lines_start_where_the_robots_start() -> None:
 def test_a_run_without_a_tick_is_judged(asked: Any) -> None:
     result = judged(asked, driven())
     assert result.message
-    assert len(positions(driven())) == 1
+    assert len(compute_positions(driven())) == 1
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from judging import criterion, judged
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Recording
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 
@@ -89,5 +89,5 @@ def test_a_robot_that_slows_down_at_the_post_needs_no_check_in_python(
     post = find_assignment("ultrasonic-stop")
     asked = criterion("relation", scenarios=["at-the-post"], **NEARER)
     slower = replace(post, criteria=(asked,))
-    graded = grade(read_submission(examples(post.id) / example, asked=post.parts), slower, runner=runner)
+    graded = grade(read_submission(locate_examples(post.id) / example, asked=post.parts), slower, runner=runner)
     assert (graded.marks == 4) is good, graded.criteria[0].message

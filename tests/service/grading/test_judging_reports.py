@@ -18,9 +18,9 @@ from driving import driven, rest, spin, straight
 from judging import START, criterion, judged
 from service.grading.grade import TrialResult
 from service.grading.judging.judge import judge
-from service.grading.judging.text_tokens import tokens_of, words_of
-from sim.floors import floor
-from sim.recording import Datum, Fault, Line, Message, Pose, Recording, Ticks, Verdict
+from service.grading.judging.text_tokens import split_words, tokenize_text
+from sim.floors import build_floor
+from sim.recording import DatalogEntry, Fault, Message, Pose, Recording, Ticks, TimedText, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 
 pytestmark = pytest.mark.fast
@@ -46,8 +46,8 @@ def recorded(seconds: float = 3.0, rgb: Sequence[int] = (255, 255, 255), **parts
     return Recording(**(values | parts))
 
 
-def lines(*texts: str, every: float = 1.0) -> tuple[Line, ...]:
-    return tuple(Line(place * every, text) for place, text in enumerate(texts))
+def lines(*texts: str, every: float = 1.0) -> tuple[TimedText, ...]:
+    return tuple(TimedText(place * every, text) for place, text in enumerate(texts))
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def lines(*texts: str, every: float = 1.0) -> tuple[Line, ...]:
     ],
 )
 def test_words_without_case_and_punctuation(text: str, words: list[str]) -> None:
-    assert words_of(text) == words
+    assert split_words(text) == words
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_words_without_case_and_punctuation(text: str, words: list[str]) -> None
     ],
 )
 def test_numbers_as_python_writes_them(text: str, values: list[float]) -> None:
-    assert [token.value for token in tokens_of(text) if token.value is not None] == values
+    assert [token.value for token in tokenize_text(text) if token.value is not None] == values
 
 
 @pytest.mark.parametrize(
@@ -126,7 +126,7 @@ def test_replies_are_looked_at_whether_they_arrived_or_not() -> None:
 
 def test_label_of_the_floor_is_what_has_to_be_reported() -> None:
     start = Pose(600, 750, 90)
-    label = floor("MNIST_Digits", seed=34).label_at(580, 780)
+    label = build_floor("MNIST_Digits", seed=34).find_label(580, 780)
     asked = criterion("reports", expected="label", only=True)
     told = recorded(background="MNIST_Digits", sheet=34, start=start, printed=lines(f"Label: {label}"))
     assert judged(asked, told, poses=(start,)).marks == 4
@@ -220,13 +220,13 @@ BANDS = [{"text": "1", "zone": [120, 700, 140, 900]}, {"text": ["2", "two"], "zo
     [((0.1, 1.2), 4), ((0.1, 0.9), 2), ((1.2, 0.1), 0), ((0.1, 2.0), 2), ((0.1,), 2)],
 )
 def test_each_event_happens_at_its_place(times: tuple[float, ...], marks: int) -> None:
-    said = tuple(Line(t, text) for t, text in zip(times, ("band 1", "band two"), strict=False))
+    said = tuple(TimedText(t, text) for t, text in zip(times, ("band 1", "band two"), strict=False))
     result = judged(criterion("events", events=BANDS, over="mean"), recorded(spoken=said))
     assert result.marks == marks, result.message
 
 
 def test_margin_widens_every_zone() -> None:
-    said = (Line(0.1, "1"), Line(2.0, "2"))
+    said = (TimedText(0.1, "1"), TimedText(2.0, "2"))
     assert judged(criterion("events", events=BANDS, margin=15), recorded(spoken=said)).marks == 4
 
 
@@ -279,8 +279,8 @@ def test_a_robot_without_a_tick_has_not_stopped_on_anything() -> None:
     assert judged(criterion("stop_on", reflected=[0, 5]), recorded(seconds=0, rgb=(0, 0, 0))).marks == 0
 
 
-def series(*values: float, name: str = "Light_left", timed: bool = True) -> tuple[Datum, ...]:
-    return tuple(Datum(float(t), name, value, float(t) if timed else None) for t, value in enumerate(values))
+def series(*values: float, name: str = "Light_left", timed: bool = True) -> tuple[DatalogEntry, ...]:
+    return tuple(DatalogEntry(float(t), name, value, float(t) if timed else None) for t, value in enumerate(values))
 
 
 @pytest.mark.parametrize(
@@ -336,7 +336,7 @@ def test_a_reading_must_be_fresh_when_it_is_printed() -> None:
     ticks = recorded(seconds=4).ticks
     ticks.left_sums[30:] = 0
     recording = recorded(
-        seconds=4, ticks=ticks, datalog=tuple(Datum(t, "L", 100.0, t) for t in (0.0, 1.0, 1.4, 2.0, 3.0))
+        seconds=4, ticks=ticks, datalog=tuple(DatalogEntry(t, "L", 100.0, t) for t in (0.0, 1.0, 1.4, 2.0, 3.0))
     )
     result = judged(criterion("datalog", series="L", measured="left light"), recording)
     assert result.evidence[0].measures[0].value == 3
@@ -352,7 +352,7 @@ def test_one_series_dips_below_another_and_samples_have_times() -> None:
 
 def image(pose: Pose, side: str = "left", tick: int = 1, noise: int = 0) -> tuple[str, str, int]:
     """Return the sensor's reading at ``pose`` on sheet 34, taken from the image itself."""
-    drawn = floor("MNIST_Digits", seed=34).pixels
+    drawn = build_floor("MNIST_Digits", seed=34).pixels
     column = int(pose.x) - (30 if side == "left" else -10)
     row = 1143 - int(pose.y) - 40
     pixels = np.full((20, 20, 4), 255, np.uint8)

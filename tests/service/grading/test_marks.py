@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from judging import criterion, judged, recorded, talk
-from service.grading.judging.answers import same_value
-from service.grading.judging.outcome import Outcome, Over, earned, share_of, share_of_accuracy
+from service.grading.judging.answers import is_same_value
+from service.grading.judging.outcome import Outcome, Over, combine_outcomes, compute_accuracy_share, compute_marks
 
 outcomes = st.lists(
     st.one_of(
@@ -29,8 +29,8 @@ overs: st.SearchStrategy[Over] = st.sampled_from(("share", "all", "mean", "media
 def test_marks_are_within_bounds_and_full_exactly_for_a_full_share(
     full: Decimal, found: list[Outcome], over: Over
 ) -> None:
-    share = share_of(found, over)
-    got = earned(full, share)
+    share = combine_outcomes(found, over)
+    got = compute_marks(full, share)
     assert 0 <= got <= full
     assert got == got.quantize(Decimal("0.01"))
     if all(outcome.passed for outcome in found):
@@ -46,7 +46,7 @@ def test_passing_one_more_trial_never_costs_marks(
     place = data.draw(st.integers(0, len(found) - 1))
     better = [*found]
     better[place] = Outcome(True, Fraction(1), "")
-    assert earned(full, share_of(better, over)) >= earned(full, share_of(found, over))
+    assert compute_marks(full, combine_outcomes(better, over)) >= compute_marks(full, combine_outcomes(found, over))
 
 
 @given(marks, st.integers(0, 60), st.integers(1, 60), st.none() | st.floats(0.01, 1), st.sampled_from(("share", "all")))
@@ -54,9 +54,9 @@ def test_a_better_accuracy_never_costs_marks(
     full: Decimal, right: int, count: int, at_least: float | None, over: Over
 ) -> None:
     right = min(right, count)
-    got = earned(full, share_of_accuracy(right, count, at_least, over))
+    got = compute_marks(full, compute_accuracy_share(right, count, at_least, over))
     assert 0 <= got <= full
-    assert earned(full, share_of_accuracy(min(right + 1, count), count, at_least, over)) >= got
+    assert compute_marks(full, compute_accuracy_share(min(right + 1, count), count, at_least, over)) >= got
     if right == count or (at_least is not None and right / count >= at_least + 1e-9):
         assert got == full
 
@@ -74,13 +74,13 @@ def test_a_better_accuracy_never_costs_marks(
     ],
 )
 def test_marks_are_rounded_half_up_once(full: str, share: Fraction, got: str) -> None:
-    assert earned(Decimal(full), share) == Decimal(got)
+    assert compute_marks(Decimal(full), share) == Decimal(got)
 
 
 def test_nine_of_ten_is_at_least_nine_tenths() -> None:
-    assert share_of_accuracy(9, 10, 0.9, "share") == 1
-    assert share_of_accuracy(8, 10, 0.9, "share") == Fraction(8, 9)
-    assert share_of_accuracy(8, 10, 0.9, "all") == 0
+    assert compute_accuracy_share(9, 10, 0.9, "share") == 1
+    assert compute_accuracy_share(8, 10, 0.9, "share") == Fraction(8, 9)
+    assert compute_accuracy_share(8, 10, 0.9, "all") == 0
 
 
 def test_a_run_of_very_many_messages_is_judged_like_a_short_one() -> None:
@@ -94,4 +94,4 @@ def test_a_run_of_very_many_messages_is_judged_like_a_short_one() -> None:
 
 @pytest.mark.parametrize(("found", "expected"), [(10**400, 0.5), (-(10**400), 1.0), (float("inf"), 10**400)])
 def test_numbers_beyond_all_fractions_are_compared(found: float, expected: float) -> None:
-    assert not same_value(found, expected)
+    assert not is_same_value(found, expected)

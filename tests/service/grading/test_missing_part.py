@@ -9,11 +9,11 @@ import pytest
 
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.reports.formats.json_output import json_document
-from service.reports.formats.text import plain_text
-from service.reports.html import report
-from service.reports.view import staff_view, student_view
-from submissions.assignment.examples import examples
+from service.reports.formats.json_output import build_json_document
+from service.reports.formats.text import render_plain_text
+from service.reports.html import render_report_page
+from service.reports.view import build_staff_view, build_student_view
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 from submissions.criteria import SCHEMAS
@@ -37,7 +37,7 @@ def test_what_is_there_is_graded(
 ) -> None:
     own = tmp_path / "ada"
     own.mkdir()
-    (own / part).write_bytes((examples(assignment) / "reference" / part).read_bytes())
+    (own / part).write_bytes((locate_examples(assignment) / "reference" / part).read_bytes())
     asked = find_assignment(assignment)
     graded = grade(read_submission(own, asked=asked.parts), asked, runner=runner)
     assert {result.id: result.marks for result in graded.criteria} == marks
@@ -45,10 +45,10 @@ def test_what_is_there_is_graded(
     assert graded.missing == lacking
     lost = [result.message for result in graded.criteria if not result.marks]
     assert set(lost) == {f"There is no {lacking}."}
-    for told in (plain_text(staff_view(graded)), report(student_view(graded), {})):
+    for told in (render_plain_text(build_staff_view(graded)), render_report_page(build_student_view(graded), {})):
         assert f"There is no {lacking}, so" in told
         assert f"Submit {lacking} together with {part}" in told
-    assert json_document(staff_view(graded))["missing"] == lacking
+    assert build_json_document(build_staff_view(graded))["missing"] == lacking
 
 
 def test_a_responder_is_asked_alike_whenever_it_is_graded(runner: TrialRunner, tmp_path: Path) -> None:
@@ -57,7 +57,7 @@ def test_a_responder_is_asked_alike_whenever_it_is_graded(runner: TrialRunner, t
     submission = read_submission(tmp_path, asked=asked.parts)
     first, second = (grade(submission, asked, runner=runner) for _ in range(2))
     assert [trial.recording.sha256 for trial in first.trials] == [trial.recording.sha256 for trial in second.trials]
-    assert "error in the responder; no robot.py" in plain_text(staff_view(first))
+    assert "error in the responder; no robot.py" in render_plain_text(build_staff_view(first))
 
 
 def test_each_criterion_needs_some_part() -> None:

@@ -16,8 +16,8 @@ from _pytest.mark import ParameterSet
 
 from mistakes import first_screen
 from paths import DATA, ROOT
-from service.grading.hint_advice import ACTIONS, ADVICE, PROPERTIES, USAGE
 from service.grading.hint_code import read_code
+from service.grading.hint_tables import ACTIONS, ADVICE, PROPERTIES, USAGE
 from service.grading.trial_runner import TrialRunner
 
 MISTAKES = tomllib.loads((DATA / "mistakes.toml").read_text("utf-8"))["mistake"]
@@ -90,6 +90,6 @@ def vars_of(owner: type) -> dict[str, Any]:
 def test_code_is_read_as_far_as_it_can_be_split_into_tokens() -> None:
     code = read_code(["%%sim_magic_preloaded", "while x > 0: x -= 1", "def f(a,", "      b):", "    return '", "y = 1"])
     loop, inside, function = code.statements[:3]
-    assert (loop.line, loop.condition, code.body(loop)) == (2, ("x", ">", "0"), (inside,))
-    assert (function.line, function.last_line, inside.bound) == (3, 4, {"x"})
-    assert code.around(inside) == (loop,)
+    assert (loop.line, loop.condition, code.list_body(loop)) == (2, ("x", ">", "0"), (inside,))
+    assert (function.line, function.last_line, inside.bound_names) == (3, 4, {"x"})
+    assert code.list_enclosing(inside) == (loop,)

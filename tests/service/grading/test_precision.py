@@ -10,11 +10,11 @@ import pytest
 
 from driving import driven, straight
 from judging import criterion, judged
-from service.grading.judging.outcome import failed, passed
-from service.grading.judging.precision import Strays, tempered
-from sim.recording import Datum, Line, Message, Recording
+from service.grading.judging.outcome import fail_with, pass_with
+from service.grading.judging.stray_penalty import Strays, apply_stray_penalty
+from sim.recording import DatalogEntry, Message, Recording, TimedText
 from submissions.criteria import SCHEMAS
-from submissions.criteria.common import AmongMany
+from submissions.criteria.common import CriterionWithStrays
 
 ZONES = [{"text": "1", "zone": [120, 0, 140, 1143]}, {"text": "2", "zone": [160, 0, 180, 1143]}]
 BEGINNINGS = ("all", "it is", "now", "I am", "we are", "you are")
@@ -28,16 +28,16 @@ def drove(**parts: Any) -> Recording:
     return driven(straight(90, per_tick=1), **parts)
 
 
-def told(*texts: str, every: float = 0.02) -> tuple[Line, ...]:
-    return tuple(Line(number * every, text) for number, text in enumerate(texts))
+def told(*texts: str, every: float = 0.02) -> tuple[TimedText, ...]:
+    return tuple(TimedText(number * every, text) for number, text in enumerate(texts))
 
 
 def sent(*texts: str) -> tuple[Message, ...]:
     return tuple(Message(number * 0.02, "robot", text, number * 0.02) for number, text in enumerate(texts))
 
 
-def logged(*values: float, every: float = 0.02) -> tuple[Datum, ...]:
-    return tuple(Datum(0.5 + number * every, "Light", value, None) for number, value in enumerate(values))
+def logged(*values: float, every: float = 0.02) -> tuple[DatalogEntry, ...]:
+    return tuple(DatalogEntry(0.5 + number * every, "Light", value, None) for number, value in enumerate(values))
 
 
 #: The kind, its options, the output of an honest program (full marks), and that of one that lists everything.
@@ -45,8 +45,15 @@ CASES: Sequence[tuple[str, dict[str, Any], dict[str, Any], dict[str, Any]]] = [
     (
         "events",
         {"events": ZONES, "source": "speech"},
-        {"spoken": (Line(0.1, "1"), Line(0.2, "now 1"), Line(0.7, "looking for 2"), Line(1.2, "2"))},
-        {"spoken": (*(Line(t / 30, "1") for t in range(20)), *(Line(t / 30, "2") for t in range(31, 89)))},
+        {
+            "spoken": (
+                TimedText(0.1, "1"),
+                TimedText(0.2, "now 1"),
+                TimedText(0.7, "looking for 2"),
+                TimedText(1.2, "2"),
+            )
+        },
+        {"spoken": (*(TimedText(t / 30, "1") for t in range(20)), *(TimedText(t / 30, "2") for t in range(31, 89)))},
     ),
     (
         "prints",
@@ -106,7 +113,7 @@ CASES: Sequence[tuple[str, dict[str, Any], dict[str, Any], dict[str, Any]]] = [
         "reports",
         {"expected": [[17]]},
         # A program may print readings and their count throughout the run.
-        {"printed": tuple(Line(0.5 + n / 100, f"{n}: 100 %, 255") for n in range(100, 190)) + told("17")},
+        {"printed": tuple(TimedText(0.5 + n / 100, f"{n}: 100 %, 255") for n in range(100, 190)) + told("17")},
         {"printed": told(*GUESSES, every=0)},
     ),
     (
@@ -135,7 +142,7 @@ def test_naming_everything_earns_less_than_a_third_and_honest_work_all(
 
 
 def test_every_kind_that_looks_among_much_has_its_case() -> None:
-    looking = {check for check, schema in SCHEMAS.items() if issubclass(schema, AmongMany)}
+    looking = {check for check, schema in SCHEMAS.items() if issubclass(schema, CriterionWithStrays)}
     assert looking == {check for check, *_ in CASES}
 
 
@@ -156,12 +163,12 @@ def test_strays_that_are_not_forgiven_count_like_more_that_did_not_come(
     forgiven: int | None, wanted: int, misplaced: int, others: int, score: str | int
 ) -> None:
     asked = criterion("says", at_least=1, strays=forgiven)
-    assert isinstance(asked, AmongMany)
+    assert isinstance(asked, CriterionWithStrays)
     strays = Strays("more came", misplaced, others)
-    outcome = tempered(passed("All came."), asked, wanted, strays)
+    outcome = apply_stray_penalty(pass_with("All came."), asked, wanted, strays)
     assert (outcome.score, outcome.passed) == (Decimal(score), score == 1)
     assert ("more came" in outcome.message) == (score != 1)
-    half = tempered(failed("Half came.", score=outcome.score / 2), asked, wanted, strays)
+    half = apply_stray_penalty(fail_with("Half came.", score=outcome.score / 2), asked, wanted, strays)
     assert half.score == outcome.score**2 / 2
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.reports.formats.text import plain_text
-from service.reports.view import staff_view, student_view
+from service.reports.formats.text import render_plain_text
+from service.reports.view import build_staff_view, build_student_view
 from submissions.assignment.definition import Assignment
 from submissions.assignment.problems import AssignmentProblems
 from submissions.assignment.reader import read_assignment
@@ -42,7 +42,7 @@ def checked(folder: Path, check: str, runner: TrialRunner) -> Grade:
     folder.mkdir(exist_ok=True)
     (folder / "assignment.toml").write_text(HEAD)
     (folder / "check.py").write_text(check)
-    program = Code("robot.py", "print('Light_left: 3 1')\ntank_drive.on_for_seconds(50, 50, 1)\nsay('x')")
+    program = SourceFile("robot.py", "print('Light_left: 3 1')\ntank_drive.on_for_seconds(50, 50, 1)\nsay('x')")
     return grade(Submission("ada", program), read_assignment(folder), runner=runner)
 
 
@@ -70,7 +70,7 @@ def test_no_number_that_a_student_prints_breaks_a_check(value: str, tmp_path: Pa
         "    numbers = [number for _, _, *both in trial['datalog'] for number in both if number is not None]\n"
         "    return {'passed': not numbers, 'score': sum(numbers) - sum(numbers), 'measures': {'sum': sum(numbers)}}\n"
     )
-    program = Code("robot.py", f"print('Light_left: {value}')\n" * 3)
+    program = SourceFile("robot.py", f"print('Light_left: {value}')\n" * 3)
     assert grade(Submission("ada", program), read_assignment(tmp_path), runner=runner).marks == 4
 
 
@@ -145,15 +145,15 @@ def trusting(tmp_path_factory: pytest.TempPathFactory) -> Assignment:
 def test_no_text_of_a_students_ends_the_job_by_way_of_a_check(
     text: str, trusting: Assignment, runner: TrialRunner
 ) -> None:
-    result = grade(Submission("ada", Code("robot.py", f"print({text!r})")), trusting, runner=runner)
+    result = grade(Submission("ada", SourceFile("robot.py", f"print({text!r})")), trusting, runner=runner)
     asked, ended = result.criteria
     assert asked.marks == 0
     assert asked.unjudged
     assert ended.marks == 2
     assert not ended.unjudged
-    told = plain_text(staff_view(result))
+    told = render_plain_text(build_staff_view(result))
     assert "For staff: Could not be judged: " in told
-    shown = plain_text(student_view(result))
+    shown = render_plain_text(build_student_view(result))
     assert "This criterion could not be judged. Staff will review it." in shown
     assert asked.unjudged[:30] not in shown
 
@@ -162,7 +162,7 @@ def test_a_check_has_what_it_needs_when_the_submission_has_used_up_its_own(
     trusting: Assignment, runner: TrialRunner
 ) -> None:
     few = replace(trusting, limits=replace(trusting.limits, all_cpu=1.5))
-    program = Code("robot.py", "print('json [1]')\nwhile True: pass")
+    program = SourceFile("robot.py", "print('json [1]')\nwhile True: pass")
     asked, ended = grade(Submission("ada", program), few, runner=runner).criteria
     assert ended.marks == 0
     assert not asked.unjudged

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from service.grading.ranks import RankTable, StudentMeasures, ranked
+from service.grading.ranks import RankTable, StudentMeasures, rank_students
 
 
 def places(*values: tuple[float, ...], highest: bool = False) -> list[tuple[str, str]]:
     measures = [StudentMeasures(name, own, 3) for name, own in zip("abcdef", values, strict=False)]
-    table = RankTable("a", "T", "lap time", "s", ranked(measures, highest=highest))
+    table = RankTable("a", "T", "lap time", "s", rank_students(measures, highest=highest))
     return [(student, place) for place, student, *_ in table.texts]
 
 
@@ -39,5 +39,5 @@ def test_equal_figures_share_a_place_and_the_next_one_is_left_out(
     ],
 )
 def test_the_interval_is_that_of_the_mean_of_the_trials(values: tuple[float, ...], interval: str) -> None:
-    (row,) = RankTable("a", "T", "x", "", ranked([StudentMeasures("ada", values, 50)], highest=False)).texts
+    (row,) = RankTable("a", "T", "x", "", rank_students([StudentMeasures("ada", values, 50)], highest=False)).texts
     assert row[3:] == (interval, f"{len(values)} of 50")

@@ -14,7 +14,7 @@ from notebook_builder import notebook
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from submissions import submission as submission_module
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 
@@ -43,7 +43,7 @@ def counted(monkeypatch: pytest.MonkeyPatch, module: Any, function: str) -> Coun
 
 def with_own_texts(example: str, folder: Path) -> Path:
     """Return a copy of an example with unique texts that are in no cache."""
-    copy = shutil.copytree(examples(example) / "reference", folder / "ada")
+    copy = shutil.copytree(locate_examples(example) / "reference", folder / "ada")
     for file in copy.glob("*.py"):
         file.write_text(f"{file.read_text()}\n# in {folder}\n")
     return copy

@@ -18,17 +18,17 @@ from pydantic import ValidationError
 import report_builders as build
 from judging import START, criterion, judged
 from paths import ROOT
-from responders.code import Code
-from service.grading.grade import Accuracy, CriterionResult, Shown, TrialResult
+from responders.source_file import SourceFile
+from service.grading.grade import Accuracy, CriterionResult, TrialResult, VisibleFeedback
 from service.grading.grader import grade
-from service.grading.judging.geometry import part_at
+from service.grading.judging.class_scores import compute_class_scores
+from service.grading.judging.geometry import locate_part
 from service.grading.judging.judge import judge
-from service.grading.judging.label_patches import CODES, decoded
-from service.grading.judging.per_class import class_scores
-from service.grading.judging.truths import NO_IMAGE
+from service.grading.judging.label_patches import CODES, decode_label
+from service.grading.judging.true_labels import NO_IMAGE
 from service.grading.trial_runner import TrialRunner
-from service.reports.recognition_table import recognition_table
-from service.reports.view import student_view
+from service.reports.recognition_table import build_recognition_table
+from service.reports.view import build_student_view
 from sim.floors import SHAPES
 from sim.recording import Fault, Image, Message, Pose, Recording, Ticks, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
@@ -212,9 +212,9 @@ def test_the_counts_add_up(driven: list[Recording], keys: dict[str, Any]) -> Non
     assert counts.sent == counts.answered + counts.late + counts.malformed + counts.unanswered
     assert found.n == counts.counted + counts.missing == sum(number for _, _, number in found.confusion)
     assert counts.missing == sum(number for truth, _, number in found.confusion if truth == NO_IMAGE)
-    assert sum(score.shown for score in class_scores(found)) == found.n
+    assert sum(score.shown for score in compute_class_scores(found)) == found.n
     assert 0 <= found.low <= found.value <= found.high <= 1
-    numbers = [int(word) for word in recognition_table(result).sums.split() if word.isdecimal()]
+    numbers = [int(word) for word in build_recognition_table(result).sums.split() if word.isdecimal()]
     assert numbers[0] == sum(numbers[1:5])
 
 
@@ -226,14 +226,14 @@ def test_the_grey_patch_can_be_the_truth() -> None:
 
     greys = (0, 42, 85, 127, 170, 212)
     shown = [Image(0, 0, START, b"", patch(grey), 0) for grey in greys]
-    assert [decoded(image, CODES["shapes"]) for image in shown] == list(SHAPES)
+    assert [decode_label(image, CODES["shapes"]) for image in shown] == list(SHAPES)
     for useless in (patch(60), patch(85, edge=5), patch(255)):
-        assert decoded(replace(shown[0], right=useless), CODES["shapes"]) is None
+        assert decode_label(replace(shown[0], right=useless), CODES["shapes"]) is None
     chance = np.random.default_rng(1)
     noisy = np.frombuffer(patch(127), np.uint8).astype(int) + chance.integers(-32, 33, 1600)
     image = replace(shown[0], right=noisy.clip(0, 255).astype(np.uint8).tobytes())
-    assert decoded(image, CODES["shapes"], light_noise=32) == "downwards facing triangle"
-    assert decoded(image, CODES["shapes"]) is None
+    assert decode_label(image, CODES["shapes"], light_noise=32) == "downwards facing triangle"
+    assert decode_label(image, CODES["shapes"]) is None
     recording = talk((None, "left facing triangle"), (None, "square"))
     seen = tuple(replace(image, right=patch(85)) for image in recording.images)
     assert judged(asked(truth="grey"), replace(recording, images=seen)).marks == 2
@@ -272,7 +272,7 @@ def test_the_grey_patch_can_be_the_truth_on_an_image_of_the_instructors_own(
     with pytest.raises(AssignmentProblems, match=r'has no labels, expected greys = "shapes", "digits" or'):
         read_assignment(tmp_path)
     file.write_text(GREY_WORLD + "greys = { church = 42, mill = 190 }\n")
-    program = Submission("ada", Code("robot.py", "import time\nprint('IMG_DATA')\ntime.sleep(0.5)\n"))
+    program = Submission("ada", SourceFile("robot.py", "import time\nprint('IMG_DATA')\ntime.sleep(0.5)\n"))
     result = grade(program, read_assignment(tmp_path), runner=runner).criteria[0]
     # A grey of no label shows nothing to recognise. A trial without an image that counts is a wrong answer.
     assert result.message.startswith("1 of 3 images identified correctly")
@@ -455,7 +455,7 @@ def test_more_images_near_the_start_do_not_weigh_more() -> None:
 
 def test_precision_and_recall_of_each_class() -> None:
     said = [("square", "square"), ("square", "diamond"), ("diamond", "diamond"), ("diamond", None)]
-    scores = {score.label: score for score in class_scores(accuracy(judged(asked(), talk(*said))))}
+    scores = {score.label: score for score in compute_class_scores(accuracy(judged(asked(), talk(*said))))}
     assert (scores["square"].precision, scores["square"].recall) == (1.0, 0.5)
     assert (scores["diamond"].precision, scores["diamond"].recall) == (0.5, 0.5)
     assert (scores["upwards facing triangle"].precision, scores["upwards facing triangle"].recall) == (None, None)
@@ -473,20 +473,22 @@ def test_the_levels_of_a_hidden_sweep_are_not_told() -> None:
         (result,) = judge(assignment, trials)
         assert result.marks == 4
         assert "64" in result.message
-        assert result.shown == (None if visibility == "visible" else Shown("Marked in trials that are not shown."))
+        assert result.shown == (
+            None if visibility == "visible" else VisibleFeedback("Marked in trials that are not shown.")
+        )
 
 
 def test_a_student_sees_no_curve_of_hidden_trials() -> None:
     grade = build.swept_grade()
-    assert student_view(grade).grade.criteria[0].curves
+    assert build_student_view(grade).grade.criteria[0].curves
     hidden = replace(grade, trials=(*grade.trials[:-1], replace(grade.trials[-1], visibility="hidden")))
-    assert not student_view(hidden).grade.criteria[0].curves
+    assert not build_student_view(hidden).grade.criteria[0].curves
 
 
 def test_images_taken_far_from_what_they_show_do_not_count() -> None:
     recording = talk(("square", "square"), ("square", "circle"))
     first, second = recording.images
-    x, y = part_at(recording, "left", first.pose)
+    x, y = locate_part(recording, "left", first.pose)
     recording = replace(recording, images=(first, replace(second, pose=replace(first.pose, x=first.pose.x + 8))))
     keys: dict[str, Any] = {"truth": "places", "places": [[x, y, "square"]]}
     assert judged(asked(**keys), recording).marks < 4

@@ -11,13 +11,13 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from responders.repeated_faults import SPARED
-from service.grading.example_check import example_names
+from responders.repeated_faults import REPLAY_NOTES
+from service.grading.example_check import list_examples
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Recording, Ticks, Verdict
-from submissions.assignment.examples import expected, read_example
+from submissions.assignment.examples import read_example, read_expected
 from submissions.assignment.reader import find_assignment, read_assignment
 from submissions.bundle import read_submission
 
@@ -65,12 +65,12 @@ def runs_all() -> Iterator[TrialRunner]:
 def all_but_ticks(recording: Recording) -> Recording:
     """Return the data to compare beside the ticks' hash chain, without the line where a loop was interrupted."""
     faults = (replace(each, line=None) if each.verdict is Verdict.CPU_LIMIT else each for each in recording.faults)
-    notes = (note for note in recording.notes if note not in SPARED.values())
+    notes = (note for note in recording.notes if note not in REPLAY_NOTES.values())
     return replace(recording, faults=tuple(faults), notes=tuple(notes), ticks=_NO_TICKS)
 
 
 def spared(graded: Grade, role: str) -> list[int]:
-    return [number for number, each in enumerate(graded.trials) if SPARED[role] in each.recording.notes]
+    return [number for number, each in enumerate(graded.trials) if REPLAY_NOTES[role] in each.recording.notes]
 
 
 @pytest.mark.parametrize(
@@ -163,8 +163,8 @@ def _faulty() -> list[tuple[str, str]]:
     return [
         (name, example)
         for name in names
-        for example in example_names(name)
-        if (wanted := expected(name).examples.get(example)) is not None and wanted.verdict is not Verdict.FINISHED
+        for example in list_examples(name)
+        if (wanted := read_expected(name).examples.get(example)) is not None and wanted.verdict is not Verdict.FINISHED
     ]
 
 

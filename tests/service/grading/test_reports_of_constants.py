@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from judging import criterion, judged, recorded, talk
 from service.grading.grade import TrialResult
-from service.grading.guessable import find_guessable_reports
+from service.grading.guessable_reports import find_guessable_reports
 from service.grading.judging.judge import judge
-from sim.floors import floor, label_names
-from sim.recording import Line, Pose, Recording
+from sim.floors import build_floor, list_label_names
+from sim.recording import Pose, Recording, TimedText
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.assignment.reader import find_assignment
 
@@ -32,7 +32,7 @@ _SHARED_ROWS = _ROWS.flatmap(
 
 
 def _said(text: str) -> Recording:
-    return recorded(printed=(Line(1.0, text),))
+    return recorded(printed=(TimedText(1.0, text),))
 
 
 def _places(count: int) -> tuple[Pose, ...]:
@@ -125,7 +125,7 @@ def _labelled(background: str) -> dict[str, Pose]:
     """Return a start pose for each label of the floor, and one for no label, by label."""
     places = {
         each.label: Pose(each.x + each.width / 2 - 30, each.y + each.height / 2 - 20, 0)
-        for each in floor(background).labels
+        for each in build_floor(background).labels
     }
     return places | {"nothing": Pose(5, 5, 0)}
 
@@ -134,7 +134,7 @@ def _passes_at_labels(background: str, text: str, **keys: Any) -> list[str]:
     """Return the labels at which the constant text passes."""
     asked = criterion("reports", expected="label", strays=1000, **keys)
     places = _labelled(background)
-    runs = [recorded(background=background, start=pose, printed=(Line(1.0, text),)) for pose in places.values()]
+    runs = [recorded(background=background, start=pose, printed=(TimedText(1.0, text),)) for pose in places.values()]
     result = judged(asked, *runs, poses=tuple(places.values()))
     return [label for label, evidence in zip(places, result.evidence, strict=True) if evidence.passed]
 
@@ -153,7 +153,7 @@ _KEYS_OF_LABELS = st.fixed_dictionaries(
 def test_a_list_of_labels_passes_at_one_of_them_at_most(
     background: str, keys: dict[str, Any], data: st.DataObject
 ) -> None:
-    labels = st.sampled_from([*label_names(background), "nothing"])
+    labels = st.sampled_from([*list_label_names(background), "nothing"])
     numbers = st.integers(-1, 20).map(lambda half: str(half / 2))
     said = data.draw(st.lists(labels | numbers if background == "MNIST_Digits" else labels, min_size=1, max_size=12))
     assert len(_passes_at_labels(background, ", ".join(said), **keys)) <= 1
@@ -282,7 +282,7 @@ _LOLLIPOP = "82.75 or 82.75 or 0 or 0 or 100 or 66.67 or 100 or 33.33"
 )
 def test_no_constant_earns_the_marks_of_the_catalogue(assignment: str, text: str) -> None:
     asked = find_assignment(assignment)
-    run = recorded(printed=(Line(1.0, text),), messages=talk(("IMG_DATA", text)))
+    run = recorded(printed=(TimedText(1.0, text),), messages=talk(("IMG_DATA", text)))
     trials = tuple(
         TrialResult(each.scenario.id, each.index, 1, 0.0, 0.0, "visible", run, place=each.place)
         for each in asked.trials()

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from paths import HELPERS
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from submissions.assignment.reader import find_assignment
@@ -50,7 +50,7 @@ def _graded(runner: TrialRunner) -> list[list[object]]:
     """Return the marks and hashes that must be equal."""
     programs = BY_HASH + BY_ADDRESS * ("fixed addresses" in runner.check_sandbox())
     asked = find_assignment("say-tm129")
-    grades = [grade(Submission("ada", Code("robot.py", text)), asked, runner=runner) for text in programs]
+    grades = [grade(Submission("ada", SourceFile("robot.py", text)), asked, runner=runner) for text in programs]
     return [[str(each.marks), *(trial.recording.sha256 for trial in each.trials)] for each in grades]
 
 

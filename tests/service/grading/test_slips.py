@@ -10,8 +10,8 @@ import pytest
 
 from paths import ROOT
 from service.grading.hint_clues import Listing
-from service.grading.hint_loops import without_effect
-from service.grading.hint_slips import slips_in
+from service.grading.hint_loops import describe_discarded_value
+from service.grading.hint_slips import collect_slips
 
 
 def listing(text: str, name: str = "robot.py") -> Listing:
@@ -35,7 +35,7 @@ def _cells(file: Path) -> Iterator[tuple[str, str]]:
 
 
 def test_there_is_no_slip_in_programs_that_are_right() -> None:
-    found = {name: slips for name, text in sources() if (slips := list(slips_in(listing(text, name))))}
+    found = {name: slips for name, text in sources() if (slips := list(collect_slips(listing(text, name))))}
     assert found == {}
 
 
@@ -66,7 +66,7 @@ def test_there_is_no_slip_in_programs_that_are_right() -> None:
     ],
 )
 def test_a_slip_is_found_with_its_fix(line: str, words: str) -> None:
-    found = list(slips_in(listing(line)))
+    found = list(collect_slips(listing(line)))
     assert len(found) == 1
     assert words in found[0]
 
@@ -100,13 +100,13 @@ def test_a_slip_is_found_with_its_fix(line: str, words: str) -> None:
     ],
 )
 def test_no_slip_is_seen_in_what_is_right(line: str) -> None:
-    assert list(slips_in(listing(line))) == []
+    assert list(collect_slips(listing(line))) == []
 
 
 def effects(text: str) -> list[str]:
     """Return the statements of a text that are reported to have no effect."""
     code = listing(text).code
-    return [found for each in code.statements if (found := without_effect(each, code))]
+    return [found for each in code.statements if (found := describe_discarded_value(each, code))]
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from service.grading.standalone import read_files_beside, read_runnable
+from service.grading.standalone_runs import read_neighbour_files, read_runnable
 from sim.errors import UsageError
 
 
@@ -19,4 +19,4 @@ def test_a_file_that_is_too_large_is_refused_unread(name: str, tmp_path: Path) -
     with pytest.raises(UsageError, match="too large"):
         read_runnable(huge)
     program.write_text("import huge\n")
-    assert name not in read_files_beside(program, program.read_text())
+    assert name not in read_neighbour_files(program, program.read_text())

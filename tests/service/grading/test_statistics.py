@@ -7,7 +7,7 @@ from decimal import Decimal
 import pytest
 
 from report_builders import shape_grade
-from service.grading.statistics import MarkedCriterion, MarkedSubmission, marked_of, statistics_of
+from service.grading.class_statistics import MarkedCriterion, MarkedSubmission, compute_statistics, to_marked_submission
 
 
 def _marked(who: str, *marks: int, verdict: str = "finished", assignment: str = "echo") -> MarkedSubmission:
@@ -19,7 +19,7 @@ def _marked(who: str, *marks: int, verdict: str = "finished", assignment: str = 
 
 
 def test_a_class_of_four() -> None:
-    (found,) = statistics_of(
+    (found,) = compute_statistics(
         [_marked("dan", 4, 4), _marked("bob", 4, 0), _marked("ada", 2, 0), _marked("cyd", 0, 0, verdict="cpu_limit")]
     )
     assert (found.n, found.max_marks, found.mean) == (4, 8, 3.5)
@@ -37,19 +37,19 @@ def test_a_class_of_four() -> None:
 
 
 def test_each_assignment_by_itself_and_nothing_of_none() -> None:
-    found = statistics_of([_marked("ada", 4, assignment="walk"), _marked("ada", 2, assignment="echo")])
+    found = compute_statistics([_marked("ada", 4, assignment="walk"), _marked("ada", 2, assignment="echo")])
     assert [(each.assignment, each.mean, each.spread) for each in found] == [("echo", 2, None), ("walk", 4, None)]
     assert found[1].causes == ()
-    assert statistics_of([]) == ()
+    assert compute_statistics([]) == ()
 
 
 def test_a_fault_that_cost_no_marks_is_no_cause() -> None:
-    (found,) = statistics_of([_marked("ada", 4, 4, verdict="time_limit")])
+    (found,) = compute_statistics([_marked("ada", 4, 4, verdict="time_limit")])
     assert found.causes == ()
 
 
 def test_who_was_still_running_at_the_end_lost_marks_for_criteria_too() -> None:
-    (found,) = statistics_of([_marked("ada", 4, 0, verdict="time_limit")])
+    (found,) = compute_statistics([_marked("ada", 4, 0, verdict="time_limit")])
     assert [(cause.sentence, cause.criterion) for cause in found.causes] == [
         ("lost marks for: Does b", "Does b"),
         ("still running at the end", ""),
@@ -58,6 +58,6 @@ def test_who_was_still_running_at_the_end_lost_marks_for_criteria_too() -> None:
 
 def test_of_a_grade_the_criteria_that_were_judged_count() -> None:
     grade = shape_grade()
-    marked = marked_of(grade)
+    marked = to_marked_submission(grade)
     assert (marked.marks, marked.max_marks, marked.verdict) == (grade.marks, grade.max_marks, "finished")
     assert [each.id for each in marked.criteria] == [each.id for each in grade.criteria if not each.unjudged]

@@ -13,10 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from responders.channel import Channel
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grade import Level
 from service.grading.grader import grade
-from service.grading.judging.sweeps import area, part_above, range_above
+from service.grading.judging.accuracy_curves import compute_area, compute_share_above, find_range_above
 from service.grading.trial_runner import TrialRunner
 from service.store.codec import decode, encode
 from sim.recording import Pose
@@ -150,8 +150,8 @@ def test_area_and_range_of_a_curve(
     shares: list[tuple[float, int, int]], mean: Fraction, part: Fraction, ends: tuple[float, float] | None
 ) -> None:
     curve = levels(*shares)
-    held = range_above(curve, 0.8)
-    assert (area(curve), part_above(curve, 0.8)) == (mean, part)
+    held = find_range_above(curve, 0.8)
+    assert (compute_area(curve), compute_share_above(curve, 0.8)) == (mean, part)
     assert (None if held is None else (held[0].at, held[1].at)) == ends
 
 
@@ -167,8 +167,8 @@ def test_a_better_level_never_costs_marks(pairs: list[tuple[int, int]], data: st
     better = data.draw(st.integers(0, len(pairs) - 1))
     before = levels(*((at, right, 6) for at, right in pairs))
     after = levels(*((at, right + (place == better), 6) for place, (at, right) in enumerate(pairs)))
-    assert 0 <= area(before) <= area(after) <= 1
-    assert 0 <= part_above(before, level) <= part_above(after, level) <= 1
+    assert 0 <= compute_area(before) <= compute_area(after) <= 1
+    assert 0 <= compute_share_above(before, level) <= compute_share_above(after, level) <= 1
 
 
 def test_delay_loss_and_offset_are_felt(runner: TrialRunner) -> None:
@@ -184,7 +184,7 @@ def test_delay_loss_and_offset_are_felt(runner: TrialRunner) -> None:
         )
     )
     asked = assignment(Scenario("s", POSES[:1], sweep=sweep, seconds=5), *wanted)
-    submission = Submission("s", Code("robot.py", SENDS_TWO), Code("responder.py", SAYS_SQUARE))
+    submission = Submission("s", SourceFile("robot.py", SENDS_TWO), SourceFile("responder.py", SAYS_SQUARE))
     result = grade(submission, asked, runner=runner)
     curves = {
         found.id: [(level.at, level.right, level.n) for level in found.curves[0].levels] for found in result.criteria

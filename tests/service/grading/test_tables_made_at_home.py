@@ -17,19 +17,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grade import Grade
 from service.grading.grader import grade
-from service.grading.judging.label_patches import grey_image
+from service.grading.judging.label_patches import convert_to_grey
 from service.grading.trial_runner import TrialRunner
 from submissions.assignment.definition import Assignment
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
-from submissions.seeds import PUBLIC, Secret
+from submissions.seeds import PUBLIC_SECRET, Secret
 from submissions.submission import Submission
 
 MARKING = Secret("of the installation where marks are given")
-HOMES = (PUBLIC, Secret("of the home of a student"))
+HOMES = (PUBLIC_SECRET, Secret("of the home of a student"))
 
 #: All values that may distinguish a trial before its first image, and the robot's position.
 TELLTALE = """
@@ -96,7 +96,9 @@ def grading_request(program: str, table: Mapping[str, Mapping[str, str]], name: 
     own = TELLTALE.replace("import numpy\n", "").replace('"numpy": float(numpy.random.random()), ', "")
     responder = RESPONDER.replace("{telltale}", TELLTALE).replace("{table!r}", repr(packed))
     return Submission(
-        name, Code("robot.py", program.replace("{telltale}", own)), Code("responder.py", f"# {name}\n{responder}")
+        name,
+        SourceFile("robot.py", program.replace("{telltale}", own)),
+        SourceFile("responder.py", f"# {name}\n{responder}"),
     )
 
 
@@ -197,7 +199,7 @@ def test_a_table_made_at_home_is_no_model(runner: TrialRunner) -> None:
     table = {}
     for trial in grade(_model({}), asked, secret=HOMES[1], runner=runner).trials:
         for image in trial.recording.images:
-            row = grey_image(image, focus=True).astype(float).ravel()
+            row = convert_to_grey(image, focus=True).astype(float).ravel()
             table[str(np.round(row / max(1.0, row.max()) * 255).astype(int).tolist())] = str(image.truth)
     assert grade(_model(table), asked, secret=HOMES[1], runner=runner).marks == asked.max_marks
     assert grade(_model(table), asked, secret=MARKING, runner=runner).marks == 0
@@ -205,7 +207,7 @@ def test_a_table_made_at_home_is_no_model(runner: TrialRunner) -> None:
 
 def _model(table: Mapping[str, str]) -> Submission:
     packed = base64.b64encode(zlib.compress(json.dumps(table).encode())).decode()
-    return Submission("s", None, Code("responder.py", TRAINS.replace("{table!r}", repr(packed))))
+    return Submission("s", None, SourceFile("responder.py", TRAINS.replace("{table!r}", repr(packed))))
 
 
 SHOWS = """
@@ -237,7 +239,7 @@ def noisy() -> Assignment:
 
 
 def submission(comment: str) -> Submission:
-    return Submission("s", Code("robot.py", f"# {comment}{SHOWS}"), Code("responder.py", ECHO))
+    return Submission("s", SourceFile("robot.py", f"# {comment}{SHOWS}"), SourceFile("responder.py", ECHO))
 
 
 def test_chance_and_the_order_of_trials_are_each_submissions_own(noisy: Assignment) -> None:
@@ -256,7 +258,7 @@ def test_chance_and_the_order_of_trials_are_each_submissions_own(noisy: Assignme
 def test_the_same_submission_and_secret_give_the_same_recordings(runner: TrialRunner, noisy: Assignment) -> None:
     asked = replace(noisy, scenarios=(replace(noisy.scenarios[0], trials=3),))
     quiet = Submission(
-        "s", Code("robot.py", SHOWS.replace('print("NUMBER", os.getpid())', "")), Code("responder.py", ECHO)
+        "s", SourceFile("robot.py", SHOWS.replace('print("NUMBER", os.getpid())', "")), SourceFile("responder.py", ECHO)
     )
     chains = [
         [
@@ -272,10 +274,10 @@ def test_a_table_of_truths_follows_the_order_in_which_the_secret_shuffles(runner
     """Judging uses the start place of the real run, whatever the secret is."""
     asked = find_assignment("black-or-grey")
     shuffled = replace(asked, scenarios=tuple(replace(scenario, choose="shuffled") for scenario in asked.scenarios))
-    program = (examples("black-or-grey") / "reference" / "robot.py").read_text()
-    reference = Submission("s", Code("robot.py", program))
+    program = (locate_examples("black-or-grey") / "reference" / "robot.py").read_text()
+    reference = Submission("s", SourceFile("robot.py", program))
     orders = set()
-    for secret in (PUBLIC, MARKING, *HOMES[1:]):
+    for secret in (PUBLIC_SECRET, MARKING, *HOMES[1:]):
         graded = grade(reference, shuffled, secret=secret, runner=runner)
         assert graded.marks == Decimal(8)
         orders.add(tuple(trial.place for trial in graded.trials))

@@ -9,7 +9,7 @@ import pytest
 
 from driving import driven, measured, passes, rest, straight
 from judging import criterion, judged
-from sim.recording import Fault, Line, Pose, Recording, Verdict
+from sim.recording import Fault, Pose, Recording, TimedText, Verdict
 
 HERE, THERE = Pose(100, 500, 0), Pose(1100, 500, 180)
 
@@ -71,7 +71,7 @@ def test_a_criterion_looks_at_the_robot_that_it_names(robot: int, x: float) -> N
 def test_what_one_says_or_does_wrong_is_not_the_others() -> None:
     crashed = replace(
         driven(rest(), start=THERE),
-        spoken=(Line(0.1, "ouch"),),
+        spoken=(TimedText(0.1, "ouch"),),
         faults=(Fault(0.1, Verdict.PROGRAM_ERROR, "second program", "ZeroDivisionError: division by zero", 1),),
         verdict=Verdict.PROGRAM_ERROR,
     )

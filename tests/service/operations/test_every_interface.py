@@ -22,15 +22,15 @@ from service.operations.courses import find
 from service.operations.policies import PolicyLimits
 from service.store.batches import intake
 from service.store.courses import open_assignments, policies
-from service.store.courses.versions import freeze
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.engine import now
 from service.store.grades import appeals, comments, overrides
 from service.store.models import Enrolment, Job
 from service.store.people import webhooks
-from service.store.queue import jobs, tryouts
+from service.store.queue import jobs, test_runs
 from service.store.states import JobState
 from submissions.assignment.reader import find_assignment
-from submissions.packed import pack_submission
+from submissions.stored_submission import pack_submission
 from web import COURSE, Web, grade_all
 from web_world import make_world
 
@@ -39,14 +39,11 @@ TABLE: dict[str, Row] = batches.ROWS | grades.ROWS | courses.ROWS
 #: Operations without a row in the table, and the reason.
 ELSEWHERE = {
     "assignments.prepare": "a part of prepare_from_catalogue and upload",
-    "batches.assignment_for": "reads",
-    "batches.course_of_batches": "reads",
-    "batch_views.table_page": "reads",
+    "batches.resolve_course": "reads",
     "courses.list_own": "reads",
     "credentials.make_token": "the page of one's own account; test_reach.py",
     "credentials.end_credential": "the page of one's own account; test_reach.py",
     "credentials.end_other_credentials": "the page of one's own account; test_reach.py",
-    "lookup.names_for": "reads",
     "people.enrol_new": "the page of one student; programs send a list",
     "people.issue_token": "the command; on the web everybody makes their own",
     "privacy.archive": "the command",
@@ -54,7 +51,7 @@ ELSEWHERE = {
     "sign_in_links.make_members_link": "the command; on the web an instructor gets a link when they are added",
     "sign_in_links.make_own_link": "the command that brings the service up",
     "sign_in.identify": "test_reach.py; pages and API, before anything else",
-    "sign_in.note_use": "the API; test_reach.py",
+    "sign_in.record_use": "the API; test_reach.py",
     "sign_in.sign_in": "the page; test_sign_in.py",
     "sign_in.sign_out": "the page; test_sign_in.py",
     "launches.begin": "learning platforms; test_lti.py",
@@ -62,10 +59,10 @@ ELSEWHERE = {
     "database.upgrade": "the command",
     "database.back_up": "the command",
     "database.restore": "the command",
-    "database.remove_old": "the command",
-    "replies.begin": "the API; test_api.py",
-    "replies.keep": "the API; test_api.py",
-    "replies.forget": "the API; test_api.py",
+    "database.remove_old_submissions": "the command",
+    "replies.reserve_key": "the API; test_api.py",
+    "replies.store_reply": "the API; test_api.py",
+    "replies.release_key": "the API; test_api.py",
 }
 #: Name prefixes of functions that change nothing. Functions in the table have a row even so.
 READING = (
@@ -75,13 +72,11 @@ READING = (
     "search_",
     "export",
     "check_",
-    "foresee",
-    "look",
+    "preview_submissions",
+    "poll_",
     "load",
     "count_",
     "is_",
-    "sending",
-    "changes_",
 )
 
 
@@ -89,7 +84,7 @@ def _members(web: Web) -> dict[str, Any]:
     """Create one object of every kind, an unopened assignment, and a person who operates the installation."""
     world = make_world(web)
     with web.store.transaction() as session:
-        open_assignments.prepare(session, 1, freeze(find_assignment("json-queue")))
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(find_assignment("json-queue")))
     people = {"grace": world.grace, "ada": world.ada, "root": web.operator()}
     ids = {name: str(each.enrolment_id) for name, each in people.items()}
     return world.values | ids | {"leaver": world.values["student_id"], "people": people}
@@ -138,7 +133,7 @@ def _dead(web: Web) -> dict[str, str]:
 def _over_a_limit(web: Web) -> dict[str, str]:
     made = _batch(web)
     with web.store.transaction() as session:
-        jobs.put_aside(session, made["job_id"], now(session))
+        jobs.put_aside_job(session, made["job_id"], now(session))
     return made
 
 
@@ -146,27 +141,27 @@ def _marked(web: Web) -> dict[str, str]:
     with web.store.transaction() as session:
         (job_id,) = session.scalars(select(Job.id).where(Job.submission_id == 1))
         overrides.set_marks(session, job_id, _CRITERION, Decimal(1), "seen again", "staff")
-        comments.comment(session, job_id, "", "Well done.", "staff")
+        comments.add_comment(session, job_id, "", "Well done.", "staff")
     return {}
 
 
 def _answered(web: Web) -> dict[str, str]:
     with web.store.transaction() as session:
-        appeals.answer(session, 1, 1, "It is right.", "staff")
+        appeals.answer_appeal(session, 1, 1, "It is right.", "staff")
     return {}
 
 
 def _running_a_test(web: Web) -> dict[str, str]:
     with web.store.transaction() as session:
-        version_id = open_assignments.find(session, 1, "echo-responder").version_id
+        version_id = open_assignments.load_course_assignment(session, 1, "echo-responder").version_id
         ada = session.scalars(select(Enrolment.id).where(Enrolment.student == "ada")).one()
-        tryouts.ask(session, ada, version_id, pack_submission(grading_request("ada").submission))
+        test_runs.queue_test_run(session, ada, version_id, pack_submission(grading_request("ada").submission))
     return {}
 
 
 def _closed(web: Web) -> dict[str, str]:
     with web.store.transaction() as session:
-        open_assignments.close(session, 1, "echo-responder")
+        open_assignments.close_assignment(session, 1, "echo-responder")
     return {}
 
 
@@ -178,8 +173,8 @@ def _with_a_policy(web: Web) -> dict[str, str]:
 
 def _with_many_webhooks(web: Web) -> dict[str, str]:
     with web.store.transaction() as session:
-        for number in range(webhooks.MOST - 1):
-            webhooks.create(session, 1, f"https://hooks.example.org/{number}", ["grade.finished"])
+        for number in range(webhooks.MOST_WEBHOOKS - 1):
+            webhooks.create_webhook(session, 1, f"https://hooks.example.org/{number}", ["grade.finished"])
     return {}
 
 

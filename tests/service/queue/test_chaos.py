@@ -7,22 +7,28 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.harness.fault_injection import Campaign, FaultInjector, Tally, quiet_hashes, small_disk
-from benchmarks.harness.postgresql_server import PostgresqlServer, fresh_database
+from benchmarks.harness.fault_injection import (
+    Campaign,
+    CampaignResults,
+    FaultInjector,
+    compute_expected_hashes,
+    small_disk,
+)
+from benchmarks.harness.postgresql_server import PostgresqlServer, create_database
 from builders import settings_in
 from service.store.engine import open_store
 from service.store.states import JobState
 
 
-def _assert_whole(tally: Tally, grading_requests: int) -> None:
+def _assert_whole(tally: CampaignResults, grading_requests: int) -> None:
     assert tally.states == {JobState.DONE: grading_requests}, tally.errors
-    assert (tally.doubled, tally.differing) == (0, 0)
+    assert (tally.duplicated, tally.differing) == (0, 0)
 
 
 @pytest.mark.long
 def test_on_sqlite(tmp_path: Path) -> None:
     settings = settings_in(tmp_path, concurrency=1, lease_seconds=3.0)
-    quiet = quiet_hashes()
+    quiet = compute_expected_hashes()
     assert len(set(quiet)) == len(quiet)
     with open_store(settings) as store:
         injector = FaultInjector(settings, store, None, workers=2, seed=1, disk=None)
@@ -40,11 +46,11 @@ def test_on_postgresql(tmp_path: Path) -> None:
     with small_disk(folder, 400) as disk:
         server = PostgresqlServer(folder)
         try:
-            settings = settings_in(tmp_path, concurrency=1, lease_seconds=3.0, database_url=fresh_database(server.url))
+            settings = settings_in(tmp_path, concurrency=1, lease_seconds=3.0, database_url=create_database(server.url))
             with open_store(settings) as store:
                 injector = FaultInjector(settings, store, server, workers=2, seed=2, disk=disk)
                 try:
-                    tally = Campaign(90, pause=(0.5, 2.0)).run(injector, quiet_hashes())
+                    tally = Campaign(90, pause=(0.5, 2.0)).run(injector, compute_expected_hashes())
                 finally:
                     injector.stop()
         finally:

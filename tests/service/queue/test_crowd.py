@@ -19,7 +19,7 @@ from sqlalchemy import func, select
 from builders import PROGRAM, echo, settings_in
 from floods import FLOODS, Flood
 from memory_group import MemoryGroup, memory_group
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from service.queue.broker import EmbeddedBroker
@@ -30,7 +30,7 @@ from service.settings import Settings
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
 from service.store.models import Enrolment, Job
-from service.store.states import UNFINISHED, JobState, Lane
+from service.store.states import UNFINISHED, JobQueue, JobState
 from sim.recording import Verdict
 from submissions.grading_request import GradingRequest
 from submissions.submission import Submission
@@ -56,7 +56,7 @@ OTHERS = [
 
 
 def _submission(student: str, program: str, responder: str | None) -> GradingRequest:
-    parts = Code("robot.py", program), Code("responder.py", responder or ECHO)
+    parts = SourceFile("robot.py", program), SourceFile("responder.py", responder or ECHO)
     return GradingRequest(Submission(student, *parts), echo(), student)
 
 
@@ -77,7 +77,7 @@ def _worker(settings: Settings, group: MemoryGroup | None) -> Iterator[None]:
     with (settings.home / "worker.log").open("wb") as log:
         process = subprocess.Popen(
             [sys.executable, "-m", "service.queue.worker"],
-            env=os.environ | settings.environment(),
+            env=os.environ | settings.to_environment(),
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,
@@ -96,7 +96,7 @@ def _run(settings: Settings, store: Store, grading_requests: list[GradingRequest
     batch = accept_batch(store, "crowd", grading_requests, [], max_attempts=3).id
     with EmbeddedBroker(settings) as broker, memory_group(MEMORY) as group, _worker(broker.settings, group):
         notifier = Notifier(make_celery(broker.settings), store, broker.settings)
-        notifier.grade(Lane.BATCH, len(grading_requests))
+        notifier.grade(JobQueue.BATCH, len(grading_requests))
         until = time.monotonic() + patience_seconds
         open_jobs = select(func.count()).select_from(Job).where(Job.batch_id == batch, Job.state.in_(UNFINISHED))
         while True:

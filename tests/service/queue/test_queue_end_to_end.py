@@ -15,28 +15,28 @@ from rich.console import Console
 from sqlalchemy import func, select
 
 import acting
-from benchmarks.harness.postgresql_server import fresh_database
-from benchmarks.harness.process_tree import children, command_line, descendants
+from benchmarks.harness.postgresql_server import create_database
+from benchmarks.harness.process_tree import find_children, find_descendants, read_command_line
 from builders import comparable, grading_request, settings_in
 from processes import PATIENCE, until
-from service.commands.batch.waiting import Waiting
+from service.commands.batch.batch_waiter import BatchWaiter
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.queue.broker import EmbeddedBroker, broker_answers, socket_path
+from service.queue.broker import EmbeddedBroker, is_broker_responding, prepare_socket_path
 from service.queue.celery_app import make_celery
-from service.queue.embedded import EmbeddedServices
+from service.queue.embedded_services import EmbeddedServices
 from service.queue.notifier import Notifier
-from service.reports.plots.drawn import plots_of
+from service.reports.plots.grade_plots import list_plots
 from service.settings import Settings
 from service.store import artifacts
 from service.store.batches import batches
 from service.store.batches.intake import accept_batch, load_grading_request
 from service.store.engine import Store, open_store
 from service.store.grades import results
-from service.store.installation import secret_of
+from service.store.installation import load_secret
 from service.store.models import CriterionResultRow, Job, TrialRow
-from service.store.states import JobState, Lane, PlotState
-from submissions.assignment.examples import examples
+from service.store.states import JobQueue, JobState, PlotState
+from submissions.assignment.examples import locate_examples
 from submissions.batch_folder import read_batch
 from submissions.grading_request import GradingRequest
 
@@ -54,7 +54,7 @@ class Service:
 
     def submit(self, grading_requests: list[GradingRequest]) -> str:
         accepted = accept_batch(self.store, "test", grading_requests, [], max_attempts=3)
-        self.notifier.grade(Lane.BATCH, len(grading_requests))
+        self.notifier.grade(JobQueue.BATCH, len(grading_requests))
         return accepted.id
 
     def wait(self, batch: str) -> list[Job]:
@@ -64,11 +64,11 @@ class Service:
             assert time.monotonic() - begun < PATIENCE, "the batch does not end"
             self.services.ensure()
 
-        waiting = Waiting(
+        waiting = BatchWaiter(
             acting.service_on(self.store), acting.machine(), self.notifier, batch, Console(quiet=True), keep_up
         )
-        waiting.for_marks()
-        waiting.for_plots()
+        waiting.wait_for_marks()
+        waiting.wait_for_plots()
         return self.jobs(batch)
 
     def jobs(self, batch: str) -> list[Job]:
@@ -102,7 +102,7 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
 
 
 def _pool_children(worker: int) -> list[int]:
-    return [pid for pid in children(worker) if "spawn_main" in command_line(pid)]
+    return [pid for pid in find_children(worker) if "spawn_main" in read_command_line(pid)]
 
 
 def _spinning(count: int) -> list[GradingRequest]:
@@ -110,7 +110,7 @@ def _spinning(count: int) -> list[GradingRequest]:
 
 
 def test_examples_are_graded_once_each_and_as_without_a_queue(service: Service, runner: TrialRunner) -> None:
-    checked = read_batch(examples("echo-responder"), "echo-responder")
+    checked = read_batch(locate_examples("echo-responder"), "echo-responder")
     assert checked.refusals == ()
     batch = service.submit(list(checked.grading_requests))
     graded = service.wait(batch)
@@ -119,11 +119,11 @@ def test_examples_are_graded_once_each_and_as_without_a_queue(service: Service, 
     with service.store.reading() as session:
         for job in graded:
             taken_in = load_grading_request(session, job.id)
-            direct = grade(taken_in.submission, taken_in.assignment, secret=secret_of(service.store), runner=runner)
-            assert comparable(results.load(session, job.id)) == comparable(direct)
+            direct = grade(taken_in.submission, taken_in.assignment, secret=load_secret(service.store), runner=runner)
+            assert comparable(results.load_grade(session, job.id)) == comparable(direct)
             assert (job.marks, job.verdict) == (direct.marks, direct.verdict.value)
-            plots = artifacts.get(session, job.id, prefix="plot-")
-            assert len(plots) == len(plots_of(direct))
+            plots = artifacts.load_files(session, job.id, prefix="plot-")
+            assert len(plots) == len(list_plots(direct))
             assert all(plot.data.startswith(b"\x89PNG") for plot in plots.values())
 
 
@@ -140,7 +140,7 @@ def test_a_job_that_no_attempt_could_grade_is_dead_at_once_and_says_why(service:
 def _lines(service: Service, batch: str) -> list[batches.JobLine]:
     service.wait(batch)
     with service.store.reading() as session:
-        return batches.job_lines(session, batch)
+        return batches.load_job_lines(session, batch)
 
 
 def test_a_killed_worker_loses_nothing(service: Service) -> None:
@@ -170,7 +170,7 @@ def test_a_killed_pool_child_loses_nothing(service: Service) -> None:
 def test_a_killed_broker_loses_nothing(service: Service) -> None:
     batch = service.submit(_spinning(1) + [grading_request(f"quick-{number}") for number in range(4)])
     service.until_running(batch)
-    (broker,) = [pid for pid in descendants(os.getpid()) if "valkey-server" in command_line(pid)]
+    (broker,) = [pid for pid in find_descendants(os.getpid()) if "valkey-server" in read_command_line(pid)]
     os.kill(broker, signal.SIGKILL)
     service.wait(batch)
     service.assert_graded_once(batch)
@@ -178,10 +178,12 @@ def test_a_killed_broker_loses_nothing(service: Service) -> None:
 
 @pytest.mark.long
 def test_a_batch_on_postgresql(tmp_path: Path, postgresql: str) -> None:
-    settings = settings_in(tmp_path, database_url=fresh_database(postgresql))
+    settings = settings_in(tmp_path, database_url=create_database(postgresql))
     with open_store(settings) as store, EmbeddedServices(settings, store) as services:
         service = Service(settings, store, services)
-        batch = service.submit([*read_batch(examples("json-queue"), "json-queue").grading_requests, *_spinning(1)])
+        batch = service.submit(
+            [*read_batch(locate_examples("json-queue"), "json-queue").grading_requests, *_spinning(1)]
+        )
         service.until_running(batch)
         assert services.worker_pid is not None
         os.kill(services.worker_pid, signal.SIGKILL)
@@ -214,9 +216,9 @@ def test_a_worker_frozen_past_its_lease_changes_nothing_when_it_thaws(tmp_path: 
 
 def _has_student(pool_child: int) -> bool:
     """Return whether this pool child runs a student: the doorkeeper's zygote has a child, in bubblewrap or not."""
-    below = [(pid, command_line(pid)) for pid in descendants(pool_child)]
+    below = [(pid, read_command_line(pid)) for pid in find_descendants(pool_child)]
     doorkeepers = [pid for pid, command in below if "inside.zygote" in command and "bwrap" not in command]
-    return any(children(zygote) for doorkeeper in doorkeepers for zygote in children(doorkeeper))
+    return any(find_children(zygote) for doorkeeper in doorkeepers for zygote in find_children(doorkeeper))
 
 
 def test_a_cancelled_job_stops(service: Service) -> None:
@@ -232,12 +234,12 @@ def test_a_cancelled_job_stops(service: Service) -> None:
 
 def test_a_home_with_a_long_path_has_its_socket_elsewhere(tmp_path: Path) -> None:
     settings = settings_in(tmp_path / ("deep" * 30))
-    path = socket_path(settings)
+    path = prepare_socket_path(settings)
     assert len(os.fsencode(path)) < 108
     assert path.parent.stat().st_mode & 0o077 == 0
     with EmbeddedBroker(settings), EmbeddedBroker(settings):
-        assert broker_answers(settings)
-    assert not broker_answers(settings)
+        assert is_broker_responding(settings)
+    assert not is_broker_responding(settings)
     path.parent.rmdir() if not any(path.parent.iterdir()) else None
 
 
@@ -248,7 +250,7 @@ def test_a_broker_whose_file_is_rubbish_begins_afresh(tmp_path: Path) -> None:
     for path in (settings.home / "broker" / "appendonlydir").iterdir():
         path.write_bytes(b"rubbish" * 100)
     with EmbeddedBroker(settings):
-        assert broker_answers(settings)
+        assert is_broker_responding(settings)
     assert (settings.home / "broker.unreadable").is_dir()
 
 
@@ -265,7 +267,7 @@ def test_a_broker_holds_the_lock_of_its_home_as_long_as_it_lives(tmp_path: Path)
         def again() -> bool:
             # A process that has released its lock may still be ending.
             broker.ensure()
-            return broker_answers(settings)
+            return is_broker_responding(settings)
 
         assert until(again)
 
@@ -275,4 +277,4 @@ def test_a_broker_that_was_found_running_is_left_running(tmp_path: Path) -> None
     with EmbeddedBroker(settings):
         with EmbeddedBroker(settings):
             pass
-        assert broker_answers(settings)
+        assert is_broker_responding(settings)

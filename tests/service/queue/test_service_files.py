@@ -9,7 +9,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from acting import service_on
 from paths import ROOT
 from service.store.engine import Store
-from service.web.metrics import metrics_text
+from service.web.metrics import render_metrics
 
 PAGE = ROOT / "docs" / "operators.md"
 
@@ -18,6 +18,6 @@ def test_every_metric_is_in_the_table(store: Store) -> None:
     shown = set(re.findall(r"^\| `(robomark_\w+)` \|", PAGE.read_text(), re.MULTILINE))
     told = {
         family.name + ("_total" if family.type == "counter" else "")
-        for family in text_string_to_metric_families(metrics_text(service_on(store)).decode())
+        for family in text_string_to_metric_families(render_metrics(service_on(store)).decode())
     }
     assert shown == told

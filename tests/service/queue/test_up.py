@@ -17,26 +17,26 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from sqlalchemy import func, select
 
-from benchmarks.harness.process_tree import command_line, descendants
+from benchmarks.harness.process_tree import find_descendants, read_command_line
 from builders import accept_one, grading_request, settings_in
 from processes import COMMAND, alive, robomark, until
 from service.command_line import main
-from service.queue.alive import worker_lives
-from service.queue.broker import broker_answers
+from service.queue.broker import is_broker_responding
+from service.queue.live_workers import is_worker_running
 from service.settings import Settings
 from service.store import phases
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
 from service.store.models import Job
 from service.store.states import JobState, PlotState
-from service.web.listening import listen
+from service.web.listening_sockets import listen
 from sim.errors import UsageError
 
 SPIN = "print('begun')\nwhile True:\n    pass\n"
 
 
 def _environment(settings: Settings) -> dict[str, str]:
-    return settings.environment()
+    return settings.to_environment()
 
 
 def _address(up: subprocess.Popen[str]) -> str:
@@ -128,7 +128,7 @@ def test_all_of_it_comes_up_grades_tells_and_ends(tmp_path: Path) -> None:
         assert (second.returncode, second.stdout) == (2, "")
         assert f"process {up.pid}, {address}" in second.stderr
 
-        below = descendants(up.pid)
+        below = find_descendants(up.pid)
         up.send_signal(signal.SIGINT)
         out, err = up.communicate(timeout=60)
         assert (up.returncode, err) == (0, "")
@@ -156,21 +156,21 @@ def test_what_ends_is_started_again_and_a_kill_leaves_nothing(tmp_path: Path) ->
     with open_store(settings) as store:
         with robomark("up", "--port", "0", **_environment(settings)) as up:
             address = _ready(up)
-            first = descendants(up.pid)
+            first = find_descendants(up.pid)
             for pid in first:
-                if any(word in command_line(pid) for word in ("valkey", "service.queue.worker", "web.server")):
+                if any(word in read_command_line(pid) for word in ("valkey", "service.queue.worker", "web.server")):
                     os.kill(pid, signal.SIGKILL)
             until(lambda: not any(map(alive, first)))
             accept_batch(store, "spinning", [grading_request("spinner", SPIN)], [], max_attempts=3)
             until(lambda: _jobs(store, JobState.RUNNING))
             assert _get(f"{address}/health/live")[0] == 200
-            below = descendants(up.pid)
+            below = find_descendants(up.pid)
             assert len(below) >= 6
             up.kill()
             up.wait()
             until(lambda: not any(map(alive, below)))
-        assert not broker_answers(settings)
-        assert not worker_lives(settings)
+        assert not is_broker_responding(settings)
+        assert not is_worker_running(settings)
         assert _jobs(store, JobState.RUNNING) == 1
         # The next worker need not wait for the lease of a worker that is known to have ended.
         with robomark("up", "--no-serve", **_environment(settings)) as up:

@@ -23,7 +23,7 @@ from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
 from service.store.models import Job
 from service.store.queue import workers
-from service.store.states import JobState, Lane
+from service.store.states import JobQueue, JobState
 
 DRIVES_LONG = (
     "from ev3dev2.motor import MoveTank, OUTPUT_B, OUTPUT_C, SpeedPercent\n"
@@ -36,7 +36,7 @@ DRIVES_LONG = (
 def _worker(settings: Settings, *command: str) -> Iterator[Path]:
     """Run a worker in the background; yield its log."""
     log = settings.home / "worker.log"
-    environment = {**os.environ, **settings.environment()}
+    environment = {**os.environ, **settings.to_environment()}
     with (
         log.open("ab") as output,
         subprocess.Popen([sys.executable, *command], env=environment, stdout=output, stderr=output) as process,
@@ -49,7 +49,7 @@ def _worker(settings: Settings, *command: str) -> Iterator[Path]:
 
 def _submit(store: Store, notifier: Notifier, student: str, program: str = "print('hello')\n") -> str:
     (job,) = accept_batch(store, "class", [grading_request(student, program)], [], max_attempts=2).jobs
-    notifier.grade(Lane.BATCH)
+    notifier.grade(JobQueue.BATCH)
     return job.job_id
 
 
@@ -88,13 +88,13 @@ def test_a_worker_begins_nothing_once_the_tables_are_too_new_for_it(tmp_path: Pa
 
             def problem() -> str:
                 with store.reading() as session:
-                    return "".join(each.worker.problem for each in workers.known_workers(session))
+                    return "".join(each.worker.problem for each in workers.load_workers(session))
 
             assert "newer release" in until(problem)
             until(lambda: _job(store, running).state is JobState.DONE)
             # From its next heartbeat on, it leaves its messages to other workers.
             until(lambda: "worker.takes_no_messages" in log.read_text())
-            notifier.grade(Lane.BATCH)
+            notifier.grade(JobQueue.BATCH)
             until(lambda: notifier.waiting() > 0)
             assert _job(store, waiting).state is JobState.QUEUED
         assert log.read_text().count("worker.must_be_restarted") == 1

@@ -18,11 +18,11 @@ import report_builders as build
 from builders import accept_one
 from moodle_rules import feedback_taken_by_moodle, imported_by_moodle
 from paths import DATA
-from service.batch_rows import row_of, why_not_shown
+from service.batch_rows import build_row, describe_missing_grade
 from service.grading.grade import Grade
 from service.reports.formats import FORMATS
-from service.reports.html import refusal_page
-from service.reports.rows import ReportPage, TableRow, missing_words, rows_for_students
+from service.reports.html import render_refusal_page
+from service.reports.rows import ReportPage, TableRow, describe_missing_part, select_student_rows
 from service.store.batches import batches
 from service.store.engine import Store
 from service.store.states import JobState
@@ -54,7 +54,7 @@ MARY = TableRow(
     of_moodle("O'Neil, Mary Mo", 500001),
     "shape-recognition",
     _without_trials(build.shape_grade(missing="responder.py")),
-    missing_words("responder.py"),
+    describe_missing_part("responder.py"),
 )
 ZOE: TableRow[Grade] = TableRow(
     Student("s3", "Zoë Ångström", "zoe@uni.example"),
@@ -74,13 +74,13 @@ ROWS: list[TableRow[Grade]] = [ADA, MARY, ZOE, EVE, NOBODY]
 
 def written(form: str) -> str:
     chosen = FORMATS[form]
-    if chosen.filled_in is not None:
-        return chosen.filled_in(ROWS, WORKSHEET).text
+    if chosen.worksheet is not None:
+        return chosen.worksheet(ROWS, WORKSHEET).text
     assert chosen.table is not None
     return chosen.table(ROWS)
 
 
-TABLES = sorted(name for name, form in FORMATS.items() if form.table or form.filled_in)
+TABLES = sorted(name for name, form in FORMATS.items() if form.table or form.worksheet)
 
 
 @pytest.mark.parametrize("form", TABLES)
@@ -156,7 +156,7 @@ def test_moodle_takes_the_worksheet_back_with_all_else_untouched() -> None:
         "500000": 7, "500001": 7, "500002": None, "500003": None,
     }  # fmt: skip
     assert taken["500002"][1].startswith("Not graded: has no robot.py")
-    filled_in = FORMATS["moodle-worksheet"].filled_in
+    filled_in = FORMATS["moodle-worksheet"].worksheet
     assert filled_in is not None
     assert filled_in(ROWS, WORKSHEET).left_over == ("line 9",)
     marked = filled_in(ROWS, "\ufeff" + WORKSHEET.replace("\n", "\r\n"))
@@ -164,7 +164,7 @@ def test_moodle_takes_the_worksheet_back_with_all_else_untouched() -> None:
 
 
 def test_who_did_not_come_from_moodle_is_found_by_id_address_or_name() -> None:
-    filled_in = FORMATS["moodle-worksheet"].filled_in
+    filled_in = FORMATS["moodle-worksheet"].worksheet
     assert filled_in is not None
     people = (Student("?", email="ADA@uni.example"), Student('O\'Neil, Mary "Mo"'), Student("x", "Somebody Else"))
     filled = filled_in([replace(ADA, student=each, source="a.zip") for each in people], WORKSHEET)
@@ -181,14 +181,14 @@ def test_who_did_not_come_from_moodle_is_found_by_id_address_or_name() -> None:
     ],
 )
 def test_what_is_not_its_worksheet_is_refused(given: str, expected: str) -> None:
-    filled_in = FORMATS["moodle-worksheet"].filled_in
+    filled_in = FORMATS["moodle-worksheet"].worksheet
     assert filled_in is not None
     with pytest.raises(UsageError, match=expected):
         filled_in(ROWS, given)
 
 
 def test_moodle_finds_whose_each_feedback_file_is() -> None:
-    packed = FORMATS["moodle-feedback"].packed
+    packed = FORMATS["moodle-feedback"].archive
     assert packed is not None
     odd = replace(ADA, source=of_moodle("a_b/../c", 7))
     pages = [ReportPage(row, f"<p>{row.who}</p>") for row in (ADA, MARY, ZOE, odd, NOBODY)]
@@ -224,13 +224,15 @@ def test_gradescope_takes_each_document_of_one_submission() -> None:
 
 
 def test_who_was_refused_reads_what_was_found_and_what_to_do() -> None:
-    page = refusal_page(ZOE)
+    page = render_refusal_page(ZOE)
     told = re.sub(r"\s+", " ", re.sub(r"<style>.*</style>|<[^>]+>", " ", page, flags=re.DOTALL))
     assert "Zoë Ångström shape-recognition Your submission was not graded." in told
     assert "Problem has no robot.py." in told
     assert "Expected robot.py (a robot program)." in told
     assert "submit again" in told
-    hostile = refusal_page(replace(ZOE, student=Student(build.HOSTILE), source=build.HOSTILE, reason=build.HOSTILE))
+    hostile = render_refusal_page(
+        replace(ZOE, student=Student(build.HOSTILE), source=build.HOSTILE, reason=build.HOSTILE)
+    )
     assert "<script" not in hostile
     assert "<h2>Expected</h2>" in hostile
 
@@ -242,21 +244,21 @@ def test_no_gradebook_has_a_word_that_is_for_staff(name: str) -> None:
         Student("eve"), "eve.zip", "echo", reason="for staff only: attempt 2, allowed: 1", for_staff=True
     )
     dead: TableRow[Grade] = TableRow(
-        Student("zoe"), "zoe.zip", "echo", reason="dead: /srv is full", told="could not be graded yet"
+        Student("zoe"), "zoe.zip", "echo", reason="dead: /srv is full", student_reason="could not be graded yet"
     )
     chosen = FORMATS[name]
     given = "Identifier,ID number,Grade,Feedback comments\nParticipant 1,eve,,\nParticipant 2,zoe,,\n"
     if chosen.table is not None:
         text = chosen.table([over, dead])
-    elif chosen.filled_in is not None:
-        text = chosen.filled_in([over, dead], given).text
+    elif chosen.worksheet is not None:
+        text = chosen.worksheet([over, dead], given).text
     else:
         return
     staffs = {"csv", "csv-long", "json", "junit"}
     assert ("attempt 2" in text) is (name in staffs)
     assert ("/srv is full" in text) is (name in staffs)
     assert ("could not be graded yet" in text) is (name not in staffs)
-    if chosen.filled_in is not None:
+    if chosen.worksheet is not None:
         assert "Participant 1,eve,,\n" in text
 
 
@@ -275,9 +277,9 @@ def test_what_a_student_is_told_of_a_job_without_a_grade(
 ) -> None:
     accepted = accept_one(store)
     with store.reading() as session:
-        line = replace(batches.job_line(session, accepted.job_id), state=state, **changes)  # type: ignore[arg-type]
-    row = row_of(line, None, why_not_shown(line))
-    (shown,) = rows_for_students([row]) or [row]
+        line = replace(batches.load_job_line(session, accepted.job_id), state=state, **changes)  # type: ignore[arg-type]
+    row = build_row(line, None, describe_missing_grade(line))
+    (shown,) = select_student_rows([row]) or [row]
     assert row.for_staff is for_staff
     if told:
         assert shown.reason.startswith(told)

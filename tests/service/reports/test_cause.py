@@ -13,17 +13,17 @@ import pytest
 from rich.console import Console
 
 import report_builders as build
-from service.grading.grade import CriterionResult, Evidence, Grade, SetByHand
-from service.reports.cause import diagnose
-from service.reports.formats.gradescope import gradescope_document
-from service.reports.formats.json_output import json_document
-from service.reports.formats.junit import junit_text
-from service.reports.formats.rich_text import rich_report
-from service.reports.formats.text import plain_text
-from service.reports.html import report
-from service.reports.page import page_of
-from service.reports.verdict_sentences import FULL_MARKS, verdict_words
-from service.reports.view import gradebook_view, staff_view, student_view
+from service.grading.grade import CriterionResult, Evidence, Grade, StaffAdjustment
+from service.reports.diagnosis import diagnose
+from service.reports.formats.gradescope import build_gradescope_document
+from service.reports.formats.json_output import build_json_document
+from service.reports.formats.junit import render_junit
+from service.reports.formats.rich_text import render_rich_report
+from service.reports.formats.text import render_plain_text
+from service.reports.html import render_report_page
+from service.reports.page import build_page
+from service.reports.verdict_sentences import FULL_MARKS, describe_verdict
+from service.reports.view import build_gradebook_view, build_staff_view, build_student_view
 from sim.recording import Fault, Verdict
 
 ERROR = "NameError: name 'pasrer' is not defined"
@@ -137,12 +137,12 @@ def test_the_dearest_criterion_is_the_cause_with_those_that_failed_where_it_did(
 
 
 def test_what_was_set_by_hand_is_no_cause_and_keeps_its_words() -> None:
-    by_hand = SetByHand(Decimal(0), Decimal(2), "It drove well.", excused=False)
+    by_hand = StaffAdjustment(Decimal(0), Decimal(2), "It drove well.", excused=False)
     dear = replace(criterion("dear", missed(0, 1.5), message="Adjusted by staff from 0 to 1."), set_by_hand=by_hand)
     full = replace(dear, id="full", marks=Decimal(2), message="Adjusted by staff from 0 to 2.")
     grade = replace(build.line_follower_grade(), criteria=(replace(dear, marks=Decimal(1)), full, criterion("cheap")))
     assert diagnose(grade).lost == {2}
-    for line, marks in zip(page_of(staff_view(grade)).others, (1, 2), strict=True):
+    for line, marks in zip(build_page(build_staff_view(grade)).others, (1, 2), strict=True):
         assert line.told.startswith(f"Adjusted by staff from 0 to {marks}: It drove well.")
 
 
@@ -161,7 +161,7 @@ def test_what_is_ours_is_told_before_any_hint(verdict: Verdict) -> None:
     grade = hinted(HINT)
     broken = replace(grade.trials[0], recording=replace(grade.trials[0].recording, verdict=verdict))
     told = diagnose(replace(grade, trials=(broken,)))
-    assert told.next_step == verdict_words(verdict).next_step
+    assert told.next_step == describe_verdict(verdict).next_step
     assert told.lost == frozenset()
 
 
@@ -174,16 +174,18 @@ def test_full_marks_have_no_cause() -> None:
 
 def _on_a_terminal(grade: Grade) -> str:
     console = Console(width=400, record=True, file=io.StringIO())
-    console.print(rich_report(staff_view(grade), build.faulty_submission()))
+    console.print(render_rich_report(build_staff_view(grade), build.faulty_submission()))
     return console.export_text()
 
 
 WRITERS: dict[str, Callable[[Grade], str]] = {
-    "text": lambda grade: plain_text(staff_view(grade), build.faulty_submission()),
+    "text": lambda grade: render_plain_text(build_staff_view(grade), build.faulty_submission()),
     "terminal": _on_a_terminal,
-    "gradescope": lambda grade: gradescope_document(gradebook_view(grade), build.faulty_submission())["output"],
-    "junit": lambda grade: unescape(junit_text(staff_view(grade), build.faulty_submission())),
-    "page": lambda grade: unescape(report(student_view(grade), {}, build.faulty_submission())),
+    "gradescope": lambda grade: build_gradescope_document(build_gradebook_view(grade), build.faulty_submission())[
+        "output"
+    ],
+    "junit": lambda grade: unescape(render_junit(build_staff_view(grade), build.faulty_submission())),
+    "page": lambda grade: unescape(render_report_page(build_student_view(grade), {}, build.faulty_submission())),
 }
 
 
@@ -204,8 +206,8 @@ def test_every_format_tells_cause_lines_and_next_step_in_this_order(name: str) -
 
 def test_json_and_page_say_the_same() -> None:
     grade, submission = hinted(HINT), build.faulty_submission()
-    document = json.loads(json.dumps(json_document(staff_view(grade), submission)))
-    page = page_of(staff_view(grade), submission)
+    document = json.loads(json.dumps(build_json_document(build_staff_view(grade), submission)))
+    page = build_page(build_staff_view(grade), submission)
     assert document["cause"] == page.diagnosis.cause
     assert document["next_step"] == page.diagnosis.next_step
     assert document["excerpt"]["of"] == "responder.py"
@@ -215,11 +217,11 @@ def test_json_and_page_say_the_same() -> None:
 
 def test_what_was_lost_through_the_cause_has_one_line_and_the_others_their_own_words() -> None:
     criteria = (criterion("asked", missed(1, None)), criterion("drives", missed(0, 1.0, "Expected 5 mm.")))
-    page = page_of(student_view(hinted(HINT, criteria=criteria)))
+    page = build_page(build_student_view(hinted(HINT, criteria=criteria)))
     assert [(line.title, line.told) for line in page.lost] == [("Asked", "")]
     assert [(line.title, line.told[:14]) for line in page.others] == [("Drives", "Expected 5 mm,")]
 
 
 def test_a_student_reads_no_cause_of_hidden_trials() -> None:
-    told = diagnose(student_view(build.hidden_grade()).grade)
+    told = diagnose(build_student_view(build.hidden_grade()).grade)
     assert "SECRET" not in told.cause + told.next_step

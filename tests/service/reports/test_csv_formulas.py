@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from paths import ROOT
-from service.reports.formats.csv_output import csv_text
+from service.reports.formats.csv_output import render_safe_csv
 
 _STARTS = ("=", "+", "-", "@", "\uff1d", "\uff0b", "\uff0d", "\uff20")
 
@@ -19,7 +19,7 @@ _STARTS = ("=", "+", "-", "@", "\uff1d", "\uff0b", "\uff0d", "\uff20")
 @example([["x;=1+cmd|' /C calc'!A0"]])
 @example([["a", "\t=1"], ['"=1', 'x;"=1']])
 def test_no_cell_is_a_formula_by_any_separator(rows: list[list[str]]) -> None:
-    text = csv_text(rows)
+    text = render_safe_csv(rows)
     for separator in (",", ";", "\t"):
         for row in csv.reader(io.StringIO(text, newline=""), delimiter=separator):
             assert not any(cell.strip(" \"'").startswith(_STARTS) and not cell.startswith("'") for cell in row), row
@@ -27,7 +27,7 @@ def test_no_cell_is_a_formula_by_any_separator(rows: list[list[str]]) -> None:
 
 @pytest.mark.parametrize("cell", ["PY::0", "3.5", "a - b", "Ada Lovelace", "one, two; three", "a=b", ""])
 def test_ordinary_cells_stay_as_they_are(cell: str) -> None:
-    assert next(csv.reader(io.StringIO(csv_text([[cell, "x"]])))) == [cell, "x"]
+    assert next(csv.reader(io.StringIO(render_safe_csv([[cell, "x"]])))) == [cell, "x"]
 
 
 def test_only_one_module_writes_tables() -> None:

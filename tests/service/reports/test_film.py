@@ -13,8 +13,8 @@ from PIL import Image, ImageSequence
 import report_builders as build
 from replays import long_recording
 from service.grading.grade import TrialResult
-from service.reports.film import FRAME, MOST_FRAMES, film
-from service.reports.written import write_film
+from service.reports.film import FRAME_MILLISECONDS, MOST_FRAMES, render_film
+from service.reports.output_files import write_film
 from sim.errors import UsageError
 from sim.recording import Pose, Recording, Touch
 
@@ -44,16 +44,16 @@ def circling(count: int) -> Recording:
 
 
 def test_the_robot_heads_where_it_did() -> None:
-    frames = frames_of(film(trial_of(circling(60)), {}))
+    frames = frames_of(render_film(trial_of(circling(60)), {}))
     ways = [place_of(RIGHT_LIGHT, frame) - place_of(LEFT_LIGHT, frame) for frame in (frames[0], frames[-1])]
     headings = [np.degrees(np.arctan2(way[1], way[0])) + 90 for way in ways]  # right sensor to the right
     assert headings == pytest.approx([0, 90], abs=3)
 
 
 def test_time_is_as_long_as_it_was_and_the_last_frame_stays() -> None:
-    image = Image.open(io.BytesIO(film(trial_of(build.line_follower_recording(90)), {})))
+    image = Image.open(io.BytesIO(render_film(trial_of(build.line_follower_recording(90)), {})))
     shown = [frame.info["duration"] for frame in ImageSequence.Iterator(image)]
-    assert sum(shown[:-1]) == pytest.approx(3000, abs=2 * FRAME)
+    assert sum(shown[:-1]) == pytest.approx(3000, abs=2 * FRAME_MILLISECONDS)
     assert shown[-1] == 2000
     assert image.info["loop"] == 0
     assert image.width == 640
@@ -61,7 +61,7 @@ def test_time_is_as_long_as_it_was_and_the_last_frame_stays() -> None:
 
 @pytest.mark.parametrize("count", [0, 1])
 def test_a_trial_without_ticks_has_a_film(count: int) -> None:
-    assert len(frames_of(film(trial_of(build.line_follower_recording(count)), {}))) >= 1
+    assert len(frames_of(render_film(trial_of(build.line_follower_recording(count)), {}))) >= 1
 
 
 def test_two_robots_hostile_texts_and_far_ways_break_nothing() -> None:
@@ -76,21 +76,24 @@ def test_two_robots_hostile_texts_and_far_ways_break_nothing() -> None:
         replace(recording, ticks=lost, touches=touches),
         replace(recording, background="gone.png"),
     ):
-        assert len(frames_of(film(trial_of(own), {}))) > 10
+        assert len(frames_of(render_film(trial_of(own), {}))) > 10
 
 
 def test_a_floor_of_the_assignments_own_is_filmed() -> None:
     recording = replace(circling(1), background="own.png")
     red = np.full((1143, 2362, 3), (200, 30, 30), np.uint8)
     assert (
-        np.abs(frames_of(film(trial_of(recording), {"own.png": red}))[0][2, 320].astype(int) - (200, 30, 30)).max() < 9
+        np.abs(
+            frames_of(render_film(trial_of(recording), {"own.png": red}))[0][2, 320].astype(int) - (200, 30, 30)
+        ).max()
+        < 9
     )
-    assert frames_of(film(trial_of(recording), {}))[0][2, 320].tolist() == [255, 255, 255]
+    assert frames_of(render_film(trial_of(recording), {}))[0][2, 320].tolist() == [255, 255, 255]
 
 
 @pytest.mark.long
 def test_ten_minutes_make_no_more_frames_than_a_minute() -> None:
-    data = film(trial_of(long_recording(18_000, images=500)), {})
+    data = render_film(trial_of(long_recording(18_000, images=500)), {})
     assert Image.open(io.BytesIO(data)).n_frames <= MOST_FRAMES  # type: ignore[attr-defined]
     assert len(data) < 6_000_000
 

@@ -12,12 +12,18 @@ import pytest
 import report_builders as build
 from replays import data_of, parting_grade, values_of
 from service.grading.grade import Grade, TrialResult
-from service.reports.html import report
-from service.reports.replay.document import packed, replay_of_grade
-from service.reports.replay.over import parted
-from service.reports.view import BEFORE_PUBLICATION, OtherTrials, other_trials, staff_view, student_view
+from service.reports.html import render_report_page
+from service.reports.replay.document import build_grade_replay, compress_replay
+from service.reports.replay.overlay import find_divergence
+from service.reports.view import (
+    BEFORE_PUBLICATION,
+    OverlayTrials,
+    build_staff_view,
+    build_student_view,
+    select_overlay_trials,
+)
 from sim.errors import UsageError
-from sim.recording import BROWSER_TICK, Line, Pose, Recording, Ticks
+from sim.recording import BROWSER_TICK, Pose, Recording, Ticks, TimedText
 
 PUBLISHED = BEFORE_PUBLICATION | {"after_published", "after_due_date"}
 
@@ -52,13 +58,17 @@ def steps(count: int, x: float = 0, heading: float = 0) -> list[tuple[float, flo
 def test_they_part_where_poses_differ_by_more_than_10_mm_or_5_degrees(
     one: Recording, other: Recording, moment: float | None
 ) -> None:
-    assert parted(one, other) == parted(other, one) == (None if moment is None else pytest.approx(moment))
+    assert (
+        find_divergence(one, other)
+        == find_divergence(other, one)
+        == (None if moment is None else pytest.approx(moment))
+    )
 
 
 def test_of_two_robots_the_first_that_differs_tells_where_they_part() -> None:
     one = replace(straight(*steps(30)), partner=straight(*steps(30)))
     other = replace(straight(*steps(30, 1)), partner=straight(*steps(30, 2)))
-    assert parted(one, other) == pytest.approx(6 / 30)
+    assert find_divergence(one, other) == pytest.approx(6 / 30)
 
 
 def as_of(student: str) -> Grade:
@@ -71,9 +81,9 @@ def hiding(grade: Grade) -> Grade:
 
 
 def test_the_same_scenario_seed_and_place_lie_over_each_other() -> None:
-    view = student_view(build.line_follower_grade())
+    view = build_student_view(build.line_follower_grade())
     other = parting_grade()
-    others = other_trials(view, replace(other, trials=other.trials[::-1]), "attempt 1", BEFORE_PUBLICATION)
+    others = select_overlay_trials(view, replace(other, trials=other.trials[::-1]), "attempt 1", BEFORE_PUBLICATION)
     assert {index: trial.scenario for index, trial in others.trials.items()} == {0: "plain", 1: "with-obstacle"}
 
 
@@ -88,14 +98,14 @@ def test_the_same_scenario_seed_and_place_lie_over_each_other() -> None:
     ],
 )
 def test_what_was_run_otherwise_lies_over_nothing(elsewhere: Callable[[TrialResult], TrialResult]) -> None:
-    view, other = student_view(build.line_follower_grade()), parting_grade()
+    view, other = build_student_view(build.line_follower_grade()), parting_grade()
     one = replace(other, trials=(elsewhere(other.trials[0]), other.trials[1]))
-    assert set(other_trials(view, one, "attempt 1", BEFORE_PUBLICATION).trials) == {1}
+    assert set(select_overlay_trials(view, one, "attempt 1", BEFORE_PUBLICATION).trials) == {1}
     none = replace(other, trials=tuple(elsewhere(trial) for trial in other.trials[:1]))
     with pytest.raises(UsageError, match="none lies over another"):
-        other_trials(view, none, "attempt 1", BEFORE_PUBLICATION)
+        select_overlay_trials(view, none, "attempt 1", BEFORE_PUBLICATION)
     with pytest.raises(UsageError, match="none lies over another"):
-        other_trials(view, replace(other, assignment="another"), "attempt 1", BEFORE_PUBLICATION)
+        select_overlay_trials(view, replace(other, assignment="another"), "attempt 1", BEFORE_PUBLICATION)
 
 
 @pytest.mark.parametrize(
@@ -112,44 +122,44 @@ def test_what_was_run_otherwise_lies_over_nothing(elsewhere: Callable[[TrialResu
 def test_a_student_sees_their_own_and_once_published_the_references(
     student: str, released: frozenset[str], refused: str | None
 ) -> None:
-    view = student_view(build.line_follower_grade(), released)
+    view = build_student_view(build.line_follower_grade(), released)
     if refused is None:
-        assert set(other_trials(view, as_of(student), "other", released).trials) == {0, 1}
+        assert set(select_overlay_trials(view, as_of(student), "other", released).trials) == {0, 1}
     else:
         with pytest.raises(UsageError, match=refused):
-            other_trials(view, as_of(student), "other", released)
-    staff = staff_view(build.line_follower_grade())
-    assert set(other_trials(staff, as_of(student), "other", released).trials) == {0, 1}
+            select_overlay_trials(view, as_of(student), "other", released)
+    staff = build_staff_view(build.line_follower_grade())
+    assert set(select_overlay_trials(staff, as_of(student), "other", released).trials) == {0, 1}
 
 
 @pytest.mark.parametrize("released", [BEFORE_PUBLICATION, PUBLISHED])
 def test_a_trial_that_either_hides_lies_over_nothing_for_a_student(released: frozenset[str]) -> None:
     mine, other = build.line_follower_grade(), parting_grade()
     for one, two in ((hiding(mine), other), (mine, hiding(other)), (hiding(mine), hiding(other))):
-        assert set(other_trials(student_view(one, released), two, "other", released).trials) == {0}
-        assert set(other_trials(staff_view(one), two, "other", released).trials) == {0, 1}
+        assert set(select_overlay_trials(build_student_view(one, released), two, "other", released).trials) == {0}
+        assert set(select_overlay_trials(build_staff_view(one), two, "other", released).trials) == {0, 1}
 
 
 def test_nothing_hidden_is_in_a_students_replay() -> None:
     mine, other = hiding(build.line_follower_grade()), hiding(parting_grade())
-    secret = replace(other.trials[1].recording, printed=(Line(1.0, "SECRETPRINT"),))
+    secret = replace(other.trials[1].recording, printed=(TimedText(1.0, "SECRETPRINT"),))
     other = replace(other, trials=(other.trials[0], replace(other.trials[1], recording=secret)))
-    for view, told in ((student_view(mine), False), (staff_view(mine), True)):
-        replay = replay_of_grade(view, others=other_trials(view, other, "other", BEFORE_PUBLICATION))
+    for view, told in ((build_student_view(mine), False), (build_staff_view(mine), True)):
+        replay = build_grade_replay(view, others=select_overlay_trials(view, other, "other", BEFORE_PUBLICATION))
         assert ("SECRETPRINT" in json.dumps(replay)) is told
 
 
 def test_of_the_other_trial_there_is_what_is_drawn_and_told_and_no_more() -> None:
-    view, other = student_view(build.line_follower_grade()), parting_grade()
-    others = other_trials(view, other, "attempt 1", BEFORE_PUBLICATION)
-    replay = data_of(report(view, {}, build.faulty_submission(), others=others))
+    view, other = build_student_view(build.line_follower_grade()), parting_grade()
+    others = select_overlay_trials(view, other, "attempt 1", BEFORE_PUBLICATION)
+    replay = data_of(render_report_page(view, {}, build.faulty_submission(), others=others))
     assert replay["version"] == 1
     over = replay["trials"][1]["over"]
     assert over.keys() == {
         "name", "verdict", "ended", "seconds", "tick", "messages", "events", "left_out", "robots", "parted",
     }  # fmt: skip
     assert (over["name"], over["seconds"]) == ("attempt 1", 12.0)
-    assert over["parted"] == pytest.approx(parted(view.grade.trials[1].recording, other.trials[1].recording))
+    assert over["parted"] == pytest.approx(find_divergence(view.grade.trials[1].recording, other.trials[1].recording))
     (robot,) = over["robots"]
     assert robot["columns"].keys() == {"x", "y", "heading", "left_position", "right_position"}
     assert np.abs(values_of(robot["columns"]["x"])[:, 0] - other.trials[1].recording.ticks.x).max() < 0.006
@@ -159,24 +169,24 @@ def test_of_the_other_trial_there_is_what_is_drawn_and_told_and_no_more() -> Non
 
 
 def test_without_another_there_is_no_word_of_one() -> None:
-    view = student_view(build.line_follower_grade())
-    assert all("over" not in trial for trial in replay_of_grade(view)["trials"])
-    only = OtherTrials("attempt 1", {1: parting_grade().trials[1]})
-    assert ["over" in trial for trial in replay_of_grade(view, others=only)["trials"]] == [False, True]
+    view = build_student_view(build.line_follower_grade())
+    assert all("over" not in trial for trial in build_grade_replay(view)["trials"])
+    only = OverlayTrials("attempt 1", {1: parting_grade().trials[1]})
+    assert ["over" in trial for trial in build_grade_replay(view, others=only)["trials"]] == [False, True]
 
 
 def test_another_trial_takes_its_room_in_a_report() -> None:
-    view = student_view(build.line_follower_grade())
-    others = other_trials(view, parting_grade(), "attempt 1", BEFORE_PUBLICATION)
-    alone = sum(len(packed(trial)) for trial in replay_of_grade(view)["trials"])
-    assert len(replay_of_grade(view, most_bytes=alone + 100)["trials"]) == 2
-    assert len(replay_of_grade(view, most_bytes=alone + 100, others=others)["trials"]) == 1
+    view = build_student_view(build.line_follower_grade())
+    others = select_overlay_trials(view, parting_grade(), "attempt 1", BEFORE_PUBLICATION)
+    alone = sum(len(compress_replay(trial)) for trial in build_grade_replay(view)["trials"])
+    assert len(build_grade_replay(view, most_bytes=alone + 100)["trials"]) == 2
+    assert len(build_grade_replay(view, most_bytes=alone + 100, others=others)["trials"]) == 1
 
 
 def test_hostile_names_and_texts_are_visible_and_capped() -> None:
-    view = student_view(build.hostile_grade())
-    others = other_trials(view, build.hostile_grade(), build.HOSTILE * 99, BEFORE_PUBLICATION)
-    over = replay_of_grade(view, others=others)["trials"][0]["over"]
+    view = build_student_view(build.hostile_grade())
+    others = select_overlay_trials(view, build.hostile_grade(), build.HOSTILE * 99, BEFORE_PUBLICATION)
+    over = build_grade_replay(view, others=others)["trials"][0]["over"]
     told = json.dumps(over, ensure_ascii=False)
     assert not {"\x1b", "\x00", "\u202e", "\u200b", "\u2028"} & set(told)
     assert len(over["name"]) <= 60

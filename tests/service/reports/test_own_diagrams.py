@@ -13,15 +13,15 @@ from PIL import Image
 
 import report_builders as build
 from service.grading.grade import Grade
-from service.reports.html import report
+from service.reports.html import render_report_page
+from service.reports.plots.diagram_differences import Differences, compare_with_recording, describe_differences
+from service.reports.plots.diagram_drawing import draw_diagram, draw_own_diagram
 from service.reports.plots.diagram_parts import Highlights
-from service.reports.plots.difference import Differences, differences, in_words
-from service.reports.plots.drawn import draw_all, plots_of
-from service.reports.plots.drawn_diagrams import draw_diagram, draw_own
-from service.reports.plots.own_diagrams import own_diagrams
-from service.reports.plots.style import png
-from service.reports.plots.talk import Talk, block_diagram, talks
-from service.reports.view import staff_view, student_view
+from service.reports.plots.grade_plots import draw_all_plots, list_plots
+from service.reports.plots.message_counts import MessageCount, build_block_diagram, count_messages
+from service.reports.plots.own_diagrams import list_own_diagrams
+from service.reports.plots.style import render_png
+from service.reports.view import build_staff_view, build_student_view
 from sim.recording import Call, Message
 from submissions.diagram import DiagramKind
 from submissions.diagram_cells import DiagramCell
@@ -41,7 +41,7 @@ SEED = (
 
 
 def found(text: str, kind: DiagramKind = "seqdiag") -> Differences | None:
-    return differences(read_diagram(kind, text), talks(build.shape_grade().trials[0].recording))
+    return compare_with_recording(read_diagram(kind, text), count_messages(build.shape_grade().trials[0].recording))
 
 
 def cells(*texts: str) -> Sequence[DiagramCell]:
@@ -84,7 +84,7 @@ def talk_grade(*messages: Message, calls: tuple[Call, ...] = ()) -> Grade:
 def test_differences_in_words(text: str, sentence: str) -> None:
     told = found(text.replace("agent -> digit_net [label = 'a network']", "agent -> digit_net"))
     assert told is not None
-    assert in_words(told) == sentence
+    assert describe_differences(told) == sentence
 
 
 def test_a_way_may_lead_through_who_is_not_drawn() -> None:
@@ -100,7 +100,7 @@ def test_a_diagram_of_something_else_is_not_compared(text: str) -> None:
 
 
 def test_long_lists_are_cut() -> None:
-    words = in_words(Differences(tuple(f"actor {number}" for number in range(12))))
+    words = describe_differences(Differences(tuple(f"actor {number}" for number in range(12))))
     assert words == "actor 0, actor 1, actor 2, actor 3, actor 4 and 7 more took no part."
 
 
@@ -112,14 +112,14 @@ def test_talks_are_counted_with_what_was_lost() -> None:
         Message(1.0, "robot", "PY::2", 1.0),
         Message(2.0, "robot", "PY::3", None),
     )
-    told = talks(talk_grade(*messages, calls=calls).trials[0].recording)
+    told = count_messages(talk_grade(*messages, calls=calls).trials[0].recording)
     assert told == (
-        Talk("robot", "responder", "message", 3, 1),
-        Talk("responder", "robot", "message", 1),
-        Talk("responder", "parser", "call", 2),
-        Talk("parser", "responder", "return", 1),
+        MessageCount("robot", "responder", "message", 3, 1),
+        MessageCount("responder", "robot", "message", 1),
+        MessageCount("responder", "parser", "call", 2),
+        MessageCount("parser", "responder", "return", 1),
     )
-    drawn = block_diagram(told)
+    drawn = build_block_diagram(told)
     assert [(arrow.label, arrow.heads) for arrow in drawn.arrows] == [
         ("3, 1 lost", "target"),
         ("1", "target"),
@@ -129,14 +129,18 @@ def test_talks_are_counted_with_what_was_lost() -> None:
 
 def test_many_networks_are_few_blocks() -> None:
     calls = tuple(Call(0, 0, "responder", f"net{number}", "", "1") for number in range(40))
-    drawn = block_diagram(talks(talk_grade(Message(0.0, "robot", "PY::1", 0.0), calls=calls).trials[0].recording))
+    drawn = build_block_diagram(
+        count_messages(talk_grade(Message(0.0, "robot", "PY::1", 0.0), calls=calls).trials[0].recording)
+    )
     assert [actor.name for actor in drawn.actors][2:] == ["net0", "net1", "net2", "net3", "other networks"]
     assert drawn.arrows[-1].label == "36"
 
 
 def test_the_one_most_like_it_of_each_kind_is_compared() -> None:
     grade = build.shape_grade()
-    drawn = own_diagrams(grade, cells("robot -> responder; robot <- responder", SEED, "a -> b", "robot <-> python"))
+    drawn = list_own_diagrams(
+        grade, cells("robot -> responder; robot <- responder", SEED, "a -> b", "robot <-> python")
+    )
     assert [bool(own.words) for own in drawn] == [False, True, False, True]
     assert [[plot.kind for plot in own.plots] for own in drawn] == [
         ["own"],
@@ -144,25 +148,27 @@ def test_the_one_most_like_it_of_each_kind_is_compared() -> None:
         ["own"],
         ["own", "happened"],
     ]
-    assert [own.words for own in own_diagrams(talk_grade(), cells(SEED))] == [""]
+    assert [own.words for own in list_own_diagrams(talk_grade(), cells(SEED))] == [""]
 
 
 def test_what_differs_is_highlighted_in_both_drawings() -> None:
     grade = build.shape_grade()
-    (own,) = own_diagrams(grade, cells(SEED))
-    left, right = (texts(draw_own(own, grade, plot)) for plot in own.plots)
+    (own,) = list_own_diagrams(grade, cells(SEED))
+    left, right = (texts(draw_own_diagram(own, grade, plot)) for plot in own.plots)
     assert sum(text.startswith("✗") for text in left) == 3  # two arrows and the legend
     assert sum(text.startswith("+") for text in right) == 2
     assert left.count("parser") == right.count("parser") == 1
-    (same,) = own_diagrams(grade, cells(TRUE))
-    assert not any(text[0] in "✗+" for plot in same.plots for text in texts(draw_own(same, grade, plot)))
+    (same,) = list_own_diagrams(grade, cells(TRUE))
+    assert not any(text[0] in "✗+" for plot in same.plots for text in texts(draw_own_diagram(same, grade, plot)))
 
 
 def test_what_happened_has_the_order_of_the_notebook() -> None:
     grade = build.shape_grade()
-    (own,) = own_diagrams(grade, cells("logger; MLP; agent; robot -> responder"))
+    (own,) = list_own_diagrams(grade, cells("logger; MLP; agent; robot -> responder"))
     heads = [
-        text for text in texts(draw_own(own, grade, own.plots[1])) if text in "logger network agent robot responder"
+        text
+        for text in texts(draw_own_diagram(own, grade, own.plots[1]))
+        if text in "logger network agent robot responder"
     ]
     assert heads == ["logger", "network", "agent", "robot", "responder"]
 
@@ -173,30 +179,32 @@ def test_the_page_has_both_drawings_and_the_sentence() -> None:
     notebook = Notebook("ada.ipynb", (Cell(1, "x = 1"), Cell(2, f"%%seqdiag\n{SEED}"), Cell(3, "%%seqdiag\na -> <b>")))
     submission = Submission("ada", notebook=notebook)
     read = [DiagramCell(2, read_diagram("seqdiag", SEED))]
-    drawn = draw_all(grade, cells=read)
+    drawn = draw_all_plots(grade, cells=read)
     assert {"own-cell-2-each-shape-1", "happened-cell-2-each-shape-1"} == set(drawn)
-    page = report(student_view(grade), drawn, submission)
+    page = render_report_page(build_student_view(grade), drawn, submission)
     assert "agent → parser and parser → agent did not happen." in page
     assert "Your diagram: Cell 2: sequence diagram" in page
     assert page.count("<img") == len(drawn)
-    assert "Your diagram" not in report(student_view(grade), drawn)
+    assert "Your diagram" not in render_report_page(build_student_view(grade), drawn)
 
 
 def test_a_hidden_trial_is_compared_for_staff_only() -> None:
     grade = build.shape_grade()
     hidden = replace(grade, trials=tuple(replace(trial, visibility="hidden") for trial in grade.trials))
-    (for_staff,) = own_diagrams(staff_view(hidden).grade, cells(SEED))
-    (for_student,) = own_diagrams(student_view(hidden).grade, cells(SEED))
+    (for_staff,) = list_own_diagrams(build_staff_view(hidden).grade, cells(SEED))
+    (for_student,) = list_own_diagrams(build_student_view(hidden).grade, cells(SEED))
     assert all(plot.name.endswith("-staff") for plot in for_staff.plots)
     assert for_student.words == ""
     assert [plot.name for plot in for_student.plots] == ["own-cell-1"]
     some = replace(grade, trials=(hidden.trials[0], *grade.trials[1:]))
-    both = [own_diagrams(view.grade, cells(SEED))[0] for view in (staff_view(some), student_view(some))]
+    both = [
+        list_own_diagrams(view.grade, cells(SEED))[0] for view in (build_staff_view(some), build_student_view(some))
+    ]
     assert [plot.name for plot in both[0].plots] == [plot.name for plot in both[1].plots]
     assert not any("staff" in plot.name for plot in both[0].plots)
     moving = build.line_follower_grade()
     kept = tuple(replace(trial, visibility="hidden") for trial in moving.trials)
-    names = {plot.name for plot in plots_of(replace(moving, trials=kept)) if plot.scenario}
+    names = {plot.name for plot in list_plots(replace(moving, trials=kept)) if plot.scenario}
     assert names
     assert all(name.endswith("-staff") for name in names)
 
@@ -225,7 +233,7 @@ HOSTILE = (
 def test_whatever_is_drawn_fits_into_memory_and_repeats(kind: DiagramKind, text: str) -> None:
     diagram = read_diagram(kind, text)
     highlights = Highlights(frozenset({"a"}), frozenset({("a", "b")}), words="marked")
-    first, second = (png(draw_diagram(diagram, "t", "s", highlights)) for _ in range(2))
+    first, second = (render_png(draw_diagram(diagram, "t", "s", highlights)) for _ in range(2))
     assert first == second
     with Image.open(io.BytesIO(first)) as image:
         assert image.width * image.height <= 6_100_000

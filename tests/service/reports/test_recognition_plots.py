@@ -13,15 +13,15 @@ from PIL import Image as Pixels
 
 import report_builders as build
 from service.grading.grade import Accuracy, CriterionResult, Grade, Prediction, TrialResult
-from service.reports.html import report
+from service.reports.html import render_report_page
 from service.reports.plots.confusion import draw_confusion
-from service.reports.plots.drawn import draw_all, plots_of
-from service.reports.plots.misread import draw_misread
-from service.reports.plots.sensor_images import misread
-from service.reports.plots.taken import taken, tracks, worst_track
-from service.reports.plots.track import along_the_way, draw_track
-from service.reports.view import student_view
-from sim.floors import floor
+from service.reports.plots.grade_plots import draw_all_plots, list_plots
+from service.reports.plots.misread_images import draw_misread
+from service.reports.plots.sensor_images import find_misread
+from service.reports.plots.track import compute_accuracy_curve, draw_track
+from service.reports.plots.track_images import collect_track_images, find_tracks, find_worst_track
+from service.reports.view import build_student_view
+from sim.floors import build_floor
 from sim.recording import Image, Pose
 
 
@@ -51,10 +51,10 @@ def _moving() -> Grade:
 
 
 def test_recognition_has_its_plots() -> None:
-    kinds = [plot.kind for plot in plots_of(build.swept_grade()) if not plot.scenario]
+    kinds = [plot.kind for plot in list_plots(build.swept_grade()) if not plot.scenario]
     assert kinds == ["confusion", "curves", "misread", "predictions"]
-    assert [plot.kind for plot in plots_of(_moving()) if not plot.scenario] == ["track", "predictions"]
-    for data in draw_all(build.swept_grade()).values():
+    assert [plot.kind for plot in list_plots(_moving()) if not plot.scenario] == ["track", "predictions"]
+    for data in draw_all_plots(build.swept_grade()).values():
         assert 300 < Pixels.open(io.BytesIO(data)).height < 2600
 
 
@@ -68,7 +68,7 @@ def test_confusion_tells_precision_and_recall_and_what_n_counts() -> None:
 
 def test_a_misread_image_stands_beside_the_nearest_right_ones() -> None:
     grade = build.shape_grade(wrong=4)
-    (found,) = misread(grade.criteria[0].predictions)
+    (found,) = find_misread(grade.criteria[0].predictions)
     assert (found.number, found.prediction.truth, found.prediction.answer) == (5, "upwards facing triangle", "diamond")
     assert found.like_truth is None
     assert found.like_answer is not None
@@ -78,37 +78,37 @@ def test_a_misread_image_stands_beside_the_nearest_right_ones() -> None:
     assert any("1 misread of n = 6 images" in text for text in shown)
     # Of two correct images of a class, the nearer one is shown.
     far = replace(found.like_answer, image=replace(found.like_answer.image, left=b"\x80" * 1600))
-    (again,) = misread((far, *grade.criteria[0].predictions))
+    (again,) = find_misread((far, *grade.criteria[0].predictions))
     assert again.like_answer is found.like_answer
 
 
 def test_a_track_shows_every_image_and_the_share_along_the_way() -> None:
     grade = _moving()
     predictions = grade.criteria[0].predictions
-    assert tracks(predictions, grade.trials) == (0, 1)
-    assert worst_track(predictions, grade.trials) == 1
-    images = taken(predictions, grade.trials, 1)
+    assert find_tracks(predictions, grade.trials) == (0, 1)
+    assert find_worst_track(predictions, grade.trials) == 1
+    images = collect_track_images(predictions, grade.trials, 1)
     assert [item.right for item in images[:3]] == [True, False, True]
     assert not images[1].answered
-    way = np.array([item.way for item in images])
+    way = np.array([item.distance for item in images])
     assert (np.diff(way) > 0).all()
-    curve = along_the_way([*taken(predictions, grade.trials, 0), *images])
+    curve = compute_accuracy_curve([*collect_track_images(predictions, grade.trials, 0), *images])
     assert sum(curve.n) == len(predictions)
     assert all(low <= share <= high for low, share, high in zip(curve.low, curve.share, curve.high, strict=True))
-    shown = _texts(draw_track(predictions, grade.trials, "t", floor("Simple_Shapes").pixels))
+    shown = _texts(draw_track(predictions, grade.trials, "t", build_floor("Simple_Shapes").pixels))
     assert {"x, mm", "y, mm", "distance driven, mm", "accuracy"} <= set(shown)
     assert any(f"of n = {len(predictions)} images correct, 2 trials" in text for text in shown)
 
 
 def test_standing_still_is_no_track() -> None:
     grade = build.shape_grade()
-    assert tracks(grade.criteria[0].predictions, grade.trials) == ()
+    assert find_tracks(grade.criteria[0].predictions, grade.trials) == ()
 
 
 @pytest.mark.parametrize("make", [build.swept_grade, build.hostile_grade])
 def test_the_page_has_the_figures(make: object) -> None:
     grade = make()  # type: ignore[operator]
-    page = report(student_view(grade), {})
+    page = render_report_page(build_student_view(grade), {})
     assert "Results by class" in page
     if make is build.swept_grade:
         assert "Images sent: 7 = 5 answered + 1 late + 0 malformed + 1 unanswered; duplicate answers: 2." in page

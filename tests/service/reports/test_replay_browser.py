@@ -15,13 +15,13 @@ from playwright.sync_api import Browser, Page, expect
 import report_builders as build
 from browsing import DESKTOP, PHONE, OpenPage, chromium, opened
 from replays import long_recording, parting_grade, poisoned
-from service.language import ENGLISH, language_called
-from service.reports.html import replay_page, report
-from service.reports.replay.document import replay_of_grade
-from service.reports.replay.labels import replay_words
-from service.reports.replay.over import parted
-from service.reports.view import BEFORE_PUBLICATION, other_trials, student_view
-from sim.floors import floor
+from service.language import ENGLISH, load_language
+from service.reports.html import render_replay_page, render_report_page
+from service.reports.replay.document import build_grade_replay
+from service.reports.replay.labels import translate_labels
+from service.reports.replay.overlay import find_divergence
+from service.reports.view import BEFORE_PUBLICATION, build_student_view, select_overlay_trials
+from sim.floors import build_floor
 from sim.recording import Recording
 
 pytestmark = pytest.mark.long
@@ -68,7 +68,7 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture(scope="module")
 def line_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("line") / "report.html"
-    file.write_text(report(student_view(build.line_follower_grade()), {}, build.faulty_submission()))
+    file.write_text(render_report_page(build_student_view(build.line_follower_grade()), {}, build.faulty_submission()))
     return file
 
 
@@ -117,7 +117,7 @@ def test_the_robot_is_where_the_recording_has_it_at_twenty_moments(browser: Brow
 
 
 def test_the_floor_lies_where_the_robot_drives(browser: Browser, line_report: Path) -> None:
-    pixels = floor("Lollipop").pixels
+    pixels = build_floor("Lollipop").pixels
     chance = np.random.default_rng(1)
     with opened(browser, line_report, "#trial=1&t=0", **DESKTOP) as found:
         found.page.locator("select").nth(2).select_option("floor")
@@ -159,10 +159,14 @@ def test_the_failed_second_is_reached_by_keyboard(browser: Browser, line_report:
 
 
 def test_in_german_nothing_is_said_in_english(browser: Browser, tmp_path: Path) -> None:
-    german = language_called("de")
+    german = load_language("de")
     file = tmp_path / "report.html"
-    file.write_text(report(student_view(build.line_follower_grade(), language=german), {}, build.faulty_submission()))
-    spoken, english = replay_words(german)["sentences"], replay_words(ENGLISH)["sentences"]
+    file.write_text(
+        render_report_page(
+            build_student_view(build.line_follower_grade(), language=german), {}, build.faulty_submission()
+        )
+    )
+    spoken, english = translate_labels(german)["sentences"], translate_labels(ENGLISH)["sentences"]
     with opened(browser, file, **DESKTOP) as found:
         page = found.page
         page.get_by_role("link", name="Lauf 2 bei 4.00 s ansehen").press("Enter")
@@ -253,7 +257,9 @@ def test_ten_minutes_with_500_images_can_be_scrubbed(browser: Browser, tmp_path:
     grade = build.line_follower_grade(2)
     file = tmp_path / "long.html"
     file.write_text(
-        report(student_view(replace(grade, trials=(replace(grade.trials[0], recording=recording),), criteria=())), {})
+        render_report_page(
+            build_student_view(replace(grade, trials=(replace(grade.trials[0], recording=recording),), criteria=())), {}
+        )
     )
     with opened(browser, file, "#t=599.5", **context) as found:
         assert now(found.page) == pytest.approx(599.5)
@@ -265,14 +271,16 @@ def test_ten_minutes_with_500_images_can_be_scrubbed(browser: Browser, tmp_path:
 
 @WIDTHS
 def test_hostile_texts_run_nothing_and_break_nothing(browser: Browser, tmp_path: Path, context: dict[str, Any]) -> None:
-    honest = replay_of_grade(student_view(build.faulty_grade()), build.faulty_submission())
-    images = replay_of_grade(student_view(build.shape_grade()))
+    honest = build_grade_replay(build_student_view(build.faulty_grade()), build.faulty_submission())
+    images = build_grade_replay(build_student_view(build.shape_grade()))
     both = {**honest, "trials": [*honest["trials"], images["trials"][4]]}
     endless = f"{HOSTILE}{'W' * 1_000_000}"
     pages = {
-        "replay.html": replay_page(poisoned(both, HOSTILE)),
-        "report.html": report(
-            student_view(poisoned(build.astray_grade(), endless)), {}, poisoned(build.faulty_submission(), endless)
+        "replay.html": render_replay_page(poisoned(both, HOSTILE)),
+        "report.html": render_report_page(
+            build_student_view(poisoned(build.astray_grade(), endless)),
+            {},
+            poisoned(build.faulty_submission(), endless),
         ),
     }
     for name, page in pages.items():
@@ -295,7 +303,7 @@ def test_hostile_texts_run_nothing_and_break_nothing(browser: Browser, tmp_path:
 def test_axe_finds_nothing(browser: Browser, tmp_path: Path, context: dict[str, Any], scheme: str) -> None:
     axe = files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
     file = tmp_path / "report.html"
-    file.write_text(report(student_view(build.astray_grade()), {}, build.faulty_submission()))
+    file.write_text(render_report_page(build_student_view(build.astray_grade()), {}, build.faulty_submission()))
     with opened(browser, file, "#trial=2&t=0.5", color_scheme=scheme, **context) as found:
         found.page.locator("section.replay .events summary").click()
         found.page.evaluate(axe)
@@ -307,9 +315,9 @@ def test_axe_finds_nothing(browser: Browser, tmp_path: Path, context: dict[str, 
 @pytest.fixture(scope="module")
 def report_of_two(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("over") / "report.html"
-    view = student_view(build.line_follower_grade())
-    others = other_trials(view, parting_grade(), "attempt 1", BEFORE_PUBLICATION)
-    file.write_text(report(view, {}, build.faulty_submission(), others=others))
+    view = build_student_view(build.line_follower_grade())
+    others = select_overlay_trials(view, parting_grade(), "attempt 1", BEFORE_PUBLICATION)
+    file.write_text(render_report_page(view, {}, build.faulty_submission(), others=others))
     return file
 
 
@@ -362,7 +370,7 @@ def test_the_other_trial_is_switched_off_and_on_by_keyboard(browser: Browser, re
 
 def test_where_they_part_is_a_link_to_the_moment(browser: Browser, report_of_two: Path) -> None:
     mine, other = (grade.trials[1].recording for grade in (build.line_follower_grade(), parting_grade()))
-    moment = parted(mine, other)
+    moment = find_divergence(mine, other)
     assert moment is not None
     with opened(browser, report_of_two, "#trial=2&t=0", **DESKTOP) as found:
         page = found.page
@@ -378,10 +386,12 @@ def test_where_they_part_is_a_link_to_the_moment(browser: Browser, report_of_two
 def test_hostile_texts_of_the_other_trial_run_nothing(
     browser: Browser, tmp_path: Path, context: dict[str, Any]
 ) -> None:
-    view = student_view(build.faulty_grade())
-    honest = replay_of_grade(view, others=other_trials(view, build.astray_grade(), "attempt 1", BEFORE_PUBLICATION))
+    view = build_student_view(build.faulty_grade())
+    honest = build_grade_replay(
+        view, others=select_overlay_trials(view, build.astray_grade(), "attempt 1", BEFORE_PUBLICATION)
+    )
     file = tmp_path / "replay.html"
-    file.write_text(replay_page(poisoned(honest, HOSTILE)))
+    file.write_text(render_replay_page(poisoned(honest, HOSTILE)))
     with opened(browser, file, "#trial=2&t=0.5", **context) as found:
         page = found.page
         page.locator("section.replay .events summary").click()

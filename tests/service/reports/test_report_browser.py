@@ -12,10 +12,10 @@ from playwright.sync_api import Browser
 
 import report_builders as build
 from browsing import DESKTOP, PHONE, chromium, opened
-from service.reports.html import report
-from service.reports.plots.drawn import draw_all
+from service.reports.html import render_report_page
+from service.reports.plots.grade_plots import draw_all_plots
 from service.reports.plots.plot import DPI
-from service.reports.view import student_view
+from service.reports.view import build_student_view
 
 pytestmark = pytest.mark.long
 
@@ -33,7 +33,7 @@ def browser() -> Iterator[Browser]:
 def written(name: str, folder: Path) -> Path:
     grade = getattr(build, f"{name}_grade")()
     file = folder / f"{name}.html"
-    file.write_text(report(student_view(grade), draw_all(grade), build.faulty_submission()))
+    file.write_text(render_report_page(build_student_view(grade), draw_all_plots(grade), build.faulty_submission()))
     return file
 
 

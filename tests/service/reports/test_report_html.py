@@ -10,12 +10,19 @@ import pytest
 
 import report_builders as build
 from page_reader import ATTRIBUTES, TAGS, Reader
-from service.grading.grade import Grade, SetByHand
-from service.reports.html import BatchRow, batch_index, report, report_parts, report_script, report_style
-from service.reports.page import page_of, timeline
-from service.reports.plots.drawn import draw_all, plots_of
-from service.reports.replay.document import replay_of_grade
-from service.reports.view import staff_view, student_view
+from service.grading.grade import Grade, StaffAdjustment
+from service.reports.html import (
+    BatchRow,
+    load_report_script,
+    load_report_style,
+    render_batch_index,
+    render_report_page,
+    render_report_parts,
+)
+from service.reports.page import build_page, build_timeline
+from service.reports.plots.grade_plots import draw_all_plots, list_plots
+from service.reports.replay.document import build_grade_replay
+from service.reports.view import build_staff_view, build_student_view
 from sim.recording import Fault, Verdict
 
 pytestmark = pytest.mark.fast
@@ -23,7 +30,7 @@ pytestmark = pytest.mark.fast
 
 @pytest.fixture(scope="module")
 def hostile() -> tuple[str, Reader]:
-    page = report(student_view(build.hostile_grade()), {}, build.faulty_submission())
+    page = render_report_page(build_student_view(build.hostile_grade()), {}, build.faulty_submission())
     return page, Reader(page)
 
 
@@ -48,14 +55,14 @@ def test_source_with_hostile_lines_is_escaped() -> None:
     grade, submission = build.faulty_grade(), build.faulty_submission()
     assert submission.program is not None
     program = replace(submission.program, name="</pre><img src=x>", text="a\nb\n" + build.HOSTILE.replace("\u2028", ""))
-    reader = Reader(report(student_view(grade), {}, replace(submission, program=program)))
+    reader = Reader(render_report_page(build_student_view(grade), {}, replace(submission, program=program)))
     assert reader.tags <= TAGS
     assert reader.values("img", "src") == []
 
 
 def test_the_page_is_self_contained_and_its_policy_fits_its_style() -> None:
     grade = build.shape_grade()
-    reader = Reader(report(student_view(grade), draw_all(grade)))
+    reader = Reader(render_report_page(build_student_view(grade), draw_all_plots(grade)))
     sources = reader.values("img", "src")
     assert len(sources) == 3
     assert all(source.startswith("data:image/png;base64,") for source in sources)
@@ -72,31 +79,36 @@ def test_the_page_is_self_contained_and_its_policy_fits_its_style() -> None:
 
 def test_plots_of_conversations_that_earlier_versions_kept_are_not_shown_and_break_nothing() -> None:
     grade = build.shape_grade()
-    drawn = draw_all(grade)
+    drawn = draw_all_plots(grade)
     (first, *_) = drawn.values()
     kept = drawn | {"conversation-each-shape-5": first, "talk-each-shape-5": first}
-    assert report(student_view(grade), kept) == report(student_view(grade), drawn)
-    assert not any(plot.kind in ("conversation", "talk") for plot in plots_of(grade))
-    assert "IMG_DATA::{left, right}" in Reader(report(student_view(grade), {})).text
+    assert render_report_page(build_student_view(grade), kept) == render_report_page(build_student_view(grade), drawn)
+    assert not any(plot.kind in ("conversation", "talk") for plot in list_plots(grade))
+    assert "IMG_DATA::{left, right}" in Reader(render_report_page(build_student_view(grade), {})).text
 
 
 def test_the_parts_of_a_report_are_its_body_and_two_files_that_are_the_same_for_all() -> None:
-    shapes, line = (report_parts(student_view(made()), {}) for made in (build.shape_grade, build.line_follower_grade))
+    shapes, line = (
+        render_report_parts(build_student_view(made()), {}) for made in (build.shape_grade, build.line_follower_grade)
+    )
     assert shapes.body != line.body
-    assert (shapes.style, shapes.script) == (line.style, line.script) == (report_style(), report_script())
+    assert (shapes.style, shapes.script) == (line.style, line.script) == (load_report_style(), load_report_script())
     reader = Reader(shapes.body)
     assert reader.tags.isdisjoint({"html", "head", "body", "main", "style", "meta"})
     assert reader.values("script", "type") == ["application/json"]
     assert reader.scripts == 1
-    whole = report(student_view(build.shape_grade()), {})
+    whole = render_report_page(build_student_view(build.shape_grade()), {})
     assert shapes.body in whole
     assert f"<title>{shapes.title}</title>" in whole
 
 
 def test_students_see_nothing_hidden_and_staff_see_all() -> None:
     grade = build.hidden_grade()
-    plots = draw_all(grade)
-    student, staff = report(student_view(grade), plots), report(staff_view(grade), plots)
+    plots = draw_all_plots(grade)
+    student, staff = (
+        render_report_page(build_student_view(grade), plots),
+        render_report_page(build_staff_view(grade), plots),
+    )
     assert "SECRET" not in student
     assert "Other parts of the assignment are marked but not shown" in student
     assert "SECRETCRITERION" in staff
@@ -110,13 +122,13 @@ def test_students_see_nothing_hidden_and_staff_see_all() -> None:
     assert hidden_images
     assert not any(image in student for image in hidden_images)
     first_hidden = replace(grade, trials=grade.trials[::-1])
-    assert "SECRETSCENARIO" not in report(student_view(first_hidden), {})
-    after = report(student_view(grade, frozenset({"visible", "hidden"})), plots)
+    assert "SECRETSCENARIO" not in render_report_page(build_student_view(first_hidden), {})
+    after = render_report_page(build_student_view(grade, frozenset({"visible", "hidden"})), plots)
     assert "SECRETCRITERION" in after
 
 
 def test_headline_criteria_and_stamp() -> None:
-    reader = Reader(report(student_view(build.shape_grade()), {}))
+    reader = Reader(render_report_page(build_student_view(build.shape_grade()), {}))
     assert "7of 8 marks" in reader.text
     assert "5 / 6" in reader.text
     assert "The most marks are available for “Names the right shape”" in reader.text
@@ -124,16 +136,22 @@ def test_headline_criteria_and_stamp() -> None:
     assert "First failed in each-shape, trial 5" in reader.text
     assert build.shape_grade().assignment_version in reader.text
     assert "Robomark 0.1.0" in reader.text
-    strong = Reader(report(student_view(replace(build.shape_grade(), sandbox="process limits, landlock, seccomp")), {}))
+    strong = Reader(
+        render_report_page(
+            build_student_view(replace(build.shape_grade(), sandbox="process limits, landlock, seccomp")), {}
+        )
+    )
     assert strong.text.count("sandbox: ") == 0
 
 
 def test_faults_show_line_numbers_and_the_students_own_line() -> None:
-    with_source = Reader(report(student_view(build.faulty_grade()), {}, build.faulty_submission())).text
+    with_source = Reader(
+        render_report_page(build_student_view(build.faulty_grade()), {}, build.faulty_submission())
+    ).text
     assert "Robot program (robot.py), line 3" in with_source
     assert "3    print(1 / (i - i))" in with_source
     assert "Did you mean parser?" in with_source
-    without = Reader(report(student_view(build.faulty_grade()), {})).text
+    without = Reader(render_report_page(build_student_view(build.faulty_grade()), {})).text
     assert "Robot program, line 3" in without
     assert "print(1 / (i - i))" not in without
 
@@ -142,7 +160,7 @@ def test_a_line_number_outside_the_file_gives_no_excerpt() -> None:
     submission = build.faulty_submission()
     assert submission.responder is not None
     short = replace(submission, responder=replace(submission.responder, text=""))
-    groups = page_of(staff_view(build.faulty_grade()), short).faults
+    groups = build_page(build_staff_view(build.faulty_grade()), short).faults
     assert groups[0].excerpt == ()
     assert groups[0].where == "Responder (responder.py), line 2"
 
@@ -152,24 +170,24 @@ def test_time_that_was_up_is_told_and_not_called_wrong() -> None:
     grade = build.line_follower_grade()
     recording = replace(grade.trials[0].recording, faults=(time_up,))
     ended = replace(grade, trials=(replace(grade.trials[0], recording=recording),))
-    reader = Reader(report(student_view(ended), {}))
+    reader = Reader(render_report_page(build_student_view(ended), {}))
     titles = [words for words in reader.text.split("\n") if words in ("Result", "Errors")]
     assert "Result" in titles
     assert "Errors" not in titles
-    assert ("10.00", "stopped") in [(entry.t, entry.kind) for entry in timeline(recording)]
-    assert "\nErrors\n" in Reader(report(student_view(build.faulty_grade()), {})).text
+    assert ("10.00", "stopped") in [(entry.t, entry.kind) for entry in build_timeline(recording)]
+    assert "\nErrors\n" in Reader(render_report_page(build_student_view(build.faulty_grade()), {})).text
 
 
 def test_timelines_are_capped_and_say_so() -> None:
-    entries = timeline(build.hostile_grade().trials[0].recording)
+    entries = build_timeline(build.hostile_grade().trials[0].recording)
     assert len(entries) == 56
     assert [entry.text for entry in entries if not entry.t] == ["2,949 more entries are not shown"]
 
 
 def test_messages_name_images_and_losses() -> None:
-    assert "IMG_DATA::{left, right}" in Reader(report(student_view(build.shape_grade()), {})).text
-    assert "never (lost)" in Reader(report(student_view(build.faulty_grade()), {})).text
-    astray = Reader(report(student_view(build.astray_grade()), {})).text
+    assert "IMG_DATA::{left, right}" in Reader(render_report_page(build_student_view(build.shape_grade()), {})).text
+    assert "never (lost)" in Reader(render_report_page(build_student_view(build.faulty_grade()), {})).text
+    astray = Reader(render_report_page(build_student_view(build.astray_grade()), {})).text
     for words in ("lost by chance", "out of range, 1601 mm away", "facing away, 91° off", "blocked"):
         assert f"never ({words})" in astray
     assert "0.50 s (duplicated, corrupted to PY::7)" in astray
@@ -180,10 +198,10 @@ def test_a_grade_with_nothing_in_it_still_has_a_page(verdict: Verdict) -> None:
     grade = build.faulty_grade()
     empty = replace(build.line_follower_recording(0), verdict=verdict)
     trials = (replace(grade.trials[0], recording=empty),)
-    Reader(report(student_view(replace(grade, trials=trials, criteria=())), {}))
+    Reader(render_report_page(build_student_view(replace(grade, trials=trials, criteria=())), {}))
     bare: Grade = replace(grade, trials=(), criteria=())
-    assert plots_of(bare) == ()
-    assert "0of 0 marks" in Reader(report(student_view(bare), draw_all(bare))).text
+    assert list_plots(bare) == ()
+    assert "0of 0 marks" in Reader(render_report_page(build_student_view(bare), draw_all_plots(bare))).text
 
 
 def test_batch_index_links_and_escapes() -> None:
@@ -193,8 +211,8 @@ def test_batch_index_links_and_escapes() -> None:
         BatchRow("s3", note=build.HOSTILE),
         BatchRow("s4", Decimal(8), Decimal(8), Verdict.FINISHED, "//evil.example/x"),
     ]
-    assert "ada_<wbr>l@<wbr>ou.<wbr>uk&lt;b&gt;" in batch_index([BatchRow("ada_l@ou.uk<b>")])
-    reader = Reader(batch_index(rows, "Batch <1>", "process limits only"))
+    assert "ada_<wbr>l@<wbr>ou.<wbr>uk&lt;b&gt;" in render_batch_index([BatchRow("ada_l@ou.uk<b>")])
+    reader = Reader(render_batch_index(rows, "Batch <1>", "process limits only"))
     assert reader.values("a", "href") == ["reports/s%201.html", "javascript%3Aalert%281%29", "evil.example/x"]
     assert reader.tags <= TAGS
     assert "2.5 / 8" in reader.text
@@ -205,9 +223,9 @@ def test_batch_index_links_and_escapes() -> None:
 
 def test_an_excused_criterion_is_neither_won_nor_lost() -> None:
     grade = build.line_follower_grade()
-    said = SetByHand(Decimal(0), grade.criteria[0].max_marks, "The floor was wet.", excused=True)
+    said = StaffAdjustment(Decimal(0), grade.criteria[0].max_marks, "The floor was wet.", excused=True)
     first = replace(grade.criteria[0], marks=Decimal(0), max_marks=Decimal(0), set_by_hand=said)
-    view = student_view(replace(grade, criteria=(first, *grade.criteria[1:])))
-    assert page_of(view).criteria[0].state == "excused"
-    lost = [loss["title"] for trial in replay_of_grade(view)["trials"] for loss in trial["lost"]]
+    view = build_student_view(replace(grade, criteria=(first, *grade.criteria[1:])))
+    assert build_page(view).criteria[0].state == "excused"
+    lost = [loss["title"] for trial in build_grade_replay(view)["trials"] for loss in trial["lost"]]
     assert first.title not in lost

@@ -15,14 +15,14 @@ import pytest
 from replays import data_of, island_of
 from report_builders import astray_grade, faulty_grade, hidden_grade, line_follower_grade, shape_grade, swept_grade
 from service.grading.grade import Grade
-from service.grading.judging.message_parts import shown_words
-from service.language import Language, language_called
-from service.message_catalogue import messages
-from service.reports.html import report
-from service.reports.plots.drawn import plots_of
-from service.reports.view import View, staff_view, student_view
+from service.grading.judging.message_parts import add_hidden_note
+from service.language import Language, load_language
+from service.message_catalogue import extract_messages
+from service.reports.html import render_report_page
+from service.reports.plots.grade_plots import list_plots
+from service.reports.view import View, build_staff_view, build_student_view
 
-GERMAN = language_called("de")
+GERMAN = load_language("de")
 GRADES = (astray_grade, faulty_grade, hidden_grade, line_follower_grade, shape_grade, swept_grade)
 _PIXEL = bytes.fromhex("89504e470d0a1a0a0000000d4948445200000001000000010100000000376ef924")
 _WORD = re.compile(r"[^\W\d_]{3,}")
@@ -67,7 +67,7 @@ class Texts(HTMLParser):
 
 
 def page_of(view: View) -> str:
-    return report(view, {plot.name: _PIXEL for plot in plots_of(view.grade)})
+    return render_report_page(view, {plot.name: _PIXEL for plot in list_plots(view.grade)})
 
 
 def unbracketed(text: str) -> str:
@@ -109,8 +109,8 @@ def foreign() -> Foreign:
 def test_nothing_of_ours_is_said_in_another_language(made: Callable[[], Grade], foreign: Foreign) -> None:
     grade, language = made(), Language("xx", foreign)
     # Texts written during grading stay unchanged.
-    kept = {word for text in (*texts_in(grade), shown_words("")) for word in _WORD.findall(text)}
-    for view in (staff_view(grade, language), student_view(grade, language=language)):
+    kept = {word for text in (*texts_in(grade), add_hidden_note("")) for word in _WORD.findall(text)}
+    for view in (build_staff_view(grade, language), build_student_view(grade, language=language)):
         page = page_of(view)
         shown = [*Texts(page).found, *texts_of_replay(data_of(page) if view.grade.trials else {})]
         left = {word for text in shown for word in _WORD.findall(unbracketed(text))}
@@ -119,13 +119,13 @@ def test_nothing_of_ours_is_said_in_another_language(made: Callable[[], Grade], 
 
 def test_everything_that_is_said_is_in_the_catalogues(foreign: Foreign) -> None:
     for made in GRADES:
-        page_of(staff_view(made(), Language("xx", foreign)))
-    known = {each.id if isinstance(each.id, str) else each.id[0] for each in messages() if each.id}
+        page_of(build_staff_view(made(), Language("xx", foreign)))
+    known = {each.id if isinstance(each.id, str) else each.id[0] for each in extract_messages() if each.id}
     assert foreign.said - known == {"°"}, "what is said inside an f-string is not found"
 
 
 def test_a_german_report_is_german() -> None:
-    page = page_of(student_view(shape_grade(), language=GERMAN))
+    page = page_of(build_student_view(shape_grade(), language=GERMAN))
     assert '<html lang="de">' in page
     for words in ("Punkten</span>", "<h2>Wiedergabe</h2>", "wurde als", "Die meisten Punkte sind", "Alle Läufe"):
         assert words in page
@@ -136,7 +136,7 @@ def test_a_german_report_is_german() -> None:
 def test_the_script_of_a_replay_asks_for_all_the_words_that_there_are_and_no_others() -> None:
     folder = files("service.reports.replay").joinpath("component")
     code = "".join(each.read_text(encoding="utf-8") for each in folder.iterdir() if each.name.endswith(".js"))
-    words = island_of(page_of(student_view(line_follower_grade())))["words"]
+    words = island_of(page_of(build_student_view(line_follower_grade())))["words"]
     literals = set(re.findall(r'"(\w+)"', code))
     assert set(re.findall(r'\bsay\("(\w+)"', code)) <= set(words["sentences"]) <= literals
     assert set(re.findall(r'\bworded\("(\w+)"', code)) <= set(words)

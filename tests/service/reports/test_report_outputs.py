@@ -12,26 +12,26 @@ import pytest
 from rich.console import Console
 
 import report_builders as build
-from responders.sandbox.meter import JobLimits, Spent
-from service.grading.grade import Cost, unjudged_notes
+from responders.sandbox.meter import JobCosts, JobLimits
+from service.grading.grade import Cost, build_unjudged_notes
 from service.reports.formats import FORMATS
-from service.reports.formats.csv_output import marks_csv
-from service.reports.formats.gradescope import gradescope_document, gradescope_text
-from service.reports.formats.json_output import json_document, json_text
-from service.reports.formats.junit import junit_text
-from service.reports.formats.moodle import moodle_csv
-from service.reports.formats.rich_text import rich_report
-from service.reports.formats.text import plain_text
-from service.reports.html import report
-from service.reports.verdict_sentences import verdict_words
-from service.reports.view import View, gradebook_view, staff_view, student_view, worst_trial
+from service.reports.formats.csv_output import render_marks_csv
+from service.reports.formats.gradescope import build_gradescope_document, render_gradescope
+from service.reports.formats.json_output import build_json_document, render_json
+from service.reports.formats.junit import render_junit
+from service.reports.formats.moodle import render_moodle_csv
+from service.reports.formats.rich_text import render_rich_report
+from service.reports.formats.text import render_plain_text
+from service.reports.html import render_report_page
+from service.reports.verdict_sentences import describe_verdict
+from service.reports.view import View, build_gradebook_view, build_staff_view, build_student_view, find_worst_trial
 from sim.recording import Verdict
 
 pytestmark = pytest.mark.fast
 
 
 def test_json_has_exactly_the_keys_of_the_schema() -> None:
-    document = json.loads(json_text(staff_view(build.shape_grade())))
+    document = json.loads(render_json(build_staff_view(build.shape_grade())))
     top = ["schema", "assignment", "marks", "max_marks", "verdict", "criteria", "trials", "accuracy", "notes"]
     said_first = ["cause", "next_step", "lost_by_cause"]
     assert [key for key in document if key not in said_first] == top
@@ -53,17 +53,17 @@ LOST = (
 
 
 def test_every_report_says_what_the_channel_lost_and_why() -> None:
-    view = staff_view(build.astray_grade())
-    assert LOST in " ".join(plain_text(view).split())
+    view = build_staff_view(build.astray_grade())
+    assert LOST in " ".join(render_plain_text(view).split())
     shown = Console(width=400, record=True, file=io.StringIO())
-    shown.print(rich_report(view))
+    shown.print(render_rich_report(view))
     assert LOST in shown.export_text()
-    assert LOST in " ".join(report(view, {}).split())
-    messages = json_document(view)["trials"][1]["messages"]
+    assert LOST in " ".join(render_report_page(view, {}).split())
+    messages = build_json_document(view)["trials"][1]["messages"]
     assert messages[0] == {"t": 0.1, "sender": "robot", "text": "PY::0", "lost": "chance"}
     assert (messages[1]["lost"], messages[1]["distance"], messages[1]["angle"]) == ("out of range", 1600.2, 3.0)
     assert messages[4]["arrived_as"] == "PY::7"
-    assert "The channel" not in plain_text(staff_view(build.line_follower_grade()))
+    assert "The channel" not in render_plain_text(build_staff_view(build.line_follower_grade()))
 
 
 @pytest.mark.parametrize("form", [name for name, form in FORMATS.items() if form.document] + ["page", "terminal"])
@@ -71,9 +71,15 @@ def test_full_marks_say_so_and_ask_for_nothing_more(form: str) -> None:
     made = build.shape_grade()
     full = replace(made, criteria=tuple(replace(each, marks=each.max_marks) for each in made.criteria))
     shown = Console(width=400, record=True, file=io.StringIO())
-    shown.print(rich_report(staff_view(full)))
+    shown.print(render_rich_report(build_staff_view(full)))
     document = FORMATS[form].document if form in FORMATS else None
-    told = document(full) if document else report(student_view(full), {}) if form == "page" else shown.export_text()
+    told = (
+        document(full)
+        if document
+        else render_report_page(build_student_view(full), {})
+        if form == "page"
+        else shown.export_text()
+    )
     words = " ".join(re.sub("<script.*?</script>", "", told, flags=re.DOTALL).split())
     assert "missing" not in words
     assert "to be gained" not in words
@@ -85,53 +91,55 @@ def test_full_marks_say_so_and_ask_for_nothing_more(form: str) -> None:
 
 
 def test_json_without_classification_and_with_half_marks() -> None:
-    document = json_document(staff_view(build.line_follower_grade()))
+    document = build_json_document(build_staff_view(build.line_follower_grade()))
     assert document["accuracy"] is None
     assert document["marks"] == 4.5
     assert isinstance(document["max_marks"], int)
 
 
 def test_hostile_text_survives_strict_json() -> None:
-    text = json_text(staff_view(build.hostile_grade()))
+    text = render_json(build_staff_view(build.hostile_grade()))
     assert text.isascii()
     assert json.loads(text)["criteria"][0]["title"].encode()  # no lone surrogate remains
 
 
 def test_gradescope_leaves_hiding_to_gradescope_but_tells_nothing_at_the_top() -> None:
-    document = gradescope_document(gradebook_view(build.hidden_grade()))
+    document = build_gradescope_document(build_gradebook_view(build.hidden_grade()))
     assert [test["visibility"] for test in document["tests"]] == ["visible", "visible", "hidden"]
     assert sum(test["score"] for test in document["tests"]) == document["score"] == 8
     assert [test["status"] for test in document["tests"]] == ["failed", "passed", "failed"]
     assert "SECRET" not in document["output"]
     assert document["output_format"] == "text"
-    json.loads(gradescope_text(gradebook_view(build.hostile_grade())))
+    json.loads(render_gradescope(build_gradebook_view(build.hostile_grade())))
 
 
 def test_gradescope_names_the_line_of_a_fault() -> None:
-    output = gradescope_document(gradebook_view(build.faulty_grade()))["output"]
+    output = build_gradescope_document(build_gradebook_view(build.faulty_grade()))["output"]
     assert re.search(r"line \d+: ", output)
 
 
 def test_junit_counts_failures_and_is_well_formed_whatever_was_printed() -> None:
-    suite = ElementTree.fromstring(junit_text(staff_view(build.shape_grade())))[0]
+    suite = ElementTree.fromstring(render_junit(build_staff_view(build.shape_grade())))[0]
     assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("2", "1", "0")
     failure = suite.find("testcase/failure")
     assert failure is not None
     assert failure.get("message") == "5 of 6 marks"
-    hostile = ElementTree.fromstring(junit_text(staff_view(build.hostile_grade())))
+    hostile = ElementTree.fromstring(render_junit(build_staff_view(build.hostile_grade())))
     assert "<script>alert(1)</script>" in hostile[0][1].attrib["name"]
 
 
 def test_junit_calls_an_unmarked_grade_an_error() -> None:
     grade = build.faulty_grade()
     trial = replace(grade.trials[0], recording=replace(grade.trials[0].recording, verdict=Verdict.HOST_ERROR))
-    suite = ElementTree.fromstring(junit_text(staff_view(replace(grade, trials=(trial,)))))[0]
+    suite = ElementTree.fromstring(render_junit(build_staff_view(replace(grade, trials=(trial,)))))[0]
     assert (suite.get("failures"), suite.get("errors")) == ("0", "1")
 
 
 def test_csv_has_a_column_a_criterion_and_no_formulas() -> None:
     evil = replace(build.faulty_grade(), student="=HYPERLINK(1)")
-    table = marks_csv([build.row_of(grade).shown(staff_view) for grade in (build.shape_grade(), evil)])
+    table = render_marks_csv(
+        [build.row_of(grade).apply_view(build_staff_view) for grade in (build.shape_grade(), evil)]
+    )
     rows = list(csv.DictReader(io.StringIO(table)))
     assert rows[0]["student"] == "s1234567"
     assert rows[0]["accuracy"] == "0.8333"
@@ -141,14 +149,18 @@ def test_csv_has_a_column_a_criterion_and_no_formulas() -> None:
 
 
 def test_moodle_feedback_says_nothing_of_hidden_criteria() -> None:
-    row = next(csv.DictReader(io.StringIO(moodle_csv([build.row_of(build.hidden_grade()).shown(gradebook_view)]))))
+    row = next(
+        csv.DictReader(
+            io.StringIO(render_moodle_csv([build.row_of(build.hidden_grade()).apply_view(build_gradebook_view)]))
+        )
+    )
     assert row["Grade"] == "8"
     assert "SECRET" not in row["Feedback comments"]
     assert "Names the right shape: 5 of 6" in row["Feedback comments"]
 
 
 def test_plain_text_says_marks_verdict_and_where_it_failed() -> None:
-    text = plain_text(staff_view(build.faulty_grade()))
+    text = render_plain_text(build_staff_view(build.faulty_grade()))
     assert "0 of 4 marks; error in the responder" in text
     assert "Responder, line 2: NameError" in text
     assert "2 times in 2 of 3 trials" in text
@@ -158,19 +170,19 @@ def test_plain_text_says_marks_verdict_and_where_it_failed() -> None:
 
 def test_terminals_get_no_control_codes_from_students() -> None:
     grade = build.hostile_grade()
-    for shown in (plain_text(staff_view(grade)), _on_a_terminal(staff_view(grade))):
+    for shown in (render_plain_text(build_staff_view(grade)), _on_a_terminal(build_staff_view(grade))):
         assert not {"\x1b", "\x00", "\u202e", "\ud800"} & set(shown)
         assert "[red]x[/red]" in shown
 
 
 def test_student_view_drops_hidden_parts_and_keeps_indices_right() -> None:
-    view = student_view(build.hidden_grade()).grade
+    view = build_student_view(build.hidden_grade()).grade
     assert [result.id for result in view.criteria] == ["names-the-right-shape", "asks-aloud"]
     assert {trial.scenario for trial in view.trials} == {"each-shape"}
     assert [prediction.trial for prediction in view.criteria[0].predictions] == [0, 1, 2, 3]
     assert view.criteria[0].accuracy is not None
     assert (view.criteria[0].accuracy.n, view.criteria[0].message[:8]) == (4, "VISIBLE:")
-    released = student_view(build.hidden_grade(), frozenset({"visible", "hidden"})).grade
+    released = build_student_view(build.hidden_grade(), frozenset({"visible", "hidden"})).grade
     assert (len(released.criteria), len(released.trials)) == (3, 6)
     assert released.criteria[0].message == build.shape_grade().criteria[0].message
 
@@ -178,29 +190,29 @@ def test_student_view_drops_hidden_parts_and_keeps_indices_right() -> None:
 def test_a_grade_of_before_visible_trials_were_told_apart_tells_nothing_of_trials() -> None:
     grade = build.hidden_grade()
     old = replace(grade, criteria=tuple(replace(result, shown=None) for result in grade.criteria))
-    first = student_view(old).grade.criteria[0]
+    first = build_student_view(old).grade.criteria[0]
     assert (first.message, first.accuracy, first.curves) == ("Marked in trials that are not shown.", None, ())
 
 
 def test_student_view_where_the_first_trial_is_hidden() -> None:
     grade = build.shape_grade()
     first_hidden = replace(grade, trials=(replace(grade.trials[0], visibility="hidden"), *grade.trials[1:]))
-    view = student_view(first_hidden).grade
+    view = build_student_view(first_hidden).grade
     predictions = view.criteria[0].predictions
     assert [(prediction.trial, prediction.truth) for prediction in predictions] == [
         (i, build.SHAPES[i + 1]) for i in range(5)
     ]
-    assert worst_trial(view, "each-shape") == 3
+    assert find_worst_trial(view, "each-shape") == 3
 
 
 def test_worst_trial_is_the_one_that_lost_most() -> None:
-    assert worst_trial(build.shape_grade(), "each-shape") == 4
-    assert worst_trial(build.faulty_grade(), "talk") == 1
+    assert find_worst_trial(build.shape_grade(), "each-shape") == 4
+    assert find_worst_trial(build.faulty_grade(), "talk") == 1
 
 
 @pytest.mark.parametrize("verdict", list(Verdict))
 def test_every_verdict_has_words(verdict: Verdict) -> None:
-    words = verdict_words(verdict)
+    words = describe_verdict(verdict)
     assert all((words.short, words.happened, words.whose, words.next_step))
     ours = verdict in (Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
     assert ("not your fault" in words.whose) is ours
@@ -210,35 +222,44 @@ def test_marks_are_not_rounded_on_the_way() -> None:
     grade = build.line_follower_grade()
     tenth = replace(grade.criteria[0], marks=Decimal("0.1"))
     assert (
-        json_document(staff_view(replace(grade, criteria=(tenth, replace(tenth, marks=Decimal("0.2"))))))["marks"]
+        build_json_document(build_staff_view(replace(grade, criteria=(tenth, replace(tenth, marks=Decimal("0.2"))))))[
+            "marks"
+        ]
         == 0.3
     )
 
 
 def _on_a_terminal(view: View) -> str:
     console = Console(file=io.StringIO(), width=100, color_system=None)
-    console.print(rich_report(view))
+    console.print(render_rich_report(view))
     assert isinstance(console.file, io.StringIO)
     return console.file.getvalue()
 
 
-COSTLY = replace(build.shape_grade(), cost=Cost(JobLimits(64 << 20, 240.0, 20.0), Spent(150_000, 3.21, 0.04)))
+COSTLY = replace(build.shape_grade(), cost=Cost(JobLimits(64 << 20, 240.0, 20.0), JobCosts(150_000, 3.21, 0.04)))
 FIGURES = "CPU time: 3.2 of 240 s. Sleep: 0 of 20 s. Output: 0.1 of 64 MB."
 
 
 def test_staff_read_what_was_used_and_students_nothing_that_grows_with_hidden_trials() -> None:
-    for_staff = (plain_text(staff_view(COSTLY)), _on_a_terminal(staff_view(COSTLY)), report(staff_view(COSTLY), {}))
+    for_staff = (
+        render_plain_text(build_staff_view(COSTLY)),
+        _on_a_terminal(build_staff_view(COSTLY)),
+        render_report_page(build_staff_view(COSTLY), {}),
+    )
     assert all(FIGURES in page for page in for_staff)
-    viewed = student_view(COSTLY)
-    for_students = (plain_text(viewed), _on_a_terminal(viewed), report(viewed, {}))
-    in_files = (gradescope_text(gradebook_view(COSTLY)), moodle_csv([build.row_of(COSTLY).shown(gradebook_view)]))
+    viewed = build_student_view(COSTLY)
+    for_students = (render_plain_text(viewed), _on_a_terminal(viewed), render_report_page(viewed, {}))
+    in_files = (
+        render_gradescope(build_gradebook_view(COSTLY)),
+        render_moodle_csv([build.row_of(COSTLY).apply_view(build_gradebook_view)]),
+    )
     assert all("240" not in text for text in (*for_students, *in_files))
-    assert json_document(staff_view(COSTLY))["cost"]["spent"] == {
+    assert build_json_document(build_staff_view(COSTLY))["cost"]["spent"] == {
         "kept_bytes": 150_000,
         "cpu_seconds": 3.21,
         "sleep_seconds": 0.04,
     }
-    assert "cost" not in json_document(viewed)
+    assert "cost" not in build_json_document(viewed)
 
 
 def test_students_read_how_many_of_the_criteria_that_they_see_could_not_be_judged() -> None:
@@ -248,25 +269,25 @@ def test_students_read_how_many_of_the_criteria_that_they_see_could_not_be_judge
         replace(second, unjudged="too long", visibility="visible"),
         replace(second, id="third", visibility="visible"),
     )
-    grade = replace(build.shape_grade(), criteria=criteria, notes=("a note", *unjudged_notes(criteria)))
-    assert "2 of 3 criteria could not be judged; staff will review them" in staff_view(grade).grade.notes
-    assert student_view(grade).grade.notes == (
+    grade = replace(build.shape_grade(), criteria=criteria, notes=("a note", *build_unjudged_notes(criteria)))
+    assert "2 of 3 criteria could not be judged; staff will review them" in build_staff_view(grade).grade.notes
+    assert build_student_view(grade).grade.notes == (
         "a note",
         "1 of 2 criteria could not be judged; staff will review them",
     )
     all_hidden = replace(grade, criteria=tuple(replace(each, visibility="hidden") for each in criteria))
-    assert student_view(all_hidden).grade.notes == ("a note",)
+    assert build_student_view(all_hidden).grade.notes == ("a note",)
 
 
 def test_of_a_grade_that_was_given_before_this_was_measured_nothing_is_said() -> None:
-    assert all(word not in plain_text(staff_view(build.shape_grade())) for word in ("Used ", "together"))
-    assert "cost" not in json_document(staff_view(build.shape_grade()))
+    assert all(word not in render_plain_text(build_staff_view(build.shape_grade())) for word in ("Used ", "together"))
+    assert "cost" not in build_json_document(build_staff_view(build.shape_grade()))
 
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_writes_an_odd_grade_and_ends_its_last_line(name: str) -> None:
     form, grade = FORMATS[name], build.hostile_grade()
-    assert form.document or form.table or form.filled_in or form.packed
+    assert form.document or form.table or form.worksheet or form.archive
     assert form.suffix.startswith(".")
     written = [form.document(grade)] if form.document else []
     written += [form.table([build.row_of(grade), build.row_of(grade)])] if form.table else []

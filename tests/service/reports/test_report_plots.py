@@ -11,19 +11,19 @@ from PIL import Image
 
 import report_builders as build
 from service.grading.grade import Accuracy, TrialResult
-from service.reports.page import page_of
-from service.reports.plots.confusion import confusion_table, draw_confusion
+from service.reports.page import build_page
+from service.reports.plots.confusion import build_confusion_table, draw_confusion
+from service.reports.plots.diagram_drawing import draw_diagram
 from service.reports.plots.diagram_parts import Highlights
-from service.reports.plots.drawn import draw_all, plots_of
-from service.reports.plots.drawn_diagrams import draw_diagram
+from service.reports.plots.grade_plots import draw_all_plots, list_plots
+from service.reports.plots.message_counts import build_sequence_diagram
 from service.reports.plots.path import draw_path
 from service.reports.plots.plot import DPI
-from service.reports.plots.sensor import draw_sensors, panels_of, strips_of
-from service.reports.plots.sensor_images import chosen_predictions, focus_image, sensor_image
-from service.reports.plots.sequence import Gap, Step, conversation
+from service.reports.plots.sensor import build_panels, build_strips, draw_sensors
+from service.reports.plots.sensor_images import crop_focus, select_predictions, to_rgb_image
+from service.reports.plots.sequence import Gap, Step, build_conversation
 from service.reports.plots.style import WIDTH
-from service.reports.plots.talk import sequence_diagram
-from service.reports.view import staff_view
+from service.reports.view import build_staff_view
 from sim.recording import Call, Message, Pose, Recording
 
 
@@ -36,7 +36,7 @@ def _talk(*messages: Message, calls: tuple[Call, ...] = ()) -> Recording:
 
 
 def test_names_of_all_plots() -> None:
-    assert set(draw_all(build.shape_grade())) == {
+    assert set(draw_all_plots(build.shape_grade())) == {
         "confusion-names-the-right-shape",
         "misread-names-the-right-shape",
         "predictions-names-the-right-shape",
@@ -44,9 +44,9 @@ def test_names_of_all_plots() -> None:
 
 
 def test_of_a_robot_that_stood_still_the_page_says_so_and_nothing_is_drawn() -> None:
-    for scene in page_of(staff_view(build.shape_grade())).scenes:
+    for scene in build_page(build_staff_view(build.shape_grade())).scenes:
         assert scene.notes[0] == "the robot did not move, so its path and sensors are not drawn"
-    for scene in page_of(staff_view(build.line_follower_grade())).scenes:
+    for scene in build_page(build_staff_view(build.line_follower_grade())).scenes:
         assert {plot.kind for plot in scene.plots} >= {"path", "sensors"}
         assert not any("stood still" in note for note in scene.notes)
 
@@ -56,23 +56,23 @@ def test_criteria_that_judge_the_same_answers_share_their_images() -> None:
     (judged,) = (result for result in grade.criteria if result.predictions)
     again = replace(judged, id="says-it-too", title="Says it too")
     both = replace(grade, criteria=(*grade.criteria, again))
-    assert draw_all(both).keys() == draw_all(grade).keys()
-    (seen,) = page_of(staff_view(both)).recognition
+    assert draw_all_plots(both).keys() == draw_all_plots(grade).keys()
+    (seen,) = build_page(build_staff_view(both)).recognition
     assert [table.title for table in seen.tables] == [judged.title, "Says it too"]
     assert {plot.kind for plot in seen.plots} == {"confusion", "misread", "predictions"}
     other = replace(again, predictions=again.predictions[1:])
-    assert len(page_of(staff_view(replace(grade, criteria=(*grade.criteria, other)))).recognition) == 2
+    assert len(build_page(build_staff_view(replace(grade, criteria=(*grade.criteria, other)))).recognition) == 2
 
 
 def test_at_most_256_colours_and_white_stays_white() -> None:
-    for data in draw_all(build.line_follower_grade()).values():
+    for data in draw_all_plots(build.line_follower_grade()).values():
         with Image.open(io.BytesIO(data)) as image:
             assert image.mode == "P"
             assert image.convert("RGB").getpixel((image.width - 2, 2)) == (255, 255, 255)
 
 
 def test_bytes_repeat_and_sizes_are_small() -> None:
-    first, second = draw_all(build.line_follower_grade()), draw_all(build.line_follower_grade())
+    first, second = draw_all_plots(build.line_follower_grade()), draw_all_plots(build.line_follower_grade())
     assert first == second
     for data in first.values():
         with Image.open(io.BytesIO(data)) as image:
@@ -84,16 +84,16 @@ def test_bytes_repeat_and_sizes_are_small() -> None:
 
 
 def test_hidden_trials_are_in_staff_plots_only() -> None:
-    for plot in plots_of(build.hidden_grade()):
+    for plot in list_plots(build.hidden_grade()):
         if "SECRET" in plot.title or plot.kind in ("confusion", "predictions"):
             assert plot.name.endswith("-staff")
-    students = {name for name in draw_all(build.hidden_grade()) if not name.endswith("-staff")}
+    students = {name for name in draw_all_plots(build.hidden_grade()) if not name.endswith("-staff")}
     assert "predictions-names-the-right-shape" in students
     assert not any("SECRET" in name for name in students)
 
 
 def test_hostile_text_is_drawn_not_interpreted() -> None:
-    drawn = draw_all(build.hostile_grade())
+    drawn = draw_all_plots(build.hostile_grade())
     assert all(len(data) < 150_000 for data in drawn.values())
 
 
@@ -126,18 +126,18 @@ def test_path_tells_units_start_end_and_images() -> None:
 
 def test_sensor_panels_and_events() -> None:
     recording = build.line_follower_grade().trials[1].recording
-    light, distance, *_, wheels = panels_of(recording)
+    light, distance, *_, wheels = build_panels(recording)
     assert [curve.label for curve in light.curves] == ["left", "right"]
     assert distance.curves[0].values[0] == recording.ticks.ultrasonic[0] / 10
     assert np.array_equal(wheels.curves[1].values, recording.ticks.right_position)
-    assert [strip.label for strip in strips_of(recording)] == ["said", "touch"]
+    assert [strip.label for strip in build_strips(recording)] == ["said", "touch"]
     shown = _texts(draw_sensors(build.line_follower_grade().trials[1], "t"))
     assert {"Ultrasonic, cm", "Reflected light, red 0–255", "simulated time, s"} <= set(shown)
 
 
 def test_conversation_names_each_party_once_and_orders_nested_calls() -> None:
     trial = build.shape_grade().trials[4]
-    told = conversation(trial.recording)
+    told = build_conversation(trial.recording)
     assert told.parties == ("robot", "responder", "parser", "agent", "logger", "network")
     arrows = [(step.kind, step.source, step.target) for step in told.steps if isinstance(step, Step)]
     assert arrows == [
@@ -151,16 +151,18 @@ def test_conversation_names_each_party_once_and_orders_nested_calls() -> None:
         ("call", "responder", "logger"),
         ("message", "responder", "robot"),
     ]
-    shown = _texts(draw_diagram(sequence_diagram(told), "t", "", Highlights()))
+    shown = _texts(draw_diagram(build_sequence_diagram(told), "t", "", Highlights()))
     assert all(shown.count(party) == 1 for party in told.parties)
     inner = [
-        line.sender for line in page_of(staff_view(build.shape_grade())).scenes[0].messages if line.kind == "inner"
+        line.sender
+        for line in build_page(build_staff_view(build.shape_grade())).scenes[0].messages
+        if line.kind == "inner"
     ]
     assert inner == [f"{source} → {target}" for kind, source, target in arrows if kind != "message"]
 
 
 def test_the_diagram_says_why_each_was_lost() -> None:
-    steps = [step for step in conversation(_talk(*build.ASTRAY)).steps if isinstance(step, Step)]
+    steps = [step for step in build_conversation(_talk(*build.ASTRAY)).steps if isinstance(step, Step)]
     assert [(step.kind, step.note, step.label) for step in steps] == [
         ("lost", "lost by chance", "PY::0"),
         ("lost", "out of range", "PY::0 (1601 mm away)"),
@@ -174,15 +176,15 @@ def test_the_diagram_says_why_each_was_lost() -> None:
 def test_of_many_tries_the_one_that_got_through_is_shown() -> None:
     lost = tuple(Message(float(t), "robot", "PY::0", None, None, "lost", "chance") for t in range(30))
     through = (Message(30.0, "robot", "PY::0", 30.0), Message(30.1, "responder", "saw 0", 30.2, 30))
-    last = [step for step in conversation(_talk(*lost, *through)).steps if isinstance(step, Step)][-2:]
+    last = [step for step in build_conversation(_talk(*lost, *through)).steps if isinstance(step, Step)][-2:]
     assert [(step.kind, step.label) for step in last] == [("message", "PY::0"), ("message", "saw 0")]
 
 
 def test_lost_messages_are_told_apart() -> None:
-    told = conversation(build.faulty_grade().trials[1].recording)
+    told = build_conversation(build.faulty_grade().trials[1].recording)
     kinds = [step.kind for step in told.steps if isinstance(step, Step)]
     assert kinds == ["message", "lost", "message", "silence", "lost"]
-    (talk, *_) = (scene for scene in page_of(staff_view(build.faulty_grade())).scenes if scene.messages)
+    (talk, *_) = (scene for scene in build_page(build_staff_view(build.faulty_grade())).scenes if scene.messages)
     assert [line.arrived for line in talk.messages if line.kind == "wrong"] == ["never (lost)", "never (lost)"]
 
 
@@ -194,7 +196,7 @@ def test_long_conversations_are_cut_but_keep_what_went_wrong() -> None:
         messages.append(
             Message(float(count), "responder", f"saw {count}", arrived, 2 * count, "" if arrived else "lost")
         )
-    told = conversation(_talk(*messages))
+    told = build_conversation(_talk(*messages))
     assert (told.shown, told.total) == (6, 40)
     labels = [step.label for step in told.steps if isinstance(step, Step)]
     assert "PY::0" in labels
@@ -202,18 +204,20 @@ def test_long_conversations_are_cut_but_keep_what_went_wrong() -> None:
     gaps = [step.count for step in told.steps if isinstance(step, Gap)]
     assert sum(gaps) == 34
     trial = TrialResult("a", 0, 1, 0, 0, "visible", _talk(*messages))
-    (scene,) = page_of(staff_view(replace(build.faulty_grade(), trials=(trial,), criteria=()))).scenes
+    (scene,) = build_page(build_staff_view(replace(build.faulty_grade(), trials=(trial,), criteria=()))).scenes
     assert (len(scene.messages), scene.more_messages) == (40, 40)
 
 
 def test_answers_to_nothing_and_strange_indices_are_shown_too() -> None:
-    told = conversation(_talk(Message(0.0, "responder", "hello", 0.1, 7), Message(0.2, "responder", "again", 0.3)))
+    told = build_conversation(
+        _talk(Message(0.0, "responder", "hello", 0.1, 7), Message(0.2, "responder", "again", 0.3))
+    )
     assert [step.label for step in told.steps if isinstance(step, Step)] == ["hello", "again"]
 
 
 def test_confusion_counts_totals_and_missing_answers() -> None:
     accuracy = Accuracy(0.5, 0.2, 0.8, 4, ("a", "b"), (("a", "a", 2), ("b", None, 1), ("b", "zebra", 1)))
-    table = confusion_table(accuracy)
+    table = build_confusion_table(accuracy)
     assert table.answers == ("a", "b", "zebra", "no answer")
     assert table.counts == ((2, 0, 0, 0), (0, 0, 1, 1))
     assert table.totals == (2, 2)
@@ -224,8 +228,8 @@ def test_confusion_counts_totals_and_missing_answers() -> None:
 
 def test_sensor_images_and_focus() -> None:
     image = build.shape_grade().trials[0].recording.images[0]
-    assert sensor_image(image).size == (20, 20)
-    focus = focus_image(image)
+    assert to_rgb_image(image).size == (20, 20)
+    focus = crop_focus(image)
     assert (focus.size, focus.mode) == ((14, 14), "L")
     assert focus.getpixel((7, 7)) == 0
     assert focus.getpixel((0, 0)) == 255
@@ -233,6 +237,6 @@ def test_sensor_images_and_focus() -> None:
 
 def test_wrong_images_come_first_when_not_all_fit() -> None:
     predictions = build.shape_grade().criteria[0].predictions * 10
-    chosen = chosen_predictions(predictions)
+    chosen = select_predictions(predictions)
     assert len(chosen) == 12
     assert [index for index in chosen if index % 6 == 4] == list(range(4, 60, 6))

@@ -4,7 +4,7 @@ from decimal import Decimal
 
 import pytest
 
-from service.reports.readable import message_words, number, one_line, readable
+from service.reports.display_text import abbreviate_message, format_decimal, to_display_text, to_one_line
 
 
 @pytest.mark.parametrize(
@@ -22,32 +22,32 @@ from service.reports.readable import message_words, number, one_line, readable
     ],
 )
 def test_invisible_characters_are_spelled_out(text: str, shown: str) -> None:
-    assert readable(text) == shown
-    assert readable(readable(text)) == shown
+    assert to_display_text(text) == shown
+    assert to_display_text(to_display_text(text)) == shown
 
 
 def test_long_text_is_cut_and_says_by_how_much() -> None:
-    assert readable("x" * 1_000_000, 100) == "x" * 100 + "… (999,900 more characters)"
-    assert readable("a\n" * 50, 2000, lines=3) == "a\na\na\n… (48 more lines)"
+    assert to_display_text("x" * 1_000_000, 100) == "x" * 100 + "… (999,900 more characters)"
+    assert to_display_text("a\n" * 50, 2000, lines=3) == "a\na\na\n… (48 more lines)"
 
 
 def test_escapes_and_stacked_accents_cannot_blow_text_up() -> None:
-    assert len(readable("\x00" * 100_000, 100)) < 700
-    assert readable("a" + "\u0301" * 8).count("\u0301") == 6
+    assert len(to_display_text("\x00" * 100_000, 100)) < 700
+    assert to_display_text("a" + "\u0301" * 8).count("\u0301") == 6
 
 
 def test_one_line() -> None:
-    assert one_line("  a \n b\r\n\nc ") == "a ⏎ b ⏎ c"
-    assert one_line("w" * 50, 10) == "wwwwwwwww…"
+    assert to_one_line("  a \n b\r\n\nc ") == "a ⏎ b ⏎ c"
+    assert to_one_line("w" * 50, 10) == "wwwwwwwww…"
 
 
 def test_a_image_message_is_named_not_listed() -> None:
-    assert message_words('IMG_DATA::{"left": "' + "1," * 3200) == "IMG_DATA::{left, right}"
-    assert message_words("PY::[1, 2]") == "PY::[1, 2]"
+    assert abbreviate_message('IMG_DATA::{"left": "' + "1," * 3200) == "IMG_DATA::{left, right}"
+    assert abbreviate_message("PY::[1, 2]") == "PY::[1, 2]"
 
 
 @pytest.mark.parametrize(
     ("marks", "shown"), [("4.00", "4"), ("2.50", "2.5"), ("0E+1", "0"), ("100", "100"), ("0", "0")]
 )
 def test_marks_as_people_write_them(marks: str, shown: str) -> None:
-    assert number(Decimal(marks)) == shown
+    assert format_decimal(Decimal(marks)) == shown

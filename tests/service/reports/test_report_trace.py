@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 import report_builders as build
-from service.reports.trace import trace
-from sim.recording import Datum, Line
+from service.reports.trace import build_trace
+from sim.recording import DatalogEntry, TimedText
 
 
 def test_keys_rows_and_values() -> None:
     recording = build.line_follower_recording(300)
-    document = trace(recording)
+    document = build_trace(recording)
     assert list(document) == [
         "ticks", "printed", "spoken", "messages", "datalog", "images", "verdict", "start", "end", "sha256", "sandbox",
     ]  # fmt: skip
@@ -30,10 +30,10 @@ def test_keys_rows_and_values() -> None:
 
 
 def test_images_of_both_kinds() -> None:
-    sent = trace(build.shape_grade().trials[2].recording)["images"][0]
+    sent = build_trace(build.shape_grade().trials[2].recording)["images"][0]
     assert len(sent["left"]) == len(sent["right"]) == 1600
     assert (sent["x"], sent["truth"], sent["source"]) == (360.0, "left facing triangle", "IMG_DATA")
-    collected = trace(build.line_follower_recording(60))["images"][0]
+    collected = build_trace(build.line_follower_recording(60))["images"][0]
     assert (collected["source"], collected["t"], len(collected["left"])) == ("image_data", 1.0, 1600)
 
 
@@ -42,16 +42,16 @@ def test_nothing_that_json_cannot_hold() -> None:
     strange = replace(
         recording,
         ticks=replace(recording.ticks, x=np.array([np.nan, np.inf, 1.0])),
-        datalog=(Datum(0.0, "\ud800", float("inf"), None),),
-        printed=(Line(0.0, "\ud800"),),
+        datalog=(DatalogEntry(0.0, "\ud800", float("inf"), None),),
+        printed=(TimedText(0.0, "\ud800"),),
     )
-    document = trace(strange)
+    document = build_trace(strange)
     assert document["ticks"]["x"] == [None, None, 1.0]
     assert document["datalog"][0]["value"] is None
     json.dumps(document, allow_nan=False, ensure_ascii=False).encode()
 
 
 def test_a_trial_without_ticks() -> None:
-    document = trace(build.line_follower_recording(0))
+    document = build_trace(build.line_follower_recording(0))
     assert document["ticks"]["left_rgb"] == []
     json.dumps(document, allow_nan=False)

@@ -14,15 +14,20 @@ import report_builders
 from page_reader import ATTRIBUTES, TAGS, Reader
 from service.grading.grade import Grade
 from service.reports import view
-from service.reports.similarity import as_plain, similarity_page, similarity_rows, what_it_says
-from service.reports.view import View, staff_similarity
-from service.similarity.behaviour import SameInTrial, TrialName
+from service.reports.similarity import (
+    build_similarity_rows,
+    describe_similarity,
+    render_similarity_page,
+    similarity_to_json,
+)
+from service.reports.view import View, build_similarity_view
+from service.similarity.behaviour import SharedBehaviour, TrialName
 from service.similarity.pairs import Similarity, SimilarPair
-from service.similarity.writing import AlikeSources, Stretch
+from service.similarity.similar_sources import SimilarSources, Stretch
 
 BOTH = ("<b>ada", "bob\u202e")
-ALIKE = AlikeSources(BOTH, ("robot.py", "<i>.py"), (0.75, 0.5), (80, 120), (Stretch((2, 3), (1, 4), 60),))
-TRIAL = SameInTrial(TrialName("<u>line", 0, True), "path", 2, 12)
+ALIKE = SimilarSources(BOTH, ("robot.py", "<i>.py"), (0.75, 0.5), (80, 120), (Stretch((2, 3), (1, 4), 60),))
+TRIAL = SharedBehaviour(TrialName("<u>line", 0, True), "path", 2, 12)
 FOUND = Similarity("shape-recognition", 12, (SimilarPair(BOTH, (ALIKE,), (TRIAL,)),), ("cyd",))
 
 
@@ -33,7 +38,7 @@ def text_of(assignment: str, student: str, file: str) -> str:
 
 @pytest.fixture(scope="module")
 def page() -> str:
-    return similarity_page(staff_similarity([FOUND]), text_of, "Similar submissions in <class>", 100)
+    return render_similarity_page(build_similarity_view([FOUND]), text_of, "Similar submissions in <class>", 100)
 
 
 def test_the_page_shows_both_sources_side_by_side_with_their_lines(page: str) -> None:
@@ -56,11 +61,11 @@ def test_nothing_that_a_student_wrote_becomes_markup_or_is_endless(page: str) ->
 
 def test_pairs_beyond_the_most_are_counted() -> None:
     many = dataclasses.replace(FOUND, pairs=FOUND.pairs * 5)
-    assert "3 more pairs are not shown." in similarity_page(staff_similarity([many]), text_of, "Alike", 2)
+    assert "3 more pairs are not shown." in render_similarity_page(build_similarity_view([many]), text_of, "Alike", 2)
 
 
 def test_json_has_everything() -> None:
-    (told,) = json.loads(json.dumps(as_plain(staff_similarity([FOUND]))))
+    (told,) = json.loads(json.dumps(similarity_to_json(build_similarity_view([FOUND]))))
     (pair,) = told["pairs"]
     assert told["too_short"] == ["cyd"]
     assert (pair["students"], pair["share"]) == (list(BOTH), 0.75)
@@ -69,17 +74,17 @@ def test_json_has_everything() -> None:
 
 
 def test_the_table_says_how_much_and_where() -> None:
-    assert what_it_says(FOUND).startswith(
+    assert describe_similarity(FOUND).startswith(
         "shape-recognition: 1 similar pair among 12 students; 1 student has too little code"
     )
-    assert similarity_rows(FOUND) == [(*BOTH, "75%", "robot.py and <i>.py", "1 trial")]
+    assert build_similarity_rows(FOUND) == [(*BOTH, "75%", "robot.py and <i>.py", "1 trial")]
 
 
 def test_no_grade_and_no_view_of_one_can_have_it_in_it() -> None:
     """Formats, reports and pages are made from a grade. No grade contains similarities, so no student can see them."""
     assert not any(kind.__module__.startswith("service.similarity") for kind in _within(Grade) | _within(View))
     makers = [each for each in vars(view).values() if "SimilarityView" in str(getattr(each, "__annotations__", {}))]
-    assert makers == [staff_similarity]
+    assert makers == [build_similarity_view]
 
 
 def _within(kind: object) -> set[type]:

@@ -10,14 +10,14 @@ import pytest
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.reports.faults import fault_groups
-from service.reports.formats.json_output import json_document
-from service.reports.page import page_of
-from service.reports.plots.drawn import draw_all, plots_of
-from service.reports.plots.sequence import Step, conversation
-from service.reports.trace import trace
-from service.reports.view import staff_view
-from service.store.grades.recordings import from_bytes, keep, to_bytes
+from service.reports.faults import group_faults
+from service.reports.formats.json_output import build_json_document
+from service.reports.page import build_page
+from service.reports.plots.grade_plots import draw_all_plots, list_plots
+from service.reports.plots.sequence import Step, build_conversation
+from service.reports.trace import build_trace
+from service.reports.view import build_staff_view
+from service.store.grades.recordings import encode_within_limit, from_bytes, to_bytes
 from sim.recording import Recording, Verdict
 from submissions.assignment.examples import read_example
 from submissions.assignment.reader import find_assignment
@@ -52,27 +52,27 @@ def test_a_stored_recording_has_its_partner(relayed: Grade) -> None:
 
 
 def test_what_is_too_large_of_either_is_cut(relayed: Grade) -> None:
-    kept = keep(relayed.trials[0].recording, 2500)
+    kept = encode_within_limit(relayed.trials[0].recording, 2500)
     assert len(kept.data) <= 2500
     assert all("too large" in each.notes[-1] for each in (kept.recording, partner_of(kept.recording)))
 
 
 def test_traces_and_json_have_both(relayed: Grade) -> None:
     recording = relayed.trials[0].recording
-    told = trace(recording)
+    told = build_trace(recording)
     assert told["partner"]["spoken"] == [[line.t, line.text] for line in partner_of(recording).spoken]
-    document = json.loads(json.dumps(json_document(staff_view(relayed))))
+    document = json.loads(json.dumps(build_json_document(build_staff_view(relayed))))
     assert document["trials"][0]["partner"]["spoken"] == ["I see grey"]
     assert document["trials"][0]["spoken"] == []
 
 
 def test_the_diagram_has_a_lane_for_each_and_every_text_once(relayed: Grade, crashed: Grade) -> None:
-    told = conversation(relayed.trials[0].recording, most_exchanges=50)
+    told = build_conversation(relayed.trials[0].recording, most_exchanges=50)
     assert told.parties == ("robot", "responder", "robot 2")
     arrows = [(step.source, step.target) for step in told.steps if isinstance(step, Step)]
     assert arrows.count(("robot", "responder")) == arrows.count(("responder", "robot")) == 1
     assert arrows.count(("robot 2", "responder")) == arrows.count(("responder", "robot 2")) == 4
-    linked = conversation(crashed.trials[0].recording)
+    linked = build_conversation(crashed.trials[0].recording)
     assert linked.parties == ("robot", "robot 2")
     assert [(step.kind, step.source, step.target) for step in linked.steps if isinstance(step, Step)] == [
         ("lost", "robot", "robot 2")
@@ -81,9 +81,9 @@ def test_the_diagram_has_a_lane_for_each_and_every_text_once(relayed: Grade, cra
 
 def test_a_fault_of_the_second_program_is_called_so(crashed: Grade) -> None:
     assert crashed.verdict is Verdict.PROGRAM_ERROR
-    (group,) = fault_groups(crashed)
+    (group,) = group_faults(crashed)
     assert group.where == "Program of the second robot, line 10"
-    (scene,) = page_of(staff_view(crashed)).scenes
+    (scene,) = build_page(build_staff_view(crashed)).scenes
     assert [entry.text for entry in scene.timeline if entry.kind == "fault"] == [
         "robot 2: IndexError: list index out of range"
     ]
@@ -103,9 +103,9 @@ def test_plots_are_drawn_and_name_both(relayed: Grade) -> None:
         (relayed, set()),
         (replace(relayed, trials=moved), {"path", "sensors"}),
     ):
-        told = {plot.kind: plot.alt for plot in plots_of(pair)}
+        told = {plot.kind: plot.alt for plot in list_plots(pair)}
         assert told.keys() == kinds
-        assert draw_all(pair).keys() == {plot.name for plot in plots_of(pair)}
+        assert draw_all_plots(pair).keys() == {plot.name for plot in list_plots(pair)}
     assert "Path of the second robot from (2000, 200) mm to (2000, 200) mm." in told["path"]
-    talk = page_of(staff_view(relayed)).scenes[0].talk
+    talk = build_page(build_staff_view(relayed)).scenes[0].talk
     assert "robot to responder 1, responder to robot 1, robot 2 to responder 4, responder to robot 2 4." in talk

@@ -7,16 +7,16 @@ from functools import cache
 
 import pytest
 
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grade import TrialResult
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.reports.similarity import what_it_says
-from service.similarity.behaviour import behaviour_of
-from service.similarity.pairs import Similarity, similarity
-from service.similarity.sources import given_with
-from service.similarity.tokens import tokens_of
-from service.similarity.writing import source_of
+from service.reports.similarity import describe_similarity
+from service.similarity.behaviour import extract_behaviour
+from service.similarity.pairs import Similarity, compare_submissions
+from service.similarity.similar_sources import build_source
+from service.similarity.sources import collect_given_code
+from service.similarity.tokens import tokenise_source
 from submissions.assignment.reader import find_assignment
 from submissions.submission import Submission
 
@@ -62,13 +62,13 @@ def _edge_followers(number: int) -> dict[str, str]:
 
 @cache
 def _trials(program: str, runner: TrialRunner) -> tuple[TrialResult, ...]:
-    return grade(Submission("student", Code("robot.py", program.lstrip())), ASSIGNMENT, runner=runner).trials
+    return grade(Submission("student", SourceFile("robot.py", program.lstrip())), ASSIGNMENT, runner=runner).trials
 
 
 def _compared(programs: Mapping[str, str], runner: TrialRunner, trials: int) -> Similarity:
-    behaviours = {student: behaviour_of(_trials(text, runner)[:trials]) for student, text in programs.items()}
-    sources = [source_of(student, "robot.py", program) for student, program in programs.items()]
-    return similarity(ASSIGNMENT.id, sources, given_with(ASSIGNMENT), behaviours)
+    behaviours = {student: extract_behaviour(_trials(text, runner)[:trials]) for student, text in programs.items()}
+    sources = [build_source(student, "robot.py", program) for student, program in programs.items()]
+    return compare_submissions(ASSIGNMENT.id, sources, collect_given_code(ASSIGNMENT), behaviours)
 
 
 @pytest.mark.parametrize("trials", [pytest.param(1, marks=pytest.mark.long), 2])
@@ -95,8 +95,8 @@ def test_one_way_in_three_spellings_is_no_pair(runner: TrialRunner, others: int)
     assert found.pairs == ()
     assert found.same == ()
     assert found.same_recordings == (tuple(squares),)
-    assert "no pairs" not in what_it_says(found)
-    assert "1 group with a common file or common recordings" in what_it_says(found)
+    assert "no pairs" not in describe_similarity(found)
+    assert "1 group with a common file or common recordings" in describe_similarity(found)
 
 
 @pytest.mark.parametrize(
@@ -115,7 +115,7 @@ def test_one_way_in_three_spellings_is_no_pair(runner: TrialRunner, others: int)
     ],
 )
 def test_order_of_operands_and_brackets_do_not_count(one: str, other: str) -> None:
-    assert tokens_of(one).numbers.tolist() == tokens_of(other).numbers.tolist()
+    assert tokenise_source(one).numbers.tolist() == tokenise_source(other).numbers.tolist()
 
 
 @pytest.mark.parametrize(
@@ -131,4 +131,4 @@ def test_order_of_operands_and_brackets_do_not_count(one: str, other: str) -> No
     ],
 )
 def test_other_sums_are_other_tokens(one: str, other: str) -> None:
-    assert tokens_of(one).numbers.tolist() != tokens_of(other).numbers.tolist()
+    assert tokenise_source(one).numbers.tolist() != tokenise_source(other).numbers.tolist()

@@ -8,12 +8,18 @@ from dataclasses import replace
 import pytest
 
 import report_builders
-from responders.code import Code
+from responders.source_file import SourceFile
 from service.grading.grade import TrialResult
-from service.similarity.behaviour import FEWEST_STUDENTS, SameInTrial, TrialName, behaviour_of, same_in_trials
-from service.similarity.pairs import similarity
-from service.similarity.writing import source_of
-from sim.recording import Fault, Line, Message, Recording, Verdict
+from service.similarity.behaviour import (
+    FEWEST_STUDENTS,
+    SharedBehaviour,
+    TrialName,
+    extract_behaviour,
+    find_shared_behaviour,
+)
+from service.similarity.pairs import compare_submissions
+from service.similarity.similar_sources import build_source
+from sim.recording import Fault, Message, Recording, TimedText, Verdict
 from submissions.submission import Submission
 
 STILL = replace(report_builders.line_follower_recording(0), printed=(), spoken=())
@@ -24,11 +30,13 @@ def trials(*recordings: Recording) -> list[TrialResult]:
 
 
 def said(text: str) -> Recording:
-    return replace(STILL, printed=(Line(0.1, text),), messages=(Message(0.1, "robot", text, 0.2),))
+    return replace(STILL, printed=(TimedText(0.1, text),), messages=(Message(0.1, "robot", text, 0.2),))
 
 
-def same(of_students: Sequence[Sequence[Recording]]) -> dict[tuple[str, str], tuple[SameInTrial, ...]]:
-    return same_in_trials({f"s{number:02}": behaviour_of(trials(*each)) for number, each in enumerate(of_students)})
+def same(of_students: Sequence[Sequence[Recording]]) -> dict[tuple[str, str], tuple[SharedBehaviour, ...]]:
+    return find_shared_behaviour(
+        {f"s{number:02}": extract_behaviour(trials(*each)) for number, each in enumerate(of_students)}
+    )
 
 
 def driven(ticks: int) -> Recording:
@@ -37,7 +45,7 @@ def driven(ticks: int) -> Recording:
 
 def test_a_path_that_only_two_drove_is_named_with_its_trial() -> None:
     found = same([[driven(30)], [driven(30)], *([driven(31 + number)] for number in range(8))])
-    assert found == {("s00", "s01"): (SameInTrial(TrialName("line", 0, True), "path", 2, 10),)}
+    assert found == {("s00", "s01"): (SharedBehaviour(TrialName("line", 0, True), "path", 2, 10),)}
 
 
 def test_a_path_that_many_drove_says_nothing() -> None:
@@ -73,15 +81,17 @@ def test_a_trial_that_the_machine_cut_is_not_compared(verdict: Verdict) -> None:
 
 
 def test_robots_alone_make_a_pair_only_where_they_did_the_same_often() -> None:
-    submitted = {f"s{number:02}": Submission(f"s{number:02}", Code("robot.py", "x = 1\n")) for number in range(10)}
-    sources = [source_of(student, "robot.py", "x = 1\n") for student in submitted]
+    submitted = {
+        f"s{number:02}": Submission(f"s{number:02}", SourceFile("robot.py", "x = 1\n")) for number in range(10)
+    }
+    sources = [build_source(student, "robot.py", "x = 1\n") for student in submitted]
 
     def pairs(*shared: int) -> list[tuple[str, str]]:
         own = [[driven(40 + 9 * number + trial) for trial in range(4)] for number in range(10)]
         for trial in shared:
             own[1][trial] = own[0][trial]
-        behaviours = {student: behaviour_of(trials(*each)) for student, each in zip(submitted, own, strict=True)}
-        return [pair.students for pair in similarity("line", sources, (), behaviours).pairs]
+        behaviours = {student: extract_behaviour(trials(*each)) for student, each in zip(submitted, own, strict=True)}
+        return [pair.students for pair in compare_submissions("line", sources, (), behaviours).pairs]
 
     assert pairs(0) == []
     assert pairs(0, 2) == [("s00", "s01")]

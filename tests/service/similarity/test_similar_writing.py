@@ -6,24 +6,26 @@ import time
 
 import pytest
 
-from benchmarks.harness.copyists import COPYISTS
-from service.similarity import writing
-from service.similarity.sources import given_with
-from service.similarity.tokens import MOST_TOKENS, tokens_of
-from service.similarity.writing import AlikeSources, Source, Writing, compare, source_of
-from submissions.assignment.examples import examples
+from benchmarks.harness.disguises import DISGUISES
+from service.similarity import similar_sources
+from service.similarity.similar_sources import SimilarSources, Source, SourceComparison, build_source, compare_sources
+from service.similarity.sources import collect_given_code
+from service.similarity.tokens import MOST_TOKENS, tokenise_source
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
 
 
 def example(assignment: str, name: str, file: str = "responder.py") -> str:
-    return (examples(assignment) / name / file).read_text(encoding="utf-8")
+    return (locate_examples(assignment) / name / file).read_text(encoding="utf-8")
 
 
-def of_two(one: str, other: str, given: tuple[str, ...] = ()) -> Writing:
-    return compare([source_of("ada", "responder.py", one), source_of("bob", "responder.py", other)], given)
+def of_two(one: str, other: str, given: tuple[str, ...] = ()) -> SourceComparison:
+    return compare_sources(
+        [build_source("ada", "responder.py", one), build_source("bob", "responder.py", other)], given
+    )
 
 
-def alike(found: Writing) -> AlikeSources:
+def alike(found: SourceComparison) -> SimilarSources:
     assert found.too_short == ()
     (pair,) = found.alike
     return pair
@@ -36,15 +38,15 @@ def program(number: int, lines: int = 14) -> str:
     )
 
 
-@pytest.mark.parametrize("how", COPYISTS)
+@pytest.mark.parametrize("how", DISGUISES)
 @pytest.mark.parametrize(
     ("assignment", "name"), [("rules-without-a-network", "reference"), ("shapes-on-a-track", "reference")]
 )
 def test_a_copy_is_found_however_it_is_disguised(how: str, assignment: str, name: str) -> None:
     text = example(assignment, name)
-    pair = alike(of_two(text, COPYISTS[how](text), given_with(find_assignment(assignment))))
+    pair = alike(of_two(text, DISGUISES[how](text), collect_given_code(find_assignment(assignment))))
     assert pair.students == ("ada", "bob")
-    assert pair.share >= writing.ALIKE
+    assert pair.share >= similar_sources.SIMILARITY_THRESHOLD
 
 
 @pytest.mark.parametrize(
@@ -57,8 +59,10 @@ def test_a_copy_is_found_however_it_is_disguised(how: str, assignment: str, name
     ],
 )
 def test_honest_solutions_of_one_assignment_are_not_alike(assignment: str, one: str, other: str) -> None:
-    found = of_two(example(assignment, one), example(assignment, other), given_with(find_assignment(assignment)))
-    assert found == Writing((), ())
+    found = of_two(
+        example(assignment, one), example(assignment, other), collect_given_code(find_assignment(assignment))
+    )
+    assert found == SourceComparison((), ())
 
 
 def test_a_copied_part_of_a_larger_source_is_found() -> None:
@@ -70,24 +74,24 @@ def test_a_copied_part_of_a_larger_source_is_found() -> None:
 
 def test_code_that_was_given_is_nobodys_copy() -> None:
     given, one, other = program(1), program(2), program(3)
-    assert compare(
-        [source_of("ada", "a.py", f"{given}\n{one}"), source_of("bob", "a.py", f"{other}\n{given}")], [given]
-    ) == Writing((), ())
+    assert compare_sources(
+        [build_source("ada", "a.py", f"{given}\n{one}"), build_source("bob", "a.py", f"{other}\n{given}")], [given]
+    ) == SourceComparison((), ())
     # Too little code is left to compare, so there is no result for either.
-    assert of_two(given, f"{given}\nspeed = 3", (given,)) == Writing((), ("ada", "bob"))
+    assert of_two(given, f"{given}\nspeed = 3", (given,)) == SourceComparison((), ("ada", "bob"))
 
 
 def test_code_that_many_of_a_batch_share_is_nobodys_copy() -> None:
     shared = program(1)
-    sources = [source_of(f"student {number}", "robot.py", f"{shared}\n{program(number)}") for number in range(2, 14)]
-    assert compare(sources, []).alike == ()
-    few = [*sources, source_of("eve", "robot.py", program(2)), source_of("ivy", "robot.py", program(3))]
-    assert {pair.students for pair in compare(few, []).alike} == {("eve", "student 2"), ("ivy", "student 3")}
+    sources = [build_source(f"student {number}", "robot.py", f"{shared}\n{program(number)}") for number in range(2, 14)]
+    assert compare_sources(sources, []).alike == ()
+    few = [*sources, build_source("eve", "robot.py", program(2)), build_source("ivy", "robot.py", program(3))]
+    assert {pair.students for pair in compare_sources(few, []).alike} == {("eve", "student 2"), ("ivy", "student 3")}
 
 
 def test_two_files_of_one_student_are_not_compared() -> None:
-    sources = [source_of("ada", "robot.py", program(1)), source_of("ada", "helper.py", program(1))]
-    assert compare(sources, []).alike == ()
+    sources = [build_source("ada", "robot.py", program(1)), build_source("ada", "helper.py", program(1))]
+    assert compare_sources(sources, []).alike == ()
 
 
 def test_tables_of_numbers_are_not_alike() -> None:
@@ -95,7 +99,7 @@ def test_tables_of_numbers_are_not_alike() -> None:
         f"{program(number)}\ntable = [\n" + "".join(f"    [{number}, {row}, 7],\n" for row in range(300)) + "]\n"
         for number in (1, 2)
     )
-    assert of_two(one, other) == Writing((), ())
+    assert of_two(one, other) == SourceComparison((), ())
 
 
 def test_stretches_name_the_lines_of_both() -> None:
@@ -114,8 +118,8 @@ def test_stretches_of_what_changed_places_point_crosswise() -> None:
 def test_names_numbers_texts_and_layout_do_not_count() -> None:
     one = "total = 0\nfor place in range(9):\n    total += read(place, 'left')\n"
     other = 't=1 # sum\nfor i in range(10) :\n\tt += read( i,\n  "right" )\n'
-    assert tokens_of(one).numbers.tolist() == tokens_of(other).numbers.tolist()
-    assert tokens_of(one).numbers.tolist() != tokens_of(one.replace("read", "write")).numbers.tolist()
+    assert tokenise_source(one).numbers.tolist() == tokenise_source(other).numbers.tolist()
+    assert tokenise_source(one).numbers.tolist() != tokenise_source(one.replace("read", "write")).numbers.tolist()
 
 
 @pytest.mark.parametrize(
@@ -138,33 +142,36 @@ def test_names_numbers_texts_and_layout_do_not_count() -> None:
 def test_what_is_no_python_is_compared_too_and_nothing_hangs(text: str) -> None:
     began = time.process_time()
     found = of_two(text, text)
-    assert len(tokens_of(text)) <= MOST_TOKENS
+    assert len(tokenise_source(text)) <= MOST_TOKENS
     assert all(pair.share == 1 for pair in found.alike)
     assert time.process_time() - began < 20
 
 
 def test_only_candidates_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
     compared: list[str] = []
-    inner = writing._compared
+    inner = similar_sources._compare_pair
 
-    def counted(one: writing._Indexed, other: writing._Indexed) -> AlikeSources:
+    def counted(one: similar_sources._IndexedSource, other: similar_sources._IndexedSource) -> SimilarSources:
         compared.append(one.source.student)
         return inner(one, other)
 
-    monkeypatch.setattr(writing, "_compared", counted)
-    sources: list[Source] = [source_of(str(number), "robot.py", program(number)) for number in range(200)]
-    found = compare([*sources, source_of("eve", "robot.py", program(7))], [])
+    monkeypatch.setattr(similar_sources, "_compare_pair", counted)
+    sources: list[Source] = [build_source(str(number), "robot.py", program(number)) for number in range(200)]
+    found = compare_sources([*sources, build_source("eve", "robot.py", program(7))], [])
     assert [pair.students for pair in found.alike] == [("7", "eve")]
     assert len(compared) == 1
 
 
 def test_of_too_many_pairs_those_with_most_in_common_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(writing, "MOST_PAIRS", 2)
+    monkeypatch.setattr(similar_sources, "MOST_PAIRS", 2)
     half = f"{program(1)}\n{program(2)}"
-    sources = [source_of("ada", "robot.py", program(1)), source_of("bob", "robot.py", half)]
-    sources += [source_of(str(number), "robot.py", program(number)) for number in range(3, 18)]
-    sources += [source_of("eve", "robot.py", program(3)), source_of("ivy", "robot.py", f"{program(4)}\n{program(5)}")]
-    found = compare(sources, [])
+    sources = [build_source("ada", "robot.py", program(1)), build_source("bob", "robot.py", half)]
+    sources += [build_source(str(number), "robot.py", program(number)) for number in range(3, 18)]
+    sources += [
+        build_source("eve", "robot.py", program(3)),
+        build_source("ivy", "robot.py", f"{program(4)}\n{program(5)}"),
+    ]
+    found = compare_sources(sources, [])
     assert (len(found.alike), found.not_compared) == (2, 2)
 
 
@@ -172,13 +179,13 @@ def test_a_file_that_groups_share_is_named_however_many_copied_it() -> None:
     """Five programs of six students each. Too much of each is common for any pair to have enough unique code."""
     shared = program(0, 12)
     sources = [
-        source_of(f"s{number:02}", "robot.py", f"{shared}\n{program(number % 5, 3)}\n# no {number}")
+        build_source(f"s{number:02}", "robot.py", f"{shared}\n{program(number % 5, 3)}\n# no {number}")
         for number in range(30)
     ]
-    found = compare(sources, ())
+    found = compare_sources(sources, ())
     assert found.alike == ()
     assert found.same == tuple(tuple(f"s{number:02}" for number in range(first, 30, 5)) for first in range(5))
     assert found.too_short == ()
-    assert compare(sources, (shared, *(program(number, 3) for number in range(5)))).same == ()
-    everybody = [source_of(f"s{number}", "robot.py", shared) for number in range(9)]
-    assert compare(everybody, ()).same == ()
+    assert compare_sources(sources, (shared, *(program(number, 3) for number in range(5)))).same == ()
+    everybody = [build_source(f"s{number}", "robot.py", shared) for number in range(9)]
+    assert compare_sources(everybody, ()).same == ()

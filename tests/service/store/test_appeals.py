@@ -10,8 +10,8 @@ from builders import grading_request
 from service.store import audit
 from service.store.batches.intake import accept_batch
 from service.store.courses import open_assignments
-from service.store.courses.hidden_names import HiddenNames, hidden_names_of
-from service.store.courses.versions import freeze
+from service.store.courses.assignment_versions import freeze_assignment
+from service.store.courses.hidden_names import HiddenNames, load_hidden_names
 from service.store.engine import Store
 from service.store.grades import appeals, results
 from service.store.grades.appeals import LONGEST_TEXT
@@ -32,19 +32,19 @@ def _graded(store: Store) -> None:
 
 
 def _grade(store: Store) -> None:
-    claim = jobs.claim(store, "worker", 60)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), claim.at)
+    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), claim.at)
 
 
 def _ask(store: Store, text: str = "Why?") -> int:
     with store.transaction() as session:
-        return appeals.ask(session, 1, text)
+        return appeals.open_appeal(session, 1, text)
 
 
 def _answer(store: Store, number: int, text: str = "Because.", course: int = 1) -> None:
     with store.transaction() as session:
-        appeals.answer(session, course, number, text, "grace")
+        appeals.answer_appeal(session, course, number, text, "grace")
 
 
 def test_one_asks_is_answered_and_may_ask_again(store: Store) -> None:
@@ -53,18 +53,18 @@ def test_one_asks_is_answered_and_may_ask_again(store: Store) -> None:
     with pytest.raises(UsageError, match="you already have an open appeal"):
         _ask(store, "And why?")
     with store.reading() as session:
-        (line,) = appeals.open_in_course(session, 1, NONE_HIDDEN)
+        (line,) = appeals.list_open_appeals(session, 1, NONE_HIDDEN)
     assert (line.who, line.text, line.answer) == ("ada", "Why?\nLine 3 prints it.", None)
     _answer(store, first)
     with pytest.raises(UsageError, match="already has an answer"):
         _answer(store, first, "Really.")
     second = _ask(store, "And why?")
     with store.reading() as session:
-        assert [each.id for each in appeals.open_in_course(session, 1, NONE_HIDDEN)] == [second]
-        (answered,) = appeals.answered_in_course(session, 1, NONE_HIDDEN)
-        assert [each.id for each in appeals.of_submission(session, 1)] == [second, first]
-        assert appeals.open_in_course(session, 2, NONE_HIDDEN) == []
-        (entry,) = audit.entries(session, "submission", "1")
+        assert [each.id for each in appeals.list_open_appeals(session, 1, NONE_HIDDEN)] == [second]
+        (answered,) = appeals.list_answered_appeals(session, 1, NONE_HIDDEN)
+        assert [each.id for each in appeals.load_appeals(session, 1)] == [second, first]
+        assert appeals.list_open_appeals(session, 2, NONE_HIDDEN) == []
+        (entry,) = audit.load_entries(session, "submission", "1")
     assert (answered.answer, answered.answered_by) == ("Because.", "grace")
     assert (entry.actor, entry.action, entry.detail) == ("grace", "answer appeal", {"appeal": first})
 
@@ -97,10 +97,10 @@ def test_who_asks_is_not_named_while_names_are_hidden(store: Store) -> None:
     _graded(store)
     _ask(store)
     with store.transaction() as session:
-        open_assignments.prepare(session, 1, freeze(grading_request("ada").assignment))
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(grading_request("ada").assignment))
         open_assignments.hide_names(session, 1, "echo-responder", True)
-    hidden = hidden_names_of(store, 1)
+    hidden = load_hidden_names(store, 1)
     with store.reading() as session:
-        (line,) = appeals.open_in_course(session, 1, hidden)
-    assert line.who == hidden.called("echo-responder", "ada")
+        (line,) = appeals.list_open_appeals(session, 1, hidden)
+    assert line.who == hidden.label_student("echo-responder", "ada")
     assert line.who.startswith("Participant ")

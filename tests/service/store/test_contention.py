@@ -22,7 +22,7 @@ import service
 from builders import accept_one, grading_request
 from paths import ROOT
 from processes import until
-from service.lti.keys import signing_key
+from service.lti.keys import ensure_signing_key
 from service.store.batches import intake
 from service.store.batches.intake import accept_batch
 from service.store.courses import policies
@@ -32,9 +32,9 @@ from service.store.grades import appeals, overrides, results
 from service.store.models import Base, Extension, Job, Policy
 from service.store.people import lti
 from service.store.people.lti import Registration
-from service.store.queue import jobs, lease_reaper, self_tests, tryouts
-from service.store.queue.jobs import Retry
-from service.store.states import JobState, Lane, Standing
+from service.store.queue import jobs, lease_reaper, self_tests, test_runs
+from service.store.queue.jobs import RetryPolicy
+from service.store.states import JobQueue, JobState, Standing
 from service.store.web_tables import LtiKey, LtiPlatform
 from sim.errors import Cancelled, UsageError
 
@@ -45,9 +45,9 @@ ROUNDS = 25
 
 
 def _finish_next(store: Store, worker: str) -> None:
-    claim = jobs.claim(store, worker, 60)
+    claim = jobs.claim_job(store, worker, 60)
     if claim is not None:
-        jobs.finish(store, claim, results.prepare(GRADE), datetime.now(UTC))
+        jobs.finish_job(store, claim, results.prepare_grade(GRADE), datetime.now(UTC))
 
 
 @retry_conflicts
@@ -62,9 +62,9 @@ def _any_done(store: Store, chance: random.Random) -> str:
 
 
 def _lose_leases(store: Store, chance: random.Random) -> None:
-    jobs.claim(store, f"silent-{chance.randrange(3)}", -1)
-    lease_reaper.requeue_lost(store, Retry(0.0))
-    lease_reaper.note_notices(store, Lane.BATCH, 10)
+    jobs.claim_job(store, f"silent-{chance.randrange(3)}", -1)
+    lease_reaper.requeue_lost_jobs(store, RetryPolicy(0.0))
+    lease_reaper.mark_notified(store, JobQueue.BATCH, 10)
 
 
 def test_staff_workers_and_the_lease_reaper_at_once(store: Store) -> None:
@@ -76,12 +76,12 @@ def test_staff_workers_and_the_lease_reaper_at_once(store: Store) -> None:
         lambda _: acting.regrade(store, batch.id, None, max_attempts=1000, actor="grace"),
         lambda chance: acting.regrade_one(store, _any_done(store, chance), None, max_attempts=1000, actor="grace"),
         lambda chance: _mark(store, overrides.set_marks, _any_done(store, chance), Decimal(0), "because"),
-        lambda chance: _mark(store, overrides.excuse, _any_done(store, chance), "because"),
-        lambda chance: _mark(store, overrides.withdraw, _any_done(store, chance)),
+        lambda chance: _mark(store, overrides.excuse_criterion, _any_done(store, chance), "because"),
+        lambda chance: _mark(store, overrides.withdraw_override, _any_done(store, chance)),
         lambda _: _finish_next(store, "worker"),
         lambda _: _finish_next(store, "worker"),
         lambda chance: _lose_leases(store, chance),
-        lambda chance: self_tests.quarantine(store, f"silent-{chance.randrange(3)}", "it adds wrongly"),
+        lambda chance: self_tests.quarantine_worker(store, f"silent-{chance.randrange(3)}", "it adds wrongly"),
     ]
     start = threading.Barrier(len(actions))
 
@@ -105,7 +105,7 @@ def test_staff_workers_and_the_lease_reaper_at_once(store: Store) -> None:
         counts = dict(session.execute(standing.group_by(Job.submission_id)).all())
         assert (len(counts), set(counts.values())) == (len(STUDENTS), {1})
         for job_id, marks in session.execute(select(Job.id, Job.marks).where(Job.state == JobState.DONE)).all():
-            assert marks == sum(line.marks for line in overrides.criterion_marks(session, job_id)), job_id
+            assert marks == sum(line.marks for line in overrides.load_criterion_marks(session, job_id)), job_id
 
 
 def _waiting(store: Store) -> bool:
@@ -121,7 +121,7 @@ def test_marks_by_hand_wait_for_a_regrade_that_is_stored_and_do_not_deadlock(ser
     accepted = accept_one(store)
     _finish_next(store, "worker")
     again = acting.regrade_one(store, accepted.job_id, None, max_attempts=3, actor="grace")
-    claim = jobs.claim(store, "worker", 60)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
     assert claim.job_id == again
     locked, done = threading.Event(), threading.Event()
@@ -167,15 +167,15 @@ def _set_marks(session: Session, job_id: str, actor: str, seen: int) -> None:
 
 
 def _excuse(session: Session, job_id: str, actor: str, seen: int) -> None:
-    overrides.excuse(session, job_id, CRITERION, "because", actor, seen=seen)
+    overrides.excuse_criterion(session, job_id, CRITERION, "because", actor, seen=seen)
 
 
 def _withdraw(session: Session, job_id: str, actor: str, seen: int) -> None:
-    overrides.withdraw(session, job_id, CRITERION, actor, seen=seen)
+    overrides.withdraw_override(session, job_id, CRITERION, actor, seen=seen)
 
 
 def _answer_appeal(session: Session, job_id: str, actor: str, seen: int) -> None:
-    appeals.answer(session, 1, 1, "It is right.", actor)
+    appeals.answer_appeal(session, 1, 1, "It is right.", actor)
 
 
 @pytest.mark.long
@@ -218,18 +218,20 @@ def _set_policy(session: Session) -> None:
 
 
 def _extend(session: Session) -> None:
-    policies.extend(session, 1, "", None, 1)
+    policies.extend_policy(session, 1, "", None, 1)
 
 
 def _register(session: Session) -> None:
     site = "https://platform.example.org"
-    lti.register(session, Registration("Moodle", site, "c", ("1",), f"{site}/auth", f"{site}/token", f"{site}/keys"))
+    lti.register_platform(
+        session, Registration("Moodle", site, "c", ("1",), f"{site}/auth", f"{site}/token", f"{site}/keys")
+    )
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("make", "table"),
-    [(_set_policy, Policy), (_extend, Extension), (_register, LtiPlatform), (signing_key, LtiKey)],
+    [(_set_policy, Policy), (_extend, Extension), (_register, LtiPlatform), (ensure_signing_key, LtiKey)],
 )
 def test_of_two_who_make_the_first_row_at_once_one_does(
     server: Store, make: Callable[[Session], object], table: type[Base]
@@ -250,10 +252,10 @@ def _marked_by_hand(store: Store) -> tuple[str, int]:
     accepted = accept_one(store)
     _finish_next(store, "worker")
     with store.transaction() as session:
-        overrides.excuse(session, accepted.job_id, CRITERION, "because", "grace")
-        appeals.ask(session, accepted.submission_id, "Please look again.")
+        overrides.excuse_criterion(session, accepted.job_id, CRITERION, "because", "grace")
+        appeals.open_appeal(session, accepted.submission_id, "Please look again.")
     with store.reading() as session:
-        return accepted.job_id, overrides.of_jobs(session, [accepted.job_id])[accepted.job_id][CRITERION].id
+        return accepted.job_id, overrides.load_overrides(session, [accepted.job_id])[accepted.job_id][CRITERION].id
 
 
 @pytest.mark.long
@@ -262,9 +264,11 @@ def test_one_student_tries_one_program_at_a_time(server: Store) -> None:
 
     def second() -> None:
         with server.transaction() as session:
-            tryouts.ask(session, enrolment_id, version_id, b"")
+            test_runs.queue_test_run(session, enrolment_id, version_id, b"")
 
-    asked = _second_waits(server, lambda session: tryouts.ask(session, enrolment_id, version_id, b""), second)
+    asked = _second_waits(
+        server, lambda session: test_runs.queue_test_run(session, enrolment_id, version_id, b""), second
+    )
     with pytest.raises(UsageError, match="not completed yet"):
         asked.result()
 
@@ -286,12 +290,12 @@ def test_an_attempt_that_is_claimed_while_the_next_comes_in_counts_alone(
     claims: list[jobs.Claim | None] = []
 
     def rule_then_claim(*asked: Any) -> policies.Ruling:
-        ruling = policies.rule(*asked)
-        claims.append(jobs.claim(server, "worker", 60))
+        ruling = policies.apply_policy(*asked)
+        claims.append(jobs.claim_job(server, "worker", 60))
         return ruling
 
-    monkeypatch.setattr(intake, "rule", rule_then_claim)
-    newer = intake.accept(server, grading_request("ada", "print('newer')\n"), max_attempts=1)
+    monkeypatch.setattr(intake, "apply_policy", rule_then_claim)
+    newer = intake.accept_submission(server, grading_request("ada", "print('newer')\n"), max_attempts=1)
     begun = [claim for claim in claims if claim is not None]
     assert (len(begun), newer.staff_only) in ((0, ""), (1, "attempt 2, allowed: 1"))
 

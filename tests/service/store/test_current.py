@@ -12,22 +12,22 @@ from sqlalchemy import select, update
 import acting
 import report_builders
 from builders import grading_request
-from service.batch_rows import why_not_shown
-from service.lti import passing_back
+from service.batch_rows import describe_missing_grade
+from service.lti import passback
 from service.lti.services import Score
-from service.operations import own_work
+from service.operations import own_submissions
 from service.store.batches import batch_table, batches
-from service.store.batches.intake import accept, accept_batch
+from service.store.batches.intake import accept_batch, accept_submission
 from service.store.courses import policies
 from service.store.courses.hidden_names import HiddenNames
 from service.store.courses.policies import PolicyLimits
 from service.store.engine import Store
-from service.store.grades import current, overrides, results
+from service.store.grades import current_grades, overrides, results
 from service.store.models import Enrolment, Job, SubmissionRow
 from service.store.people import lti
-from service.store.people.students import course_of
+from service.store.people.students import ensure_course
 from service.store.queue import jobs, self_tests
-from service.store.queue.jobs import Retry
+from service.store.queue.jobs import RetryPolicy
 from service.store.states import JobState, Standing
 
 GRADE = report_builders.faulty_grade()
@@ -36,17 +36,17 @@ NOBODY = HiddenNames(frozenset(), b"")
 
 def _submit(store: Store, program: str, batch_id: str | None = None) -> str:
     request = grading_request("ada", f"print({program!r})\n")
-    return accept(store, request, max_attempts=1, batch_id=batch_id).job_id
+    return accept_submission(store, request, max_attempts=1, batch_id=batch_id).job_id
 
 
 def _end_next(store: Store, how: str = "done", worker: str = "worker") -> None:
-    claim = jobs.claim(store, worker, 60)
+    claim = jobs.claim_job(store, worker, 60)
     if claim is None or how == "running":
         return
     if how == "dead":
-        jobs.fail(store, claim, "the disk is full", Retry(0.0))
+        jobs.fail_job(store, claim, "the disk is full", RetryPolicy(0.0))
     else:
-        jobs.finish(store, claim, results.prepare(GRADE), datetime.now(UTC))
+        jobs.finish_job(store, claim, results.prepare_grade(GRADE), datetime.now(UTC))
 
 
 def _readers(store: Store, batch_id: str | None) -> dict[str, str | None]:
@@ -54,15 +54,15 @@ def _readers(store: Store, batch_id: str | None) -> dict[str, str | None]:
     found: dict[str, str | None] = {}
     with store.reading() as session:
         enrolment_id = session.scalars(select(Enrolment.id)).one()
-        of_all = own_work.own_assignments(session, 1, enrolment_id)
+        of_all = own_submissions.load_own_assignments(session, 1, enrolment_id)
         found["own list"] = None if of_all[0].counting is None else of_all[0].counting.job_id
-        own = own_work.own_attempts(session, enrolment_id, "echo-responder").counting
+        own = own_submissions.load_own_attempts(session, enrolment_id, "echo-responder").counting
         found["own page"] = None if own is None else own.job_id
-        lines = {"course": batches.course_lines(session, 1, ["echo-responder"])}
+        lines = {"course": batches.load_course_lines(session, 1, ["echo-responder"])}
         if batch_id is not None:
-            lines["batch"] = batches.job_lines(session, batch_id)
-            lines["some of a batch"] = batches.some_job_lines(session, batch_id, NOBODY, 10)
-            (row,) = batch_table.table_lines(session, batch_id, (), NOBODY)
+            lines["batch"] = batches.load_job_lines(session, batch_id)
+            lines["some of a batch"] = batches.load_job_lines_page(session, batch_id, NOBODY, 10)
+            (row,) = batch_table.load_table_lines(session, batch_id, (), NOBODY)
             found["table"] = row.id if row.marks is not None and not row.staff_only else None
         for name, (line,) in lines.items():
             found[name] = line.id if line.marks is not None and not line.staff_only else None
@@ -79,8 +79,8 @@ def test_a_newer_attempt_without_a_grade_leaves_the_marks_of_the_earlier_one(sto
         _end_next(store, how)
     assert set(_readers(store, batch.id).values()) == {batch.jobs[0].job_id}
     with store.reading() as session:
-        (line,) = batches.job_lines(session, batch.id)
-        (row,) = batch_table.table_lines(session, batch.id, (), NOBODY)
+        (line,) = batches.load_job_lines(session, batch.id)
+        (row,) = batch_table.load_table_lines(session, batch.id, (), NOBODY)
     assert (line.marks, line.newer_attempt, row.newer_attempt) == (GRADE.marks, 2, 2)
     exported = acting.export_file(store, batch.id, "moodle", published=True).data.decode()
     assert f"ada,{GRADE.marks:f}," in exported
@@ -94,9 +94,9 @@ def test_a_batch_shows_the_attempt_that_counts_from_wherever_it_came(store: Stor
     _end_next(store)
     assert set(_readers(store, old.id).values()) == {newer}
     with store.reading() as session:
-        (line,) = batches.job_lines(session, old.id)
-        (row,) = batch_table.table_lines(session, old.id, (), NOBODY)
-        (own,) = batches.attempt_lines(session, old.id)
+        (line,) = batches.load_job_lines(session, old.id)
+        (row,) = batch_table.load_table_lines(session, old.id, (), NOBODY)
+        (own,) = batches.load_attempt_lines(session, old.id)
     # The system that the batch came from recognises the student by that name.
     assert (line.attempt, line.source, row.elsewhere) == (2, "ada.zip", True)
     assert (own.id, own.attempt) == (old.jobs[0].job_id, 1)
@@ -106,7 +106,7 @@ def test_a_batch_shows_the_attempt_that_counts_from_wherever_it_came(store: Stor
 def test_all_readers_name_the_same_attempt_after_any_history(store: Store, seed: int) -> None:
     chance = random.Random(seed)
     with store.transaction() as session:
-        course_of(session, "default", datetime.now(UTC))
+        ensure_course(session, "default", datetime.now(UTC))
         policies.set_policy(session, 1, "", PolicyLimits(attempts=chance.choice([2, None])))
     first = accept_batch(store, "class", [grading_request("ada")], [], max_attempts=1)
     for number in range(20):
@@ -116,7 +116,7 @@ def test_all_readers_name_the_same_attempt_after_any_history(store: Store, seed:
             case "end":
                 _end_next(store, chance.choice(["done", "done", "dead"]), f"worker-{number // 4}")
             case "quarantine":
-                self_tests.quarantine(store, f"worker-{number // 4}", "it adds wrongly")
+                self_tests.quarantine_worker(store, f"worker-{number // 4}", "it adds wrongly")
         with store.reading() as session:
             query = (
                 select(Job.id)
@@ -137,9 +137,9 @@ def test_predicates_and_expressions_say_the_same_of_every_outcome(store: Store) 
     """For each state, standing, suspicion and limit. A table gives a reason exactly where students see no grade."""
     made = itertools.product(JobState, Standing, (None, "it adds wrongly"), (None, "attempt 3, allowed: 2"))
     pairs = {
-        current.is_trusted: current.IS_TRUSTED,
-        current.is_for_students: current.IS_FOR_STUDENTS,
-        current.can_count: current.CAN_COUNT,
+        current_grades.is_trusted: current_grades.IS_TRUSTED,
+        current_grades.is_for_students: current_grades.IS_FOR_STUDENTS,
+        current_grades.can_count: current_grades.CAN_COUNT,
     }
     job_id = _submit(store, "one")
     for state, standing, suspect, staff_only in made:
@@ -148,13 +148,13 @@ def test_predicates_and_expressions_say_the_same_of_every_outcome(store: Store) 
             session.execute(update(Job).values(state=state, standing=standing, suspect=suspect, lease=lease))
             session.execute(update(SubmissionRow).values(staff_only=staff_only))
         with store.reading() as session:
-            line = batches.job_line(session, job_id)
+            line = batches.load_job_line(session, job_id)
             asked = [select(Job.id).join(SubmissionRow).where(*which) for which in pairs.values()]
             found = [session.scalar(query) is not None for query in asked]
         assert [is_so(line) for is_so in pairs] == found, line
-        assert (why_not_shown(line) == "") == current.is_for_students(line), line
+        assert (describe_missing_grade(line) == "") == current_grades.is_for_students(line), line
         counts = state is JobState.DONE and standing is Standing.STANDS and suspect is None and staff_only is None
-        assert current.can_count(line) == counts, line
+        assert current_grades.can_count(line) == counts, line
 
 
 def test_an_earlier_attempt_is_not_passed_back_where_all_of_the_newest_is_excused(
@@ -166,19 +166,19 @@ def test_an_earlier_attempt_is_not_passed_back_where_all_of_the_newest_is_excuse
         sent.extend(scores)
         return len(scores)
 
-    monkeypatch.setattr(lti, "subjects", lambda *_: {"ada": "subject-1"})
-    monkeypatch.setattr(passing_back, "send_scores", send)
+    monkeypatch.setattr(lti, "load_subjects", lambda *_: {"ada": "subject-1"})
+    monkeypatch.setattr(passback, "send_scores", send)
     link = object.__new__(lti.CourseLink)
     object.__setattr__(link, "platform", None)
     for program in ("one", "two"):
         job_id = _submit(store, program)
         _end_next(store)
         acting.publish_one(store, job_id, actor="grace", anyway=True)
-    passing_back.send_marks(store, link, 1, "echo-responder")
+    passback.send_marks(store, link, 1, "echo-responder")
     assert [score.marks for score in sent] == [GRADE.marks]
     with store.transaction() as session:
         for criterion in GRADE.criteria:
-            overrides.excuse(session, job_id, criterion.id, "the task was wrong", "grace")
+            overrides.excuse_criterion(session, job_id, criterion.id, "the task was wrong", "grace")
     sent.clear()
-    passing_back.send_marks(store, link, 1, "echo-responder")
+    passback.send_marks(store, link, 1, "echo-responder")
     assert sent == []

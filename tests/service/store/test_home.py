@@ -21,7 +21,7 @@ from service.home import open_home
 from service.queue.processes import end_processes, start_process
 from service.store.engine import open_store
 from sim.errors import UsageError
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 
 ANOTHER = 12345
 AS_ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
@@ -69,7 +69,7 @@ def test_an_open_home_is_repaired_and_said_so_once(tmp_path: Path) -> None:
 def test_the_home_is_private_whatever_the_umask_and_reports_go_by_it(tmp_path: Path) -> None:
     home, report, marks = tmp_path / "home", tmp_path / "reports", tmp_path / "marks.csv"
     (tmp_path / "class").mkdir()
-    shutil.copytree(examples("echo-responder") / "reference", tmp_path / "class" / "ada")
+    shutil.copytree(locate_examples("echo-responder") / "reference", tmp_path / "class" / "ada")
     submitted = ("batch", "submit", tmp_path / "class", "-a", "echo-responder", "--output", report)
     ended = _robomark(home, 0o000, *submitted)
     assert ended.returncode == 0, ended.stderr
@@ -281,7 +281,7 @@ def test_what_python_keeps_of_modules_is_for_whoever_reads_the_modules(tmp_path:
     source = tmp_path / "package" / "late.py"
     source.write_text("found = 1\n")
     source.chmod(0o644)  # whatever the umask of this process is now
-    code = "from service.home import keep_private; keep_private(); import package.late; open('own', 'w')"
+    code = "from service.home import keep_files_private; keep_files_private(); import package.late; open('own', 'w')"
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": ""}
     subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, umask=0o022, check=True)
     (late,) = tmp_path.rglob("late.*.pyc")

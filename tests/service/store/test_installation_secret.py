@@ -17,28 +17,28 @@ from sqlalchemy import update
 from battery import scrambled
 from command import FORKING, robomark
 from first_release import lay_first_release
-from responders.code import Code
+from responders.source_file import SourceFile
 from service import home_secret
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.home_secret import secret_here
+from service.home_secret import load_home_secret
 from service.settings import Settings, load_settings
 from service.store.engine import open_store
-from service.store.installation import secret_of
+from service.store.installation import load_secret
 from service.store.models import Installation, Job
 from sim.errors import HostError, UsageError
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
 from submissions.seeds import Secret
 from submissions.submission import Submission
 
 SECRET = "a-secret-of-32-characters-9c41e7"
-ECHO = examples("echo-responder") / "reference"
+ECHO = locate_examples("echo-responder") / "reference"
 
 
 def _put_secret(settings: Settings, found: Queue[str]) -> None:
     with open_store(settings) as store:
-        found.put(secret_of(store).text)
+        found.put(load_secret(store).text)
 
 
 def test_all_who_start_at_once_agree(service_settings: Settings) -> None:
@@ -56,14 +56,14 @@ def test_all_who_start_at_once_agree(service_settings: Settings) -> None:
 
 
 def test_another_database_has_another_secret(tmp_path: Path) -> None:
-    one, other = (secret_here(Settings(home=tmp_path / name)) for name in ("one", "other"))
+    one, other = (load_home_secret(Settings(home=tmp_path / name)) for name in ("one", "other"))
     assert one.text != other.text
 
 
 def test_a_database_of_the_first_release_gets_one(service_settings: Settings, tmp_path: Path) -> None:
     lay_first_release(service_settings.database, tmp_path).dispose()
     with open_store(service_settings) as store:
-        assert len(secret_of(store).text) == 64
+        assert len(load_secret(store).text) == 64
         with store.transaction() as session:
             assert set(session.scalars(update(Job).values(error="x").returning(Job.secret_sha256))) == {None}
 
@@ -73,29 +73,29 @@ def test_a_database_that_lost_it_is_not_graded_with(service_settings: Settings) 
         with store.transaction() as session:
             session.delete(session.get_one(Installation, 1))
         with pytest.raises(HostError, match="the secret that it was made with is gone; restore a backup"):
-            secret_of(store)
+            load_secret(store)
 
 
 def test_the_environments_wins(service_settings: Settings) -> None:
     settings = replace(service_settings, secret=Secret(SECRET))
     with open_store(settings) as store:
-        assert secret_of(store) == secret_here(settings) == Secret(SECRET)
+        assert load_secret(store) == load_home_secret(settings) == Secret(SECRET)
     with open_store(service_settings) as store:
-        assert secret_of(store) == secret_here(service_settings) != Secret(SECRET)
+        assert load_secret(store) == load_home_secret(service_settings) != Secret(SECRET)
 
 
 def test_a_home_is_opened_once_for_its_secret(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = Settings(home=tmp_path)
-    first = secret_here(settings)
-    monkeypatch.setattr(home_secret, "_opened", lambda _: pytest.fail("opened again"))
-    assert secret_here(settings) == first
-    assert secret_here(Settings(database_url=f"sqlite:///{tmp_path}/robomark.db")) == first
+    first = load_home_secret(settings)
+    monkeypatch.setattr(home_secret, "_load_store_secret", lambda _: pytest.fail("opened again"))
+    assert load_home_secret(settings) == first
+    assert load_home_secret(Settings(database_url=f"sqlite:///{tmp_path}/robomark.db")) == first
 
 
 def test_a_home_that_cannot_be_made_is_said(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(HostError, match=r"secret for trials cannot be saved: .* or ROBOMARK_SECRET\.$"):
-        secret_here(Settings(home=tmp_path / "file" / "home"))
+        load_home_secret(Settings(home=tmp_path / "file" / "home"))
 
 
 @pytest.mark.parametrize("text", ["short", "   fifteen chars   ", "x" * 15])
@@ -112,7 +112,7 @@ def test_settings_do_not_tell_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     monkeypatch.setenv("ROBOMARK_SECRET", f"  {SECRET}\n")
     settings = load_settings(home=tmp_path)
     assert settings.own_secret == Secret(SECRET)
-    for told in (repr(settings), str(settings), settings.environment(), repr(settings.own_secret), vars(settings)):
+    for told in (repr(settings), str(settings), settings.to_environment(), repr(settings.own_secret), vars(settings)):
         assert SECRET not in str(told)
     monkeypatch.setenv("ROBOMARK_SECRET", " ")
     assert load_settings().own_secret is None
@@ -151,8 +151,8 @@ def test_student_code_does_not_come_by_it(monkeypatch: pytest.MonkeyPatch, tmp_p
     asked = type(asked)("a", "A", asked.world, asked.parts, asked.scenarios[:1], asked.criteria[:1])
     (seed,) = (trial.seed for trial in asked.trials(Secret(SECRET)))
     search = SEARCH.format(database=tmp_path / "robomark.db", codes=scrambled(SECRET, str(seed)))
-    program = Code("robot.py", f"{search}\nprint('PY::', told())\n")
-    responder = Code("responder.py", f"{search}\ndef responder(text): return str(told())\n")
+    program = SourceFile("robot.py", f"{search}\nprint('PY::', told())\n")
+    responder = SourceFile("responder.py", f"{search}\ndef responder(text): return str(told())\n")
     with TrialRunner() as runner:
         (trial,) = grade(Submission("s", program, responder), asked, secret=Secret(SECRET), runner=runner).trials
     assert [message.text for message in trial.recording.messages] == ["PY:: []", "[]"]
@@ -200,7 +200,7 @@ def test_only_its_hash_is_told(tmp_path: Path) -> None:
     files = [path for folder in (home, tmp_path / "out") for path in folder.rglob("*") if path.is_file()]
     assert any(path.suffix == ".log" for path in files)
     assert not any(SECRET.encode() in path.read_bytes() for path in files)
-    own = secret_here(Settings(home=home)).text
+    own = load_home_secret(Settings(home=home)).text
     assert own not in told
     assert [path.name for path in files if own.encode() in path.read_bytes()] == ["robomark.db"]
 
@@ -217,7 +217,7 @@ def test_only_its_hash_is_told(tmp_path: Path) -> None:
 
 def test_a_backup_has_it(tmp_path: Path) -> None:
     settings = Settings(home=tmp_path / "home")
-    own = secret_here(settings)
+    own = load_home_secret(settings)
     copy = tmp_path / "copy.db"
     assert robomark("db", "backup", copy, ROBOMARK_HOME=str(settings.home)).returncode == 0
     assert sqlite3.connect(copy).execute("SELECT secret FROM installation").fetchall() == [(own.text,)]
@@ -226,7 +226,7 @@ def test_a_backup_has_it(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_grades_of_before_are_verified_in_the_worlds_of_then(tmp_path: Path) -> None:
     home, batch = tmp_path / "home", tmp_path / "class"
-    shutil.copytree(examples("dead-reckoning-with-noise") / "reference", batch / "ada")
+    shutil.copytree(locate_examples("dead-reckoning-with-noise") / "reference", batch / "ada")
     environment: dict[str, Any] = {"ROBOMARK_HOME": str(home)}
     done = robomark("batch", "submit", batch, "-a", "dead-reckoning-with-noise", "--wait", **environment)
     found = re.search(r"^ada .* (\w+) *$", done.stdout, re.MULTILINE)

@@ -22,12 +22,12 @@ from service.store.engine import Store, now
 from service.store.grades import results
 from service.store.models import Job, SubmissionRow
 from service.store.queue import jobs
-from service.store.queue.jobs import TRANSITIONS, Claim, Fenced, Retry, Transition
+from service.store.queue.jobs import TRANSITIONS, Claim, LeaseLost, RetryPolicy, Transition
 from service.store.states import CancelReason, JobState
 from sim.errors import HostError
 
 WORKER = "worker"
-RETRY = Retry(0.0)
+RETRY = RetryPolicy(0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,18 +46,18 @@ def _accept(store: Store, student: str) -> tuple[str, str]:
 
 
 def _claimed(store: Store) -> Claim:
-    claim = jobs.claim(store, WORKER, 60)
+    claim = jobs.claim_job(store, WORKER, 60)
     assert claim is not None
     return claim
 
 
 def _finish(store: Store, claim: Claim) -> None:
-    jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
 
 
 def _fail(store: Store, claim: Claim, *, enough: bool) -> None:
     tried = Claim(claim.job_id, claim.lease, 2 if enough else 1, 2, claim.at)
-    jobs.fail(store, tried, "it broke", RETRY)
+    jobs.fail_job(store, tried, "it broke", RETRY)
 
 
 def _in_session(change: Callable[..., object]) -> Callable[[Store, Subject], object]:
@@ -75,24 +75,26 @@ def _submissions(subject: Subject) -> Select[int]:
 def _ask_for(session: Session, subject: Subject, at: datetime) -> None:
     """Request a job as if it had been cancelled because it is over a limit."""
     session.execute(update(Job).where(Job.id == subject.job_id).values(cancelled_for=CancelReason.OVER_LIMIT))
-    jobs.ask_for(session, subject.job_id, at)
+    jobs.queue_over_limit_job(session, subject.job_id, at)
 
 
 #: One action for each transition, by a caller who may do it.
 MOVES: dict[Transition, Callable[[Store, Subject], object]] = {
-    jobs.COPY: _in_session(lambda session, subject, at: jobs.copy(session, subject.job_id, subject.source_id, at)),
-    jobs.SUPERSEDE: _in_session(
-        lambda session, subject, at: jobs.supersede(session, _submissions(subject), "another", at)
+    jobs.COPY: _in_session(
+        lambda session, subject, at: jobs.copy_grade(session, subject.job_id, subject.source_id, at)
     ),
-    jobs.CLAIM: lambda store, subject: jobs.claim(store, WORKER, 60),
-    jobs.HEARTBEAT: lambda store, subject: jobs.heartbeat(store, subject.claim, 60, 0.5),
+    jobs.SUPERSEDE: _in_session(
+        lambda session, subject, at: jobs.supersede_jobs(session, _submissions(subject), "another", at)
+    ),
+    jobs.CLAIM: lambda store, subject: jobs.claim_job(store, WORKER, 60),
+    jobs.HEARTBEAT: lambda store, subject: jobs.renew_lease(store, subject.claim, 60, 0.5),
     jobs.FINISH: lambda store, subject: _finish(store, subject.claim),
     jobs.TRY_AGAIN: lambda store, subject: _fail(store, subject.claim, enough=False),
     jobs.GIVE_UP: lambda store, subject: _fail(store, subject.claim, enough=True),
     jobs.GIVE_BACK: lambda store, subject: jobs.release_worker(store, WORKER),
-    jobs.CANCEL: _in_session(lambda session, subject, at: jobs.cancel(session, subject.batch_id, "enough", at)),
-    jobs.RETRY: _in_session(lambda session, subject, at: jobs.retry(session, (Job.id == subject.job_id,), at)),
-    jobs.PUT_ASIDE: _in_session(lambda session, subject, at: jobs.put_aside(session, subject.job_id, at)),
+    jobs.CANCEL: _in_session(lambda session, subject, at: jobs.cancel_jobs(session, subject.batch_id, "enough", at)),
+    jobs.RETRY: _in_session(lambda session, subject, at: jobs.retry_jobs(session, (Job.id == subject.job_id,), at)),
+    jobs.PUT_ASIDE: _in_session(lambda session, subject, at: jobs.put_aside_job(session, subject.job_id, at)),
     jobs.ASK_FOR: _in_session(_ask_for),
 }
 
@@ -108,7 +110,7 @@ def _subject(store: Store, state: JobState, student: str, source_id: str) -> Sub
     if state is JobState.DONE:
         _finish(store, claim)
     elif state is JobState.DEAD:
-        jobs.give_up(store, claim, "no program")
+        jobs.give_up_job(store, claim, "no program")
     elif state is JobState.CANCELLED:
         acting.cancel(store, batch_id)
     return Subject(job_id, batch_id, source_id, claim)
@@ -127,7 +129,7 @@ def test_a_transition_is_made_where_it_begins_and_nowhere_else(store: Store, sta
     for number, (transition, move) in enumerate(MOVES.items()):
         subject = _subject(store, state, f"student-{number}", source_id)
         assert _job(store, subject.job_id).state is state
-        with suppress(Fenced, HostError):
+        with suppress(LeaseLost, HostError):
             move(store, subject)
         job = _job(store, subject.job_id)
         assert job.state is (transition.after if state in transition.before else state), transition.name
@@ -146,7 +148,7 @@ def test_every_state_can_be_reached_and_left_or_is_an_end() -> None:
 def test_staff_ask_for_nothing_but_what_was_put_aside(store: Store) -> None:
     subject = _subject(store, JobState.CANCELLED, "ada", "")
     with store.transaction() as session:
-        assert not jobs.ask_for(session, subject.job_id, datetime.now(UTC))
+        assert not jobs.queue_over_limit_job(session, subject.job_id, datetime.now(UTC))
     assert _job(store, subject.job_id).state is JobState.CANCELLED
 
 
@@ -218,7 +220,7 @@ def test_a_write_of_a_state_would_be_found(written: str) -> None:
 
 
 #: The one module that writes them, and the module of test runs, which are not jobs and have their own states.
-_WITH_STATES = ("store/queue/jobs.py", "store/queue/tryouts.py")
+_WITH_STATES = ("store/queue/jobs.py", "store/queue/test_runs.py")
 
 
 def test_nothing_else_writes_the_state_of_a_job() -> None:

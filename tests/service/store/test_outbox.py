@@ -36,7 +36,7 @@ def hook(store: Store, *events: str) -> str:
         if session.get(Course, 1) is None:
             session.add(Course(id=1, name="default", created_at=datetime.now(UTC)))
             session.flush()
-        return webhooks.create(session, 1, "https://hooks.example.org/x", events or EVENTS)[0].id
+        return webhooks.create_webhook(session, 1, "https://hooks.example.org/x", events or EVENTS)[0].id
 
 
 def told(store: Store) -> list[tuple[str, dict[str, Any]]]:
@@ -46,9 +46,9 @@ def told(store: Store) -> list[tuple[str, dict[str, Any]]]:
 
 
 def grade_next(store: Store) -> str:
-    claim = jobs.claim(store, "worker", 60)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
     return claim.job_id
 
 
@@ -83,9 +83,9 @@ def test_nobody_is_named(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_ends_without_a_grade_ends_its_batch_too(store: Store) -> None:
     hook(store, "batch.finished")
     batch = submit(store, "ada")
-    claim = jobs.claim(store, "worker", 60)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.give_up(store, claim, "the disk is full")
+    jobs.give_up_job(store, claim, "the disk is full")
     cancelled = submit(store, "bob")
     acting.cancel(store, cancelled)
     superseded = submit(store, "carol")
@@ -100,7 +100,7 @@ def test_what_ends_without_a_grade_ends_its_batch_too(store: Store) -> None:
 def test_without_webhooks_nothing_is_written(store: Store) -> None:
     revoked = hook(store)
     with store.transaction() as session:
-        assert webhooks.revoke(session, 1, revoked)
+        assert webhooks.revoke_webhook(session, 1, revoked)
     submit(store, "ada")
     grade_next(store)
     assert told(store) == []
@@ -110,12 +110,12 @@ def test_only_one_sender_has_a_delivery(store: Store) -> None:
     hook(store, "grade.finished")
     submit(store, "ada")
     grade_next(store)
-    (claimed,) = outbox.claim(store, 8)
+    (claimed,) = outbox.claim_deliveries(store, 8)
     assert claimed.attempt == 1
-    assert outbox.claim(store, 8) == []
-    outbox.delivered(store, claimed)
+    assert outbox.claim_deliveries(store, 8) == []
+    outbox.record_delivery(store, claimed)
     _past(store, timedelta(hours=1))
-    assert outbox.claim(store, 8) == []
+    assert outbox.claim_deliveries(store, 8) == []
 
 
 def test_what_does_not_arrive_is_tried_again_ever_later_and_given_up_after_a_day(store: Store) -> None:
@@ -124,11 +124,11 @@ def test_what_does_not_arrive_is_tried_again_ever_later_and_given_up_after_a_day
     grade_next(store)
     waits = []
     for _ in range(40):
-        due = outbox.claim(store, 8)
+        due = outbox.claim_deliveries(store, 8)
         if not due:
             break
         before = datetime.now(UTC)
-        outbox.failed(store, due[0], "answered 500")
+        outbox.record_failure(store, due[0], "answered 500")
         with store.reading() as session:
             row = session.scalars(select(Delivery)).one()
         if row.due_at is None:
@@ -146,9 +146,9 @@ def test_of_two_workers_that_end_a_batch_at_once_one_says_so(store: Store) -> No
     hook(store, "batch.finished")
     for _ in range(5):
         batch = submit(store, "ada", "bob")
-        claims = [jobs.claim(store, "worker", 60) for _ in range(2)]
+        claims = [jobs.claim_job(store, "worker", 60) for _ in range(2)]
         with ThreadPoolExecutor(2) as pool:
-            list(pool.map(lambda claim: jobs.give_up(store, claim, "the disk is full"), claims))
+            list(pool.map(lambda claim: jobs.give_up_job(store, claim, "the disk is full"), claims))
         assert told(store)[-1] == ("batch.finished", {"batch": batch, "states": {"dead": 2}})
     assert len(told(store)) == 5
 
@@ -156,7 +156,7 @@ def test_of_two_workers_that_end_a_batch_at_once_one_says_so(store: Store) -> No
 def test_of_two_requests_with_a_key_one_holds_it(store: Store) -> None:
     with store.transaction() as session:
         person_id = membership.make_instructor(session, "default", Student("grace")).person_id
-        credentials.issue(
+        credentials.issue_credential(
             session,
             person_id,
             CredentialKind.TOKEN,
@@ -164,19 +164,19 @@ def test_of_two_requests_with_a_key_one_holds_it(store: Store) -> None:
             name="t",
             reach=credentials.Reach(scopes=frozenset({"read"})),
         )
-        (token,) = credentials.of_person(session, person_id)
+        (token,) = credentials.list_credentials(session, person_id)
     asked = (service_on(store), Actor("grace", person_id, credential_id=token.id), "k")
 
     def begin(_: int) -> str:
         try:
-            return "holds it" if replies.begin(*asked) is None else "answered"
+            return "holds it" if replies.reserve_key(*asked) is None else "answered"
         except replies.InProgress:
             return "waits"
 
     with ThreadPoolExecutor(4) as pool:
         assert sorted(pool.map(begin, range(4))) == ["holds it", "waits", "waits", "waits"]
-    replies.keep(*asked, replies.KeptReply("a" * 64, 201, b"{}"))
-    assert replies.begin(*asked) == replies.KeptReply("a" * 64, 201, b"{}")
+    replies.store_reply(*asked, replies.StoredReply("a" * 64, 201, b"{}"))
+    assert replies.reserve_key(*asked) == replies.StoredReply("a" * 64, 201, b"{}")
 
 
 def test_what_waits_for_a_revoked_webhook_is_not_sent(store: Store) -> None:
@@ -184,9 +184,9 @@ def test_what_waits_for_a_revoked_webhook_is_not_sent(store: Store) -> None:
     submit(store, "ada")
     grade_next(store)
     with store.transaction() as session:
-        assert not webhooks.revoke(session, 2, revoked)
-        assert webhooks.revoke(session, 1, revoked)
-    assert outbox.claim(store, 8) == []
+        assert not webhooks.revoke_webhook(session, 2, revoked)
+        assert webhooks.revoke_webhook(session, 1, revoked)
+    assert outbox.claim_deliveries(store, 8) == []
 
 
 def test_addresses_that_are_none_are_refused(store: Store) -> None:
@@ -204,7 +204,7 @@ def test_addresses_that_are_none_are_refused(store: Store) -> None:
     )
     for url in urls:
         with store.transaction() as session, pytest.raises(UsageError, match=r"^url: "):
-            webhooks.create(session, 1, url, EVENTS)
+            webhooks.create_webhook(session, 1, url, EVENTS)
 
 
 def _past(store: Store, time: timedelta) -> None:

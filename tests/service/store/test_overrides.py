@@ -19,21 +19,21 @@ from sqlalchemy.orm import Session
 import acting
 import report_builders
 from builders import accept_one, grading_request
-from service.batch_rows import rows_of
-from service.grading.grade import Grade, SetByHand
-from service.grading.statistics import marked_of
-from service.report_files import report_body
+from service.batch_rows import build_rows
+from service.grading.class_statistics import to_marked_submission
+from service.grading.grade import Grade, StaffAdjustment
+from service.report_files import render_report_body
 from service.reports.formats import FORMATS
-from service.reports.formats.json_output import json_document
-from service.reports.view import gradebook_view, staff_view, student_view
+from service.reports.formats.json_output import build_json_document
+from service.reports.view import build_gradebook_view, build_staff_view, build_student_view
 from service.store import audit
 from service.store.batches import batch_table, batches, class_overview, regrades
-from service.store.batches.intake import accept, accept_batch
-from service.store.courses.hidden_names import NAMED, HiddenNames
+from service.store.batches.intake import accept_batch, accept_submission
+from service.store.courses.hidden_names import NO_HIDDEN_NAMES, HiddenNames
 from service.store.engine import Store
 from service.store.grades import comments, marking_history, overrides, results
-from service.store.grades.marked import marked
-from service.store.installation import secret_of
+from service.store.grades.statistics_marks import load_marked_submissions
+from service.store.installation import load_secret
 from service.store.models import Job
 from service.store.queue import jobs
 from sim.errors import UsageError
@@ -49,16 +49,16 @@ def _set(criterion: str, marks: str) -> Change:
 
 
 def _excuse(criterion: str) -> Change:
-    return lambda session, job: overrides.excuse(session, job, criterion, "was ill", "staff")
+    return lambda session, job: overrides.excuse_criterion(session, job, criterion, "was ill", "staff")
 
 
 def _withdraw(criterion: str) -> Change:
-    return lambda session, job: overrides.withdraw(session, job, criterion, "staff")
+    return lambda session, job: overrides.withdraw_override(session, job, criterion, "staff")
 
 
 def _grade_all(store: Store, grade: Grade = GRADE) -> None:
-    while (claim := jobs.claim(store, "worker", 60)) is not None:
-        jobs.finish(store, claim, results.prepare(grade), datetime.now(UTC))
+    while (claim := jobs.claim_job(store, "worker", 60)) is not None:
+        jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
 
 
 def _graded(store: Store, grade: Grade = GRADE) -> tuple[str, str]:
@@ -77,17 +77,17 @@ def _change(store: Store, job_id: str, *changes: Change) -> None:
 def _totals(store: Store, batch: str) -> dict[str, tuple[float, float]]:
     """Return marks and maximum marks from each reader of them."""
     with store.reading() as session:
-        (line,) = batches.job_lines(session, batch)
+        (line,) = batches.load_job_lines(session, batch)
         job = session.get_one(Job, line.id)
-        grade = results.load(session, line.id)
-        counted = marked(session, [line])
+        grade = results.load_grade(session, line.id)
+        counted = load_marked_submissions(session, [line])
     # In statistics, as in a gradebook, the other criteria replace an excused one. Fully excused students are left out.
     assert [(each.marks, each.max_marks) for each in counted] == [
-        (marks, grade.worth) for marks in [gradebook_view(grade).marks] if marks is not None
+        (marks, grade.worth) for marks in [build_gradebook_view(grade).marks] if marks is not None
     ]
     if counted:
-        assert counted == [marked_of(replace(grade, assignment=line.assignment, student="ada"))]
-    rows = rows_of(store, [line])
+        assert counted == [to_marked_submission(replace(grade, assignment=line.assignment, student="ada"))]
+    rows = build_rows(store, [line])
     wide, *_ = _csv(FORMATS["csv"].table, rows)
     long = _csv(FORMATS["csv-long"].table, rows)
     (told,) = json.loads(_written(FORMATS["json"].table, rows))
@@ -95,7 +95,7 @@ def _totals(store: Store, batch: str) -> dict[str, tuple[float, float]]:
         each.get("name"): each.get("value") or ""
         for each in ElementTree.fromstring(_written(FORMATS["junit"].table, rows)).iter("property")
     }
-    body = str(report_body(store, line.id, line.plots, student_view(grade)).body)
+    body = str(render_report_body(store, line.id, line.plots, build_student_view(grade)).body)
     score = re.search(r"<b>([\d.]+)</b><span>of ([\d.]+) marks", body)
     assert score is not None
     assert line.marks is not None
@@ -146,8 +146,8 @@ def test_every_place_that_tells_marks_tells_the_same(
     _change(store, job_id, *changes)
     assert set(_totals(store, batch).values()) == {(marks, most)}
     with store.reading() as session:
-        rows = rows_of(store, batches.job_lines(session, batch))
-        assert results.load_graded(session, job_id).criteria == GRADE.criteria
+        rows = build_rows(store, batches.load_job_lines(session, batch))
+        assert results.load_original_grade(session, job_id).criteria == GRADE.criteria
     # A gradebook has one maximum per assignment, so the other criteria replace the excused one.
     moodle = _csv(FORMATS["moodle"].table, rows)[0]["Grade"]
     assert moodle == ("" if of_all is None else f"{of_all:g}")
@@ -164,7 +164,7 @@ def test_a_regrade_counts_what_was_set_and_changes_the_rest(store: Store) -> Non
     _grade_all(store, replace(GRADE, criteria=worse))
     with store.reading() as session:
         again = session.query(Job).filter(Job.regrade_of == job_id).one()
-        (change,) = regrades.changes(session, again.batch_id or "", NAMED)
+        (change,) = regrades.load_changes(session, again.batch_id or "", NO_HIDDEN_NAMES)
     assert (change.before, change.after) == (8, Decimal("7.5"))
     assert [(each.title, each.by_hand) for each in change.criteria] == [(aloud.title, False)]
     acting.publish(store, batch, actor="staff")
@@ -182,7 +182,7 @@ def test_marks_set_for_more_than_a_changed_criterion_gives_are_all_that_it_gives
     _grade_all(store, replace(GRADE, criteria=(replace(shape, marks=Decimal(1), max_marks=Decimal(4)), aloud)))
     with store.reading() as session:
         again = session.query(Job).filter(Job.regrade_of == job_id).one()
-        (change,) = regrades.changes(session, again.batch_id or "", NAMED)
+        (change,) = regrades.load_changes(session, again.batch_id or "", NO_HIDDEN_NAMES)
     assert change.criteria == (
         regrades.CriterionChange(shape.title, (Decimal(6), Decimal(6)), (Decimal(4), Decimal(4)), by_hand=True),
     )
@@ -193,26 +193,26 @@ def test_marks_set_for_more_than_a_changed_criterion_gives_are_all_that_it_gives
 def test_a_copy_of_a_grade_has_the_graders_marks_and_not_what_was_set_for_another(store: Store) -> None:
     request = grading_request("ada")
     theirs = [replace(request, submission=replace(request.submission, student=name)) for name in ("ada", "bob", "eve")]
-    secret = secret_of(store).sha256
-    first = accept(store, theirs[0], max_attempts=3)
-    waits = accept(store, theirs[1], max_attempts=3)
-    claim = jobs.claim(store, "worker", 60)
+    secret = load_secret(store).sha256
+    first = accept_submission(store, theirs[0], max_attempts=3)
+    waits = accept_submission(store, theirs[1], max_attempts=3)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish(store, claim, results.prepare(replace(GRADE, secret_sha256=secret)), datetime.now(UTC))
+    jobs.finish_job(store, claim, results.prepare_grade(replace(GRADE, secret_sha256=secret)), datetime.now(UTC))
     _change(store, first.job_id, _set(SHAPE, "0"))
-    claim = jobs.claim(store, "worker", 60)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    assert jobs.finish_from_cache(store, claim)
-    copied = accept(store, theirs[2], max_attempts=3)
+    assert jobs.finish_job_from_cache(store, claim)
+    copied = accept_submission(store, theirs[2], max_attempts=3)
     with store.reading() as session:
-        told = {job: batches.job_line(session, job).marks for job in (first.job_id, waits.job_id, copied.job_id)}
-        assert batches.job_line(session, copied.job_id).copied_from == first.job_id
+        told = {job: batches.load_job_line(session, job).marks for job in (first.job_id, waits.job_id, copied.job_id)}
+        assert batches.load_job_line(session, copied.job_id).copied_from == first.job_id
     assert list(told.values()) == [2, 7, 7]
     # An override of a submission also applies to a copied grade.
     _change(store, copied.job_id, _excuse(SHAPE))
     with store.reading() as session:
-        assert batches.job_line(session, copied.job_id).marks == 2
-        assert batches.job_line(session, first.job_id).max_marks == 8
+        assert batches.load_job_line(session, copied.job_id).marks == 2
+        assert batches.load_job_line(session, first.job_id).max_marks == 8
 
 
 def test_what_could_not_be_judged_gets_its_marks_and_is_published(store: Store) -> None:
@@ -223,15 +223,15 @@ def test_what_could_not_be_judged_gets_its_marks_and_is_published(store: Store) 
     _change(store, job_id, _set(SHAPE, "5"))
     assert set(_totals(store, batch).values()) == {(7, 8)}
     with store.reading() as session:
-        (line,) = batches.job_lines(session, batch)
-        told = staff_view(results.load(session, job_id)).grade.criteria[0]
+        (line,) = batches.load_job_lines(session, batch)
+        told = build_staff_view(results.load_grade(session, job_id)).grade.criteria[0]
     assert (line.unjudged, line.set_by_hand) == (0, 1)
     assert told.message == "Adjusted by staff to 5: seen again."
     assert acting.publish(store, batch, actor="staff").published == 1
     _change(store, job_id, _withdraw(SHAPE))
     with store.reading() as session:
-        assert batches.job_line(session, job_id).unjudged == 1
-        (step, *_) = marking_history.history(session, session.get_one(Job, job_id).submission_id)
+        assert batches.load_job_line(session, job_id).unjudged == 1
+        (step, *_) = marking_history.load_history(session, session.get_one(Job, job_id).submission_id)
     assert (step.before, step.after, step.text) == ("not judged", "5", "seen again")
 
 
@@ -242,12 +242,15 @@ REFUSED: list[tuple[Change, str]] = [
     (_set(SHAPE, "1E-7"), "are 1E-7, expected 0 to 6"),
     (_set("names-the-right-shap", "1"), "has no criterion 'names-the-right-shap'; did you mean"),
     (_withdraw(SHAPE), "are not adjusted"),
-    (lambda session, _: overrides.excuse(session, "nowhere", SHAPE, "why", "staff"), "nowhere has no grade"),
-    (lambda session, job: overrides.excuse(session, job, SHAPE, "  ", "staff"), "the reason has 0 characters"),
-    (lambda session, job: overrides.excuse(session, job, SHAPE, "x" * 501, "staff"), "the reason has 501"),
-    (lambda session, job: comments.comment(session, job, "", " ", "staff"), "the comment has 0 characters"),
-    (lambda session, job: comments.comment(session, job, "other", "x", "staff"), "has no criterion 'other'"),
-    (lambda session, job: comments.withdraw(session, job, 1, "staff"), "has no comment 1"),
+    (lambda session, _: overrides.excuse_criterion(session, "nowhere", SHAPE, "why", "staff"), "nowhere has no grade"),
+    (
+        lambda session, job: overrides.excuse_criterion(session, job, SHAPE, "  ", "staff"),
+        "the reason has 0 characters",
+    ),
+    (lambda session, job: overrides.excuse_criterion(session, job, SHAPE, "x" * 501, "staff"), "the reason has 501"),
+    (lambda session, job: comments.add_comment(session, job, "", " ", "staff"), "the comment has 0 characters"),
+    (lambda session, job: comments.add_comment(session, job, "other", "x", "staff"), "has no criterion 'other'"),
+    (lambda session, job: comments.withdraw_comment(session, job, 1, "staff"), "has no comment 1"),
 ]
 
 
@@ -261,7 +264,7 @@ def test_what_cannot_be_is_refused_and_changes_nothing(store: Store) -> None:
 
 @pytest.mark.parametrize(("text", "marks"), [("2.5", "2.5"), (" 2,5 ", "2.5"), ("3", "3")])
 def test_marks_are_read_as_people_write_them(text: str, marks: str) -> None:
-    assert overrides.read_marks(text) == Decimal(marks)
+    assert overrides.parse_marks(text) == Decimal(marks)
 
 
 def test_a_grade_that_waits_has_no_marks_to_be_set(store: Store) -> None:
@@ -273,11 +276,13 @@ def test_a_grade_that_waits_has_no_marks_to_be_set(store: Store) -> None:
 def test_the_trail_says_who_changed_what_and_keeps_no_reason(store: Store) -> None:
     _, job_id = _graded(store)
     _change(store, job_id, _set(SHAPE, "5.50"), _excuse(SHAPE), _withdraw(SHAPE))
-    _change(store, job_id, lambda session, job: comments.comment(session, job, SHAPE, "Look at line 3.", "staff"))
+    _change(store, job_id, lambda session, job: comments.add_comment(session, job, SHAPE, "Look at line 3.", "staff"))
     with store.reading() as session:
         subject = session.get_one(Job, job_id).submission_id
-        told = [(step.action, step.before, step.after, step.text) for step in marking_history.history(session, subject)]
-        kept = audit.entries(session, "submission", str(subject))
+        told = [
+            (step.action, step.before, step.after, step.text) for step in marking_history.load_history(session, subject)
+        ]
+        kept = audit.load_entries(session, "submission", str(subject))
     assert told == [
         ("set marks", "5", "5.5", "seen again"),
         ("excuse", "5.5", "excused", "was ill"),
@@ -292,11 +297,11 @@ def test_a_report_says_what_was_set_why_and_what_was_written(store: Store) -> No
     _, job_id = _graded(store)
     _change(store, job_id, _set(SHAPE, "6"), _excuse(ALOUD))
     for criterion, text in (("", "Well <b>done</b>."), (SHAPE, "Line 3 was right.")):
-        _change(store, job_id, partial(comments.comment, criterion=criterion, text=text, actor="staff"))
+        _change(store, job_id, partial(comments.add_comment, criterion=criterion, text=text, actor="staff"))
     with store.reading() as session:
-        grade = results.load(session, job_id)
-        line = batches.job_line(session, job_id)
-    told = json_document(staff_view(grade))
+        grade = results.load_grade(session, job_id)
+        line = batches.load_job_line(session, job_id)
+    told = build_json_document(build_staff_view(grade))
     first, second = told["criteria"]
     assert first["message"].startswith("Adjusted by staff from 5 to 6: seen again. 5 of 6 images")
     assert first["set_by_hand"] == {"from": 5, "of": 6, "excused": False, "reason": "seen again"}
@@ -304,9 +309,9 @@ def test_a_report_says_what_was_set_why_and_what_was_written(store: Store) -> No
     assert told["comments"] == [
         {"criterion": "", "text": "Well <b>done</b>."}, {"criterion": SHAPE, "text": "Line 3 was right."},
     ]  # fmt: skip
-    body = str(report_body(store, line.id, line.plots, student_view(grade)).body)
+    body = str(render_report_body(store, line.id, line.plots, build_student_view(grade)).body)
     assert "Well &lt;b&gt;done" in body
-    rows = rows_of(store, [line])
+    rows = build_rows(store, [line])
     assert _csv(FORMATS["csv"].table, rows)[0][f"marks: {ALOUD}"] == ""
     for form in ("csv", "junit", "moodle", "gradescope", "json"):
         assert "Line 3 was right." in _written(FORMATS[form].table, rows), form
@@ -314,18 +319,18 @@ def test_a_report_says_what_was_set_why_and_what_was_written(store: Store) -> No
         assert "Line 3 was right." in _written(FORMATS[form].document, grade), form
     # Notes on a criterion that a student does not see are hidden as well.
     hidden = replace(grade, criteria=(replace(grade.criteria[0], visibility="hidden"), grade.criteria[1]))
-    assert [each.criterion for each in student_view(hidden).grade.comments] == [""]
-    _change(store, job_id, lambda session, job: comments.withdraw(session, job, 1, "staff"))
+    assert [each.criterion for each in build_student_view(hidden).grade.comments] == [""]
+    _change(store, job_id, lambda session, job: comments.withdraw_comment(session, job, 1, "staff"))
     with store.reading() as session:
-        assert [each.criterion for each in results.load(session, job_id).comments] == [SHAPE]
+        assert [each.criterion for each in results.load_grade(session, job_id).comments] == [SHAPE]
 
 
 def test_what_was_set_is_told_where_the_message_is_of_visible_trials_alone() -> None:
     shape = GRADE.criteria[0]
-    by_hand = SetByHand(Decimal(5), Decimal(6), "seen again", excused=False)
+    by_hand = StaffAdjustment(Decimal(5), Decimal(6), "seen again", excused=False)
     said = replace(shape, set_by_hand=by_hand, marks=Decimal(6))
     trials = tuple(replace(trial, visibility="hidden") for trial in GRADE.trials)
-    told = student_view(replace(GRADE, criteria=(said,), trials=trials)).grade.criteria[0].message
+    told = build_student_view(replace(GRADE, criteria=(said,), trials=trials)).grade.criteria[0].message
     assert told.startswith("Adjusted by staff from 5 to 6: seen again.")
     assert "5 of 6 images" not in told
 
@@ -339,9 +344,9 @@ def test_who_is_excused_is_out_of_every_statistic(store: Store) -> None:
     _change(store, ada, _set(SHAPE, "3"), _excuse(ALOUD))
     _change(store, bob, _excuse(SHAPE), _excuse(ALOUD))
     with store.reading() as session:
-        lines = batch_table.table_lines(session, batch.id, (), HiddenNames(frozenset(), b""))
-        (found,) = class_overview.overview(session, 1, lines, Decimal("0.6"), NAMED)
-        accuracies = {line.student: line.accuracy for line in batches.job_lines(session, batch.id)}
+        lines = batch_table.load_table_lines(session, batch.id, (), HiddenNames(frozenset(), b""))
+        (found,) = class_overview.compute_overviews(session, 1, lines, Decimal("0.6"), NO_HIDDEN_NAMES)
+        accuracies = {line.student: line.accuracy for line in batches.load_job_lines(session, batch.id)}
     # Ada has 3 of 6, so 4 of 8; Cid 7 of 8.
     statistics = found.statistics
     assert (statistics.n, statistics.mean, statistics.max_marks) == (2, 5.5, 8)

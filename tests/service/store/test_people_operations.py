@@ -45,14 +45,14 @@ def test_two_persons_become_one_who_signs_in_anew(service: Service) -> None:
         membership.make_operator(session, two.person_id)
         for each in (one, two):
             lifetime = credentials.SESSION_LIFETIME
-            secrets.append(credentials.issue(session, each.person_id, CredentialKind.SESSION, lifetime))
+            secrets.append(credentials.issue_credential(session, each.person_id, CredentialKind.SESSION, lifetime))
     joined = operations.join(service, ROOT, JoinRequest(one.enrolment_id, two.enrolment_id))
     assert (joined.person_id, joined.operator) == (one.person_id, True)
     with service.store.reading() as session:
         assert set(session.scalars(select(Enrolment.person_id))) == {one.person_id}
         assert session.get(Person, two.person_id) is None
         assert [credentials.identify(session, each, CredentialKind.SESSION) for each in secrets] == [None, None]
-        (entry,) = audit.entries(session, "person", str(one.person_id))
+        (entry,) = audit.load_entries(session, "person", str(one.person_id))
     assert (entry.action, entry.actor, entry.detail["joined"]) == ("join", "root", two.person_id)
 
 
@@ -101,5 +101,5 @@ def test_an_operator_removes_an_instructor(service: Service) -> None:
         operations.remove(service, ROOT, one.course_id + 1, one.enrolment_id)
     operations.remove(service, ROOT, one.course_id, one.enrolment_id)
     with service.store.reading() as session:
-        assert [each.person_id for each in membership.members(session, one.course_id)] == [two.person_id]
+        assert [each.person_id for each in membership.list_members(session, one.course_id)] == [two.person_id]
         assert credentials.identify(session, secret, CredentialKind.TOKEN) is None

@@ -26,7 +26,7 @@ def test_the_home_is_the_users_data_directory(monkeypatch: pytest.MonkeyPatch, t
 
 def test_a_child_process_reads_the_same_settings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     settings = Settings(home=tmp_path, broker_url="redis://host:1/2", lease_seconds=3.5, concurrency=3)
-    for name, value in settings.environment().items():
+    for name, value in settings.to_environment().items():
         monkeypatch.setenv(name, value)
     assert load_settings() == settings
 

@@ -24,9 +24,9 @@ GRADE = report_builders.faulty_grade()
 
 
 def _grade_next(store: Store, worker: str) -> bool:
-    claim = jobs.claim(store, worker, 60)
+    claim = jobs.claim_job(store, worker, 60)
     if claim is not None:
-        jobs.finish(store, claim, results.prepare(GRADE), datetime.now(UTC))
+        jobs.finish_job(store, claim, results.prepare_grade(GRADE), datetime.now(UTC))
     return claim is not None
 
 
@@ -42,7 +42,7 @@ def test_a_waiting_regrade_replaces_the_rerun_of_a_quarantined_grade(store: Stor
     assert _grade_next(store, "wrong")
     proposed = acting.regrade_one(store, accepted.job_id, None, max_attempts=3, actor="staff")
     assert _grade_next(store, "right")
-    (rerun,) = self_tests.quarantine(store, "wrong", "it adds wrongly").again
+    (rerun,) = self_tests.quarantine_worker(store, "wrong", "it adds wrongly").again
     assert acting.publish_one(store, proposed, actor="staff").replaced == 1
     with store.reading() as session:
         standing = select(Job.id).where(Job.submission_id == accepted.submission_id, Job.standing == Standing.STANDS)
@@ -79,5 +79,5 @@ def test_one_job_stands_after_any_order_of_actions(store: Store, seed: int) -> N
             case "publish":
                 acting.publish_one(store, chance.choice(ids), actor="staff")
             case "quarantine":
-                self_tests.quarantine(store, f"worker-{chance.randrange(number // 8 + 1)}", "it adds wrongly")
+                self_tests.quarantine_worker(store, f"worker-{chance.randrange(number // 8 + 1)}", "it adds wrongly")
         assert set(_standing(store).values()) == {1}

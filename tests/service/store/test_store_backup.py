@@ -12,21 +12,21 @@ from sqlalchemy import func, select, update
 
 import acting
 import report_builders
-from benchmarks.harness.postgresql_server import fresh_database
+from benchmarks.harness.postgresql_server import create_database
 from builders import grading_request, settings_in
 from service.settings import Settings
 from service.store.backup import back_up, restore
-from service.store.batches.intake import accept_batch, accept_new
+from service.store.batches.intake import accept_batch, accept_new_submissions
 from service.store.engine import Store, open_engine, open_store
 from service.store.grades import appeals, comments, overrides, results
-from service.store.installation import secret_of
+from service.store.installation import load_secret
 from service.store.models import Artifact, Batch, Enrolment, Job, Person, SubmissionRow, TrialRow
-from service.store.purge import Purged, purge
+from service.store.purge import PurgeCounts, purge_submissions
 from service.store.queue import jobs
 from service.store.states import JobState
 from service.store.web_tables import METADATA, Appeal, Comment, Override
 from sim.errors import HostError, UsageError
-from submissions.student_identity import Refusal
+from submissions.student_identity import RejectedSubmission
 
 GRADE = replace(report_builders.shape_grade(), sandbox="Landlock 7, seccomp, process limits, policy 0")
 TABLES = METADATA.sorted_tables
@@ -38,12 +38,12 @@ def elsewhere(request: pytest.FixtureRequest, tmp_path: Path) -> Settings:
     home = tmp_path / "elsewhere"
     if request.param == "sqlite":
         return settings_in(home)
-    return settings_in(home, database_url=fresh_database(request.getfixturevalue("postgresql")))
+    return settings_in(home, database_url=create_database(request.getfixturevalue("postgresql")))
 
 
 def _batch(store: Store, name: str, *students: str) -> str:
-    batch = accept_new(
-        store, name, [grading_request(each) for each in students], [Refusal("x", "is bad.")], max_attempts=3
+    batch = accept_new_submissions(
+        store, name, [grading_request(each) for each in students], [RejectedSubmission("x", "is bad.")], max_attempts=3
     )
     assert batch.batch is not None
     _grade_all(store)
@@ -51,15 +51,15 @@ def _batch(store: Store, name: str, *students: str) -> str:
 
 
 def _grade_all(store: Store) -> None:
-    while (claim := jobs.claim(store, "worker", 60)) is not None:
-        own = replace(GRADE, secret_sha256=secret_of(store).sha256)
-        jobs.finish(store, claim, results.prepare(own), datetime.now(UTC))
+    while (claim := jobs.claim_job(store, "worker", 60)) is not None:
+        own = replace(GRADE, secret_sha256=load_secret(store).sha256)
+        jobs.finish_job(store, claim, results.prepare_grade(own), datetime.now(UTC))
 
 
 def _filled(store: Store) -> str:
     """Store two students, a copy of a reviewed grade, a regrade, and a waiting job. Return the first batch."""
     first = _batch(store, "first", "ada", "bob 🤖")
-    copied = accept_new(store, "same again", [grading_request("eve")], [], max_attempts=3).batch
+    copied = accept_new_submissions(store, "same again", [grading_request("eve")], [], max_attempts=3).batch
     assert copied is not None
     _look_again(store, copied.jobs[0].job_id)
     acting.regrade(store, first, None, max_attempts=3, actor="staff")
@@ -71,10 +71,10 @@ def _filled(store: Store) -> str:
 def _look_again(store: Store, job_id: str) -> None:
     """Add the student's appeal, and an instructor's override, comment and answer."""
     with store.transaction() as session:
-        appeal = appeals.ask(session, session.get_one(Job, job_id).submission_id, "Why?")
-        overrides.excuse(session, job_id, GRADE.criteria[0].id, "was ill", "staff")
-        comments.comment(session, job_id, "", "Well done.", "staff")
-        appeals.answer(session, 1, appeal, "See there.", "staff")
+        appeal = appeals.open_appeal(session, session.get_one(Job, job_id).submission_id, "Why?")
+        overrides.excuse_criterion(session, job_id, GRADE.criteria[0].id, "was ill", "staff")
+        comments.add_comment(session, job_id, "", "Well done.", "staff")
+        appeals.answer_appeal(session, 1, appeal, "See there.", "staff")
 
 
 def _rows(store: Store) -> dict[str, list[Any]]:
@@ -162,9 +162,9 @@ def test_a_purge_takes_what_is_old_and_no_more(store: Store) -> None:
     long_ago = datetime.now(UTC) - timedelta(days=100)
     _age(store, "eve", "mia")
     # mia's job still waits.
-    assert purge(store, long_ago, "staff", only_count=True) == Purged(1, 1, 1)
+    assert purge_submissions(store, long_ago, "staff", only_count=True) == PurgeCounts(1, 1, 1)
     assert _counts(store) == before
-    assert purge(store, long_ago, "staff") == Purged(1, 1, 1)
+    assert purge_submissions(store, long_ago, "staff") == PurgeCounts(1, 1, 1)
     after = _counts(store)
     assert {name: before[name] - after[name] for name in before} == {
         "batch": 1, "submission": 1, "job": 1, "trial": before["trial"] - after["trial"],
@@ -173,7 +173,7 @@ def test_a_purge_takes_what_is_old_and_no_more(store: Store) -> None:
     }  # fmt: skip
     assert after["trial"] < before["trial"]
     # Newer work of the same students is complete.
-    assert purge(store, long_ago, "staff") == Purged(0, 0, 0)
+    assert purge_submissions(store, long_ago, "staff") == PurgeCounts(0, 0, 0)
 
 
 def test_a_purge_keeps_what_a_later_grade_is_a_copy_of(store: Store) -> None:
@@ -185,14 +185,14 @@ def test_a_purge_keeps_what_a_later_grade_is_a_copy_of(store: Store) -> None:
             select(Enrolment.student).join(Job, Job.enrolment_id == Enrolment.id).where(Job.id == copied)
         ).one()
     _age(store, source)
-    assert purge(store, long_ago, "staff").submissions == 0
+    assert purge_submissions(store, long_ago, "staff").submissions == 0
     _age(store, "eve")
-    assert purge(store, long_ago, "staff").submissions == 2
+    assert purge_submissions(store, long_ago, "staff").submissions == 2
 
 
 def test_nothing_is_left_when_all_is_old(store: Store) -> None:
     _filled(store)
-    jobs_left = purge(store, datetime.now(UTC) + timedelta(days=1), "staff")
+    jobs_left = purge_submissions(store, datetime.now(UTC) + timedelta(days=1), "staff")
     # mia's submission waits, and stays with her.
     assert jobs_left.submissions == 3
     assert _counts(store) == {

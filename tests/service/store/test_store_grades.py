@@ -12,28 +12,28 @@ from sqlalchemy import select, text, update
 
 import report_builders
 from builders import accept_one, comparable
-from responders.sandbox.meter import JobLimits, Spent
+from responders.sandbox.meter import JobCosts, JobLimits
 from service.grading.grade import Cost, Grade
-from service.reports.formats.json_output import json_document
-from service.reports.formats.text import plain_text
-from service.reports.view import staff_view
+from service.reports.formats.json_output import build_json_document
+from service.reports.formats.text import render_plain_text
+from service.reports.view import build_staff_view
 from service.store import artifacts
 from service.store.batches.intake import load_grading_request
-from service.store.columns import storable
+from service.store.columns import make_storable
 from service.store.engine import Store
 from service.store.grades import results
 from service.store.models import Artifact, AssignmentVersion, CriterionResultRow, Job, SubmissionRow
 from service.store.queue import jobs
 from sim.errors import HostError, UsageError
-from sim.recording import Line
+from sim.recording import TimedText
 
 
 def _stored(store: Store, grade: Grade) -> str:
     """Store a grade and return its job's id. The rows that the grade belongs to are adapted to it."""
     accepted = accept_one(store, grade.student)
-    claim = jobs.claim(store, "worker", 60)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish(store, claim, results.prepare(grade), datetime.now(UTC))
+    jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
     with store.transaction() as session:
         version = {"assignment": grade.assignment, "title": grade.assignment_title, "version": grade.assignment_version}
         session.execute(update(AssignmentVersion).values(**version))
@@ -55,21 +55,21 @@ def test_a_grade_comes_back_as_it_was(store: Store, make: Callable[[], Grade]) -
     grade = make()
     job_id = _stored(store, grade)
     with store.reading() as session:
-        back, words = results.load(session, job_id), results.load_words(session, job_id)
+        back, words = results.load_grade(session, job_id), results.load_grade_texts(session, job_id)
     assert comparable(back) == comparable(grade)
     assert (back.marks, back.max_marks, back.verdict) == (grade.marks, grade.max_marks, grade.verdict)
-    assert json_document(staff_view(words)) == json_document(staff_view(back))
-    assert plain_text(staff_view(words)) == plain_text(staff_view(back))
+    assert build_json_document(build_staff_view(words)) == build_json_document(build_staff_view(back))
+    assert render_plain_text(build_staff_view(words)) == render_plain_text(build_staff_view(back))
 
 
 def test_what_it_cost_is_kept_and_told_of_no_two_grades_apart(store: Store) -> None:
-    cost = Cost(JobLimits(1 << 20, 240.0, 20.0), Spent(1 << 18, 3.25, 0.5))
+    cost = Cost(JobLimits(1 << 20, 240.0, 20.0), JobCosts(1 << 18, 3.25, 0.5))
     grade = replace(report_builders.shape_grade(), cost=cost)
     job_id = _stored(store, grade)
     with store.reading() as session:
-        back = results.load(session, job_id)
+        back = results.load_grade(session, job_id)
     assert back.cost == cost
-    other = replace(grade, cost=Cost(cost.limits, Spent(1 << 18, 3.5, 0.0)))
+    other = replace(grade, cost=Cost(cost.limits, JobCosts(1 << 18, 3.5, 0.0)))
     assert other == grade
     assert hash(other.cost) != hash(cost)
 
@@ -77,14 +77,16 @@ def test_what_it_cost_is_kept_and_told_of_no_two_grades_apart(store: Store) -> N
 def test_hostile_texts_go_in_and_the_recordings_keep_them(store: Store) -> None:
     grade = report_builders.hostile_grade()
     first = grade.trials[0]
-    poisoned = replace(first.recording, printed=(*first.recording.printed, Line(1.0, "\0\ud800'; DROP TABLE job;--")))
+    poisoned = replace(
+        first.recording, printed=(*first.recording.printed, TimedText(1.0, "\0\ud800'; DROP TABLE job;--"))
+    )
     criteria = tuple(replace(result, message=result.message + "\0\ud800") for result in grade.criteria)
     grade = replace(grade, trials=(replace(first, recording=poisoned), *grade.trials[1:]), criteria=criteria)
     job_id = _stored(store, grade)
     with store.reading() as session:
-        back = results.load(session, job_id)
+        back = results.load_grade(session, job_id)
     assert comparable(back)[1] == comparable(grade)[1]
-    assert [result.message for result in back.criteria] == [storable(result.message) for result in grade.criteria]
+    assert [result.message for result in back.criteria] == [make_storable(result.message) for result in grade.criteria]
 
 
 def test_accuracy_is_data(store: Store) -> None:
@@ -107,7 +109,7 @@ def test_marks_keep_their_places(store: Store) -> None:
     third = replace(grade.criteria[0], marks=Decimal("0.10"), max_marks=Decimal("3.30"))
     job_id = _stored(store, replace(grade, criteria=(third,)))
     with store.reading() as session:
-        back = results.load(session, job_id).criteria[0]
+        back = results.load_grade(session, job_id).criteria[0]
     assert (str(back.marks), str(back.max_marks)) == ("0.10", "3.30")
 
 
@@ -117,7 +119,7 @@ def test_a_flood_of_images_is_cut_and_the_marks_stay(store: Store, monkeypatch: 
     grade = report_builders.shape_grade()
     job_id = _stored(store, grade)
     with store.reading() as session:
-        back = results.load(session, job_id)
+        back = results.load_grade(session, job_id)
     assert back.marks == grade.marks
     assert back.accuracy == grade.accuracy
     assert all("too large" in trial.recording.notes[-1] for trial in back.trials)
@@ -136,17 +138,21 @@ def test_what_a_worker_needs_is_all_in_the_database(store: Store) -> None:
 def test_a_job_without_a_grade_says_so(store: Store) -> None:
     accepted = accept_one(store)
     with store.reading() as session, pytest.raises(UsageError, match="has no grade"):
-        results.load(session, accepted.job_id)
+        results.load_grade(session, accepted.job_id)
 
 
 def test_a_file_of_the_same_name_is_replaced(store: Store) -> None:
     job_id = accept_one(store).job_id
     for data in (b"first", b"second"):
         with store.transaction() as session:
-            artifacts.put(session, job_id, [artifacts.File("plot-a%.png", "image/png", data)], datetime.now(UTC))
+            artifacts.store_files(
+                session, job_id, [artifacts.File("plot-a%.png", "image/png", data)], datetime.now(UTC)
+            )
     with store.reading() as session:
-        assert {name: file.data for name, file in artifacts.get(session, job_id).items()} == {"plot-a%.png": b"second"}
-        assert artifacts.get(session, job_id, prefix="plot-%") == {}
+        assert {name: file.data for name, file in artifacts.load_files(session, job_id).items()} == {
+            "plot-a%.png": b"second"
+        }
+        assert artifacts.load_files(session, job_id, prefix="plot-%") == {}
 
 
 def test_a_damaged_file_is_noticed(store: Store) -> None:
@@ -154,7 +160,7 @@ def test_a_damaged_file_is_noticed(store: Store) -> None:
     with store.transaction() as session:
         session.execute(update(Artifact).values(sha256="0" * 64))
     with store.reading() as session, pytest.raises(HostError, match="damaged"):
-        results.load(session, job_id)
+        results.load_grade(session, job_id)
 
 
 def test_a_file_over_the_cap_is_refused(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -162,7 +168,7 @@ def test_a_file_over_the_cap_is_refused(store: Store, monkeypatch: pytest.Monkey
     job_id = accept_one(store).job_id
     file = artifacts.File("large", "application/octet-stream", bytes(range(256)))
     with pytest.raises(HostError, match="too large"), store.transaction() as session:
-        artifacts.put(session, job_id, [file], datetime.now(UTC))
+        artifacts.store_files(session, job_id, [file], datetime.now(UTC))
 
 
 def test_a_moment_without_a_zone_is_refused(store: Store) -> None:

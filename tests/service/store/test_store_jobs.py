@@ -14,7 +14,7 @@ import acting
 import report_builders
 from builders import accept_one, grading_request, settings_in
 from command import FORKING
-from service.operations.batches import Controlled
+from service.operations.batches import BatchControlResult
 from service.settings import Settings
 from service.store.batches import batches
 from service.store.batches.intake import accept_batch
@@ -22,13 +22,13 @@ from service.store.engine import Store, open_store
 from service.store.grades import plots, results
 from service.store.models import Batch, Course, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
 from service.store.queue import jobs
-from service.store.queue.jobs import Claim, Fenced, Retry
-from service.store.queue.lease_reaper import note_notices, requeue_lost, wanting_notices
+from service.store.queue.jobs import Claim, LeaseLost, RetryPolicy
+from service.store.queue.lease_reaper import count_missing_notices, mark_notified, requeue_lost_jobs
 from service.store.queue.scheduling import BATCH_EVERY
-from service.store.states import BatchState, JobState, Lane, PlotState
-from submissions.student_identity import Refusal
+from service.store.states import BatchState, JobQueue, JobState, PlotState
+from submissions.student_identity import RejectedSubmission
 
-NO_WAIT = Retry(0.0)
+NO_WAIT = RetryPolicy(0.0)
 
 
 def _job(store: Store, job_id: str) -> Job:
@@ -42,13 +42,13 @@ def _change(store: Store, job_id: str, **values: Any) -> None:
 
 
 def _claim(store: Store, worker: str = "worker") -> Claim:
-    claim = jobs.claim(store, worker, 60)
+    claim = jobs.claim_job(store, worker, 60)
     assert claim is not None
     return claim
 
 
 def _finish(store: Store, claim: Claim) -> None:
-    jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
 
 
 def _rows(store: Store) -> tuple[int, int]:
@@ -65,7 +65,7 @@ def test_a_job_is_claimed_once_and_finished_once(store: Store) -> None:
     job_id = accept_one(store).job_id
     claim = _claim(store, "first")
     assert claim.job_id == job_id
-    assert jobs.claim(store, "second", 60) is None
+    assert jobs.claim_job(store, "second", 60) is None
     _finish(store, claim)
     job = _job(store, job_id)
     assert (job.state, job.attempt, job.worker, job.lease, job.plots) == (
@@ -76,31 +76,31 @@ def test_a_job_is_claimed_once_and_finished_once(store: Store) -> None:
         PlotState.DUE,
     )
     assert job.queued_at <= job.started_at <= job.graded_at <= job.finished_at  # type: ignore[operator]
-    assert jobs.claim(store, "second", 60) is None
+    assert jobs.claim_job(store, "second", 60) is None
 
 
 def test_a_stale_worker_can_change_nothing(store: Store) -> None:
     job_id = accept_one(store).job_id
     stale = _claim(store, "stale")
     _lapse(store, job_id)
-    assert requeue_lost(store, NO_WAIT) == 1
+    assert requeue_lost_jobs(store, NO_WAIT) == 1
     fresh = _claim(store, "fresh")
     for change in (
-        lambda: jobs.heartbeat(store, stale, 60, 0.5),
+        lambda: jobs.renew_lease(store, stale, 60, 0.5),
         lambda: _finish(store, stale),
-        lambda: jobs.fail(store, stale, "late", NO_WAIT),
-        lambda: jobs.give_up(store, stale, "late"),
+        lambda: jobs.fail_job(store, stale, "late", NO_WAIT),
+        lambda: jobs.give_up_job(store, stale, "late"),
     ):
-        with pytest.raises(Fenced):
+        with pytest.raises(LeaseLost):
             change()
     assert jobs.release_worker(store, "stale") == 0
     assert _rows(store) == (0, 0)
     assert (_job(store, job_id).state, _job(store, job_id).worker) == (JobState.RUNNING, "fresh")
     _finish(store, fresh)
     once = _rows(store)
-    with pytest.raises(Fenced):
+    with pytest.raises(LeaseLost):
         _finish(store, stale)
-    with pytest.raises(Fenced):
+    with pytest.raises(LeaseLost):
         _finish(store, fresh)
     assert _rows(store) == once
     assert _job(store, job_id).attempt == 2
@@ -114,7 +114,7 @@ def test_a_finish_that_fails_half_way_leaves_nothing(store: Store, monkeypatch: 
         raise OSError("the disk is full")
 
     with monkeypatch.context() as patch:
-        patch.setattr("service.store.artifacts.put", broken)
+        patch.setattr("service.store.artifacts.store_files", broken)
         with pytest.raises(OSError, match="disk is full"):
             _finish(store, claim)
     assert _rows(store) == (0, 0)
@@ -127,27 +127,27 @@ def test_a_heartbeat_keeps_the_lease_and_tells_the_progress(store: Store) -> Non
     job_id = accept_one(store).job_id
     claim = _claim(store)
     _lapse(store, job_id)
-    jobs.heartbeat(store, claim, 60, 0.25)
-    assert requeue_lost(store, NO_WAIT) == 0
+    jobs.renew_lease(store, claim, 60, 0.25)
+    assert requeue_lost_jobs(store, NO_WAIT) == 0
     assert _job(store, job_id).progress == 0.25
 
 
 def test_faults_of_ours_are_tried_again_later_and_not_for_ever(store: Store) -> None:
     job_id = accept_one(store, max_attempts=3).job_id
-    retry = Retry(100.0)
+    retry = RetryPolicy(100.0)
     waits = []
     for attempt in (1, 2):
         before = datetime.now(UTC)
-        assert jobs.fail(store, _claim(store), f"fault {attempt}", retry) is JobState.QUEUED
-        assert jobs.claim(store, "eager", 60) is None
+        assert jobs.fail_job(store, _claim(store), f"fault {attempt}", retry) is JobState.QUEUED
+        assert jobs.claim_job(store, "eager", 60) is None
         waits.append((_job(store, job_id).due_at - before).total_seconds())
         _change(store, job_id, due_at=before)
     assert waits == [pytest.approx(100, abs=20), pytest.approx(200, abs=20)]
-    assert jobs.fail(store, _claim(store), "fault 3", retry) is JobState.DEAD
+    assert jobs.fail_job(store, _claim(store), "fault 3", retry) is JobState.DEAD
     job = _job(store, job_id)
     assert job.error == "Tried 3 times, the last time: fault 3"
     assert job.finished_at is not None
-    assert jobs.claim(store, "eager", 60) is None
+    assert jobs.claim_job(store, "eager", 60) is None
 
 
 def test_lost_workers_cost_attempts_and_end_with_a_reason(store: Store) -> None:
@@ -155,11 +155,11 @@ def test_lost_workers_cost_attempts_and_end_with_a_reason(store: Store) -> None:
     for worker in ("one", "two"):
         _claim(store, worker)
         _lapse(store, job_id)
-        assert requeue_lost(store, NO_WAIT) == 1
+        assert requeue_lost_jobs(store, NO_WAIT) == 1
     job = _job(store, job_id)
     assert job.state is JobState.DEAD
     assert "the worker two stopped responding" in (job.error or "")
-    assert requeue_lost(store, NO_WAIT) == 0
+    assert requeue_lost_jobs(store, NO_WAIT) == 0
 
 
 def test_what_is_given_back_costs_no_attempt(store: Store) -> None:
@@ -170,7 +170,7 @@ def test_what_is_given_back_costs_no_attempt(store: Store) -> None:
     claim = _claim(store, "ended")
     assert jobs.release_worker(store, "another") == 0
     assert jobs.release_worker(store, "ended") == 1
-    with pytest.raises(Fenced):
+    with pytest.raises(LeaseLost):
         _finish(store, claim)
     _finish(store, _claim(store))
     assert _job(store, job_id).attempt == 1
@@ -179,10 +179,10 @@ def test_what_is_given_back_costs_no_attempt(store: Store) -> None:
 def test_a_cancelled_job_stops_its_worker(store: Store) -> None:
     batch = _batch(store, "batch", 2)
     claim = _claim(store)
-    assert acting.cancel(store, batch) == Controlled(True, 1, 1)
-    with pytest.raises(Fenced, match="cancelled"):
-        jobs.heartbeat(store, claim, 60, 0.5)
-    assert jobs.claim(store, "worker", 60) is None
+    assert acting.cancel(store, batch) == BatchControlResult(True, 1, 1)
+    with pytest.raises(LeaseLost, match="cancelled"):
+        jobs.renew_lease(store, claim, 60, 0.5)
+    assert jobs.claim_job(store, "worker", 60) is None
     assert not acting.cancel(store, batch).changed
 
 
@@ -200,7 +200,7 @@ def test_the_newest_submission_supersedes_one_that_waits_not_one_that_runs(store
 
 def _batch(store: Store, name: str, count: int) -> str:
     grading_requests = [grading_request(f"{name}-{number}") for number in range(count)]
-    return accept_batch(store, name, grading_requests, [Refusal("odd.txt", "is odd.")], max_attempts=3).id
+    return accept_batch(store, name, grading_requests, [RejectedSubmission("odd.txt", "is odd.")], max_attempts=3).id
 
 
 def _served(store: Store, count: int) -> list[str | None]:
@@ -241,7 +241,7 @@ def test_a_paused_batch_waits(store: Store) -> None:
     batch = _batch(store, "batch", 1)
     with store.transaction() as session:
         session.execute(update(Batch).values(state=BatchState.PAUSED))
-    assert jobs.claim(store, "worker", 60) is None
+    assert jobs.claim_job(store, "worker", 60) is None
     with store.transaction() as session:
         session.execute(update(Batch).values(state=BatchState.OPEN))
     assert _job(store, _claim(store).job_id).batch_id == batch
@@ -250,46 +250,52 @@ def test_a_paused_batch_waits(store: Store) -> None:
 def test_a_batch_knows_how_far_it_is(store: Store) -> None:
     batch = _batch(store, "batch", 3)
     _finish(store, _claim(store))
-    jobs.heartbeat(store, _claim(store), 60, 0.5)
+    jobs.renew_lease(store, _claim(store), 60, 0.5)
     with store.reading() as session:
-        progress = batches.progress(session, batch)
-        line = batches.batch(session, batches.find_batch(session, batch[:8]))
-        lines = batches.job_lines(session, batch)
+        progress = batches.load_progress(session, batch)
+        line = batches.load_batch(session, batches.find_batch(session, batch[:8]))
+        lines = batches.load_job_lines(session, batch)
     assert (progress.jobs, progress.ended, progress.partial, progress.plots_due) == (3, 1, 0.5, 1)
     assert line.states == {JobState.DONE: 1, JobState.RUNNING: 1, JobState.QUEUED: 1}
-    assert line.refusals == (Refusal("odd.txt", "is odd."),)
+    assert line.refusals == (RejectedSubmission("odd.txt", "is odd."),)
     assert [(line.student, line.ended) for line in lines].count(("batch-0", True)) <= 1
     assert sum(line.ended for line in lines) == 1
 
 
 def test_notices_are_wanting_until_they_are_noted(store: Store) -> None:
     _batch(store, "batch", 3)
-    assert (wanting_notices(store, 60)[Lane.BATCH].due, wanting_notices(store, 60)[Lane.BATCH].stale) == (3, 3)
-    note_notices(store, Lane.BATCH, 2)
-    assert (wanting_notices(store, 60)[Lane.BATCH].due, wanting_notices(store, 60)[Lane.BATCH].stale) == (3, 1)
-    assert wanting_notices(store, 0)[Lane.BATCH].stale == 3
+    assert (
+        count_missing_notices(store, 60)[JobQueue.BATCH].due,
+        count_missing_notices(store, 60)[JobQueue.BATCH].stale,
+    ) == (3, 3)
+    mark_notified(store, JobQueue.BATCH, 2)
+    assert (
+        count_missing_notices(store, 60)[JobQueue.BATCH].due,
+        count_missing_notices(store, 60)[JobQueue.BATCH].stale,
+    ) == (3, 1)
+    assert count_missing_notices(store, 0)[JobQueue.BATCH].stale == 3
     _claim(store)
-    assert wanting_notices(store, 60)[Lane.BATCH].due == 2
+    assert count_missing_notices(store, 60)[JobQueue.BATCH].due == 2
 
 
 def test_plots_are_tried_a_few_times(store: Store) -> None:
     job_id = accept_one(store).job_id
-    assert plots.claim(store, 60) is None
+    assert plots.claim_plots(store, 60) is None
     _finish(store, _claim(store))
-    for _ in range(plots.ATTEMPTS):
-        assert plots.claim(store, 60) == job_id
-        assert plots.claim(store, 60) is None
+    for _ in range(plots.MOST_ATTEMPTS):
+        assert plots.claim_plots(store, 60) == job_id
+        assert plots.claim_plots(store, 60) is None
         _change(store, job_id, plots_due_at=datetime.now(UTC))
-    assert plots.claim(store, 60) is None
+    assert plots.claim_plots(store, 60) is None
     assert _job(store, job_id).plots is PlotState.FAILED
 
 
 def _race(settings: Settings, number: int, counts: Any) -> None:
     claimed = []
     with open_store(settings) as store:
-        while (claim := jobs.claim(store, f"racer-{number}", 60)) is not None:
+        while (claim := jobs.claim_job(store, f"racer-{number}", 60)) is not None:
             claimed.append(claim.job_id)
-            jobs.give_up(store, claim, "raced")
+            jobs.give_up_job(store, claim, "raced")
     counts.put(claimed)
 
 
@@ -345,7 +351,7 @@ def test_courses_share_alike_however_many_batches_they_have(store: Store) -> Non
     begun: Counter[str] = Counter()
     ended_at: dict[str, int] = {}
     for turn in range(1, 121):
-        claim = jobs.claim(store, "worker", 600)
+        claim = jobs.claim_job(store, "worker", 600)
         assert claim is not None
         with store.reading() as session:
             enrolment = session.get_one(Enrolment, session.get_one(Job, claim.job_id).enrolment_id)

@@ -25,18 +25,18 @@ from service.store.backup import back_up, restore
 from service.store.batches import batches, intake
 from service.store.codec import decode
 from service.store.courses import open_assignments, policies
-from service.store.courses.policies import Exceeded
+from service.store.courses.policies import ExceededLimit
 from service.store.engine import Store, open_engine, open_store
 from service.store.grades import results
-from service.store.migrate import configuration, migrate
+from service.store.migrate import apply_migrations, build_alembic_config
 from service.store.models import Artifact, Batch, CriterionResultRow, Enrolment, Job, Person, SubmissionRow, TrialRow
 from service.store.queue import jobs
-from service.store.recorded_schema import statements_of
-from service.store.revision import current_revision, newest_revision, revision_of, schema_state
+from service.store.recorded_schema import read_statements
+from service.store.revision import find_newest_revision, load_current_revision, load_schema_state, read_revision
 from service.store.states import CancelReason, JobState, Role, Standing
 from service.store.web_tables import METADATA, Credential, LtiCourse, LtiPlatform, OpenAssignment
 from sim.errors import HostError
-from submissions.student_identity import Refusal
+from submissions.student_identity import RejectedSubmission
 
 
 def _open(settings: Settings) -> None:
@@ -46,15 +46,15 @@ def _open(settings: Settings) -> None:
 def test_the_migrations_make_what_the_models_say(service_settings: Settings) -> None:
     engine = open_engine(service_settings.database)
     with engine.begin() as connection:
-        migrate(connection)
+        apply_migrations(connection)
     engine.dispose()
     with open_store(service_settings) as store:
-        assert current_revision(store.engine) == newest_revision()
+        assert load_current_revision(store.engine) == find_newest_revision()
         assert set(inspect(store.engine).get_table_names()) == {*METADATA.tables, "alembic_version"}
         with store.engine.begin() as connection:
-            known = configuration(connection)
+            known = build_alembic_config(connection)
             command.check(known)
-            assert ScriptDirectory.from_config(known).get_current_head() == newest_revision()
+            assert ScriptDirectory.from_config(known).get_current_head() == find_newest_revision()
 
 
 def _lines_of(statement: str) -> list[str]:
@@ -64,16 +64,19 @@ def _lines_of(statement: str) -> list[str]:
 
 def test_a_new_database_is_what_the_migrations_make(tmp_path: Path) -> None:
     told = []
-    for name, lay in (("laid", partial(new_database.lay, revision=newest_revision())), ("migrated", migrate)):
+    for name, lay in (
+        ("laid", partial(new_database.create_tables, revision=find_newest_revision())),
+        ("migrated", apply_migrations),
+    ):
         engine = open_engine(f"sqlite:///{tmp_path / name}.db")
         with engine.begin() as connection:
-            assert new_database.can_be_laid(connection)
+            assert new_database.is_empty_sqlite(connection)
             lay(connection)
-            schema = [_lines_of(statement) for statement in statements_of(connection)]
+            schema = [_lines_of(statement) for statement in read_statements(connection)]
             rows = {table.name: connection.execute(select(table)).mappings().all() for table in METADATA.sorted_tables}
             (installation,) = rows.pop("installation")
-            told.append((schema, rows, len(installation["secret"]), revision_of(connection)))
-            assert not new_database.can_be_laid(connection)
+            told.append((schema, rows, len(installation["secret"]), read_revision(connection)))
+            assert not new_database.is_empty_sqlite(connection)
         engine.dispose()
     assert told[0] == told[1], "python -m service.store.recorded_schema writes down anew what the migrations make"
 
@@ -87,7 +90,7 @@ def test_many_may_come_first(service_settings: Settings) -> None:
         assert process.exitcode == 0
         process.close()
     engine = open_engine(service_settings.database)
-    assert current_revision(engine) == newest_revision()
+    assert load_current_revision(engine) == find_newest_revision()
     engine.dispose()
 
 
@@ -106,9 +109,9 @@ def _back_up_and_restore(store: Store, file: Path) -> None:
 def test_a_newer_database_that_this_release_can_use_is_used(service_settings: Settings, tmp_path: Path) -> None:
     with open_store(service_settings) as store:
         job_id = accept_one(store).job_id
-        upgraded_by_newer_release(store, newest_revision())
+        upgraded_by_newer_release(store, find_newest_revision())
     with open_store(service_settings) as store:
-        claim = jobs.claim(store, "worker", 60)
+        claim = jobs.claim_job(store, "worker", 60)
         assert claim is not None
         assert claim.job_id == job_id
         # A copy row by row would lack the columns that the newer release added.
@@ -120,9 +123,10 @@ def test_migrations_name_the_oldest_revision_that_can_use_the_tables(service_set
     engine = open_engine(service_settings.database)
     with engine.begin() as connection:
         scripts = {
-            each.revision: each for each in ScriptDirectory.from_config(configuration(connection)).walk_revisions()
+            each.revision: each
+            for each in ScriptDirectory.from_config(build_alembic_config(connection)).walk_revisions()
         }
-        migrate(connection)
+        apply_migrations(connection)
     named = {
         revision: getattr(scripts[revision].module, "OLDEST_COMPATIBLE", None)
         for revision in sorted(scripts)
@@ -133,7 +137,7 @@ def test_migrations_name_the_oldest_revision_that_can_use_the_tables(service_set
     )
     assert list(named.values()) == sorted(map(str, named.values()))
     assert all(oldest in scripts and oldest <= revision for revision, oldest in named.items())
-    assert schema_state(engine).oldest_compatible == named[newest_revision()]
+    assert load_schema_state(engine).oldest_compatible == named[find_newest_revision()]
     engine.dispose()
 
 
@@ -148,35 +152,35 @@ def test_a_database_of_the_first_release_is_upgraded_with_its_data(service_setti
             ]
             assert counts == [2, 10, 3]
             (batch,) = session.scalars(select(Batch.id).where(Batch.name == "class"))
-            ada, bob = sorted(batches.job_lines(session, batch), key=lambda line: line.student == "Bob 🤖")
-            graded = results.load(session, ada.id)
+            ada, bob = sorted(batches.load_job_lines(session, batch), key=lambda line: line.student == "Bob 🤖")
+            graded = results.load_grade(session, ada.id)
             assert (graded.student, graded.marks, ada.standing) == ("ada", Decimal("1.00"), Standing.STANDS)
             assert len(graded.trials[0].recording.ticks) > 10
             assert graded.cost is None
             assert bob.student == "Bob 🤖"
             assert (bob.name, bob.email, bob.missing) == ("", "", "")
-            assert batches.batch(session, batch).refusals == (Refusal("odd.txt", "is odd."),)
+            assert batches.load_batch(session, batch).refusals == (RejectedSubmission("odd.txt", "is odd."),)
             people = session.execute(select(Enrolment.student, Enrolment.written, Enrolment.name)).all()
             assert {(student, written) for student, written, _ in people} >= {("ada", "ada"), ("Bob 🤖", "Bob 🤖")}
             assert {name for _, _, name in people} == {""}
-            assert artifacts.get(session, ada.id, prefix="plot-")["plot-path.png"].data.startswith(b"\x89PNG")
+            assert artifacts.load_files(session, ada.id, prefix="plot-")["plot-path.png"].data.startswith(b"\x89PNG")
             assert intake.load_grading_request(session, ada.id).submission.program is not None
         with store.engine.begin() as connection:
-            command.check(configuration(connection))
+            command.check(build_alembic_config(connection))
         # The new release grades the waiting job, and new jobs get the next numbers.
-        waiting = jobs.claim(store, "worker", 60)
+        waiting = jobs.claim_job(store, "worker", 60)
         assert waiting is not None
-        jobs.finish(store, waiting, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+        jobs.finish_job(store, waiting, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
         assert accept_one(store, "ada").attempt == 3
 
 
 def test_a_database_of_release_0_2_0_is_upgraded_with_its_data(service_settings: Settings, tmp_path: Path) -> None:
     engine = lay_release_0_2_0(service_settings.database, tmp_path)
-    assert current_revision(engine) == "0008"
+    assert load_current_revision(engine) == "0008"
     engine.dispose()
     with open_store(service_settings) as store:
         with store.engine.begin() as connection:
-            command.check(configuration(connection))
+            command.check(build_alembic_config(connection))
         with store.reading() as session:
             found = session.execute(select(Job.state, Job.standing, func.count()).group_by(Job.state, Job.standing))
             assert {(state, standing): count for state, standing, count in found} == {
@@ -188,20 +192,20 @@ def test_a_database_of_release_0_2_0_is_upgraded_with_its_data(service_settings:
             }
             assert session.scalar(select(func.count()).where(Job.published_at.is_not(None))) == 2
             (batch,) = session.scalars(select(Batch.id).where(Batch.name == "class"))
-            assert batches.batch(session, batch).refusals == (Refusal("odd.txt", "is odd."),)
-            published = [line for line in batches.job_lines(session, batch) if line.marks is not None]
+            assert batches.load_batch(session, batch).refusals == (RejectedSubmission("odd.txt", "is odd."),)
+            published = [line for line in batches.load_job_lines(session, batch) if line.marks is not None]
             assert sorted(line.marks for line in published if line.marks is not None) == [Decimal(0), Decimal(8)]
             for line in published:
-                assert results.load(session, line.id).marks == line.marks
-            limits = policies.policies(session, 1)["echo-responder"]
+                assert results.load_grade(session, line.id).marks == line.marks
+            limits = policies.load_policies(session, 1)["echo-responder"]
             assert (limits.late_days, limits.attempts, limits.cool_down_seconds) == (2, 1, 60.0)
             ada = session.scalars(select(Enrolment.id).where(Enrolment.student == "ada")).one()
-            assert policies.limits(session, ada, "echo-responder").attempts == 3
+            assert policies.load_limits(session, ada, "echo-responder").attempts == 3
             names = session.scalars(select(Enrolment.student).order_by(Enrolment.id)).all()
             assert set(names) == {"ada", "Bob 🤖", "cyd", "dan"}
         # The new release grades, publishes and extends the old regrades.
-        while claim := jobs.claim(store, "worker", 60):
-            jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+        while claim := jobs.claim_job(store, "worker", 60):
+            jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
         acting.publish(store, batch, anyway=True)
         assert accept_one(store, "eve").attempt == 1
 
@@ -222,23 +226,23 @@ def test_what_the_first_tables_called_superseded_is_cancelled(service_settings: 
 @pytest.mark.parametrize(
     ("sentence", "exceeded", "now"),
     [
-        ("attempt 3, allowed: 2", Exceeded("attempts", 3, 2), "attempt 3, allowed: 2"),
-        ("1 day late, allowed: 0", Exceeded("date", 1, 0), "1 day late, allowed: 0"),
-        ("12 days late, allowed: 3", Exceeded("date", 12, 3), "12 days late, allowed: 3"),
+        ("attempt 3, allowed: 2", ExceededLimit("attempts", 3, 2), "attempt 3, allowed: 2"),
+        ("1 day late, allowed: 0", ExceededLimit("date", 1, 0), "1 day late, allowed: 0"),
+        ("12 days late, allowed: 3", ExceededLimit("date", 12, 3), "12 days late, allowed: 3"),
         (
             "submitted 0 min after the one before, asked for: 10 min",
-            Exceeded("cool-down", 0, 10),
+            ExceededLimit("cool-down", 0, 10),
             "submitted 0 min after the previous submission, required: 10 min",
         ),
     ],
 )
 def test_sentences_of_earlier_releases_become_data(
-    service_settings: Settings, tmp_path: Path, sentence: str, exceeded: Exceeded, now: str
+    service_settings: Settings, tmp_path: Path, sentence: str, exceeded: ExceededLimit, now: str
 ) -> None:
     assert str(exceeded) == now
     engine = lay_first_release(service_settings.database, tmp_path)
     with engine.begin() as connection:
-        command.upgrade(configuration(connection), "0017")
+        command.upgrade(build_alembic_config(connection), "0017")
         connection.execute(text("UPDATE submission SET staff_only = :sentence"), {"sentence": sentence})
         aside = {"sentence": "over a limit: it is graded when staff ask for it"}
         connection.execute(text("UPDATE job SET state = 'cancelled', error = :sentence WHERE state = 'dead'"), aside)
@@ -246,7 +250,7 @@ def test_sentences_of_earlier_releases_become_data(
     engine.dispose()
     with open_store(service_settings) as store, store.reading() as session:
         stored = session.scalars(select(SubmissionRow.exceeded)).all()
-        assert {decode(Exceeded, each) for each in stored} == {exceeded}
+        assert {decode(ExceededLimit, each) for each in stored} == {exceeded}
         (replaced,) = session.scalars(select(Job).where(Job.cancelled_for == CancelReason.SUPERSEDED))
         assert replaced.error == f"superseded by {replaced.superseded_by}"
         assert session.get(Job, replaced.superseded_by) is not None
@@ -258,7 +262,7 @@ def test_what_was_submitted_on_the_web_before_it_had_a_batch_is_in_one(
 ) -> None:
     engine = lay_first_release(service_settings.database, tmp_path)
     with engine.begin() as connection:
-        command.upgrade(configuration(connection), "0012")
+        command.upgrade(build_alembic_config(connection), "0012")
         connection.execute(text("UPDATE job SET batch_id = NULL"))
         connection.execute(text("UPDATE submission SET batch_id = NULL"))
         (name,) = set(connection.scalars(text("SELECT assignment FROM submission")))
@@ -268,11 +272,11 @@ def test_what_was_submitted_on_the_web_before_it_had_a_batch_is_in_one(
             connection.execute(insert(OpenAssignment).values(row))
     engine.dispose()
     with open_store(service_settings) as store, store.reading() as session:
-        assert open_assignments.find(session, 1, "never").batch_id is None
-        batch_id = open_assignments.find(session, 1, name).batch_id
+        assert open_assignments.load_course_assignment(session, 1, "never").batch_id is None
+        batch_id = open_assignments.load_course_assignment(session, 1, name).batch_id
         assert batch_id is not None
-        assert {line.student for line in batches.job_lines(session, batch_id)} == {"ada", "Bob 🤖", "eve"}
-        assert batches.batch(session, batch_id).web_assignment == name
+        assert {line.student for line in batches.load_job_lines(session, batch_id)} == {"ada", "Bob 🤖", "eve"}
+        assert batches.load_batch(session, batch_id).web_assignment == name
         assert session.scalar(select(func.count()).where(Job.batch_id.is_(None))) == 0
 
 
@@ -280,7 +284,7 @@ def test_of_two_jobs_that_stand_the_published_one_stays(service_settings: Settin
     """Quarantine and publication could leave two standing jobs for one submission, until the index prevented it."""
     engine = lay_first_release(service_settings.database, tmp_path)
     with engine.begin() as connection:
-        command.upgrade(configuration(connection), "0013")
+        command.upgrade(build_alembic_config(connection), "0013")
         done, dead = (
             connection.scalars(text(f"SELECT min(id) FROM job WHERE state = '{state}'")).one()
             for state in ("done", "dead")
@@ -314,7 +318,7 @@ def test_names_go_to_enrolments_and_credentials_get_their_reach(service_settings
     at = "2026-01-02 03:04:05.000000+00:00"
     engine = lay_first_release(service_settings.database, tmp_path)
     with engine.begin() as connection:
-        command.upgrade(configuration(connection), "0015")
+        command.upgrade(build_alembic_config(connection), "0015")
 
         def add(table: str, **values: object) -> None:
             names = ", ".join(values)
@@ -359,10 +363,10 @@ def test_there_is_no_way_down(service_settings: Settings, revision: str) -> None
             pytest.raises(HostError, match=r"cannot be taken back .* restore the backup"),
             store.engine.begin() as down,
         ):
-            command.downgrade(configuration(down), revision)
-        assert current_revision(store.engine) == newest_revision()
+            command.downgrade(build_alembic_config(down), revision)
+        assert load_current_revision(store.engine) == find_newest_revision()
         with store.engine.begin() as connection:
-            command.check(configuration(connection))
+            command.check(build_alembic_config(connection))
 
 
 def test_a_database_that_is_away_is_named_without_its_password(service_settings: Settings) -> None:

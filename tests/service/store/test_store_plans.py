@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from builders import accept_one, opened, settings_in
 from service.store.batches import batches
 from service.store.engine import Store, now
-from service.store.queue.scheduling import next_job
+from service.store.queue.scheduling import find_next_job
 
 
 @pytest.fixture
@@ -24,10 +24,10 @@ def sqlite(tmp_path: Path) -> Iterator[Store]:
 @pytest.mark.parametrize(
     "ask",
     [
-        lambda session: next_job(session, now(session), "worker"),
+        lambda session: find_next_job(session, now(session), "worker"),
         batches.list_batches,
-        lambda session: batches.progress(session, "none"),
-        lambda session: batches.job_lines(session, "none"),
+        lambda session: batches.load_progress(session, "none"),
+        lambda session: batches.load_job_lines(session, "none"),
     ],
     ids=["claim", "batch list", "how far a batch is", "marks of a batch"],
 )

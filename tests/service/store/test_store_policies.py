@@ -12,17 +12,17 @@ from sqlalchemy import select
 import acting
 import report_builders
 from builders import grading_request
-from service.operations.regrades import Published
+from service.operations.regrades import PublicationCounts
 from service.store.batches import batches
-from service.store.batches.intake import Accepted, accept, accept_batch, accept_new
+from service.store.batches.intake import AcceptedSubmission, accept_batch, accept_new_submissions, accept_submission
 from service.store.courses import policies
 from service.store.courses.policies import PolicyLimits
 from service.store.engine import Store, now
 from service.store.grades import results
 from service.store.models import Job, SubmissionRow
-from service.store.people.students import Students, course_of
+from service.store.people.students import Students, ensure_course
 from service.store.queue import jobs
-from service.store.states import JobState, Lane
+from service.store.states import JobQueue, JobState
 from sim.recording import Verdict
 from submissions.student_identity import Student
 
@@ -33,24 +33,24 @@ DAY = timedelta(days=1)
 
 def _set(store: Store, allowed: PolicyLimits, assignment: str = "") -> None:
     with store.transaction() as session:
-        policies.set_policy(session, course_of(session, "default", now(session)), assignment, allowed)
+        policies.set_policy(session, ensure_course(session, "default", now(session)), assignment, allowed)
 
 
 def _extend(store: Store, student: str, due_at: datetime | None = None, more: int = 0, assignment: str = "") -> None:
     with store.transaction() as session:
         at = now(session)
-        policies.extend(
+        policies.extend_policy(
             session,
-            Students(session, course_of(session, "default", at)).enrol(Student(student), at),
+            Students(session, ensure_course(session, "default", at)).enrol(Student(student), at),
             assignment,
             due_at,
             more,
         )
 
 
-def _request(store: Store, program: int, at: datetime | None = None, student: str = "ada") -> Accepted:
+def _request(store: Store, program: int, at: datetime | None = None, student: str = "ada") -> AcceptedSubmission:
     taken = replace(grading_request(student, f"print({program})\n"), submitted_at=at)
-    batch = accept_new(store, "class", [taken], [], max_attempts=3).batch
+    batch = accept_new_submissions(store, "class", [taken], [], max_attempts=3).batch
     assert batch is not None
     return batch.jobs[0]
 
@@ -60,8 +60,8 @@ def _grade_all(store: Store, verdict: Verdict | None = None) -> None:
     if verdict is not None:
         (trial, *rest) = GRADE.trials
         grade = replace(GRADE, trials=(replace(trial, recording=replace(trial.recording, verdict=verdict)), *rest))
-    while (claim := jobs.claim(store, "worker", 60)) is not None:
-        jobs.finish(store, claim, results.prepare(grade), datetime.now(UTC))
+    while (claim := jobs.claim_job(store, "worker", 60)) is not None:
+        jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
 
 
 def test_without_a_policy_everything_counts(store: Store) -> None:
@@ -77,9 +77,9 @@ def test_attempts_are_different_submissions_that_were_graded(store: Store) -> No
     assert _request(store, 2).staff_only == ""
     _grade_all(store, Verdict.ASSIGNMENT_ERROR)
     assert _request(store, 3).staff_only == ""
-    claim = jobs.claim(store, "worker", 60)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.give_up(store, claim, "the disk is full")
+    jobs.give_up_job(store, claim, "the disk is full")
     assert _request(store, 4).staff_only == ""
     _grade_all(store)
     assert _request(store, 5).staff_only == ""
@@ -98,17 +98,17 @@ def test_what_is_over_is_marked_but_neither_supersedes_nor_is_published(store: S
     assert _request(store, 3).staff_only
     with store.reading() as session:
         job = session.get_one(Job, over.job_id)
-        assert (job.state, job.lane) == (JobState.QUEUED, Lane.BATCH)
+        assert (job.state, job.lane) == (JobState.QUEUED, JobQueue.BATCH)
         batch = session.get_one(SubmissionRow, job.submission_id).batch_id
     assert batch is not None
     _grade_all(store)
     with store.reading() as session:
-        (own,) = batches.attempt_lines(session, batch)
+        (own,) = batches.load_attempt_lines(session, batch)
         assert (own.marks, own.staff_only) == (GRADE.marks, "attempt 2, allowed: 1")
-        (line,) = batches.job_lines(session, batch)
+        (line,) = batches.load_job_lines(session, batch)
         assert (line.id, line.newer_attempt) == (first.job_id, 3)
         assert session.get_one(Job, first.job_id).state is JobState.DONE
-    assert acting.publish(store, batch, actor="staff") == Published(0, 0, 0, 0, 1, 0)
+    assert acting.publish(store, batch, actor="staff") == PublicationCounts(0, 0, 0, 0, 1, 0)
 
 
 @pytest.mark.parametrize(
@@ -149,10 +149,10 @@ def test_a_cool_down_counts_from_the_one_before(store: Store) -> None:
 
 def test_what_a_person_submits_is_submitted_now(store: Store) -> None:
     _set(store, PolicyLimits(datetime.now(UTC) - DAY, late_days=2, cool_down_seconds=3600))
-    first = accept(store, grading_request("ada", "print(1)\n"), max_attempts=3)
+    first = accept_submission(store, grading_request("ada", "print(1)\n"), max_attempts=3)
     assert first.staff_only == ""
     _grade_all(store)
-    assert "0 min after" in accept(store, grading_request("ada", "print(2)\n"), max_attempts=3).staff_only
+    assert "0 min after" in accept_submission(store, grading_request("ada", "print(2)\n"), max_attempts=3).staff_only
     with store.reading() as session:
         assert session.scalars(select(SubmissionRow.days_late)).all() == [2, 2]
 
@@ -181,7 +181,7 @@ def test_what_is_hidden_opens_when_nobody_can_submission_any_more_or_when_publis
 
     def released() -> frozenset[str]:
         with store.reading() as session:
-            return policies.released(session, job_id)
+            return policies.load_visibilities(session, job_id)
 
     assert released() == {"visible", "after_due_date"}
     _set(store, PolicyLimits(datetime.now(UTC) - DAY, late_days=2))
@@ -224,8 +224,8 @@ def test_late_days_are_days_of_the_calendar(
     monkeypatch.setenv("TZ", "America/New_York")
     with store.transaction() as session:
         enrolment_id = Students(session, 1).enrol(Student("ada"), now(session))
-        ruling = policies.rule(session, enrolment_id, "echo-responder", "0", _moment(submitted))
-        closed_at = policies.limits(session, enrolment_id, "echo-responder").closed_at
+        ruling = policies.apply_policy(session, enrolment_id, "echo-responder", "0", _moment(submitted))
+        closed_at = policies.load_limits(session, enrolment_id, "echo-responder").closed_at
     assert (ruling.days_late, not ruling.over) == (days_late, counts)
     assert closed_at is not None
     assert (_moment(submitted) <= closed_at) is counts
@@ -263,7 +263,7 @@ def test_a_general_and_a_particular_extension_hold_together(
         _extend(store, "ada", due_at, more, assignment)
     with store.transaction() as session:
         enrolment_id = Students(session, 1).enrol(Student("ada"), now(session))
-        allowed = policies.limits(session, enrolment_id, "echo-responder")
-        elsewhere = policies.limits(session, enrolment_id, "another")
+        allowed = policies.load_limits(session, enrolment_id, "echo-responder")
+        elsewhere = policies.load_limits(session, enrolment_id, "another")
     assert (allowed.due_at, allowed.attempts) == (due, attempts)
     assert (elsewhere.due_at, elsewhere.attempts) == (max(DUE, general[0] or DUE), 2 + general[1])

@@ -22,17 +22,17 @@ def graded(store: Store, requests: list[GradingRequest], laps: dict[str, tuple[f
     """Return a batch with these lap times, trial by trial; None for a lap that did not count."""
     batch = accept_batch(store, "class", requests, [], max_attempts=2).id
     for _ in requests:
-        claim = jobs.claim(store, "worker", 60)
+        claim = jobs.claim_job(store, "worker", 60)
         assert claim is not None
         with store.reading() as session:
-            student = batches.job_line(session, claim.job_id).student
+            student = batches.load_job_line(session, claim.job_id).student
         evidence = tuple(
             Evidence(0, lap is not None, "", measures=() if lap is None else (Measure("lap time", lap, "s"),))
             for lap in laps[student]
         )
         fast = CriterionResult("fast", "Drives it fast", Decimal(1), Decimal(5), "", evidence=evidence)
         grade = replace(report_builders.line_follower_grade(3), criteria=(fast,))
-        jobs.finish(store, claim, results.prepare(grade), datetime.now(UTC))
+        jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
     return batch
 
 
@@ -47,7 +47,7 @@ def test_a_batch_has_a_table_for_each_ranking(store: Store) -> None:
     requests = [replace(grading_request(student), assignment=circuit) for student in laps]
     batch = graded(store, requests, laps)
     with store.reading() as session:
-        (table,) = rankings.rank_tables(session, batches.job_lines(session, batch))
+        (table,) = rankings.build_rank_tables(session, batches.load_job_lines(session, batch))
     assert (table.assignment, table.measure, table.unit) == ("fastest-lap-of-thruxton", "lap time", "s")
     assert table.texts == [
         ("1=", "ada", "41.00", "28.29 to 53.71", "2 of 2"),
@@ -60,7 +60,7 @@ def test_a_batch_has_a_table_for_each_ranking(store: Store) -> None:
 def test_what_ranks_nothing_has_no_table(store: Store) -> None:
     batch = graded(store, [replace(grading_request("ada"), assignment=echo())], {"ada": (40.0,)})
     with store.reading() as session:
-        assert rankings.rank_tables(session, batches.job_lines(session, batch)) == []
+        assert rankings.build_rank_tables(session, batches.load_job_lines(session, batch)) == []
 
 
 def test_who_is_excused_from_a_ranking_has_no_place_in_it(store: Store) -> None:
@@ -69,7 +69,7 @@ def test_who_is_excused_from_a_ranking_has_no_place_in_it(store: Store) -> None:
     requests = [replace(grading_request(student), assignment=circuit) for student in laps]
     batch = graded(store, requests, laps)
     with store.transaction() as session:
-        ada, _ = batches.job_lines(session, batch)
-        overrides.excuse(session, ada.id, "fast", "was ill", "grace")
-        (table,) = rankings.rank_tables(session, batches.job_lines(session, batch))
+        ada, _ = batches.load_job_lines(session, batch)
+        overrides.excuse_criterion(session, ada.id, "fast", "was ill", "grace")
+        (table,) = rankings.build_rank_tables(session, batches.load_job_lines(session, batch))
     assert [row[1] for row in table.texts] == ["bob"]

@@ -12,11 +12,11 @@ import pytest
 
 import report_builders
 from service.grading.grade import Grade
-from service.store.courses.versions import assignment_from_bytes, assignment_to_bytes
-from service.store.grades.recorded_words import RecordingError, words_from_bytes
-from service.store.grades.recordings import from_bytes, keep, to_bytes
-from sim.recording import COLUMNS, Line, Message, Recording, Ticks
-from submissions.assignment.folder import catalogue
+from service.store.courses.assignment_versions import assignment_from_bytes, assignment_to_bytes
+from service.store.grades.recording_texts import RecordingError, texts_from_bytes
+from service.store.grades.recordings import encode_within_limit, from_bytes, to_bytes
+from sim.recording import COLUMNS, Message, Recording, Ticks, TimedText
+from submissions.assignment.folder import list_catalogue_ids
 from submissions.assignment.reader import find_assignment
 
 pytestmark = pytest.mark.fast
@@ -52,7 +52,7 @@ def test_a_recording_comes_back_as_it_was(name: str) -> None:
     for recording in _recordings(GRADES[name]()):
         _assert_same(recording, from_bytes(to_bytes(recording)))
         beside = replace(recording, partner=recording)
-        read = words_from_bytes(to_bytes(beside))
+        read = texts_from_bytes(to_bytes(beside))
         assert read.partner is not None
         assert _words(read) == _words(beside)
         assert _words(read.partner) == _words(recording)
@@ -71,7 +71,7 @@ def test_odd_values_come_back_as_they_were() -> None:
         recording,
         end_t=inf,
         ticks=replace(recording.ticks, x=odd, gyro=odd[::-1].copy()),
-        printed=(Line(0.1, "\0 \ud800 \U0001f916 \u202e"), Line(0.2, "")),
+        printed=(TimedText(0.1, "\0 \ud800 \U0001f916 \u202e"), TimedText(0.2, "")),
         messages=(Message(0.1, "robot", "PY::\n\"'", None), Message(0.2, "responder", "", 0.3, 0, "lost")),
     )
     _assert_same(odd_recording, from_bytes(to_bytes(odd_recording)))
@@ -116,7 +116,7 @@ def test_a_minute_of_driving_takes_less_than_half_of_its_raw_size() -> None:
     ids=["empty", "text", "compressed text", "pickle"],
 )
 def test_other_bytes_are_refused(data: bytes) -> None:
-    for read in (from_bytes, words_from_bytes):
+    for read in (from_bytes, texts_from_bytes):
         with pytest.raises(RecordingError):
             read(data)
 
@@ -131,8 +131,10 @@ def test_a_cut_recording_is_refused() -> None:
 def test_what_is_too_large_is_cut_and_says_so(cap: int) -> None:
     recording = report_builders.line_follower_recording(300)
     noise = np.random.default_rng(1)
-    flood = replace(recording, printed=tuple(Line(float(i), noise.bytes(40).hex()) for i in range(20_000)), images=())
-    kept = keep(flood, cap)
+    flood = replace(
+        recording, printed=tuple(TimedText(float(i), noise.bytes(40).hex()) for i in range(20_000)), images=()
+    )
+    kept = encode_within_limit(flood, cap)
     assert len(kept.data) <= cap
     cut = from_bytes(kept.data)
     assert "too large" in cut.notes[-1]
@@ -140,7 +142,7 @@ def test_what_is_too_large_is_cut_and_says_so(cap: int) -> None:
         assert getattr(cut, name) == getattr(flood, name)
 
 
-@pytest.mark.parametrize("name", catalogue())
+@pytest.mark.parametrize("name", list_catalogue_ids())
 def test_an_assignment_comes_back_as_it_was(name: str) -> None:
     assignment = find_assignment(name)
     back = assignment_from_bytes(assignment_to_bytes(assignment))

@@ -13,13 +13,13 @@ from sqlalchemy import ColumnElement, select, update
 import acting
 import report_builders
 from builders import echo, grading_request
-from service.commands.batch.batch_summary import unjudged_words
+from service.commands.batch.batch_summary import describe_unjudged
 from service.grading.grade import Grade
-from service.operations.regrades import Published
+from service.operations.regrades import PublicationCounts
 from service.store import audit
 from service.store.batches import batches, publishing, regrades
-from service.store.batches.intake import accept_batch, accept_new
-from service.store.courses.hidden_names import NAMED
+from service.store.batches.intake import accept_batch, accept_new_submissions
+from service.store.courses.hidden_names import NO_HIDDEN_NAMES
 from service.store.engine import Store
 from service.store.grades import results
 from service.store.models import Batch, Enrolment, Job
@@ -46,8 +46,8 @@ def _batch(store: Store, *students: str) -> str:
 
 
 def _grade_all(store: Store, grade: Grade = GRADE) -> None:
-    while (claim := jobs.claim(store, "worker", 60)) is not None:
-        jobs.finish(store, claim, results.prepare(grade), datetime.now(UTC))
+    while (claim := jobs.claim_job(store, "worker", 60)) is not None:
+        jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
 
 
 def _regrade(store: Store, batch: str, grade: Grade = GRADE, *, changed: bool = False) -> str:
@@ -59,25 +59,25 @@ def _regrade(store: Store, batch: str, grade: Grade = GRADE, *, changed: bool = 
 def _standing(store: Store, batch: str) -> dict[str, str]:
     """Return the standing grade by student."""
     with store.reading() as session:
-        return {line.student: line.id for line in batches.job_lines(session, batch)}
+        return {line.student: line.id for line in batches.load_job_lines(session, batch)}
 
 
 def _changes(store: Store, batch: str) -> list[regrades.Change]:
     with store.reading() as session:
-        return regrades.changes(session, batch, NAMED)
+        return regrades.load_changes(session, batch, NO_HIDDEN_NAMES)
 
 
 def test_old_grades_stand_until_the_new_ones_are_published(store: Store) -> None:
     batch = _batch(store, "ada", "bob")
     _grade_all(store)
     before = _standing(store, batch)
-    assert acting.publish(store, batch, actor="staff") == Published(2, 0, 0, 0, 0, 0)
+    assert acting.publish(store, batch, actor="staff") == PublicationCounts(2, 0, 0, 0, 0, 0)
     again = _regrade(store, batch, _better(GRADE), changed=True)
     assert _standing(store, batch) == before
     with store.reading() as session:
-        assert publishing.unpublished_regrades(session, batch) == 2
-        assert batches.batch(session, again).regrade_of == batch
-    assert acting.publish(store, batch, actor="staff") == Published(2, 2, 0, 0, 0, 0)
+        assert publishing.count_unpublished_regrades(session, batch) == 2
+        assert batches.load_batch(session, again).regrade_of == batch
+    assert acting.publish(store, batch, actor="staff") == PublicationCounts(2, 2, 0, 0, 0, 0)
     after = _standing(store, batch)
     assert set(after.values()).isdisjoint(before.values())
     with store.reading() as session:
@@ -85,8 +85,8 @@ def test_old_grades_stand_until_the_new_ones_are_published(store: Store) -> None
             old, new = session.get_one(Job, job_id), session.get_one(Job, after[student])
             assert (old.standing, old.marks, old.published_by) == (Standing.KEPT, GRADE.marks, "staff")
             assert (new.standing, new.batch_id, new.published_at is not None) == (Standing.STANDS, again, True)
-            assert results.load(session, job_id).marks == GRADE.marks
-        actions = [entry.action for entry in audit.entries(session, "batch", batch)]
+            assert results.load_grade(session, job_id).marks == GRADE.marks
+        actions = [entry.action for entry in audit.load_entries(session, "batch", batch)]
     assert actions == ["publish", "regrade", "publish"]
     assert acting.publish(store, batch, actor="staff").published == 0
 
@@ -110,21 +110,21 @@ def _unjudged(grade: Grade) -> Grade:
 def test_what_could_not_be_judged_is_named_and_stays_back(store: Store) -> None:
     batch = _batch(store, "ada", "bob")
     for claimed in (_unjudged(GRADE), GRADE):
-        claim = jobs.claim(store, "worker", 60)
+        claim = jobs.claim_job(store, "worker", 60)
         assert claim is not None
-        jobs.finish(store, claim, results.prepare(claimed), datetime.now(UTC))
+        jobs.finish_job(store, claim, results.prepare_grade(claimed), datetime.now(UTC))
     with store.reading() as session:
-        lines = batches.job_lines(session, batch)
+        lines = batches.load_job_lines(session, batch)
     (left,) = [line for line in lines if line.unjudged]
-    assert unjudged_words(lines).startswith("1 submission has criteria that could not be judged")
-    assert f": {left.student};" in unjudged_words(lines)
-    assert acting.publish(store, batch, actor="staff") == Published(1, 0, 0, 0, 0, 1)
+    assert describe_unjudged(lines).startswith("1 submission has criteria that could not be judged")
+    assert f": {left.student};" in describe_unjudged(lines)
+    assert acting.publish(store, batch, actor="staff") == PublicationCounts(1, 0, 0, 0, 0, 1)
     with store.reading() as session:
         assert session.get_one(Job, left.id).published_at is None
-    assert acting.publish(store, batch, actor="staff", anyway=True) == Published(1, 0, 0, 0, 0, 0)
+    assert acting.publish(store, batch, actor="staff", anyway=True) == PublicationCounts(1, 0, 0, 0, 0, 0)
     with store.reading() as session:
         assert session.get_one(Job, left.id).published_at is not None
-    assert acting.publish(store, batch, actor="staff") == Published(0, 0, 0, 0, 0, 0)
+    assert acting.publish(store, batch, actor="staff") == PublicationCounts(0, 0, 0, 0, 0, 0)
 
 
 def test_a_regrade_that_could_not_be_judged_takes_no_whole_grades_place(store: Store) -> None:
@@ -132,10 +132,10 @@ def test_a_regrade_that_could_not_be_judged_takes_no_whole_grades_place(store: S
     _grade_all(store)
     before = _standing(store, batch)
     _regrade(store, batch, _unjudged(GRADE))
-    assert acting.publish(store, batch, actor="staff") == Published(1, 0, 0, 0, 0, 1)
+    assert acting.publish(store, batch, actor="staff") == PublicationCounts(1, 0, 0, 0, 0, 1)
     assert _standing(store, batch) == before
     _regrade(store, batch, _better(GRADE))
-    assert acting.publish(store, batch, actor="staff") == Published(1, 1, 0, 0, 0, 0)
+    assert acting.publish(store, batch, actor="staff") == PublicationCounts(1, 1, 0, 0, 0, 0)
     assert len(_standing(store, batch)) == 1
     assert _standing(store, batch) != before
 
@@ -145,7 +145,7 @@ def test_a_whole_regrade_takes_the_place_of_what_could_not_be_judged(store: Stor
     _grade_all(store, _unjudged(GRADE))
     before = _standing(store, batch)
     _regrade(store, batch)
-    assert acting.publish(store, batch, actor="staff") == Published(1, 1, 0, 0, 0, 0)
+    assert acting.publish(store, batch, actor="staff") == PublicationCounts(1, 1, 0, 0, 0, 0)
     after = _standing(store, batch)
     assert len(after) == 1
     assert after != before
@@ -206,7 +206,7 @@ def test_equal_marks_are_equal_however_many_decimals_they_have(store: Store) -> 
                 row.marks = Decimal(before if row.regrade_of is None else after)
                 row.max_marks = Decimal("10" if row.regrade_of is None else "10.00")
     with store.reading() as session:
-        page = regrades.changes_page(session, again, 1, NAMED)
+        page = regrades.load_changes_page(session, again, 1, NO_HIDDEN_NAMES)
     assert page.differing == 1
     assert [(change.student, change.differs) for change in page.changes] == [
         ("bob", True), ("ada", False), ("cyd", False),
@@ -246,14 +246,14 @@ def test_criteria_that_come_and_go_are_told(store: Store) -> None:
 
 def test_what_is_not_graded_and_other_assignments_are_left_out(store: Store) -> None:
     batch = _batch(store, "ada", "bob", "cid")
-    claim = jobs.claim(store, "worker", 60)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
     with pytest.raises(UsageError, match="nothing to grade again: 3 of its submissions are not graded yet"):
         acting.regrade(store, batch, None, max_attempts=3, actor="staff")
-    jobs.give_up(store, claim, "no program")
-    claim = jobs.claim(store, "worker", 60)
+    jobs.give_up_job(store, claim, "no program")
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish(store, claim, results.prepare(GRADE), datetime.now(UTC))
+    jobs.finish_job(store, claim, results.prepare_grade(GRADE), datetime.now(UTC))
     other = replace(echo(), id="other")
     with pytest.raises(UsageError, match="has no submission for other, only for echo-responder"):
         acting.regrade(store, batch, other, max_attempts=3, actor="staff")
@@ -265,20 +265,20 @@ def test_what_is_not_graded_and_other_assignments_are_left_out(store: Store) -> 
 
 def test_what_could_not_be_graded_may_get_its_first_grade(store: Store) -> None:
     batch = _batch(store, "ada")
-    claim = jobs.claim(store, "worker", 60)
+    claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.give_up(store, claim, "no program")
+    jobs.give_up_job(store, claim, "no program")
     (change,) = _changes(store, _regrade(store, batch, changed=True))
     assert (change.before, change.after) == (None, GRADE.marks)
     assert "had no grade" in change.reason
-    assert acting.publish(store, batch, actor="staff") == Published(1, 1, 0, 0, 0, 0)
+    assert acting.publish(store, batch, actor="staff") == PublicationCounts(1, 1, 0, 0, 0, 0)
 
 
 def test_a_newer_submission_does_not_stop_a_regrade_of_the_one_before(store: Store) -> None:
     batch = _batch(store, "ada")
     _grade_all(store)
     made = acting.regrade(store, batch, None, max_attempts=3, actor="staff")
-    accept_new(store, "late", [grading_request("ada", "print('other')\n")], [], max_attempts=3)
+    accept_new_submissions(store, "late", [grading_request("ada", "print('other')\n")], [], max_attempts=3)
     with store.reading() as session:
         assert session.scalars(select(Job.state).where(Job.batch_id == made.batch_id)).all() == [JobState.QUEUED]
 
@@ -288,11 +288,13 @@ def test_the_same_batch_again_after_a_regrade_changes_nothing_and_points_at_a_ch
     _grade_all(store)
     _regrade(store, batch, changed=True)
     for assignment in (echo(), CHANGED):
-        again = accept_new(store, "class", [grading_request("ada", assignment=assignment)], [], max_attempts=3)
+        again = accept_new_submissions(
+            store, "class", [grading_request("ada", assignment=assignment)], [], max_attempts=3
+        )
         assert (again.batch, again.known[0].other_grader) == (None, False)
     with store.transaction() as session:
         session.execute(update(Job).values(grader_sha256="f" * 64))
-    assert accept_new(store, "class", [grading_request("ada")], [], max_attempts=3).known[0].other_grader
+    assert accept_new_submissions(store, "class", [grading_request("ada")], [], max_attempts=3).known[0].other_grader
 
 
 def test_a_batch_of_regrades_can_be_cancelled_and_leaves_the_old_grades(store: Store) -> None:
@@ -305,5 +307,5 @@ def test_a_batch_of_regrades_can_be_cancelled_and_leaves_the_old_grades(store: S
     assert _standing(store, batch) == before
     with store.reading() as session:
         names = session.scalars(select(Batch.name).order_by(Batch.created_at)).all()
-        assert [entry.actor for entry in audit.entries(session, "batch", made.batch_id)] == ["staff"]
+        assert [entry.actor for entry in audit.load_entries(session, "batch", made.batch_id)] == ["staff"]
     assert names == ["class", "regrade of class"]

@@ -24,8 +24,8 @@ from service.store.engine import Store
 from service.store.grades import results
 from service.store.models import Enrolment, Job, SubmissionRow
 from service.store.people import credentials
-from service.store.people.students import course_of
-from service.store.purge import Purged, purge
+from service.store.people.students import ensure_course
+from service.store.purge import PurgeCounts, purge_submissions
 from service.store.queue import jobs
 from service.store.states import CredentialKind, Role
 from service.store.web_tables import (
@@ -41,7 +41,7 @@ from service.store.web_tables import (
 )
 from service.student_export import export_student
 from sim.errors import UsageError
-from submissions.student_identity import Refusal, Student
+from submissions.student_identity import RejectedSubmission, Student
 
 NOW = datetime.now(UTC)
 #: Identifying data of a student; none of it may remain.
@@ -49,11 +49,11 @@ KNOWN = ("ada-known-as", "Lovelace", "ada@example.org")
 
 
 def submit(store: Store, *students: Student, refused: str = "") -> None:
-    asked = [replace(grading_request(each.id), whose=each, source=f"{each.id}.zip") for each in students]
-    refusals = (Refusal("x.zip", "is empty", Student(refused)),) if refused else ()
+    asked = [replace(grading_request(each.id), listed_student=each, source=f"{each.id}.zip") for each in students]
+    refusals = (RejectedSubmission("x.zip", "is empty", Student(refused)),) if refused else ()
     intake.accept_batch(store, "batch", asked, refusals, course="default", max_attempts=3)
-    while claim := jobs.claim(store, "worker", 60):
-        jobs.finish(store, claim, results.prepare(report_builders.faulty_grade()), NOW)
+    while claim := jobs.claim_job(store, "worker", 60):
+        jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), NOW)
 
 
 def everything(store: Store) -> int:
@@ -73,8 +73,8 @@ def everything(store: Store) -> int:
         session.add(OpenAssignment(course_id=1, assignment="echo-responder", assignment_version_id=version_id))
         session.add(Tryout(enrolment_id=enrolment.id, assignment_version_id=version_id, packed=b"", state="done",
                            queued_at=NOW, words={"said": KNOWN[1]}))  # fmt: skip
-        policies.extend(session, enrolment.id, "", NOW, 1)
-        credentials.issue(
+        policies.extend_policy(session, enrolment.id, "", NOW, 1)
+        credentials.issue_credential(
             session,
             person_id,
             CredentialKind.TOKEN,
@@ -83,15 +83,15 @@ def everything(store: Store) -> int:
             reach=credentials.Reach(scopes=frozenset({"read"})),
         )
         session.flush()
-        token = credentials.of_person(session, person_id)[0].id
+        token = credentials.list_credentials(session, person_id)[0].id
         session.add(IdempotentReply(credential_id=token, key="k", request_sha256="", status=200, body=b"", made_at=NOW))
         platform = LtiPlatform(name="p", issuer="i", client_id="c", authorization_url="", token_url="", keys_url="",
                                created_at=NOW)  # fmt: skip
         session.add(platform)
         session.flush()
         session.add(LtiPerson(platform_id=platform.id, subject=KNOWN[0], person_id=person_id))
-        audit.note(session, f"{KNOWN[1]} (person {person_id})", "submit", "submission", str(submission_id))
-        audit.note(session, "grace", "extend", "course", "1", student=KNOWN[0])
+        audit.record_action(session, f"{KNOWN[1]} (person {person_id})", "submit", "submission", str(submission_id))
+        audit.record_action(session, "grace", "extend", "course", "1", student=KNOWN[0])
         return enrolment.id
 
 
@@ -104,10 +104,10 @@ def test_nothing_is_left_of_who_is_erased_but_that_it_was_done(store: Store) -> 
     left = _dump(store)
     assert [word for word in KNOWN if word in left] == []
     with store.reading() as session:
-        assert audit.entries(session, "enrolment", str(enrolment_id))[0].detail == {"submissions": 1, "grades": 1}
+        assert audit.load_entries(session, "enrolment", str(enrolment_id))[0].detail == {"submissions": 1, "grades": 1}
         assert session.scalars(select(Enrolment.student)).all() == ["bob"]
         (job,) = session.scalars(select(Job)).all()
-        assert results.load(session, job.id).marks == report_builders.faulty_grade().marks
+        assert results.load_grade(session, job.id).marks == report_builders.faulty_grade().marks
         assert job.copied_from is None
 
 
@@ -133,8 +133,8 @@ def test_who_is_in_another_course_stays_there(store: Store) -> None:
 
 
 def test_who_is_being_graded_or_instructs_is_not_erased(store: Store) -> None:
-    intake.accept(store, grading_request("ada"), max_attempts=1)
-    assert jobs.claim(store, "worker", 60)
+    intake.accept_submission(store, grading_request("ada"), max_attempts=1)
+    assert jobs.claim_job(store, "worker", 60)
     with pytest.raises(UsageError, match="is being graded"):
         _erase(store, 1)
     with store.transaction() as session:
@@ -145,9 +145,9 @@ def test_who_is_being_graded_or_instructs_is_not_erased(store: Store) -> None:
 
 def test_what_is_old_goes_with_all_that_was_said_of_it(store: Store) -> None:
     everything(store)
-    gone = purge(store, datetime.now(UTC) + timedelta(days=1), "grace", course_id=2)
+    gone = purge_submissions(store, datetime.now(UTC) + timedelta(days=1), "grace", course_id=2)
     assert gone.submissions == 0
-    gone = purge(store, datetime.now(UTC) + timedelta(days=1), "grace", course_id=1)
+    gone = purge_submissions(store, datetime.now(UTC) + timedelta(days=1), "grace", course_id=1)
     assert (gone.submissions, gone.students) == (2, 2)
     with store.reading() as session:
         assert session.scalars(select(Appeal.id)).all() == []
@@ -172,7 +172,7 @@ def test_the_zip_has_what_the_student_may_see(store: Store) -> None:
 
 
 def _in_another_course(session: Session, person_id: int) -> None:
-    course_id = course_of(session, "another", NOW)
+    course_id = ensure_course(session, "another", NOW)
     row = Enrolment(course_id=course_id, person_id=person_id, student="x", written="x", role=Role.STUDENT)
     row.name = KNOWN[1]
     session.add(row)
@@ -184,5 +184,5 @@ def _dump(store: Store) -> str:
         return "\n".join(str(row) for table in METADATA.sorted_tables for row in session.execute(select(table)))
 
 
-def _erase(store: Store, enrolment_id: int) -> Purged:
+def _erase(store: Store, enrolment_id: int) -> PurgeCounts:
     return privacy.erase_student(acting.service_on(store), acting.machine("grace"), 1, enrolment_id)

@@ -21,14 +21,14 @@ from builders import echo, grading_request
 from service.operations import replies
 from service.store.batches import intake
 from service.store.courses import open_assignments
-from service.store.courses.hidden_names import hidden_names_of
-from service.store.courses.versions import freeze
+from service.store.courses.assignment_versions import freeze_assignment
+from service.store.courses.hidden_names import load_hidden_names
 from service.store.grades import results
 from service.store.people import membership
 from service.store.people.credentials import identify
 from service.store.queue import jobs
 from service.store.states import CredentialKind
-from service.web.access import actor_from
+from service.web.access import build_actor
 from service.web.api_uploads import LARGEST_BATCH
 from web import COURSE, Web, submit, web_in
 
@@ -76,13 +76,13 @@ def upload(program: Program, data: bytes, name: str = "week", **headers: str) ->
 def graded(web: Web) -> str:
     """Create a batch of one graded submission; return its job."""
     batch = intake.accept_batch(web.store, "week", [grading_request("ada")], (), course=COURSE, max_attempts=1)
-    claim = jobs.claim(web.store, "worker", 60)
+    claim = jobs.claim_job(web.store, "worker", 60)
     assert claim is not None
     grade = report_builders.faulty_grade()
     trials = tuple(replace(each, visibility="hidden") for each in grade.trials)
     kept = replace(grade.criteria[-1], visibility="after_published", for_staff="look here")
     hidden = replace(grade, trials=trials, criteria=(*grade.criteria[:-1], kept))
-    jobs.finish(web.store, claim, results.prepare(hidden), datetime.now(UTC))
+    jobs.finish_job(web.store, claim, results.prepare_grade(hidden), datetime.now(UTC))
     return batch.jobs[0].job_id
 
 
@@ -132,7 +132,7 @@ def test_of_two_requests_at_once_the_second_is_told_to_wait(web: Web, grace: Pro
         identity = identify(session, grace.token["authorization"].removeprefix("Bearer "), CredentialKind.TOKEN)
     assert identity is not None
     # A key belongs to one caller in one role.
-    assert replies.begin(web.app.state.context.service, actor_from(identity), "instructor k") is None
+    assert replies.reserve_key(web.app.state.context.service, build_actor(identity), "instructor k") is None
     answer = grace.ask("POST", "/people", {"idempotency-key": "k"}, json={"students": [{"id": "cyd"}]})
     assert (answer.status_code, answer.headers["retry-after"]) == (409, "5")
 
@@ -214,13 +214,13 @@ def test_what_is_known_is_not_sent_again(web: Web, grace: Program) -> None:
 def test_where_names_are_hidden_nobody_is_named(web: Web, grace: Program) -> None:
     job = graded(web)
     with web.store.transaction() as session:
-        open_assignments.prepare(session, 1, freeze(echo()))
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
         open_assignments.hide_names(session, 1, "echo-responder", True)
     batch = grace.ask("GET", "/batches").json()["items"][0]["id"]
     shown = [grace.ask("GET", path).text for path in (f"/batches/{batch}/grades", f"/batches/{batch}")]
     shown += [grace.ask("GET", f"/grades/{job}{part}").text for part in ("", "/state", "/report", "/replay")]
     assert [text for text in shown if re.search(r"\bada\b", text, re.IGNORECASE)] == []
-    called = hidden_names_of(web.store, 1).called("echo-responder", "ada")
+    called = load_hidden_names(web.store, 1).label_student("echo-responder", "ada")
     assert called.startswith("Participant ")
     assert called in shown[0]
     assert grace.ask("GET", "/submissions/1/files").status_code == 404
@@ -234,7 +234,7 @@ def test_a_student_submits_what_is_open(web: Web, ada: Program) -> None:
     path = "/mine/submissions?assignment=echo-responder"
     assert ada.ask("POST", path, files=files).status_code == 404
     with web.store.transaction() as session:
-        open_assignments.prepare(session, 1, freeze(echo()))
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
         open_assignments.open_for_students(session, 1, "echo-responder")
     assert [each["id"] for each in ada.ask("GET", "/mine/assignments").json()["items"]] == ["echo-responder"]
     answer = ada.ask("POST", path, files=files)

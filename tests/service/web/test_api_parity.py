@@ -11,8 +11,8 @@ from httpx2 import Response
 from starlette.testclient import TestClient
 
 from service.store.models import Job
-from service.store.queue import tryouts
-from submissions.assignment.export import write_new
+from service.store.queue import test_runs
+from submissions.assignment.export import create_assignment
 from web import Web, web_in
 from web_world import World, make_world
 from zips import zipped
@@ -48,7 +48,7 @@ def test_an_assignment_of_ones_own_is_checked_prepared_and_previewed(
     programs: Programs, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     folder = tmp_path_factory.mktemp("own") / "mine"
-    write_new(folder)
+    create_assignment(folder)
     files = {f"mine/{each.relative_to(folder)}": each.read_bytes() for each in folder.rglob("*") if each.is_file()}
     send = {"headers": {"content-type": "application/zip"}}
     made = programs.ask("grace", "POST", "/assignments/uploads", content=zipped(files), **send)
@@ -73,9 +73,9 @@ def test_a_program_is_tried_by_its_owner_alone(programs: Programs) -> None:
     assert (again.status_code, "not completed yet" in again.json()["detail"]) == (422, True)
     own = f"{path}/{asked.json()['id']}"
     assert programs.ask("ada", "GET", f"{own}/replay").status_code == 404
-    claimed = tryouts.claim(programs.web.store, 60)
+    claimed = test_runs.claim_test_run(programs.web.store, 60)
     assert claimed is not None
-    tryouts.finish(programs.web.store, claimed, {"happened": "It ended."}, None)
+    test_runs.finish_test_run(programs.web.store, claimed, {"happened": "It ended."}, None)
     done = programs.ask("ada", "GET", own).json()
     assert (done["state"], done["said"]) == ("done", {"happened": "It ended."})
     assert programs.ask("bob", "GET", own).status_code == 404

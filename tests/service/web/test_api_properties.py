@@ -17,7 +17,7 @@ from schemathesis.specs.openapi import checks
 
 from builders import echo
 from service.store.courses import open_assignments
-from service.store.courses.versions import freeze
+from service.store.courses.assignment_versions import freeze_assignment
 from web import Web, web_in
 from web_world import make_world
 
@@ -46,7 +46,7 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, dict[
     with web_in(tmp_path_factory.mktemp("home"), api_calls_per_minute=1_000_000) as web:
         world = make_world(web)
         with web.store.transaction() as session:
-            open_assignments.prepare(session, 1, freeze(echo()))
+            open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
             open_assignments.open_for_students(session, 1, "echo-responder")
         members = {"instructor": world.grace, "student": world.ada, "operator": web.operator()}
         tokens = {who: web.token(member, "read", "submit", "mark", "manage") for who, member in members.items()}

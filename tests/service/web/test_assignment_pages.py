@@ -13,7 +13,7 @@ from service.store import audit
 from service.store.courses import open_assignments, policies
 from service.store.models import Enrolment, SubmissionRow
 from service.store.states import Role
-from submissions.assignment.folder import assignment_folder, catalogue
+from submissions.assignment.folder import list_catalogue_ids, locate_assignment_folder
 from submissions.assignment.reader import find_in_catalogue
 from web import Web, grade_all, submit, words
 from zips import zipped
@@ -28,14 +28,14 @@ def test_an_assignment_is_prepared_opened_and_closed(web: Web, grace: TestClient
     for action, is_open in (("open", True), ("close", False), ("open", True)):
         submit(grace, f"{path}/echo-responder/{action}")
         with web.store.reading() as session:
-            assert open_assignments.find(session, 1, "echo-responder").open is is_open
+            assert open_assignments.load_course_assignment(session, 1, "echo-responder").open is is_open
     policy = {"assignment": "echo-responder", "due": "2026-11-30T17:00", "late_days": "2", "attempts": "3"}
     submit(grace, f"{HOME}/policy", policy)
     shown = grace.get(f"{path}/echo-responder").text
     assert 'value="2026-11-30T17:00"' in shown
     with web.store.reading() as session:
-        allowed = policies.policies(session, 1)["echo-responder"]
-        done = [entry.action for entry in audit.entries(session, "course", "1")]
+        allowed = policies.load_policies(session, 1)["echo-responder"]
+        done = [entry.action for entry in audit.load_entries(session, "course", "1")]
     assert (allowed.late_days, allowed.attempts) == (2, 3)
     submit(grace, f"{HOME}/policy", policy | {"due": "2020-11-30T17:00"})
     told = words(grace.get(f"{path}/echo-responder?done=policy").text)
@@ -62,7 +62,7 @@ def test_an_assignment_that_nobody_was_shown_is_taken_out(web: Web, grace: TestC
     assert "No assignments yet" in grace.get(path).text
     assert submit(grace, f"{one}/remove").status_code == 422
     with web.store.reading() as session:
-        assert policies.policies(session, 1) == {}
+        assert policies.load_policies(session, 1) == {}
     submit(grace, path, {"assignment": "echo-responder"})
     submit(grace, f"{one}/open")
     submit(grace, f"{one}/close")
@@ -72,7 +72,7 @@ def test_an_assignment_that_nobody_was_shown_is_taken_out(web: Web, grace: TestC
 
 
 def test_an_own_assignment_is_checked_prepared_and_previewed(web: Web, grace: TestClient) -> None:
-    folder = assignment_folder("echo-responder")
+    folder = locate_assignment_folder("echo-responder")
     files = {
         f"mine/{path.relative_to(folder)}": path.read_text(encoding="utf-8")
         for path in folder.rglob("*")
@@ -105,7 +105,7 @@ def test_an_own_assignment_is_checked_prepared_and_previewed(web: Web, grace: Te
 def test_what_students_have_been_shown_is_replaced_by_an_upload_where_that_is_said(web: Web, grace: TestClient) -> None:
     path = f"{HOME}/assignments"
     submit(grace, path, {"assignment": "echo-responder"})
-    text = (assignment_folder("echo-responder") / "assignment.toml").read_text(encoding="utf-8")
+    text = (locate_assignment_folder("echo-responder") / "assignment.toml").read_text(encoding="utf-8")
 
     def upload(title: str, **fields: str) -> Response:
         changed = re.sub("^title = .*", f'title = "{title}"', text, count=1, flags=re.MULTILINE)
@@ -131,7 +131,7 @@ def test_the_catalogue_is_looked_through_by_words_and_topic(web: Web, grace: Tes
     def found(query: str) -> list[str]:
         return re.findall(r'name="assignment" value="([^"]+)"', grace.get(f"{path}?{query}").text)
 
-    assert sorted(found("")) == sorted(catalogue())
+    assert sorted(found("")) == sorted(list_catalogue_ids())
     assert found("q=LOLLIPOP+noise") == ["lollipop-with-noise"]
     assert found("q=sensor&topic=05") == [each for each in found("topic=05") if each in found("q=sensor")]
     assert "relay-a-message" in found("topic=none")

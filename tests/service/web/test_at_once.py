@@ -16,7 +16,7 @@ from service.operations import privacy
 from service.settings import Settings
 from service.store.batches import intake
 from service.store.courses import open_assignments
-from service.store.courses.versions import freeze
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.models import Enrolment, SubmissionRow
 from service.store.web_tables import LtiKey
 from web import Web, submit, web_in
@@ -50,7 +50,7 @@ def _at_once(web: Web, *requests: tuple[str, str, dict[str, Any]]) -> list[Respo
 
 def _opened(web: Web) -> None:
     with web.store.transaction() as session:
-        open_assignments.prepare(session, 1, freeze(echo()))
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
         open_assignments.open_for_students(session, 1, echo().id)
 
 
@@ -114,17 +114,17 @@ def test_the_first_who_read_our_keys_make_one(web: Web) -> None:
 
 
 def test_a_student_who_is_removed_while_they_submit_stays_removed(web: Web, monkeypatch: pytest.MonkeyPatch) -> None:
-    ada, accept = web.student("ada"), intake.accept
+    ada, accept = web.student("ada"), intake.accept_submission
     _opened(web)
     browser = web.browser(ada)
 
-    def accept_too_late(*asked: Any, **options: Any) -> intake.Accepted:
+    def accept_too_late(*asked: Any, **options: Any) -> intake.AcceptedSubmission:
         privacy.erase_student(web.app.state.context.service, acting.machine(), 1, ada.enrolment_id)
         # SQLite reuses the ids of the previous one.
         web.student("bob")
         return accept(*asked, **options)
 
-    monkeypatch.setattr(intake, "accept", accept_too_late)
+    monkeypatch.setattr(intake, "accept_submission", accept_too_late)
     answer = submit(browser, f"/courses/1/mine/{echo().id}", files=_FILES)
     assert answer.status_code in (404, 422)
     with web.store.reading() as session:

@@ -12,7 +12,7 @@ from builders import grading_request
 from paths import ROOT
 from report_builders import faulty_grade
 from service.store.batches import intake
-from service.web.attachments import attachment
+from service.web.attachments import respond_with_attachment
 from web import COURSE, Web, grade_all
 
 _HEADER = re.compile(r"attachment; filename=\"([A-Za-z0-9_-][A-Za-z0-9_.-]*)\"; filename\*=UTF-8''([A-Za-z0-9._~%-]*)")
@@ -20,13 +20,13 @@ _HEADER = re.compile(r"attachment; filename=\"([A-Za-z0-9_-][A-Za-z0-9_.-]*)\"; 
 
 @given(st.text(max_size=40))
 def test_any_name_is_one_name(name: str) -> None:
-    header = attachment(b"", name).headers["content-disposition"]
+    header = respond_with_attachment(b"", name).headers["content-disposition"]
     assert _HEADER.fullmatch(header), header
 
 
 @pytest.mark.parametrize("character", ["x", "\u2603", "\U0001f916"])
 def test_a_long_name_is_shortened_and_keeps_its_ending(character: str) -> None:
-    header = attachment(b"", f"{character * 5000}.csv").headers["content-disposition"]
+    header = respond_with_attachment(b"", f"{character * 5000}.csv").headers["content-disposition"]
     found = _HEADER.fullmatch(header)
     assert found
     assert all(name.endswith(".csv") for name in found.groups())

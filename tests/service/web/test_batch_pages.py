@@ -22,14 +22,14 @@ from service.reports.formats import FORMATS
 from service.store import audit
 from service.store.batches import intake
 from service.store.courses import open_assignments
-from service.store.courses.versions import freeze
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.grades import result_cache
-from service.store.installation import secret_of
+from service.store.installation import load_secret
 from service.store.models import Batch, Enrolment, Job, TrialRow
 from service.store.states import BatchState, JobState, Standing
-from service.version import grader_sha256
-from submissions.assignment.folder import assignment_folder
-from submissions.student_identity import Refusal, Student
+from service.version import hash_grader
+from submissions.assignment.folder import locate_assignment_folder
+from submissions.student_identity import RejectedSubmission, Student
 from web import COURSE, Web, grade_all, submit, words
 from zips import zipped
 
@@ -50,7 +50,7 @@ def sent(grace: TestClient, data: bytes, name: str = "week one.zip", **fields: s
     return answer.headers["location"]
 
 
-def a_batch(web: Web, *students: str, refusals: tuple[Refusal, ...] = ()) -> intake.AcceptedBatch:
+def a_batch(web: Web, *students: str, refusals: tuple[RejectedSubmission, ...] = ()) -> intake.AcceptedBatch:
     """Create a graded batch."""
     requests = [grading_request(who, f"print({who!r})\n") for who in students]
     made = intake.accept_batch(web.store, "week one", requests, refusals, course=COURSE, max_attempts=3)
@@ -78,7 +78,7 @@ def test_a_batch_is_looked_at_before_it_is_taken_in(web: Web, grace: TestClient)
         assert each in told
     with web.store.reading() as session:
         assert session.scalar(select(func.count()).select_from(Job).where(Job.state == JobState.QUEUED)) == 2
-        (entry,) = audit.entries(session, "batch", batch.rpartition("/")[2])
+        (entry,) = audit.load_entries(session, "batch", batch.rpartition("/")[2])
         assert (entry.action, entry.actor) == ("submit", "Grace (person 1)")
         assert entry.detail["refused"] == 2
     assert grace.get(place).status_code == 404
@@ -91,11 +91,11 @@ def test_what_is_missing_known_and_new_is_said_before_it_is_taken_in(web: Web, g
     web.student("bob")
     submit(grace, f"{sent(grace, a_class('ada'))}/confirm")
     grade_all(web, report_builders.faulty_grade())
-    secret = secret_of(web.store).sha256
+    secret = load_secret(web.store).sha256
     with web.store.transaction() as session:
         job = session.query(Job).one()
         job.sandbox = "seccomp, Landlock"
-        job.cache_key = result_cache.cache_key(session, job.id, grader_sha256(), secret)
+        job.cache_key = result_cache.compute_cache_key(session, job.id, hash_grader(), secret)
         for trial in session.query(TrialRow):
             trial.verdict = "finished"
     alike = {f"{who}/{name}": f"{text}# ada\n" for who in ("ada", "bob") for name, text in ECHO.items()}
@@ -153,16 +153,16 @@ def test_an_upload_is_its_senders_alone_and_few_are_kept(web: Web, grace: TestCl
 
 def test_the_assignment_is_the_courses_own_where_it_has_one_and_never_a_folder(web: Web, grace: TestClient) -> None:
     with web.store.transaction() as session:
-        open_assignments.prepare(session, 1, freeze(replace(echo(), title="Echo, changed")))
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(replace(echo(), title="Echo, changed")))
     assert "Echo, changed" in grace.get(sent(grace, a_class("ada"))).text
     files = {"files": ("w.zip", a_class("ada"), "application/zip")}
-    folder = str(assignment_folder("echo-responder"))
+    folder = str(locate_assignment_folder("echo-responder"))
     answer = submit(grace, f"{HOME}/batches/uploads", {"assignment": folder}, files=files)
     assert answer.status_code == 422
 
 
 def test_the_table_is_sorted_filtered_searched_and_cut(web: Web, grace: TestClient) -> None:
-    refusals = (Refusal("late.zip", "is empty, expected files.", Student("late")),)
+    refusals = (RejectedSubmission("late.zip", "is empty, expected files.", Student("late")),)
     requests = [grading_request(f"s{number:03}") for number in range(120)]
     made = intake.accept_batch(web.store, "week", requests, refusals, course=COURSE, max_attempts=3)
     with web.store.transaction() as session:
@@ -263,7 +263,7 @@ def test_what_a_newer_submission_took_the_place_of_leads_to_it(web: Web, grace: 
 
 def test_the_overview_says_what_was_lost_by_whom_and_who_is_missing(web: Web, grace: TestClient) -> None:
     web.student("zoe")
-    made = a_batch(web, "ada", "bob", refusals=(Refusal("x.zip", "is broken, expected a zip."),))
+    made = a_batch(web, "ada", "bob", refusals=(RejectedSubmission("x.zip", "is broken, expected a zip."),))
     told = words(grace.get(f"{HOME}/batches/{made.id}/overview").text)
     for each in ("Graded 2", "Most common causes", "Not submitted Zoe", "x.zip is broken", "Find similar submissions"):
         assert each in told, told
@@ -291,7 +291,7 @@ def test_what_is_nearly_the_same_is_shown_with_its_lines_across_the_batches_of_a
     assert "sum = value * 3" in page
     assert "<script>alert" not in page
     with web.store.transaction() as session:
-        open_assignments.prepare(session, 1, freeze(echo()))
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
         open_assignments.hide_names(session, 1, "echo-responder", hidden=True)
     hidden = words(grace.get(path).text)
     assert "1 similar pair" in hidden
@@ -312,7 +312,7 @@ def test_publishing_all_and_publishing_one(web: Web, grace: TestClient) -> None:
     with web.store.reading() as session:
         assert session.get_one(Job, one).published_by == "Grace (person 1)"
         assert session.get_one(Job, other).published_at is None
-        assert [entry.action for entry in audit.entries(session, "job", one)] == ["publish"]
+        assert [entry.action for entry in audit.load_entries(session, "job", one)] == ["publish"]
     answer = submit(grace, f"{HOME}/batches/{made.id}/publish")
     assert "1 grade published." in words(grace.get(answer.headers["location"]).text)
     with web.store.reading() as session:
@@ -358,7 +358,7 @@ def test_a_grade_is_shown_to_staff_with_its_neighbours(web: Web, grace: TestClie
 def test_hidden_names_are_nowhere_on_the_pages_of_who_marks(web: Web, grace: TestClient) -> None:
     made = a_batch(web, "ada-lovelace", "bob-kahn")
     with web.store.transaction() as session:
-        open_assignments.prepare(session, 1, freeze(echo()))
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
     submit(grace, f"{HOME}/assignments/echo-responder/names", {"hidden": "true"})
     path = f"{HOME}/batches/{made.id}"
     pages = [path, f"{path}/overview", f"{HOME}/grades/{made.jobs[0].job_id}"]
@@ -389,7 +389,7 @@ def test_marks_are_taken_away_as_files(web: Web, grace: TestClient) -> None:
     published = list(csv.DictReader(io.StringIO(answer.content.decode("utf-8-sig"))))
     assert {row["marks"] for row in published} == {""}
     for name, each in FORMATS.items():
-        if each.filled_in is None and each.packed is None:
+        if each.worksheet is None and each.archive is None:
             answer = grace.get(f"{path}/export?format={name}")
             assert answer.status_code == 200, name
             assert answer.headers["content-disposition"].startswith("attachment"), name

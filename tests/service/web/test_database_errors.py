@@ -16,7 +16,7 @@ from builders import PROGRAM, echo
 from service.operations import replies
 from service.queue import notifier
 from service.store.courses import open_assignments
-from service.store.courses.versions import freeze
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.models import SubmissionRow
 from web import Web, submit
 
@@ -90,9 +90,9 @@ def test_a_submission_is_accepted_although_the_database_fails_after_it(
 ) -> None:
     ada = web.student("ada")
     with web.store.transaction() as session:
-        open_assignments.prepare(session, 1, freeze(echo()))
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
         open_assignments.open_for_students(session, 1, echo().id)
-    monkeypatch.setattr(notifier, "note_notices", _raise(_AWAY))
+    monkeypatch.setattr(notifier, "mark_notified", _raise(_AWAY))
     files = [("files", ("robot.py", PROGRAM)), ("files", ("responder.py", "def responder(msg):\n    return msg\n"))]
     answer = submit(web.browser(ada), f"/courses/1/mine/{echo().id}", files=files)
     assert answer.status_code == 303, answer.text
@@ -102,7 +102,7 @@ def test_a_submission_is_accepted_although_the_database_fails_after_it(
 
 def test_an_answer_of_the_api_is_given_although_it_cannot_be_kept(web: Web, monkeypatch: pytest.MonkeyPatch) -> None:
     headers = web.token(web.instructor(), "read", "manage") | {"idempotency-key": "once"}
-    monkeypatch.setattr(replies, "keep", _raise(_AWAY))
+    monkeypatch.setattr(replies, "store_reply", _raise(_AWAY))
     students = {"students": [{"id": "ada"}]}
     assert web.browser().post("/api/v1/courses/1/people", headers=headers, json=students).status_code == 201
     # A completed request is not repeated.

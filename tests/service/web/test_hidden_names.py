@@ -18,8 +18,8 @@ from builders import echo, grading_request
 from naming import is_named
 from service.store.batches import intake, regrades
 from service.store.courses import open_assignments
-from service.store.courses.hidden_names import HiddenNames, hidden_names_of
-from service.store.courses.versions import freeze
+from service.store.courses.assignment_versions import freeze_assignment
+from service.store.courses.hidden_names import HiddenNames, load_hidden_names
 from service.store.grades import results
 from service.store.people.membership import Member
 from service.store.queue import jobs
@@ -48,7 +48,7 @@ def regrade(web: Web, grace: Member) -> str:
     batch = intake.accept_batch(web.store, "week one", requests, (), course=COURSE, max_attempts=3)
     _grade_all(web)
     with web.store.transaction() as session:
-        open_assignments.prepare(session, 1, freeze(echo()))
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
         open_assignments.hide_names(session, 1, "echo-responder", True)
     made = acting.regrade(web.store, batch.id, None, max_attempts=3, actor="grace")
     _grade_all(web)
@@ -56,20 +56,22 @@ def regrade(web: Web, grace: Member) -> str:
 
 
 def _grade_all(web: Web) -> None:
-    while claim := jobs.claim(web.store, "worker", 60):
-        jobs.finish(web.store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    while claim := jobs.claim_job(web.store, "worker", 60):
+        jobs.finish_job(web.store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
 
 
 def test_changes_of_a_regrade_are_in_the_order_of_the_shown_names(web: Web, grace: Member, regrade: str) -> None:
     token = web.token(grace, "read")
     changes = web.browser().get(f"{HERE}/batches/{regrade}/changes", headers=token).json()["items"]
-    shown = hidden_names_of(web.store, 1)
-    assert [each["student"] for each in changes] == sorted(shown.called("echo-responder", who) for who in STUDENTS)
+    shown = load_hidden_names(web.store, 1)
+    assert [each["student"] for each in changes] == sorted(
+        shown.label_student("echo-responder", who) for who in STUDENTS
+    )
 
 
 def test_the_page_of_changes_is_in_the_order_of_random_ids(web: Web, grace: Member, regrade: str) -> None:
     with web.store.reading() as session:
-        found = regrades.changes_page(session, regrade, 1, hidden_names_of(web.store, 1))
+        found = regrades.load_changes_page(session, regrade, 1, load_hidden_names(web.store, 1))
     assert [each.job_id for each in found.changes] == sorted(each.job_id for each in found.changes)
     text = web.browser(grace).get(f"/courses/1/batches/{regrade}/changes").text
     assert [who for who in STUDENTS if re.search(rf"\b{who}\b", text, re.IGNORECASE)] == []
@@ -104,8 +106,8 @@ def test_an_upload_that_is_not_new_names_nobody_beside_a_grade(web: Web, grace: 
     path = f"{HERE}/batches?assignment=echo-responder&name=again"
     headers = {**token, "content-type": "application/zip"}
     known = web.browser().post(path, headers=headers, content=again).json()["known"]
-    shown = hidden_names_of(web.store, 1)
-    assert [each["student"] for each in known] == sorted(shown.called("echo-responder", who) for who in STUDENTS)
+    shown = load_hidden_names(web.store, 1)
+    assert [each["student"] for each in known] == sorted(shown.label_student("echo-responder", who) for who in STUDENTS)
     browser = web.browser(grace)
     files = {"files": ("again.zip", again, "application/zip")}
     upload = submit(browser, "/courses/1/batches/uploads", {"assignment": "echo-responder"}, files=files)
@@ -156,5 +158,5 @@ def test_numbers_of_submissions_are_not_in_the_order_of_the_names(web: Web) -> N
 
 def test_a_student_has_another_label_in_each_assignment() -> None:
     names = HiddenNames(frozenset({"one", "two"}), b"key")
-    assert names.called("one", "ada") == names.called("one", "ada")
-    assert len({names.called(assignment, "ada") for assignment in ("one", "two", "named")}) == 3
+    assert names.label_student("one", "ada") == names.label_student("one", "ada")
+    assert len({names.label_student(assignment, "ada") for assignment in ("one", "two", "named")}) == 3

@@ -19,21 +19,21 @@ import pytest
 import acting
 import builders
 from builders import echo
-from responders.code import Code
-from service.grading.grade import Grade, unjudged_notes
+from responders.source_file import SourceFile
+from service.grading.grade import Grade, build_unjudged_notes
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from service.store.batches import intake
 from service.store.courses import open_assignments
-from service.store.courses.versions import freeze
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.grades import results
-from service.store.installation import secret_of
+from service.store.installation import load_secret
 from service.store.queue import jobs
-from service.trying import tryout_assignment
+from service.test_runs import build_single_trial_assignment
 from sim.recording import Pose
 from student_reader import StudentReader
 from submissions.assignment.definition import Assignment
-from submissions.assignment.folder import assignment_folder
+from submissions.assignment.folder import locate_assignment_folder
 from submissions.bundle import read_submission
 from submissions.grading_request import GradingRequest
 from submissions.submission import Submission
@@ -83,7 +83,7 @@ def test_answers_do_not_depend_on_what_is_hidden(
 
 
 def test_programs_are_tried_the_same_whatever_is_hidden() -> None:
-    assert tryout_assignment(_FEW) == tryout_assignment(_MANY)
+    assert build_single_trial_assignment(_FEW) == build_single_trial_assignment(_MANY)
 
 
 def _answers(
@@ -94,18 +94,18 @@ def _answers(
     with web_in(home) as web:
         ada = web.student("ada")
         with web.store.transaction() as session:
-            open_assignments.prepare(session, 1, freeze(assignment))
+            open_assignments.prepare_assignment(session, 1, freeze_assignment(assignment))
             open_assignments.open_for_students(session, 1, assignment.id)
-            batch_id = open_assignments.find(session, 1, assignment.id).batch_id or ""
+            batch_id = open_assignments.load_course_assignment(session, 1, assignment.id).batch_id or ""
         request = GradingRequest(submission, assignment, example)
-        accepted = intake.accept(web.store, request, max_attempts=3, batch_id=batch_id)
+        accepted = intake.accept_submission(web.store, request, max_attempts=3, batch_id=batch_id)
         asked = StudentReader(web, ada, {"submission_id": str(accepted.submission_id), "assignment": assignment.id})
-        claim = jobs.claim(web.store, "worker", 60)
+        claim = jobs.claim_job(web.store, "worker", 60)
         assert claim is not None
-        jobs.heartbeat(web.store, claim, 60, progress)
+        jobs.renew_lease(web.store, claim, 60, progress)
         found = asked.everything("while it is graded")
-        graded = _unjudged(grade(submission, assignment, secret=secret_of(web.store), runner=runner))
-        jobs.finish(web.store, claim, results.prepare(graded), datetime.now(UTC))
+        graded = _unjudged(grade(submission, assignment, secret=load_secret(web.store), runner=runner))
+        jobs.finish_job(web.store, claim, results.prepare_grade(graded), datetime.now(UTC))
         found |= asked.everything("graded")
         acting.publish(web.store, batch_id, actor="grace", anyway=True)
         found |= asked.everything("published")
@@ -118,8 +118,8 @@ def _answers(
 
 def _submission(example: str) -> Submission:
     if example != _WAITING:
-        return read_submission(assignment_folder("echo-responder") / "examples" / example, student="ada")
-    program = Code("robot.py", "import time\ntime.sleep(70)\ntime.sleep(70)\n")
+        return read_submission(locate_assignment_folder("echo-responder") / "examples" / example, student="ada")
+    program = SourceFile("robot.py", "import time\ntime.sleep(70)\ntime.sleep(70)\n")
     return replace(_submission("reference"), program=program)
 
 
@@ -129,7 +129,7 @@ def _unjudged(graded: Grade) -> Grade:
     criteria = tuple(
         replace(each, unjudged="The check failed." if each.id in broken else "") for each in graded.criteria
     )
-    return replace(graded, criteria=criteria, notes=(*graded.notes, *unjudged_notes(criteria)))
+    return replace(graded, criteria=criteria, notes=(*graded.notes, *build_unjudged_notes(criteria)))
 
 
 def _shown_by_gradescope(text: str) -> str:

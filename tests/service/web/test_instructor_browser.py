@@ -16,11 +16,11 @@ from playwright.sync_api import expect
 
 from browsing import DESKTOP, PHONE, assert_in_order, chromium, follow
 from builders import settings_in
-from service.queue.embedded import EmbeddedServices
+from service.queue.embedded_services import EmbeddedServices
 from service.store.engine import open_store
 from service.web.app import make_app
 from serving import served
-from submissions.assignment.examples import examples
+from submissions.assignment.examples import locate_examples
 from web import Web
 
 pytestmark = pytest.mark.long
@@ -41,7 +41,7 @@ def grading(folder: Path) -> Iterator[tuple[Web, str]]:
 
 def a_class(folder: Path) -> Path:
     """Return twenty submissions: some lack parts of the reference, and one is invalid."""
-    reference = examples(ASSIGNMENT) / "reference"
+    reference = locate_examples(ASSIGNMENT) / "reference"
     path = folder / "week one.zip"
     with zipfile.ZipFile(path, "w") as archive:
         for place, student in enumerate(STUDENTS):

@@ -41,7 +41,7 @@ def launched(tmp_path: Path) -> Iterator[tuple[Web, LearningPlatform]]:
     with learning_platform() as platform, web_in(tmp_path) as web:
         urls = (f"{platform.url}/auth?x=1", f"{platform.url}/token", f"{platform.url}/keys")
         with web.store.transaction() as session:
-            lti.register(session, Registration("Moodle", ISSUER, CLIENT, ("1",), *urls))
+            lti.register_platform(session, Registration("Moodle", ISSUER, CLIENT, ("1",), *urls))
         yield web, platform
 
 
@@ -83,18 +83,20 @@ def test_an_instructor_and_then_a_student_come_to_a_course_of_its_own(launched: 
     assert ada.get("/courses/1/platform").status_code == 404
     assert grace.get("/courses/1/platform").status_code == 200
     with web.store.reading() as session:
-        assert [(each.id, each.role) for each in membership.members(session, 1)] == [
+        assert [(each.id, each.role) for each in membership.list_members(session, 1)] == [
             ("ada", Role.STUDENT),
             ("grace", Role.INSTRUCTOR),
         ]
-        assert [course.name for course in membership.courses(session)] == ["Robotics"]
+        assert [course.name for course in membership.list_courses(session)] == ["Robotics"]
     # The same people again, and a course with the same title in another context.
     _launch(web, platform, "grace", INSTRUCTOR)
     _, answer = _launch(web, platform, "grace", INSTRUCTOR, **{f"{CLAIM}context": {"id": "c2", "title": "Robotics"}})
     assert answer.headers["location"] == "/courses/2/batches"
     with web.store.reading() as session:
-        assert [course.name for course in membership.courses(session)] == ["Robotics", "Robotics (2)"]
-        (first,), (second,) = ([each for each in membership.members(session, n) if each.id == "grace"] for n in (1, 2))
+        assert [course.name for course in membership.list_courses(session)] == ["Robotics", "Robotics (2)"]
+        (first,), (second,) = (
+            [each for each in membership.list_members(session, n) if each.id == "grace"] for n in (1, 2)
+        )
         assert first.person_id == second.person_id
 
 
@@ -221,7 +223,7 @@ def test_nobody_becomes_somebody_else_by_an_id_that_a_platform_tells(
         assert "Another person already has the ID" in refused.text
         assert browser.get("/account").status_code == 303
     with web.store.reading() as session:
-        assert {each.id: each.name for each in membership.members(session, 1)}["alan"] == "Alan"
+        assert {each.id: each.name for each in membership.list_members(session, 1)}["alan"] == "Alan"
 
 
 def test_what_a_platform_lists_wrongly_is_passed_over(launched: tuple[Web, LearningPlatform]) -> None:
@@ -252,11 +254,15 @@ def test_members_are_enrolled_and_published_marks_sent(launched: tuple[Web, Lear
     answer = grace.post("/courses/1/platform/members", data={CSRF_FIELD: word})
     assert "3 platform members are enrolled" in answer.text, answer.text
     with web.store.reading() as session:
-        assert [each.name for each in membership.members(session, 1)] == ["Bob Example", "Ada Example", "Grace Example"]
+        assert [each.name for each in membership.list_members(session, 1)] == [
+            "Bob Example",
+            "Ada Example",
+            "Grace Example",
+        ]
     requests = [grading_request("ada"), grading_request("unknown")]
     intake.accept_batch(web.store, "b", requests, (), course="Robotics", max_attempts=3)
-    while claim := jobs.claim(web.store, "worker", 60):
-        jobs.finish(web.store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    while claim := jobs.claim_job(web.store, "worker", 60):
+        jobs.finish_job(web.store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
     send = {CSRF_FIELD: word, "assignment": "echo-responder"}
     assert "0 published marks" in grace.post("/courses/1/platform/marks", data=send).text
     assert platform.scores == []

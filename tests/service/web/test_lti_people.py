@@ -18,14 +18,14 @@ from sqlalchemy.orm import Session
 
 from builders import grading_request, opened, settings_in
 from service.lti import services
-from service.lti.fetching import Fetched, PlatformError
+from service.lti.platform_requests import PlatformError, PlatformReply
 from service.lti.services import Score
 from service.store.batches import intake
 from service.store.engine import Store, now
 from service.store.models import Course, Enrolment, Person
 from service.store.people import credentials, lti, membership
 from service.store.people.credentials import Reach
-from service.store.people.lti import CourseLink, Launched, Platform, Registration
+from service.store.people.lti import CourseLink, LaunchResult, Platform, Registration
 from service.store.people.students import Students
 from service.store.states import CredentialKind, Role
 from service.store.web_tables import Credential, LtiCourse, LtiPerson
@@ -44,8 +44,10 @@ def platform(store: Store) -> Platform:
 
 def register(store: Store, *origins: str, name: str = "Moodle") -> Platform:
     with store.transaction() as session:
-        lti.register(session, Registration(name, f"https://{name}.example.org", "c", ("1", "2"), *URLS, origins))
-        return next(each for each in lti.platforms(session) if each.name == name)
+        lti.register_platform(
+            session, Registration(name, f"https://{name}.example.org", "c", ("1", "2"), *URLS, origins)
+        )
+        return next(each for each in lti.list_platforms(session) if each.name == name)
 
 
 def launch(
@@ -59,19 +61,21 @@ def launch(
     id: str = "",
     members_url: str | None = None,
     title: str = "Robotics",
-) -> Launched | None:
+) -> LaunchResult | None:
     """Return a launch with a valid session, as the web server creates it."""
     with store.transaction() as session:
         who = Student(id or subject, subject.capitalize())
-        launched = lti.meet(session, platform, deployment, context, title, subject, who, role, members_url, members_url)
+        launched = lti.resolve_launch(
+            session, platform, deployment, context, title, subject, who, role, members_url, members_url
+        )
         if launched is not None:
             sign_in(session, launched.person_id, Reach(platform_id=platform.id))
         return launched
 
 
-def sign_in(session: Session, person_id: int, reach: Reach = credentials.EVERYWHERE) -> None:
+def sign_in(session: Session, person_id: int, reach: Reach = credentials.UNLIMITED_REACH) -> None:
     """Create a session of this person."""
-    credentials.issue(session, person_id, CredentialKind.SESSION, credentials.SESSION_LIFETIME, reach=reach)
+    credentials.issue_credential(session, person_id, CredentialKind.SESSION, credentials.SESSION_LIFETIME, reach=reach)
 
 
 def test_a_person_known_from_one_course_takes_nobodys_place_in_another(store: Store, platform: Platform) -> None:
@@ -84,7 +88,7 @@ def test_a_person_known_from_one_course_takes_nobodys_place_in_another(store: St
             launch(store, platform, "mallory", context="c2", id=id)
     with store.reading() as session:
         assert victim is not None
-        found = {each.id: (each.person_id, each.role) for each in membership.members(session, victim.course_id)}
+        found = {each.id: (each.person_id, each.role) for each in membership.list_members(session, victim.course_id)}
         assert found["victim"] == (victim.person_id, STUDENT)
         assert found["grace"][1] is INSTRUCTOR
     # An unused id becomes theirs.
@@ -102,7 +106,7 @@ def test_a_batch_that_came_first_waits_for_its_students(store: Store, platform: 
     known = launch(store, platform, "ada", context="c1")
     with store.reading() as session:
         course = session.get_one(Course, 2).name
-    intake.accept(store, grading_request("ada"), course=course, max_attempts=1)
+    intake.accept_submission(store, grading_request("ada"), course=course, max_attempts=1)
     with store.transaction() as session:
         row = session.scalars(select(Enrolment).where(Enrolment.course_id == 2, Enrolment.student == "ada")).one()
         (link,) = credentials.replace_links(session, [row.person_id], credentials.LINK_LIFETIME).values()
@@ -113,7 +117,7 @@ def test_a_batch_that_came_first_waits_for_its_students(store: Store, platform: 
     assert claimed.person_id == known.person_id
     with store.transaction() as session:
         assert session.get(Person, nobody) is None
-        assert credentials.redeem(session, link) is None
+        assert credentials.redeem_link(session, link) is None
 
 
 @pytest.mark.parametrize("who", ["signed in", "instructs", "elsewhere", "operator", "other platform"])
@@ -151,13 +155,13 @@ def test_an_instructor_on_a_platform_is_no_instructor_of_a_later_course(store: S
     assert mallory is not None
     assert dean.person_id != mallory.person_id
     with store.reading() as session:
-        assert [course for course, _ in membership.enrolments(session, mallory.person_id)] == ["Robotics"]
+        assert [course for course, _ in membership.load_enrolments(session, mallory.person_id)] == ["Robotics"]
 
 
 def test_a_platform_makes_no_course_that_is_the_installations_own(store: Store, platform: Platform) -> None:
     launch(store, platform, "root", INSTRUCTOR, title="default")
     with store.reading() as session:
-        assert [each.name for each in membership.courses(session)] == ["default (2)"]
+        assert [each.name for each in membership.list_courses(session)] == ["default (2)"]
 
 
 def test_launches_at_once_make_one_course_and_one_person(store: Store, platform: Platform) -> None:
@@ -165,7 +169,7 @@ def test_launches_at_once_make_one_course_and_one_person(store: Store, platform:
         found = set(pool.map(lambda _: launch(store, platform, "grace", INSTRUCTOR), range(8)))
     assert len(found) == 1
     with store.reading() as session:
-        assert len(membership.members(session, 1)) == 1
+        assert len(membership.list_members(session, 1)) == 1
 
 
 def test_two_deployments_share_no_course(store: Store, platform: Platform) -> None:
@@ -200,7 +204,7 @@ def test_long_ids_are_refused_and_never_cut(store: Store, platform: Platform, ki
         with pytest.raises(UsageError, match=f"{kind} ID is longer than 250 characters"):
             launch(store, platform, role=INSTRUCTOR, **{**names, kind: "x" * 250 + end})
     with pytest.raises(UsageError, match="deployment ID is longer"), store.transaction() as session:
-        lti.register(session, Registration("n", "i", "c", ("x" * 251,), *URLS))
+        lti.register_platform(session, Registration("n", "i", "c", ("x" * 251,), *URLS))
 
 
 @pytest.mark.parametrize("which", [0, 1])
@@ -209,9 +213,9 @@ def test_an_issuer_and_a_client_fit_into_an_index(store: Store, which: int) -> N
     longest = ["".join(chr(chance.randrange(0x10400, 0x1F9FF)) for _ in range(255)) for _ in range(2)]
     longer = [each + "x" * (number == which) for number, each in enumerate(longest)]
     with store.transaction() as session:
-        lti.register(session, Registration("n", longest[0], longest[1], ("1",), *URLS))
+        lti.register_platform(session, Registration("n", longest[0], longest[1], ("1",), *URLS))
     with pytest.raises(UsageError, match="longer than 255 characters"), store.transaction() as session:
-        lti.register(session, Registration("n", longer[0], longer[1], ("1",), *URLS))
+        lti.register_platform(session, Registration("n", longer[0], longer[1], ("1",), *URLS))
 
 
 @pytest.mark.parametrize("which", range(3))
@@ -219,7 +223,7 @@ def test_an_issuer_and_a_client_fit_into_an_index(store: Store, which: int) -> N
 def test_every_address_of_a_platform_has_an_origin(store: Store, which: int, address: str) -> None:
     first, second, third = (address if number == which else url for number, url in enumerate(URLS))
     with pytest.raises(UsageError, match="address is"), store.transaction() as session:
-        lti.register(session, Registration("n", "i", "c", ("1",), first, second, third))
+        lti.register_platform(session, Registration("n", "i", "c", ("1",), first, second, third))
 
 
 def test_long_ids_of_people_stay_apart(store: Store, platform: Platform) -> None:
@@ -233,7 +237,7 @@ def test_only_instructors_say_where_services_are(store: Store, platform: Platfor
     launch(store, platform, "grace", INSTRUCTOR, members_url="https://platform.example.org/a")
     launch(store, platform, "ada", members_url="https://platform.example.org/b")
     with store.reading() as session:
-        link = lti.course_link(session, 1)
+        link = lti.find_course_link(session, 1)
     assert link is not None
     assert (link.members_url, link.lineitems_url) == ("https://platform.example.org/a",) * 2
 
@@ -264,17 +268,20 @@ def test_services_are_only_asked_where_an_operator_registered_them(
     platform = register(store, "https://services.example.org")
     asked: list[str] = []
 
-    def fetched(url: str, **_: object) -> Fetched:
+    def fetched(url: str, **_: object) -> PlatformReply:
         asked.append(url)
-        return Fetched({"access_token": "t", "members": [], "id": url}, "")
+        return PlatformReply({"access_token": "t", "members": [], "id": url}, "")
 
-    monkeypatch.setattr(services, "fetch", fetched)
+    monkeypatch.setattr(services, "fetch_json", fetched)
     link = CourseLink(platform, url, url)
     if allowed:
-        assert services.members(store, link) == []
+        assert services.fetch_members(store, link) == []
         services.send_scores(store, link, "a", "A", [SCORE])
         return
-    for ask in (lambda: services.members(store, link), lambda: services.send_scores(store, link, "a", "A", [SCORE])):
+    for ask in (
+        lambda: services.fetch_members(store, link),
+        lambda: services.send_scores(store, link, "a", "A", [SCORE]),
+    ):
         with pytest.raises(PlatformError, match="not registered"):
             ask()
     # Not even a token was requested.
@@ -288,19 +295,19 @@ def test_what_a_platform_names_itself_is_only_asked_where_it_is_registered(
     inside = "http://127.0.0.1:9/inside"
     asked: list[str] = []
 
-    def fetched(url: str, *, method: str = "GET", **_: object) -> Fetched:
+    def fetched(url: str, *, method: str = "GET", **_: object) -> PlatformReply:
         asked.append(url)
         if url.endswith("/token"):
-            return Fetched({"access_token": "t"}, "")
+            return PlatformReply({"access_token": "t"}, "")
         if where == "next page":
-            return Fetched({"members": []}, f'<{inside}>; rel="next"')
-        return Fetched({"id": inside} if method == "POST" else [], "")
+            return PlatformReply({"members": []}, f'<{inside}>; rel="next"')
+        return PlatformReply({"id": inside} if method == "POST" else [], "")
 
-    monkeypatch.setattr(services, "fetch", fetched)
+    monkeypatch.setattr(services, "fetch_json", fetched)
     url = "https://platform.example.org/service"
     link = CourseLink(platform, url, url)
     ask: dict[str, Callable[[], object]] = {
-        "next page": lambda: services.members(store, link),
+        "next page": lambda: services.fetch_members(store, link),
         "column": lambda: services.send_scores(store, link, "a", "A", [SCORE]),
     }
     with pytest.raises(PlatformError, match=r"uses http://127\.0\.0\.1:9 for a service"):

@@ -11,7 +11,7 @@ from starlette.testclient import TestClient
 import report_builders
 from service.store import audit
 from service.store.batches import batches
-from service.store.courses.hidden_names import hidden_names_of
+from service.store.courses.hidden_names import load_hidden_names
 from service.store.grades import results
 from web import Web, submit, web_in
 from web_world import World, make_world
@@ -35,7 +35,7 @@ class Marked:
 
     def marks(self) -> tuple[float, float]:
         with self.web.store.reading() as session:
-            line = batches.job_line(session, self.world.values["job_id"])
+            line = batches.load_job_line(session, self.world.values["job_id"])
         assert line.marks is not None
         return float(line.marks), float(line.max_marks)
 
@@ -58,7 +58,7 @@ def test_marks_are_set_excused_and_withdrawn_and_all_is_told(marked: Marked) -> 
     assert "adjusted by staff" in shown
     assert "<script>alert" not in shown
     with marked.web.store.reading() as session:
-        entry = audit.entries(session, "submission", "1")[-1]
+        entry = audit.load_entries(session, "submission", "1")[-1]
     assert entry.actor.startswith("Grace (person")
     submit(marked.grace, f"{marked.marking}/excuse", about)
     assert marked.marks() == (before[0] - float(CRITERION.marks), before[1] - float(most))
@@ -84,7 +84,7 @@ def test_it_says_whose_work_is_marked_unless_names_are_hidden(marked: Marked) ->
     submit(marked.grace, path, {"hidden": "true"})
     shown = marked.grace.get(marked.marking).text
     submit(marked.grace, path, {"hidden": "false"})
-    called = hidden_names_of(marked.web.store, 1).called
+    called = load_hidden_names(marked.web.store, 1).label_student
     assert "Participant" in shown
     assert "Ada" not in shown
     assert called("echo-responder", "ada") == "ada"
@@ -120,7 +120,7 @@ def test_a_comment_is_shown_and_withdrawn(marked: Marked) -> None:
     shown = marked.grace.get(marked.marking).text
     assert "Look at &lt;script&gt;" in shown
     with marked.web.store.reading() as session:
-        said = results.load(session, marked.world.values["job_id"]).comments
+        said = results.load_grade(session, marked.world.values["job_id"]).comments
     assert [each.criterion for each in said] == ["", CRITERION.id]
     submit(marked.grace, f"{marked.marking}/uncomment", {"comment_id": "2"})
     left = marked.grace.get(marked.marking).text

@@ -18,8 +18,8 @@ from starlette.testclient import TestClient
 import report_builders
 from builders import PROGRAM, echo
 from service.store.courses import open_assignments, policies
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.policies import PolicyLimits
-from service.store.courses.versions import freeze
 from service.store.grades import results
 from service.store.models import Job
 from service.store.people.membership import Member
@@ -59,10 +59,10 @@ def web(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Web]:
         made.instructor()
         with made.store.transaction() as session:
             for name in ("open", "prepared", "closed"):
-                open_assignments.prepare(session, 1, freeze(_assignment(name)))
+                open_assignments.prepare_assignment(session, 1, freeze_assignment(_assignment(name)))
             for name in ("open", "closed"):
                 open_assignments.open_for_students(session, 1, name)
-            open_assignments.close(session, 1, "closed")
+            open_assignments.close_assignment(session, 1, "closed")
         yield made
 
 
@@ -81,8 +81,8 @@ def _grade(web: Web, marks: str = "1") -> None:
     first = replace(grade.criteria[0], marks=Decimal(marks), max_marks=Decimal(4))
     after = replace(first, id="after", title="Secret criterion", visibility="after_published")
     grade = replace(grade, criteria=(first, after))
-    while claim := jobs.claim(web.store, "worker", 60):
-        jobs.finish(web.store, claim, results.prepare(grade), datetime.now(UTC))
+    while claim := jobs.claim_job(web.store, "worker", 60):
+        jobs.finish_job(web.store, claim, results.prepare_grade(grade), datetime.now(UTC))
 
 
 def test_only_what_is_open_or_was_submitted_to_is_listed(web: Web, ada: Member) -> None:
@@ -122,7 +122,7 @@ def test_a_limit_and_an_extension_are_told_as_they_count(web: Web, ada: Member) 
         assert "1 of 2 attempts left" in browser.get(MINE).text
         assert "35 hours left" in browser.get(MINE).text
         with web.store.transaction() as session:
-            policies.extend(session, ada.enrolment_id, "open", due + timedelta(days=7), 3)
+            policies.extend_policy(session, ada.enrolment_id, "open", due + timedelta(days=7), 3)
         assert "4 of 5 attempts left" in browser.get(f"{MINE}/open").text
         assert "8 days left" in browser.get(f"{MINE}/open").text
     finally:
@@ -223,7 +223,7 @@ def test_no_marks_are_shown_that_are_not_published_and_none_that_are_for_staff(w
     assert "2 of 8 marks" in browser.get(MINE).text
     assert "Secret criterion" in browser.get(first).text
     with web.store.transaction() as session:
-        policies.extend(session, ada.enrolment_id, "open", None, 0)
+        policies.extend_policy(session, ada.enrolment_id, "open", None, 0)
         policies.set_policy(session, 1, "open", PolicyLimits(attempts=1))
     try:
         over = _send(browser, "print(2)").headers["location"]
@@ -300,7 +300,7 @@ def test_cards_come_by_due_date_then_title(web: Web, ada: Member) -> None:
     browser = web.browser(ada)
     with web.store.transaction() as session:
         for name in ("zebra", "soon", "apple"):
-            open_assignments.prepare(session, 1, freeze(_assignment(name)))
+            open_assignments.prepare_assignment(session, 1, freeze_assignment(_assignment(name)))
             open_assignments.open_for_students(session, 1, name)
         for name, days in (("zebra", 9), ("soon", 2), ("apple", 9)):
             policies.set_policy(session, 1, name, PolicyLimits(datetime(2100, 1, days, tzinfo=UTC)))
@@ -309,7 +309,7 @@ def test_cards_come_by_due_date_then_title(web: Web, ada: Member) -> None:
     finally:
         with web.store.transaction() as session:
             for name in ("zebra", "soon", "apple"):
-                open_assignments.close(session, 1, name)
+                open_assignments.close_assignment(session, 1, name)
 
 
 def test_what_failed_by_our_fault_says_so_and_tells_no_more(web: Web, ada: Member) -> None:
@@ -328,14 +328,14 @@ def test_the_place_in_the_queue_and_the_time_left_are_told(web: Web, ada: Member
     mine = _send(first, "print('a')").headers["location"]
     theirs = _send(second, "print('b')").headers["location"]
     assert "The grading service is not running." in first.get(mine).text
-    workers.beat(web.store, WorkerDescription("worker", "here", 1, "1", "all"))
+    workers.record_heartbeat(web.store, WorkerDescription("worker", "here", 1, "1", "all"))
     assert "Your submission is next in the queue." in first.get(mine).text
     assert "1 submission is ahead of yours in the queue." in second.get(theirs).text
     assert first.get(theirs).status_code == 404
     assert first.get(f"{MINE}/submissions/{10**30}").status_code in (404, 422)
-    claim = jobs.claim(web.store, "worker", 60)
+    claim = jobs.claim_job(web.store, "worker", 60)
     assert claim is not None
-    jobs.heartbeat(web.store, claim, 60, 0.5)
+    jobs.renew_lease(web.store, claim, 60, 0.5)
     assert "This submission is being graded." in first.get(mine).text
-    jobs.finish(web.store, claim, results.prepare(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish_job(web.store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
     _grade(web)

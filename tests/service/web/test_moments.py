@@ -11,7 +11,7 @@ import pytest
 from browsing import chromium
 from paths import ROOT
 from service.web import rendering
-from service.web.moments import written_moment, zone_of
+from service.web.date_times import format_utc_offset, parse_date_time
 
 SUMMER, WINTER = datetime(2026, 7, 1, 12, tzinfo=UTC), datetime(2026, 12, 1, 12, tzinfo=UTC)
 
@@ -35,9 +35,9 @@ def server_in(monkeypatch: pytest.MonkeyPatch) -> Iterator[pytest.MonkeyPatch]:
 def test_a_moment_says_its_zone(server_in: pytest.MonkeyPatch, zone: str, summer: str, winter: str) -> None:
     server_in.setenv("TZ", zone)
     time.tzset()
-    assert (zone_of(SUMMER), zone_of(WINTER)) == (summer, winter)
+    assert (format_utc_offset(SUMMER), format_utc_offset(WINTER)) == (summer, winter)
     for moment in (SUMMER, WINTER):
-        assert written_moment(f"{moment.astimezone():%Y-%m-%dT%H:%M}") == moment
+        assert parse_date_time(f"{moment.astimezone():%Y-%m-%dT%H:%M}") == moment
 
 
 @pytest.mark.long
@@ -54,7 +54,7 @@ def test_a_browser_shows_a_moment_in_the_zone_of_its_reader(
 ) -> None:
     server_in.setenv("TZ", "UTC")
     time.tzset()
-    moment = rendering._moment(datetime(2026, 7, 1, 22, tzinfo=UTC))
+    moment = rendering._format_moment(datetime(2026, 7, 1, 22, tzinfo=UTC))
     with chromium() as browser:
         page = browser.new_context(timezone_id=zone).new_page()
         page.set_content(f"<p>{moment}</p>")

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from builders import grading_request
-from service.store.batches.intake import accept_new
+from service.store.batches.intake import accept_new_submissions
 from service.store.models import Job
 from service.store.queue import jobs
-from service.store.queue.jobs import Retry
+from service.store.queue.jobs import RetryPolicy
 from service.store.states import JobState
 from web import Web, submit, words
 
-AT_ONCE = Retry(backoff_seconds=0)
+AT_ONCE = RetryPolicy(backoff_seconds=0)
 LOST = "the worker one fell silent while it graded; its log may tell why"
 
 
 def lose(web: Web, *students: str, most: int) -> None:
     """Submit for these students, and let the worker of each fail once."""
-    accept_new(web.store, "spring", [grading_request(each) for each in students], (), max_attempts=most)
+    accept_new_submissions(web.store, "spring", [grading_request(each) for each in students], (), max_attempts=most)
     for _ in students:
-        claim = jobs.claim(web.store, "one", 60)
+        claim = jobs.claim_job(web.store, "one", 60)
         assert claim is not None
-        jobs.fail(web.store, claim, LOST, AT_ONCE)
+        jobs.fail_job(web.store, claim, LOST, AT_ONCE)
 
 
 def test_attempts_that_were_lost_are_told_and_count_against_nobody(web: Web) -> None:
@@ -50,7 +50,9 @@ def test_what_could_not_be_graded_is_listed_with_its_reason_and_queued_again(web
 
 def test_a_lane_says_what_waits_in_it(web: Web) -> None:
     root = web.browser(web.operator())
-    accept_new(web.store, "spring", [grading_request(each) for each in ("ada", "bob", "cyd")], (), max_attempts=3)
+    accept_new_submissions(
+        web.store, "spring", [grading_request(each) for each in ("ada", "bob", "cyd")], (), max_attempts=3
+    )
     assert "batch: whole classes 3 0" in words(root.get("/operator").text)
-    assert jobs.claim(web.store, "one", 60) is not None
+    assert jobs.claim_job(web.store, "one", 60) is not None
     assert "batch: whole classes 2 1" in words(root.get("/operator").text)

@@ -25,7 +25,7 @@ def test_students_are_let_in_and_get_more_time(web: Web, grace: TestClient) -> N
     submit(grace, f"{own}/extensions", {"due": "2030-01-02", "more_attempts": "2"})
     assert "2 additional attempts" in words(grace.get(own).text)
     with web.store.reading() as session:
-        done = [entry.action for entry in audit.entries(session, "course", "1")]
+        done = [entry.action for entry in audit.load_entries(session, "course", "1")]
     assert done == ["enrol", "enrol", "extend"]
     answer = submit(grace, f"{path}/table", files={"file": ("x.csv", b"\xff\xfe nothing")})
     assert (answer.status_code, "x.csv: " in words(answer.text)) == (422, True)
@@ -50,9 +50,9 @@ def test_who_has_submitted_nothing_is_taken_out_of_the_course(web: Web, grace: T
     answer = submit(grace, f"{mistyped}/remove")
     assert "zoe was removed from the course" in words(grace.get(answer.headers["location"]).text)
     assert grace.get(mistyped).status_code == 404
-    intake.accept(web.store, grading_request("ada"), course=COURSE, max_attempts=3)
+    intake.accept_submission(web.store, grading_request("ada"), course=COURSE, max_attempts=3)
     with web.store.reading() as session:
-        ada = f"{HOME}/people/{membership.member(session, COURSE, 'ada').enrolment_id}"
+        ada = f"{HOME}/people/{membership.load_member(session, COURSE, 'ada').enrolment_id}"
     assert f"{ada}/remove" not in grace.get(ada).text
     assert submit(grace, f"{ada}/remove").status_code == 422
     assert submit(grace, f"{HOME}/people/{web.instructor('linus').enrolment_id}/remove").status_code == 404

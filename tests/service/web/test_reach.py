@@ -27,7 +27,7 @@ from service.store.people.students import Students
 from service.store.states import CredentialKind, Role
 from service.store.web_tables import Credential, LtiCourse, LtiPerson
 from service.web.access import SESSION_COOKIE
-from service.web.page_scopes import scope_of_page
+from service.web.page_scopes import find_page_scope
 from sim.errors import UsageError
 from submissions.student_identity import Student
 from web import Web, csrf, submit, words
@@ -69,7 +69,7 @@ def instructors_link(web: Web, grace: TestClient, ada: Member) -> str:
 def credential(web: Web, member: Member, kind: CredentialKind, **reach: object) -> str:
     with web.store.transaction() as session:
         limits = Reach(**reach)  # type: ignore[arg-type]
-        return credentials.issue(session, member.person_id, kind, timedelta(hours=1), reach=limits)
+        return credentials.issue_credential(session, member.person_id, kind, timedelta(hours=1), reach=limits)
 
 
 @pytest.fixture
@@ -167,14 +167,14 @@ def _scopes_of_pages() -> dict[str, str]:
 def test_a_page_needs_the_scope_of_its_route_of_the_api(page: str, scope: str) -> None:
     method, route = page.split(" ")
     if page not in ("GET /", "GET /account") and not (method == "GET" and route.endswith("/uploads/{upload_id}")):
-        assert scope_of_page(method, route) == scope
+        assert find_page_scope(method, route) == scope
 
 
 def test_a_platforms_session_reaches_the_platforms_courses(web: Web) -> None:
     member = web.operator()
     with web.store.transaction() as session:
         urls = ("https://p.example.org/a", "https://p.example.org/t", "https://p.example.org/k")
-        platform = lti.register(session, Registration("Moodle", "i", "c", ("1",), *urls))
+        platform = lti.register_platform(session, Registration("Moodle", "i", "c", ("1",), *urls))
         local = membership.make_instructor(session, "local", Student("root"))
         launched = membership.make_instructor(session, "launched", Student("root"))
         for each in (local, launched):
@@ -213,7 +213,9 @@ def test_what_is_made_with_a_token_lasts_no_longer_than_the_token(web: Web, ada:
     with web.store.transaction() as session:
         reach = Reach(scopes=frozenset({"sign-in", "read"}))
         day = timedelta(days=1)
-        first = credentials.issue(session, ada.person_id, CredentialKind.TOKEN, day, name="first", reach=reach)
+        first = credentials.issue_credential(
+            session, ada.person_id, CredentialKind.TOKEN, day, name="first", reach=reach
+        )
     made = []
     secret = first
     for _ in range(3):
@@ -230,7 +232,7 @@ def test_what_is_made_with_a_token_lasts_no_longer_than_the_token(web: Web, ada:
             assert own.expires_at == until
     assert all(web.browser().get("/api/v1/me", headers=each).status_code == 200 for each in (*made, other))
     with web.store.transaction() as session:
-        credentials.revoke(session, row.credential_id, ada.person_id)
+        credentials.revoke_credential(session, row.credential_id, ada.person_id)
     assert {web.browser().get("/api/v1/me", headers=each).status_code for each in made} == {401}
     assert web.browser().get("/api/v1/me", headers=other).status_code == 200
     assert browser.get("/account").status_code == 303
@@ -333,7 +335,9 @@ def test_a_name_is_that_of_its_course(web: Web, grace: TestClient, ada: Member) 
     table = {"file": ("x.csv", b"id,name,email\nada,Renamed,renamed@example.org\n")}
     assert submit(grace, "/courses/1/people/table", files=table).status_code == 303
     with web.store.reading() as session:
-        found = {each.course_id: (each.name, each.email) for _, each in membership.enrolments(session, ada.person_id)}
+        found = {
+            each.course_id: (each.name, each.email) for _, each in membership.load_enrolments(session, ada.person_id)
+        }
     assert found == {1: ("Renamed", "renamed@example.org"), other.course_id: ("Also Ada", "")}
     linus = web.browser(web.instructor("linus", "two"))
     assert "Renamed" not in linus.get(f"/courses/{other.course_id}/people").text
@@ -345,7 +349,7 @@ def test_a_courses_data_tells_no_credentials_of_another(web: Web, ada: Member) -
         for name, course_id in (("here", 1), ("there", 2), ("everywhere", None)):
             reach = Reach(course_id=course_id, scopes=frozenset({"read"}))
             kind = CredentialKind.TOKEN
-            credentials.issue(session, ada.person_id, kind, timedelta(hours=1), name=name, reach=reach)
+            credentials.issue_credential(session, ada.person_id, kind, timedelta(hours=1), name=name, reach=reach)
     headers = web.token(web.instructor(), "manage")
     packed = web.browser().get(f"/api/v1/courses/1/people/{ada.enrolment_id}/data", headers=headers).content
     with zipfile.ZipFile(io.BytesIO(packed)) as archive:
@@ -383,17 +387,17 @@ def test_an_operator_signs_somebody_out(web: Web, ada: Member) -> None:
 def test_a_released_place_is_the_next_launchs(web: Web, grace: TestClient) -> None:
     with web.store.transaction() as session:
         urls = ("https://p.example.org/a", "https://p.example.org/t", "https://p.example.org/k")
-        lti.register(session, Registration("Moodle", "i", "c", ("1",), *urls))
-        (platform,) = lti.platforms(session)
+        lti.register_platform(session, Registration("Moodle", "i", "c", ("1",), *urls))
+        (platform,) = lti.list_platforms(session)
         student = Students(session, 1).enrol(Student("ada"), now(session))
         person_id = session.get_one(Enrolment, student).person_id
-        credentials.issue(session, person_id, CredentialKind.SESSION, timedelta(hours=1))
+        credentials.issue_credential(session, person_id, CredentialKind.SESSION, timedelta(hours=1))
     root = web.browser(web.operator())
     for release in (False, True):
         submit(root, f"/operator/people/{student}/sign-out", {"release": "true"} if release else {})
         with web.store.transaction() as session:
             try:
-                lti.enrol(session, platform, 1, "subject", Student("ada"), Role.STUDENT)
+                lti.enrol_subject(session, platform, 1, "subject", Student("ada"), Role.STUDENT)
                 taken = True
             except UsageError:
                 taken = False
@@ -416,7 +420,7 @@ def test_an_operator_joins_two_whom_the_form_names(web: Web) -> None:
     assert browser.get("/account").status_code == 303
     with web.store.reading() as session:
         person_id = session.get_one(Enrolment, second).person_id
-        assert [course for course, _ in membership.enrolments(session, person_id)] == ["one", "two"]
+        assert [course for course, _ in membership.load_enrolments(session, person_id)] == ["one", "two"]
     assert root.post(f"/operator/people/{second}/join", data=data).status_code == 409
 
 
@@ -446,7 +450,7 @@ def test_who_is_not_joined(web: Web, case: str) -> None:
     if case == "a platform's person":
         with web.store.transaction() as session:
             urls = ("https://p.example.org/a", "https://p.example.org/t", "https://p.example.org/k")
-            platform = lti.register(session, Registration("Moodle", "i", "c", ("1",), *urls))
+            platform = lti.register_platform(session, Registration("Moodle", "i", "c", ("1",), *urls))
             session.add(LtiPerson(platform_id=platform, subject="s", person_id=second.person_id))
     path = f"/api/v1/operator/people/{first.enrolment_id}/join"
     answer = web.browser().post(path, headers=headers, json={"other": other})

@@ -50,7 +50,7 @@ _WITHOUT_ANSWER = {
     f"{_COURSE}/people/{{enrolment_id}}/link",
     f"{API}{_COURSE}/submissions/{{submission_id}}/files",
 }
-_FORMATS = [f"?format={name}" for name, each in FORMATS.items() if each.filled_in is None and each.packed is None]
+_FORMATS = [f"?format={name}" for name, each in FORMATS.items() if each.worksheet is None and each.archive is None]
 _SORTS = [f"?sort={way}{by}" for way in ("", "-") for by in ("student", "name", "assignment", "marks", "state")]
 #: More queries for a route.
 _QUERIES: Mapping[str, list[str]] = {

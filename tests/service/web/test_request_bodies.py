@@ -143,7 +143,7 @@ def test_only_these_routes_declare_an_upload(world: tuple[Web, dict[str, str], d
         f"{method} {route.path}": upload.most // request_bodies.MEGABYTE
         for route in iter_route_contexts(web.app.routes)
         for method in route.methods or ()
-        if (upload := getattr(route.endpoint, request_bodies._MARK, None)) is not None
+        if (upload := getattr(route.endpoint, request_bodies._UPLOAD_ATTRIBUTE, None)) is not None
     }
     assert declared == _UPLOADS
     for route, operations in web.app.openapi()["paths"].items():

@@ -89,7 +89,7 @@ def test_a_token_becomes_a_browser_only_where_it_may(web: Web) -> None:
 def _token_for(web: Web, member: Member, lifetime: timedelta) -> str:
     reach = credentials.Reach(scopes=frozenset({"sign-in"}))
     with web.store.transaction() as session:
-        return credentials.issue(session, member.person_id, CredentialKind.TOKEN, lifetime, reach=reach)
+        return credentials.issue_credential(session, member.person_id, CredentialKind.TOKEN, lifetime, reach=reach)
 
 
 def test_a_session_started_with_a_token_lasts_no_longer_than_the_token(web: Web) -> None:
@@ -112,8 +112,8 @@ def test_a_session_ends_with_the_token_it_was_started_with(web: Web) -> None:
     with web.store.transaction() as session:
         identity = credentials.identify(session, first, CredentialKind.TOKEN)
         assert identity is not None
-        credentials.revoke(session, identity.credential_id, ada.person_id)
-        assert len(credentials.of_person(session, ada.person_id)) == 2
+        credentials.revoke_credential(session, identity.credential_id, ada.person_id)
+        assert len(credentials.list_credentials(session, ada.person_id)) == 2
     assert browser.get("/account").status_code == 303
     assert other.get("/account").status_code == 200
 
@@ -122,12 +122,12 @@ def test_what_has_ended_counts_no_more(web: Web) -> None:
     ada = web.student()
     with web.store.transaction() as session:
         past = timedelta(seconds=-1)
-        link = credentials.issue(session, ada.person_id, CredentialKind.LINK, past)
-        secret = credentials.issue(session, ada.person_id, CredentialKind.SESSION, past)
-        token = credentials.issue(
+        link = credentials.issue_credential(session, ada.person_id, CredentialKind.LINK, past)
+        secret = credentials.issue_credential(session, ada.person_id, CredentialKind.SESSION, past)
+        token = credentials.issue_credential(
             session, ada.person_id, CredentialKind.TOKEN, past, reach=credentials.Reach(scopes=frozenset({"read"}))
         )
-        assert credentials.redeem(session, link) is None
+        assert credentials.redeem_link(session, link) is None
         assert credentials.identify(session, secret, CredentialKind.SESSION) is None
         assert credentials.identify(session, token, CredentialKind.TOKEN) is None
 

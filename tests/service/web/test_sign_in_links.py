@@ -79,7 +79,7 @@ def test_a_whole_course_has_its_links_in_one_table(web: Web, grace: TestClient) 
         assert signs_in(web, found[1])
         assert not signs_in(web, found[1])
     with web.store.reading() as session:
-        (entry,) = audit.entries(session, "course", "1")
+        (entry,) = audit.load_entries(session, "course", "1")
     assert (entry.action, entry.actor, entry.detail) == ("links", "Grace (person 1)", {"students": 3, "days": 3})
     assert submit(grace, f"{PEOPLE}/links", {"days": "400"}).status_code == 422
 

@@ -42,7 +42,7 @@ _NO_STATEMENT = re.compile("BEGIN|PRAGMA")
 def test_no_route_needs_many_statements_or_more_of_them_the_more_there_is(tmp_path: Path) -> None:
     with web_in(tmp_path) as web:
         world = make_world(web)
-        plots.finish(web.store, world.values["job_id"], {"path": b"PNG"})
+        plots.store_plots(web.store, world.values["job_id"], {"path": b"PNG"})
         browsers, tokens = _sign_in(web, world)
         crowd(web, world, range(1))
         few = {asked: _count(web.store, *asked, browsers, tokens, world) for asked in _all_asked()}

@@ -11,9 +11,9 @@ from playwright.sync_api import Browser, Page, expect
 from browsing import DESKTOP, PHONE, assert_in_order, chromium, follow
 from builders import settings_in
 from paths import ROOT
-from service.queue.embedded import EmbeddedServices
+from service.queue.embedded_services import EmbeddedServices
 from service.store.courses import open_assignments
-from service.store.courses.versions import freeze
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.engine import open_store
 from service.web.app import make_app
 from serving import served
@@ -47,7 +47,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
         web = Web(services.settings, store, make_app(services.settings, store))
         web.instructor()
         with store.transaction() as session:
-            open_assignments.prepare(session, 1, freeze(find_assignment(ASSIGNMENT)))
+            open_assignments.prepare_assignment(session, 1, freeze_assignment(find_assignment(ASSIGNMENT)))
             open_assignments.open_for_students(session, 1, ASSIGNMENT)
         with served(web.app) as address:
             yield Served(web, address)

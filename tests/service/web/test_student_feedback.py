@@ -18,13 +18,13 @@ from rows import quick_first
 from service.reports.formats import FORMATS
 from service.store.batches import intake
 from service.store.courses import open_assignments, policies
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.policies import PolicyLimits
-from service.store.courses.versions import freeze
 from service.store.grades import results
 from service.store.models import Job
 from service.store.people.membership import Member
 from service.store.queue import jobs, self_tests
-from service.store.queue.jobs import Claim, Retry
+from service.store.queue.jobs import Claim, RetryPolicy
 from sim.errors import UsageError
 from student_reader import StudentReader
 from web import COURSE, Web
@@ -37,11 +37,11 @@ _SOURCE = "Ada Lovelace_1234567_assignsubmission_file"
 
 
 def _fail(web: Web, claim: Claim) -> None:
-    jobs.fail(web.store, claim, f"HostError: {_SECRET} is full", Retry(0.0))
+    jobs.fail_job(web.store, claim, f"HostError: {_SECRET} is full", RetryPolicy(0.0))
 
 
 def _give_up(web: Web, claim: Claim) -> None:
-    jobs.give_up(web.store, claim, f"the assignment's check.py raised KeyError: {_SECRET}")
+    jobs.give_up_job(web.store, claim, f"the assignment's check.py raised KeyError: {_SECRET}")
 
 
 def _cancel(web: Web, claim: Claim) -> None:
@@ -54,12 +54,12 @@ def _finish(web: Web, claim: Claim) -> None:
     grade = report_builders.faulty_grade()
     broken = {"unjudged": f"KeyError: {_SECRET}", "for_staff": f"Could not be judged: {_SECRET}."}
     criteria = tuple(replace(each, **broken) for each in grade.criteria)  # type: ignore[arg-type]
-    jobs.finish(web.store, claim, results.prepare(replace(grade, criteria=criteria)), datetime.now(UTC))
+    jobs.finish_job(web.store, claim, results.prepare_grade(replace(grade, criteria=criteria)), datetime.now(UTC))
 
 
 def _quarantine(web: Web, claim: Claim) -> None:
     _finish(web, claim)
-    self_tests.quarantine(web.store, _SECRET, f"{_SECRET} adds wrongly")
+    self_tests.quarantine_worker(web.store, _SECRET, f"{_SECRET} adds wrongly")
 
 
 _ENDINGS: dict[str, Callable[[Web, Claim], None]] = {
@@ -74,7 +74,7 @@ _ENDINGS: dict[str, Callable[[Web, Claim], None]] = {
 @pytest.mark.parametrize("ending", quick_first(_ENDINGS, quick=2))
 def test_students_read_no_fault_of_ours(web: Web, ending: str) -> None:
     ada, batch_id = _submit(web)
-    claim = jobs.claim(web.store, _SECRET, 60)
+    claim = jobs.claim_job(web.store, _SECRET, 60)
     assert claim is not None
     _ENDINGS[ending](web, claim)
     acting.publish(web.store, batch_id, actor="grace", anyway=True)
@@ -86,7 +86,7 @@ def test_no_gradebook_has_an_attempt_over_a_limit(web: Web) -> None:
     with web.store.transaction() as session:
         policies.set_policy(session, 1, "", PolicyLimits(attempts=1))
     _submit(web)
-    claim = jobs.claim(web.store, "worker", 60)
+    claim = jobs.claim_job(web.store, "worker", 60)
     assert claim is not None
     _finish(web, claim)
     _, batch_id = _submit(web, "print('again')\n")
@@ -101,10 +101,10 @@ def _submit(web: Web, program: str = PROGRAM) -> tuple[Member, str]:
     """Submit for Ada in a separate batch from Moodle."""
     ada = web.student("ada")
     with web.store.transaction() as session:
-        open_assignments.prepare(session, 1, freeze(echo()))
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
         open_assignments.open_for_students(session, 1, "echo-responder")
     request = replace(grading_request("ada", program), source=_SOURCE)
-    accepted = intake.accept_new(web.store, "week one", [request], (), course=COURSE, max_attempts=1)
+    accepted = intake.accept_new_submissions(web.store, "week one", [request], (), course=COURSE, max_attempts=1)
     assert accepted.batch is not None
     return ada, accepted.batch.id
 
@@ -124,7 +124,7 @@ def _gradebooks(web: Web, batch_id: str) -> dict[str, str]:
     """Return the output of each format that students see, where it has any for the batch."""
     found = {}
     for name in FORMATS.keys() - _STAFF_FORMATS:
-        given = _WORKSHEET if FORMATS[name].filled_in is not None else ""
+        given = _WORKSHEET if FORMATS[name].worksheet is not None else ""
         try:
             data = acting.export_file(web.store, batch_id, name, published=False, given=given).data
         except UsageError as error:

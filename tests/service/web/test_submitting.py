@@ -18,23 +18,23 @@ from builders import PROGRAM, echo
 from report_builders import faulty_grade
 from service.operations.context import Actor
 from service.operations.errors import NotFound
-from service.operations.submissions import SendRequest
+from service.operations.submissions import SubmissionRequest
 from service.store.batches import intake
-from service.store.batches.intake import Accepted
+from service.store.batches.intake import AcceptedSubmission
 from service.store.courses import open_assignments, policies
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.policies import PolicyLimits
-from service.store.courses.versions import freeze
 from service.store.grades import comments
 from service.store.models import Job, SubmissionRow
 from service.store.people import credentials
 from service.store.people.membership import Member
-from service.store.people.students import course_of
+from service.store.people.students import ensure_course
 from service.store.queue import jobs
-from service.store.states import CredentialKind, JobState, Lane
-from service.web.access import actor_from
-from service.web.submitting import submit
+from service.store.states import CredentialKind, JobQueue, JobState
+from service.web.access import build_actor
+from service.web.student_submissions import submit
 from sim.errors import UsageError
-from submissions.raw_files import MAX_FILE_BYTES, MAX_FILES, SentFile
+from submissions.raw_files import MAX_FILE_BYTES, MAX_FILES, UploadedFile
 from web import COURSE, Web, grade_all, web_in, words
 from web import submit as submit_form
 
@@ -49,7 +49,7 @@ def web(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Web]:
     with web_in(tmp_path_factory.mktemp("home")) as opened:
         opened.instructor()
         with opened.store.transaction() as session:
-            open_assignments.prepare(session, 1, freeze(echo()))
+            open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
             open_assignments.open_for_students(session, 1, echo().id)
         yield opened
 
@@ -62,16 +62,16 @@ def ada(web: Web) -> Member:
 
 def _actor(web: Web, member: Member) -> Actor:
     with web.store.transaction() as session:
-        started = credentials.redeem(session, web.link(member))
+        started = credentials.redeem_link(session, web.link(member))
         assert started is not None
         found = credentials.identify(session, started.secret, CredentialKind.SESSION)
     assert found is not None
-    return actor_from(found)
+    return build_actor(found)
 
 
-def _submit(web: Web, member: Member, *files: tuple[str, bytes | str]) -> Accepted:
-    sent = [SentFile(name, BytesIO(data.encode() if isinstance(data, str) else data)) for name, data in files]
-    return submit(web.app.state.context, _actor(web, member), 1, SendRequest(echo().id, sent))
+def _submit(web: Web, member: Member, *files: tuple[str, bytes | str]) -> AcceptedSubmission:
+    sent = [UploadedFile(name, BytesIO(data.encode() if isinstance(data, str) else data)) for name, data in files]
+    return submit(web.app.state.context, _actor(web, member), 1, SubmissionRequest(echo().id, sent))
 
 
 def _zip(*entries: tuple[str, str]) -> bytes:
@@ -101,7 +101,7 @@ def test_files_and_archives_are_one_submission_each(
     with web.store.reading() as session:
         job = session.get_one(Job, accepted.job_id)
         submission = intake.load_submission(session, accepted.job_id)
-        assert (job.lane, job.submission_id) == (Lane.INTERACTIVE, accepted.submission_id)
+        assert (job.lane, job.submission_id) == (JobQueue.INTERACTIVE, accepted.submission_id)
     assert [part and part.text for part in (submission.program, submission.responder)] == [PROGRAM, RESPONDER]
     assert not submission.files
 
@@ -142,13 +142,13 @@ def test_what_is_no_submission_is_refused_with_a_sentence(
 
 def test_only_what_is_open_takes_submissions(web: Web, ada: Member) -> None:
     with web.store.transaction() as session:
-        open_assignments.close(session, 1, echo().id)
+        open_assignments.close_assignment(session, 1, echo().id)
     with pytest.raises(UsageError, match="is closed"):
         _submit(web, ada, *BOTH)
     with web.store.transaction() as session:
         open_assignments.open_for_students(session, 1, echo().id)
     with pytest.raises(NotFound):
-        submit(web.app.state.context, _actor(web, ada), 1, SendRequest("no-such", []))
+        submit(web.app.state.context, _actor(web, ada), 1, SubmissionRequest("no-such", []))
 
 
 def test_nobody_submits_without_end(web: Web, ada: Member) -> None:
@@ -177,14 +177,14 @@ def once(tmp_path: Path) -> Iterator[Web]:
     """Yield a course that allows one attempt and a few bytes."""
     with web_in(tmp_path, student_quota_mb=1) as opened:
         with opened.store.transaction() as session:
-            course_of(session, COURSE, datetime.now(UTC))
-            open_assignments.prepare(session, 1, freeze(echo()))
+            ensure_course(session, COURSE, datetime.now(UTC))
+            open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
             open_assignments.open_for_students(session, 1, echo().id)
             policies.set_policy(session, 1, "", PolicyLimits(attempts=1))
         yield opened
 
 
-def _send(web: Web, member: Member, number: int) -> Accepted:
+def _send(web: Web, member: Member, number: int) -> AcceptedSubmission:
     return _submit(web, member, ("robot.py", PROGRAM + f"# {number}\n"), ("responder.py", RESPONDER))
 
 
@@ -194,7 +194,7 @@ def test_over_a_limit_the_newest_is_kept_and_graded_when_staff_ask(once: Web) ->
     grade_all(once, faulty_grade())
     made = [_send(once, ada, number) for number in range(1, 6)]
     assert _rows(once, ada) == [(1, False, JobState.DONE), (6, True, JobState.CANCELLED)]
-    assert jobs.claim(once.store, "worker", 60) is None
+    assert jobs.claim_job(once.store, "worker", 60) is None
     path = f"/courses/1/grades/{made[-1].job_id}"
     shown = words(once.browser(ada).get(f"/courses/1/mine/submissions/{made[-1].submission_id}").text)
     assert "no attempts left" in shown
@@ -225,7 +225,7 @@ def test_a_submission_over_a_limit_that_has_a_comment_is_kept(once: Web) -> None
     grade_all(once, faulty_grade())
     made = _send(once, ada, 1)
     with once.store.transaction() as session:
-        comments.comment(session, made.job_id, "", "This is over the limit.", "grace")
+        comments.add_comment(session, made.job_id, "", "This is over the limit.", "grace")
     for number in (2, 3):
         _send(once, ada, number)
     assert [attempt for attempt, _, _ in _rows(once, ada)] == [1, 2, 4]

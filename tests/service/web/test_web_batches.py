@@ -17,8 +17,8 @@ from service.store import outbox as told_outbox
 from service.store import purge
 from service.store.batches import batches, publishing
 from service.store.courses import open_assignments, policies
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.policies import PolicyLimits
-from service.store.courses.versions import freeze
 from service.store.engine import now
 from service.store.models import Batch, Job
 from service.store.people import webhooks
@@ -34,14 +34,14 @@ RESPONDER = "def responder(msg):\n    return msg\n"
 def grace(web: Web) -> TestClient:
     client = web.browser(web.instructor())
     with web.store.transaction() as session:
-        open_assignments.prepare(session, 1, freeze(echo()))
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
     submit(client, "/courses/1/assignments/echo-responder/open")
     return client
 
 
 def batch_of(web: Web) -> str:
     with web.store.reading() as session:
-        found = open_assignments.find(session, 1, "echo-responder").batch_id
+        found = open_assignments.load_course_assignment(session, 1, "echo-responder").batch_id
     assert found is not None
     return found
 
@@ -83,7 +83,7 @@ def test_each_student_is_in_the_table_once_with_the_attempt_that_counts(web: Web
     exported = grace.get(f"{path}/export?format=csv").text
     assert len(exported.strip().splitlines()) == 3
     with web.store.reading() as session:
-        line = batches.batch(session, batch_of(web))
+        line = batches.load_batch(session, batch_of(web))
     assert (line.web_assignment, line.takes_in, line.jobs) == ("echo-responder", True, 2)
 
 
@@ -99,7 +99,9 @@ def test_what_is_over_a_limit_counts_where_there_is_nothing_else(web: Web, grace
     send(web, bob)
     grade_with(web)
     with web.store.reading() as session:
-        found = {line.student: (line.attempt, line.staff_only) for line in batches.job_lines(session, batch_of(web))}
+        found = {
+            line.student: (line.attempt, line.staff_only) for line in batches.load_job_lines(session, batch_of(web))
+        }
     assert found["ada"] == (1, None)
     assert found["bob"][1] is not None
 
@@ -131,15 +133,15 @@ def test_it_is_not_held_back_and_what_could_not_be_graded_is_retried(web: Web, g
 
 def test_it_is_finished_when_the_assignment_is_closed(web: Web, grace: TestClient) -> None:
     with web.store.transaction() as session:
-        webhooks.create(session, 1, "https://hooks.example.org/x", ["batch.finished"])
+        webhooks.create_webhook(session, 1, "https://hooks.example.org/x", ["batch.finished"])
     send(web, web.student())
     grade_with(web)
-    assert told_outbox.claim(web.store, 9) == []
+    assert told_outbox.claim_deliveries(web.store, 9) == []
     submit(grace, "/courses/1/assignments/echo-responder/close")
-    (told,) = told_outbox.claim(web.store, 9)
+    (told,) = told_outbox.claim_deliveries(web.store, 9)
     assert told.payload["data"] == {"batch": batch_of(web), "states": {"done": 1}}
     with web.store.reading() as session:
-        assert not batches.batch(session, batch_of(web)).takes_in
+        assert not batches.load_batch(session, batch_of(web)).takes_in
 
 
 def test_a_regrade_is_of_the_attempts_that_count_and_publishing_of_all(web: Web, grace: TestClient) -> None:
@@ -156,7 +158,7 @@ def test_a_regrade_is_of_the_attempts_that_count_and_publishing_of_all(web: Web,
     assert "This releases 3 grades to their students" in page
     assert "They belong to 1 student." in page
     with web.store.reading() as session:
-        planned = publishing.would_publish(session, batch).counts
+        planned = publishing.preview_publication(session, batch).counts
         assert all(job.published_at is None for job in session.query(Job))
     assert (planned.published, planned.replaced) == (3, 1)
     assert acting.publish(web.store, batch, actor="grace") == planned
@@ -169,10 +171,10 @@ def test_it_outlives_what_was_in_it_and_is_called_as_the_assignment(web: Web, gr
     batch = batch_of(web)
     with web.store.reading() as session:
         later = now(session)
-    assert purge.purge(web.store, later, "root").submissions == 1
+    assert purge.purge_submissions(web.store, later, "root").submissions == 1
     with web.store.transaction() as session:
-        open_assignments.prepare(session, 1, freeze(replace(echo(), title="Echo again")))
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(replace(echo(), title="Echo again")))
         assert session.get_one(Batch, batch).name == "Submitted on the web: Echo again"
     send(web, web.student("bob"))
     with web.store.reading() as session:
-        assert [line.student for line in batches.job_lines(session, batch)] == ["bob"]
+        assert [line.student for line in batches.load_job_lines(session, batch)] == ["bob"]

@@ -15,9 +15,9 @@ from starlette.requests import cookie_parser
 
 from service.settings import Settings, load_settings
 from service.web.api_uploads import LARGEST_BATCH
-from service.web.listening import check_reach
+from service.web.listening_sockets import check_reach
 from service.web.rate_limits import RateLimit
-from service.web.server import server_config
+from service.web.server import build_server_config
 from sim.errors import UsageError
 from web import Web, csrf, submit, web_in
 
@@ -126,7 +126,7 @@ def _told_address(settings: Settings, forwarded: str) -> str:
     async def application(scope: Any, _receive: object, _send: object) -> None:
         seen.append(scope["client"][0])
 
-    config = server_config(settings, application)
+    config = build_server_config(settings, application)
     config.load()
     scope = {
         "type": "http",
@@ -227,7 +227,7 @@ def test_our_own_faults_say_nothing_of_themselves(web: Web, monkeypatch: pytest.
             raise surprise
 
         with monkeypatch.context() as patched:
-            patched.setattr("service.store.people.credentials.of_person", fail)
+            patched.setattr("service.store.people.credentials.list_credentials", fail)
             answer = browser.get("/account")
         assert answer.status_code == status
         assert "secret" not in answer.text

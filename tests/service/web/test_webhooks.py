@@ -12,12 +12,12 @@ from threading import Thread
 
 import pytest
 
-from service.outside import ALL_OTHERS, NO_OTHERS
+from service.outgoing_requests import ALL_NETWORKS, NO_NETWORKS
 from service.store import outbox
 from service.store.engine import Store, now
 from service.store.models import Course
 from service.store.people import webhooks
-from service.webhook_sender import send_due
+from service.webhook_sender import send_due_deliveries
 
 
 @dataclass
@@ -58,14 +58,14 @@ def hooked(store: Store, url: str) -> str:
     with store.transaction() as session:
         session.add(Course(id=1, name="default", created_at=now(session)))
         session.flush()
-        secret = webhooks.create(session, 1, url, ["grades.published"])[1]
-        outbox.grades_published(session, 1, batch="b", published=3)
+        secret = webhooks.create_webhook(session, 1, url, ["grades.published"])[1]
+        outbox.emit_grades_published(session, 1, batch="b", published=3)
     return secret
 
 
 def test_a_delivery_arrives_with_its_signature(store: Store, endpoint: Endpoint) -> None:
     secret = hooked(store, endpoint.url)
-    assert send_due(store, ALL_OTHERS) == 1
+    assert send_due_deliveries(store, ALL_NETWORKS) == 1
     ((headers, body),) = endpoint.told
     assert headers["robomark-event"] == "grades.published"
     at, signed = (part.split("=")[1] for part in headers["robomark-signature"].split(","))
@@ -73,25 +73,25 @@ def test_a_delivery_arrives_with_its_signature(store: Store, endpoint: Endpoint)
     document = json.loads(body)
     assert document["id"] == headers["robomark-delivery"]
     assert (document["course"], document["data"]) == (1, {"batch": "b", "published": 3})
-    assert send_due(store, ALL_OTHERS) == 0
+    assert send_due_deliveries(store, ALL_NETWORKS) == 0
 
 
 @pytest.mark.parametrize("status", [301, 307, 400, 500])
 def test_what_is_answered_otherwise_has_not_arrived(store: Store, endpoint: Endpoint, status: int) -> None:
     hooked(store, endpoint.url)
     endpoint.status, endpoint.headers = status, {"location": endpoint.url}
-    send_due(store, ALL_OTHERS)
+    send_due_deliveries(store, ALL_NETWORKS)
     assert len(endpoint.told) == 1
     with store.reading() as session:
-        (line,) = webhooks.deliveries(session, 1, 10, None)
+        (line,) = webhooks.list_deliveries(session, 1, 10, None)
     assert line.delivered_at is None
     assert str(status) in (line.error or "")
 
 
 def test_nothing_goes_inside_unless_the_operator_says_so(store: Store, endpoint: Endpoint) -> None:
     hooked(store, endpoint.url)
-    send_due(store, NO_OTHERS)
+    send_due_deliveries(store, NO_NETWORKS)
     assert endpoint.told == []
     with store.reading() as session:
-        (line,) = webhooks.deliveries(session, 1, 10, None)
+        (line,) = webhooks.list_deliveries(session, 1, 10, None)
     assert "is not the name of a public address" in (line.error or "")

@@ -24,14 +24,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from sim.readers.csv_text import MOST_LINES_OF_RECORD, read_rows, records
+from sim.readers.csv_text import MOST_LINES_OF_RECORD, read_records, read_rows
 from sim.readers.json_text import read_json
 from sim.readers.python_source import parse_module
 from sim.readers.raster_image import read_image
+from sim.readers.reader_errors import MAX_DEPTH, UnreadableDataError
 from sim.readers.toml_text import read_toml
-from sim.readers.unreadable import DEEPEST, Unreadable
 from sim.readers.yaml_text import read_yaml
-from sim.readers.zip_archive import entry_chunks, open_zip
+from sim.readers.zip_archive import open_zip, read_entry_chunks
 
 
 def _zip_of(entries: int, data: bytes = b"") -> bytes:
@@ -90,7 +90,7 @@ _REFUSED: dict[str, tuple[Callable[[], object], str]] = {
     "json, many lists": (lambda: read_json("[" + "[]," * 300_000 + "0]"), "json.loads"),
     "json, many numbers": (lambda: read_json(b"[" + b"1," * 300_000 + b"0]"), "json.loads"),
     "csv, many cells": (lambda: read_rows("," * 3_000_000), "csv.reader"),
-    "csv, many rows": (lambda: list(records(["\n"] * 3_000_000, ",")), "csv.reader"),
+    "csv, many rows": (lambda: list(read_records(["\n"] * 3_000_000, ",")), "csv.reader"),
     "yaml, deep": (lambda: read_yaml(b"[" * 5_000), "yaml.load"),
     "yaml, many values": (lambda: read_yaml(b"- a\n" * 600_000), "yaml.load"),
     "yaml, long": (lambda: read_yaml(b" " * 30_000_000), "yaml.load"),
@@ -113,7 +113,7 @@ def test_it_is_refused_before_it_is_parsed(case: str, monkeypatch: pytest.Monkey
         pytest.fail(f"{parser} was called")
 
     monkeypatch.setattr(parser, never)
-    with pytest.raises(Unreadable):
+    with pytest.raises(UnreadableDataError):
         read()
 
 
@@ -128,7 +128,7 @@ def test_it_is_refused_before_it_is_parsed(case: str, monkeypatch: pytest.Monkey
 def test_a_refusal_takes_little_memory(read: Callable[[], object], most: int) -> None:
     tracemalloc.start()
     try:
-        with pytest.raises(Unreadable):
+        with pytest.raises(UnreadableDataError):
             read()
         assert tracemalloc.get_traced_memory()[1] < most
     finally:
@@ -179,12 +179,12 @@ def test_texts_without_an_end_are_read_once(read: Callable[[str], object], befor
 
 @pytest.mark.parametrize("number", ["0x" + "f" * 20_000, "9" * 5_000, "0b" + "1" * 70, "[1, [18446744073709551616]]"])
 def test_numbers_that_are_too_long_are_refused(number: str) -> None:
-    with pytest.raises(Unreadable, match="number that is too long"):
+    with pytest.raises(UnreadableDataError, match="number that is too long"):
         read_toml(f"a = {number}")
 
 
 def test_a_json_number_that_is_too_long_is_refused() -> None:
-    with pytest.raises(Unreadable, match="number that is too long"):
+    with pytest.raises(UnreadableDataError, match="number that is too long"):
         read_json(f"[{'9' * 5_000}]")
 
 
@@ -216,17 +216,17 @@ class _CountedLines(Sequence[str]):
 def test_broken_quotes_cost_the_same_for_each_row(line: str) -> None:
     for count in (500, 4_000):
         lines = _CountedLines(["id,name\n", *[line] * count])
-        list(records(lines, ","))
+        list(read_records(lines, ","))
         assert lines.taken <= (MOST_LINES_OF_RECORD + 1) * (count + 1)
 
 
 def test_a_row_with_broken_quotes_costs_itself_alone() -> None:
-    found = list(records(["id,name\n", 'ada,"Ada\n', "bob,Bob\n"], ","))
+    found = list(read_records(["id,name\n", 'ada,"Ada\n', "bob,Bob\n"], ","))
     assert [(each.line, each.broken) for each in found] == [(1, False), (2, True), (3, False)]
 
 
 def test_a_row_of_several_lines_is_one_row() -> None:
-    (found,) = records(['ada,"one\n', "two\n", 'three"\n'], ",")
+    (found,) = read_records(['ada,"one\n', "two\n", 'three"\n'], ",")
     assert list(found.cells) == ["ada", "one\ntwo\nthree"]
 
 
@@ -264,19 +264,19 @@ def test_no_text_is_read_that_the_parser_refuses_or_refused_that_it_reads(text: 
         try:
             expected = parse(text)
         except ValueError:
-            with pytest.raises((Unreadable, tomllib.TOMLDecodeError, json.JSONDecodeError)):
+            with pytest.raises((UnreadableDataError, tomllib.TOMLDecodeError, json.JSONDecodeError)):
                 read(text)
         else:
             assert read(text) == expected
 
 
-@given(st.integers(0, 3 * DEEPEST))
+@given(st.integers(0, 3 * MAX_DEPTH))
 def test_json_is_read_to_one_depth_and_no_deeper(depth: int) -> None:
     text = "[" * depth + "0" + "]" * depth
-    if depth <= DEEPEST:
+    if depth <= MAX_DEPTH:
         read_json(text)
     else:
-        with pytest.raises(Unreadable):
+        with pytest.raises(UnreadableDataError):
             read_json(text)
 
 
@@ -284,7 +284,7 @@ def test_json_is_read_to_one_depth_and_no_deeper(depth: int) -> None:
     "text", ["-" * 100_000 + "1", "x" + ".y" * 60_000, "(" * 5_000, "x = " + "+".join("1" * 90_000)]
 )
 def test_deep_python_is_refused_and_never_ends_the_process(text: str) -> None:
-    with pytest.raises((Unreadable, SyntaxError)):
+    with pytest.raises((UnreadableDataError, SyntaxError)):
         parse_module(text)
 
 
@@ -292,11 +292,11 @@ def test_an_entry_that_is_compressed_by_other_means_is_not_read() -> None:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_LZMA) as archive:
         archive.writestr("a", b"0" * 1000)
-    with open_zip(buffer, 10) as opened, pytest.raises(Unreadable):
-        list(entry_chunks(opened, opened.infolist()[0]))
+    with open_zip(buffer, 10) as opened, pytest.raises(UnreadableDataError):
+        list(read_entry_chunks(opened, opened.infolist()[0]))
 
 
 def test_yaml_without_sense_is_refused_with_its_line() -> None:
-    with pytest.raises(Unreadable, match="line 2"):
+    with pytest.raises(UnreadableDataError, match="line 2"):
         read_yaml(b"a: 1\n]b\n")
     assert read_yaml(b"a: 1") == {"a": "1"}

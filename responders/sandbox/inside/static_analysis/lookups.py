@@ -8,13 +8,13 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Set
 
-from .names import text_of
+from .node_properties import read_constant_text
 from .vocabulary import MAY_TAKE_NAME, MAY_UNPICKLE, NAME_IN_ANY_KEYWORD, NAME_KEYWORDS
 
-_MAKES_TEXT = frozenset({"str", "chr", "repr", "ascii", "join", "decode"})
+_TEXT_FUNCTIONS = frozenset({"str", "chr", "repr", "ascii", "join", "decode"})
 
 
-def name_arguments(call: ast.Call, calls: Set[str]) -> Iterator[tuple[str, ast.expr]]:
+def list_name_arguments(call: ast.Call, calls: Set[str]) -> Iterator[tuple[str, ast.expr]]:
     """Yield each argument that may be a name to look up, with a description. ``calls`` are the function's names.
 
     Elements of lists, tuples and dictionaries are separate arguments.
@@ -23,20 +23,20 @@ def name_arguments(call: ast.Call, calls: Set[str]) -> Iterator[tuple[str, ast.e
         starred = next((at for at, each in enumerate(call.args) if isinstance(each, ast.Starred)), len(call.args))
         for at, argument in enumerate(call.args):
             if at in MAY_TAKE_NAME[name] or at >= starred:
-                yield from ((name, part) for part in _parts(argument))
+                yield from ((name, part) for part in _list_parts(argument))
         for keyword in call.keywords:
             if keyword.arg is None or (name in NAME_IN_ANY_KEYWORD and keyword.arg not in NAME_KEYWORDS):
-                yield from ((name, part) for part in _parts(keyword.value))
+                yield from ((name, part) for part in _list_parts(keyword.value))
     for keyword in call.keywords:
         if keyword.arg in NAME_KEYWORDS:
-            yield from ((f"{keyword.arg}=", part) for part in _parts(keyword.value))
+            yield from ((f"{keyword.arg}=", part) for part in _list_parts(keyword.value))
 
 
-def _parts(node: ast.expr) -> Iterator[ast.expr]:
+def _list_parts(node: ast.expr) -> Iterator[ast.expr]:
     match node:
         case ast.List(elts=parts) | ast.Tuple(elts=parts) | ast.Set(elts=parts) | ast.Dict(values=parts):
             for part in parts:
-                yield from _parts(part)
+                yield from _list_parts(part)
         case _:
             yield node
 
@@ -51,25 +51,25 @@ def may_unpickle(call: ast.Call, calls: Set[str]) -> bool:
     return not all(isinstance(value, ast.Constant) and not value.value for value in given)
 
 
-def makes_text(node: ast.AST) -> bool:
+def is_text_expression(node: ast.AST) -> bool:
     """Return whether an expression is a text, as far as its syntax shows that."""
-    if text_of(node) is not None:
+    if read_constant_text(node) is not None:
         return True
     match node:
         case ast.JoinedStr():
             return True
         case ast.BinOp(left=left, op=ast.Add() | ast.Mult() | ast.Mod(), right=right):
-            return makes_text(left) or makes_text(right)
+            return is_text_expression(left) or is_text_expression(right)
         case ast.IfExp(body=body, orelse=orelse):
-            return makes_text(body) or makes_text(orelse)
+            return is_text_expression(body) or is_text_expression(orelse)
         case ast.BoolOp(values=parts):
-            return any(map(makes_text, parts))
+            return any(map(is_text_expression, parts))
         case ast.NamedExpr(value=value):
-            return makes_text(value)
+            return is_text_expression(value)
         case ast.Subscript(value=value):
-            return any(map(makes_text, _parts(value)))
+            return any(map(is_text_expression, _list_parts(value)))
         case ast.Call(func=ast.Name(id=name)):
-            return name in _MAKES_TEXT
+            return name in _TEXT_FUNCTIONS
         case ast.Call(func=ast.Attribute(value=value, attr=name)):
-            return name in _MAKES_TEXT or makes_text(value)
+            return name in _TEXT_FUNCTIONS or is_text_expression(value)
     return False

@@ -15,24 +15,24 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from .. import cell_source
-from ..withheld import rule_for
-from .names import leads_to_doubt
-from .units import Mention, SourcePlace, Unit
+from ..excluded_modules import find_exclusion
+from .node_properties import is_doubtful_import
+from .syntax_walker import SyntaxWalker
+from .units import CodeUnit, Mention, SourcePlace
 from .vocabulary import CONSTRUCTS, PLAIN_MODULES
-from .walk import Walk
 
 _IMPORT = "import "
 _CONSTRUCTS = frozenset({*CONSTRUCTS.values(), "else"})
 _LONGEST_TEXT = 300_000
-_LONGEST_IN_ALL = 1_000_000
+_LONGEST_TOTAL = 1_000_000
 #: Sufficient for all source that the parser accepts.
-_DEEPEST_WALK = 30_000
+_RECURSION_LIMIT = 30_000
 _MOST_DOUBTS = 4
 _LONGEST_NAME = 60
 #: Modules of the course that robot programs use but don't import, and that responders don't have.
-_OF_THE_COURSE = frozenset({"brick_link", "brick_preambles"})
+_COURSE_MODULES = frozenset({"brick_link", "brick_preambles"})
 
-Answer = list[Any] | None
+PlaceRow = list[Any] | None
 #: For each kind of mention, the first place of each name.
 Places = Mapping[str, Mapping[str, SourcePlace]]
 
@@ -51,110 +51,114 @@ def read(
         For each rule the file name and line, or None. ``unread`` is the first unreadable file and the reason. Invalid
         Python in cells, and in files beside the main part, is not reported there because it can't run.
     """
-    reading = _Reading(files)
+    reading = _SubmissionReader(files)
     units = reading.units
-    everything = _places((mention, places[0]) for unit in units for mention, places in unit.mentions.items())
-    run = _places(_run(units, asked["entries"], None if ran is None else {(name, (*at,)) for name, *at in ran}))
-    given = _without(run, reading.made - set(asked["defines"]), reading.own)
+    everything = _collect_first_places(
+        (mention, places[0]) for unit in units for mention, places in unit.mentions.items()
+    )
+    run = _collect_first_places(
+        _collect_reachable(units, asked["entries"], None if ran is None else {(name, (*at,)) for name, *at in ran})
+    )
+    given = _exclude_own_names(run, reading.made - set(asked["defines"]), reading.own)
     return {
         "unread": reading.unread,
-        "uses": [_first(given, rule, _USED) for rule in asked["uses"]],
-        "avoids": [_first(everything, rule, _AVOIDED) for rule in asked["avoids"]],
-        "in_loop": [_first(given, rule, {"()": ("looped",)}) for rule in asked["in_loop"]],
-        "defines": [_answer(run["function"].get(name)) for name in asked["defines"]],
-        "shown": [_first(everything, rule, _AVOIDED) for rule in asked["shown"]],
-        "doubts": _doubts(everything, asked["avoids"])[:_MOST_DOUBTS] if asked["avoids"] else [],
+        "uses": [_find_first_place(given, rule, _USED_KINDS) for rule in asked["uses"]],
+        "avoids": [_find_first_place(everything, rule, _AVOIDED_KINDS) for rule in asked["avoids"]],
+        "in_loop": [_find_first_place(given, rule, {"()": ("looped",)}) for rule in asked["in_loop"]],
+        "defines": [_format_place(run["function"].get(name)) for name in asked["defines"]],
+        "shown": [_find_first_place(everything, rule, _AVOIDED_KINDS) for rule in asked["shown"]],
+        "doubts": _collect_doubts(everything, asked["avoids"])[:_MOST_DOUBTS] if asked["avoids"] else [],
     }
 
 
-class _Reading:
+class _SubmissionReader:
     """All files, read in order, including those that a notebook writes."""
 
     def __init__(self, files: Sequence[Mapping[str, Any]]) -> None:
-        self.units: list[Unit] = []
+        self.units: list[CodeUnit] = []
         self.unread: list[Any] | None = None
-        self._left = _LONGEST_IN_ALL
+        self._left = _LONGEST_TOTAL
         self.made: set[str] = set()
         self.own = {str(file["name"]).partition(".")[0] for file in files}
         for file in files:
-            self._read(file)
+            self._read_file(file)
 
-    def _read(self, file: Mapping[str, Any]) -> None:
+    def _read_file(self, file: Mapping[str, Any]) -> None:
         name = str(file["name"])
-        walk = Walk(self._doubt_about)
+        walk = SyntaxWalker(self._describe_doubt)
         if "cells" in file:
             for number, cell in file["cells"]:
                 self._read_cell(walk, f"cell {number}", cell)
         else:
             source = file["bytes"].encode("latin-1") if "bytes" in file else file["text"]
-            tree = self._parsed(source, name)
+            tree = self._parse_source(source, name)
             if tree is not None:
-                unit = Unit(name.partition(".")[0], always=not name)
-                self._guarded(name, lambda: walk.read(tree, name, unit))
+                unit = CodeUnit(name.partition(".")[0], always=not name)
+                self._run_walk(name, lambda: walk.read_tree(tree, name, unit))
         self.units += walk.units
         self.made |= walk.made
         for written, text in walk.written:
             self.own.add(written.partition(".")[0])
-            self._read({"name": written or "a file", "text": text})
+            self._read_file({"name": written or "a file", "text": text})
 
-    def _read_cell(self, walk: Walk, name: str, cell: str) -> None:
-        magic = cell_source.cell_magic(cell)
-        unit = Unit("", always=True)
+    def _read_cell(self, walk: SyntaxWalker, name: str, cell: str) -> None:
+        magic = cell_source.parse_cell_magic(cell)
+        unit = CodeUnit("", always=True)
         if magic is not None:
-            self._guarded(name, lambda: walk.read_magic(magic, name, unit))
+            self._run_walk(name, lambda: walk.read_magic(magic, name, unit))
             return
-        tree = self._parsed(cell_source.python_source(cell), name)
+        tree = self._parse_source(cell_source.convert_to_python(cell), name)
         if tree is not None:
-            self._guarded(name, lambda: walk.read(tree, name, unit))
+            self._run_walk(name, lambda: walk.read_tree(tree, name, unit))
 
-    def _parsed(self, source: str | bytes, name: str) -> ast.Module | None:
+    def _parse_source(self, source: str | bytes, name: str) -> ast.Module | None:
         self._left -= len(source)
         try:
             if len(source) > _LONGEST_TEXT:
-                self._cannot(name, f"it has more than {_LONGEST_TEXT} characters")
+                self._record_unreadable(name, f"it has more than {_LONGEST_TEXT} characters")
             elif self._left < 0:
-                self._cannot(name, f"with the others it has more than {_LONGEST_IN_ALL} characters")
+                self._record_unreadable(name, f"with the others it has more than {_LONGEST_TOTAL} characters")
             else:
                 return ast.parse(source)
         except SyntaxError as error:
             if not name:
-                self._cannot(name, str(error.msg)[:200], error.lineno)
+                self._record_unreadable(name, str(error.msg)[:200], error.lineno)
         except ValueError:
             if not name:
-                self._cannot(name, "it has characters that no Python file has")
+                self._record_unreadable(name, "it has characters that no Python file has")
         except (RecursionError, MemoryError):
-            self._cannot(name, "it is nested too deeply")
+            self._record_unreadable(name, "it is nested too deeply")
         return None
 
-    def _guarded(self, name: str, walk: Callable[[], None]) -> None:
+    def _run_walk(self, name: str, walk: Callable[[], None]) -> None:
         limit = sys.getrecursionlimit()
-        sys.setrecursionlimit(_DEEPEST_WALK)
+        sys.setrecursionlimit(_RECURSION_LIMIT)
         try:
             walk()
         except (RecursionError, MemoryError):
-            self._cannot(name, "it is nested too deeply")
+            self._record_unreadable(name, "it is nested too deeply")
         finally:
             sys.setrecursionlimit(limit)
 
-    def _cannot(self, name: str, why: str, line: int | None = None) -> None:
+    def _record_unreadable(self, name: str, why: str, line: int | None = None) -> None:
         if self.unread is None:
             self.unread = [name[:_LONGEST_NAME], why, line]
 
-    def _doubt_about(self, module: str) -> str:
+    def _describe_doubt(self, module: str) -> str:
         top = module.partition(".")[0]
         if top in PLAIN_MODULES:
-            return module if leads_to_doubt(module) else ""
+            return module if is_doubtful_import(module) else ""
         if top in sys.stdlib_module_names:
             return top
         if not top or top in self.own:
             return ""
-        if top in _OF_THE_COURSE or importlib.machinery.PathFinder.find_spec(top) is not None:
+        if top in _COURSE_MODULES or importlib.machinery.PathFinder.find_spec(top) is not None:
             return top
         return f"the module {top}, which is not among the files,"
 
 
-def _run(
-    units: Sequence[Unit], entries: Sequence[str], ran: Set[tuple[Any, ...]] | None
+def _collect_reachable(
+    units: Sequence[CodeUnit], entries: Sequence[str], ran: Set[tuple[Any, ...]] | None
 ) -> Iterable[tuple[Mention, SourcePlace]]:
     """Yield the mentions in code that may run, or that ``ran``. ``looped`` is True if a loop reaches it.
 
@@ -162,15 +166,15 @@ def _run(
     functions may run.
     """
     any_name = any(mention.kind == "any_name" for unit in units for mention in unit.mentions)
-    by_name: dict[str, list[Unit]] = defaultdict(list)
+    by_name: dict[str, list[CodeUnit]] = defaultdict(list)
     for unit in units:
         by_name[unit.name].append(unit)
         if unit.owner and unit.name.startswith("__"):
             by_name[unit.owner].append(unit)
     used: dict[str, bool] = {}  # names, and whether in a loop
-    looped: dict[Unit, bool] = {}  # reachable units, and whether through a loop
+    looped: dict[CodeUnit, bool] = {}  # reachable units, and whether through a loop
 
-    def way_to(unit: Unit) -> bool | None:
+    def way_to(unit: CodeUnit) -> bool | None:
         """Return whether a loop reaches the unit, or None if nothing does."""
         if not unit.made or (unit.made_in is not None and unit.made_in not in looped):
             return None
@@ -179,7 +183,7 @@ def _run(
         entry = unit.made_in is not None and any(fnmatchcase(unit.name, pattern) for pattern in entries)
         return any(ways) if ways or entry or unit.always or any_name else None
 
-    def run_in(unit: Unit) -> Iterator[tuple[Mention, SourcePlace]]:
+    def run_in(unit: CodeUnit) -> Iterator[tuple[Mention, SourcePlace]]:
         for mention, places in unit.mentions.items():
             if mention.live:
                 was_run = (each for each in places if ran is None or (each.file, each.statement) in ran)
@@ -207,13 +211,13 @@ def _run(
 
 
 #: The kinds of mention that have a name.
-_NAMED = frozenset({"call", "looped", "name"})
+_NAMED_KINDS = frozenset({"call", "looped", "name"})
 #: The kinds of mention that match a rule for a call, a module or a name.
-_USED = {"()": ("call",), _IMPORT: ("import", "through"), "": ("name",)}
-_AVOIDED = {"()": ("call", "handed_on", "base"), _IMPORT: ("import", "through"), "": ("name", "taken")}
+_USED_KINDS = {"()": ("call",), _IMPORT: ("import", "through"), "": ("name",)}
+_AVOIDED_KINDS = {"()": ("call", "handed_on", "base"), _IMPORT: ("import", "through"), "": ("name", "taken")}
 
 
-def _places(mentions: Iterable[tuple[Mention, SourcePlace]]) -> Places:
+def _collect_first_places(mentions: Iterable[tuple[Mention, SourcePlace]]) -> Places:
     found: dict[str, dict[str, SourcePlace]] = defaultdict(dict)
     for mention, place in mentions:
         for kind in (mention.kind, "looped") if mention.kind == "call" and mention.looped else (mention.kind,):
@@ -221,7 +225,7 @@ def _places(mentions: Iterable[tuple[Mention, SourcePlace]]) -> Places:
     return found
 
 
-def _without(places: Places, made: Set[str], own: Set[str]) -> Places:
+def _exclude_own_names(places: Places, made: Set[str], own: Set[str]) -> Places:
     """Return the places without names that the submission defines itself."""
 
     def is_made(name: str) -> bool:
@@ -229,18 +233,20 @@ def _without(places: Places, made: Set[str], own: Set[str]) -> Places:
         return first in made or (first in own and (last in made or last == first))
 
     kept = {
-        kind: {name: place for name, place in found.items() if kind not in _NAMED or not is_made(name)}
+        kind: {name: place for name, place in found.items() if kind not in _NAMED_KINDS or not is_made(name)}
         for kind, found in places.items()
     }
     return defaultdict(dict, kept)
 
 
-def _first(places: Places, rule: str, kinds: Mapping[str, Sequence[str]]) -> Answer:
+def _find_first_place(places: Places, rule: str, kinds: Mapping[str, Sequence[str]]) -> PlaceRow:
     if rule in _CONSTRUCTS:
-        return _answer(places["construct"].get(rule))
+        return _format_place(places["construct"].get(rule))
     form = "()" if rule.endswith("()") else _IMPORT if rule.startswith(_IMPORT) else ""
-    fits = [place for kind in kinds.get(form, ()) for name, place in places[kind].items() if _MATCHES[form](name, rule)]
-    return _answer(min(fits, default=None))
+    fits = [
+        place for kind in kinds.get(form, ()) for name, place in places[kind].items() if _MATCHERS[form](name, rule)
+    ]
+    return _format_place(min(fits, default=None))
 
 
 def _is_called(name: str, rule: str) -> bool:
@@ -249,42 +255,44 @@ def _is_called(name: str, rule: str) -> bool:
 
 
 def _is_imported(name: str, rule: str) -> bool:
-    return rule_for(name, (_module(rule),)) is not None
+    return find_exclusion(name, (_parse_module_name(rule),)) is not None
 
 
 def _is_named(name: str, rule: str) -> bool:
     return f".{rule}." in f".{name}."
 
 
-_MATCHES = {"()": _is_called, _IMPORT: _is_imported, "": _is_named}
+_MATCHERS = {"()": _is_called, _IMPORT: _is_imported, "": _is_named}
 
 
-def _module(rule: str) -> str:
+def _parse_module_name(rule: str) -> str:
     return rule.removeprefix(_IMPORT).strip()
 
 
-def _doubts(places: Places, rules: Sequence[str]) -> list[list[Any]]:
+def _collect_doubts(places: Places, rules: Sequence[str]) -> list[list[Any]]:
     """Return places that may match or hide what a rule avoids: file, line and description, in file order."""
     found: dict[SourcePlace, str] = {}
     for kind in ("doubt", "any_name"):
         for what, place in places[kind].items():
             found.setdefault(place, what)
     for rule in rules:
-        for what, place in _look_alikes(places, rule):
+        for what, place in _list_look_alikes(places, rule):
             found.setdefault(place, what)
     return [[place.file[:_LONGEST_NAME], place.line, what[:_LONGEST_NAME]] for place, what in sorted(found.items())]
 
 
-def _look_alikes(places: Places, rule: str) -> Iterable[tuple[str, SourcePlace]]:
+def _list_look_alikes(places: Places, rule: str) -> Iterable[tuple[str, SourcePlace]]:
     if rule.endswith("()"):
         yield from ((name, place) for name, place in places["unsure"].items() if _is_called(name, rule))
         owner, _, last = rule.removesuffix("()").rpartition(".")
         if owner and any(_is_called(name, f"{last}()") for name in places["call"]):
             yield from ((name, place) for name, place in places["handed_on"].items() if _is_named(name, owner))
-    elif rule.startswith(_IMPORT) and "." not in _module(rule):
+    elif rule.startswith(_IMPORT) and "." not in _parse_module_name(rule):
         for kind in ("import", "through"):
-            yield from ((name, place) for name, place in places[kind].items() if f".{_module(rule)}." in f"{name}.")
+            yield from (
+                (name, place) for name, place in places[kind].items() if f".{_parse_module_name(rule)}." in f"{name}."
+            )
 
 
-def _answer(place: SourcePlace | None) -> Answer:
+def _format_place(place: SourcePlace | None) -> PlaceRow:
     return None if place is None else [place.file[:_LONGEST_NAME], place.line]

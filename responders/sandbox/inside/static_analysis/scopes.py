@@ -11,8 +11,8 @@ import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from .lookups import makes_text
-from .names import bound_in, dotted, root
+from .lookups import is_text_expression
+from .node_properties import collect_bound_names, find_dotted_name, find_root_name
 from .vocabulary import TABLE_CALLS
 
 _MOST_NAMES = 8
@@ -28,7 +28,7 @@ class _Scope:
     sure: set[str] = field(default_factory=set)
 
 
-class Naming:
+class SymbolTable:
     """The names of one file during a walk."""
 
     def __init__(self) -> None:
@@ -40,38 +40,38 @@ class Naming:
         #: Names that other scopes may bind or unbind.
         self._unsure: set[str] = set()
 
-    def learn(self, tree: ast.Module) -> None:
+    def record_names(self, tree: ast.Module) -> None:
         """Record all assignments and imports of a tree, before the walk."""
         for node in ast.walk(tree):
             match node:
                 case ast.Import(names=aliases):
                     for alias in aliases:
                         bound = alias.asname or alias.name.partition(".")[0]
-                        self._note(bound, alias.name if alias.asname else bound, imported=True)
+                        self._record_alias(bound, alias.name if alias.asname else bound, imported=True)
                 case ast.ImportFrom(module=module, names=aliases):
                     for alias in aliases:
-                        self._note(alias.asname or alias.name, f"{module or ''}.{alias.name}", imported=True)
+                        self._record_alias(alias.asname or alias.name, f"{module or ''}.{alias.name}", imported=True)
                 case ast.Assign(targets=targets, value=value):
                     for target in targets:
-                        self._assigned(target, value)
+                        self._record_assignment(target, value)
                 case ast.NamedExpr(target=target, value=value):
-                    self._assigned(target, value)
+                    self._record_assignment(target, value)
                 case ast.AnnAssign(target=target, value=ast.expr() as value):
-                    self._assigned(target, value)
+                    self._record_assignment(target, value)
                 case ast.arguments():
-                    self._defaults(node)
+                    self._record_defaults(node)
                 case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
                     self._functions.add(name)
                 case ast.Global(names=names):
                     self._unsure |= set(names)
                 case ast.Delete(targets=deleted):
                     self._unsure |= {target.id for target in deleted if isinstance(target, ast.Name)}
-        self._scopes[0].bound |= bound_in(tree.body)
+        self._scopes[0].bound |= collect_bound_names(tree.body)
 
-    def names(self, node: ast.AST) -> list[str]:
+    def resolve_names(self, node: ast.AST) -> list[str]:
         """Return the dotted name of a chain, followed by its names with the first part replaced by known aliases."""
-        found = [dotted(node)]
-        waiting = list(found) if root(node) else []
+        found = [find_dotted_name(node)]
+        waiting = list(found) if find_root_name(node) else []
         while waiting and len(found) < _MOST_NAMES:
             first, dot, rest = waiting.pop().partition(".")
             for other in sorted(self._stands_for.get(first, ())):
@@ -84,27 +84,31 @@ class Naming:
 
     def is_imported(self, node: ast.AST) -> bool:
         """Return whether a chain begins with an imported name."""
-        return root(node) in self._imported
+        return find_root_name(node) in self._imported
 
     def may_be_imported(self, node: ast.AST) -> bool:
         """Return whether a chain begins with an imported name or an alias of one."""
-        return any(name.partition(".")[0] in self._imported for name in self.names(node) if root(node))
+        return any(
+            name.partition(".")[0] in self._imported for name in self.resolve_names(node) if find_root_name(node)
+        )
 
     def is_text(self, node: ast.AST) -> bool:
         """Return whether an expression is a text, or the name of one."""
-        return makes_text(node) or (isinstance(node, ast.Name) and not self._texts.isdisjoint(self.names(node)))
+        return is_text_expression(node) or (
+            isinstance(node, ast.Name) and not self._texts.isdisjoint(self.resolve_names(node))
+        )
 
     def is_function(self, node: ast.AST) -> bool:
         """Return whether an expression is a lambda, or names a function of this file, of a module or of Python."""
         if not isinstance(node, ast.Name | ast.Attribute):
             return isinstance(node, ast.Lambda)
-        names = self.names(node)
-        if self.is_text(node) or not root(node):
+        names = self.resolve_names(node)
+        if self.is_text(node) or not find_root_name(node):
             return False
         own = any(name.rpartition(".")[2] in self._functions for name in names)
-        return own or self.may_be_imported(node) or hasattr(builtins, root(node))
+        return own or self.may_be_imported(node) or hasattr(builtins, find_root_name(node))
 
-    def own(self, name: str) -> bool | None:
+    def is_own(self, name: str) -> bool | None:
         """Return whether a name read here is defined by this file; None if unknown."""
         later = False
         for scope in reversed(self._scopes[1:]):
@@ -143,30 +147,30 @@ class Naming:
         if sure:
             scope.sure |= names
 
-    def _note(self, name: str, stands_for: str, *, imported: bool = False) -> None:
+    def _record_alias(self, name: str, stands_for: str, *, imported: bool = False) -> None:
         self._stands_for.setdefault(name, set()).add(stands_for)
         if imported:
             self._imported.add(name)
 
-    def _assigned(self, target: ast.AST, value: ast.AST) -> None:
+    def _record_assignment(self, target: ast.AST, value: ast.AST) -> None:
         if isinstance(target, ast.Tuple | ast.List) and isinstance(value, ast.Tuple | ast.List):
             for one, other in zip(target.elts, value.elts, strict=False):
-                self._assigned(one, other)
+                self._record_assignment(one, other)
         elif isinstance(target, ast.Name):
-            if isinstance(value, ast.Call) and dotted(value.func) in TABLE_CALLS:
-                self._note(target.id, dotted(value.func))
-            elif root(value):
-                self._note(target.id, dotted(value))
+            if isinstance(value, ast.Call) and find_dotted_name(value.func) in TABLE_CALLS:
+                self._record_alias(target.id, find_dotted_name(value.func))
+            elif find_root_name(value):
+                self._record_alias(target.id, find_dotted_name(value))
             elif isinstance(value, ast.Lambda):
                 self._functions.add(target.id)
-            elif makes_text(value):
+            elif is_text_expression(value):
                 self._texts.add(target.id)
 
-    def _defaults(self, arguments: ast.arguments) -> None:
+    def _record_defaults(self, arguments: ast.arguments) -> None:
         given = [*arguments.posonlyargs, *arguments.args]
         with_default = given[len(given) - len(arguments.defaults) :]
         pairs = [*zip(with_default, arguments.defaults, strict=True)]
         pairs += [(one, each) for one, each in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True) if each]
         for argument, default in pairs:
-            if root(default):
-                self._note(argument.arg, dotted(default))
+            if find_root_name(default):
+                self._record_alias(argument.arg, find_dotted_name(default))

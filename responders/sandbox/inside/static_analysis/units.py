@@ -40,7 +40,7 @@ class SourcePlace(NamedTuple):
 
 
 @dataclass(eq=False, slots=True)
-class Unit:
+class CodeUnit:
     """Code that runs together: of a file or a function. ``owner`` is the class of a method.
 
     For each mention, only the first places are kept.
@@ -48,8 +48,8 @@ class Unit:
 
     name: str
     owner: str = ""
-    made_in: Unit | None = None
+    made_in: CodeUnit | None = None
     made: bool = True  # its definition is reachable
     always: bool = False  # it runs without being named
     mentions: dict[Mention, list[SourcePlace]] = field(default_factory=dict)
-    units: list[Unit] = field(default_factory=list)
+    units: list[CodeUnit] = field(default_factory=list)

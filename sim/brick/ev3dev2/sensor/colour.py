@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 
-def _hue(red: float, green: float, blue: float, most: float, spread: float) -> float:
+def _compute_hue(red: float, green: float, blue: float, most: float, spread: float) -> float:
     if spread == 0:
         return 0.0
     if most == red:
@@ -15,25 +15,25 @@ def _hue(red: float, green: float, blue: float, most: float, spread: float) -> f
     return sixth * 60
 
 
-def hsv(red: float, green: float, blue: float) -> list[int]:
+def to_hsv(red: float, green: float, blue: float) -> list[int]:
     """Return hue 0..359, saturation and value 0..100."""
     red, green, blue = red / 255, green / 255, blue / 255
     most = max(red, green, blue)
     spread = most - min(red, green, blue)
     saturation = spread / most if most else 0.0
-    return [int(_hue(red, green, blue, most, spread)), int(saturation * 100), int(most * 100)]
+    return [int(_compute_hue(red, green, blue, most, spread)), int(saturation * 100), int(most * 100)]
 
 
-def hls(red: float, green: float, blue: float) -> list[int]:
+def to_hls(red: float, green: float, blue: float) -> list[int]:
     """Return hue 0..359, lightness and saturation 0..100. The saturation of black and white is 0."""
     red, green, blue = red / 255, green / 255, blue / 255
     most, least = max(red, green, blue), min(red, green, blue)
     spread, lightness = most - least, (most + least) / 2
     saturation = 0.0 if spread == 0 else spread / (1 - abs(2 * lightness - 1))
-    return [int(_hue(red, green, blue, most, spread)), int(lightness * 100), int(saturation * 100)]
+    return [int(_compute_hue(red, green, blue, most, spread)), int(lightness * 100), int(saturation * 100)]
 
 
-def lab(red: float, green: float, blue: float) -> list[int]:
+def to_lab(red: float, green: float, blue: float) -> list[int]:
     """Return CIE L*a*b*, converted through sRGB with the simulator's D65 white."""
 
     def linear(value: float) -> float:
@@ -50,9 +50,9 @@ def lab(red: float, green: float, blue: float) -> list[int]:
     return [int(116 * y - 16), int(500 * (x - y)), int(200 * (y - z))]
 
 
-def number(red: float, green: float, blue: float) -> int:
+def find_colour_number(red: float, green: float, blue: float) -> int:
     """Return the colour number: 1 black, 2 blue, 3 green, 4 yellow, 5 red, 6 white."""
-    hue, saturation, value = hsv(red, green, blue)
+    hue, saturation, value = to_hsv(red, green, blue)
     if saturation < 20:
         return 1 if value < 30 else 6
     for limit, answer in ((30, 5), (90, 4), (163, 3), (283, 2)):

@@ -76,7 +76,7 @@ class ColorSensor(Sensor):
     @property
     def color(self) -> int:
         """One of the COLOR_ numbers."""
-        return colour.number(*self._means(times=2))
+        return colour.find_colour_number(*self._means(times=2))
 
     @property
     def color_name(self) -> str:
@@ -106,16 +106,16 @@ class ColorSensor(Sensor):
     @property
     def hsv(self) -> list[int]:
         """Hue 0..359, saturation and value 0..100."""
-        return colour.hsv(*self._means())
+        return colour.to_hsv(*self._means())
 
     @property
     def hls(self) -> list[int]:
         """Hue 0..359, lightness and saturation 0..100."""
-        return colour.hls(*self._means())
+        return colour.to_hls(*self._means())
 
     @property
     def lab(self) -> list[int]:
-        return colour.lab(*self._means())
+        return colour.to_lab(*self._means())
 
     def calibrate_white(self) -> None:
         """Do nothing: white paper already reads 255."""

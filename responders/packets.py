@@ -1,0 +1,123 @@
+"""Packets: the compact encoding of the robot program's frequent actions: sensor reads, waits and motor commands.
+
+A packet stands between the lines of the wire format and is validated as strictly. ``wire.py`` handles all other frames.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import struct
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from responders.wire import LARGEST, MAX_FRAME_BYTES, MAX_UNITS, WireError
+from sim.recording import SENSORS
+
+
+class SensorRead(NamedTuple):
+    """Read a sensor. The number counts reading times."""
+
+    sensor: str
+
+
+class Wait(NamedTuple):
+    """Wait. The number is the time in thirds of a microsecond."""
+
+
+class MotorCommand(NamedTuple):
+    """Set a motor's set point to the number (unless it is empty), then send the command (unless it is None)."""
+
+    port: str
+    set_point: str
+    command: str | None
+
+
+class LineChange(NamedTuple):
+    """The program has come to another line. The number contains two lines: the innermost and the outermost.
+
+    The number 0 says that no more lines follow, because the program has come to too many.
+    """
+
+
+ActionKind = SensorRead | Wait | MotorCommand | LineChange
+Action = tuple[ActionKind, float]
+
+#: First byte of a packet. A line begins with a brace.
+PACKET_MARK = 0
+#: Mark, number of entries, and frame number.
+_HEADER = struct.Struct("<BxHxxxxQ")
+#: Code of the action, and its number.
+_ACTION = struct.Struct("<Id")
+HEADER_BYTES = _HEADER.size
+_PORTS = ("outB", "outC")
+_SET_POINTS = ("", "speed_sp", "position_sp", "position", "time_sp")
+_COMMANDS = (None, "", "reset", "run-forever", "run-timed", "run-to-rel-pos", "run-to-abs-pos", "run-direct")
+_READ, _WAIT, _MOVE, _LINE = range(4)
+#: The factor of the outermost line in the number of a place.
+_MOST_LINES = 1 << 20
+
+
+def _encode_kind(what: int, part: int = 0, set_point: int = 0, command: int = 0) -> int:
+    return int.from_bytes((what, part, set_point, command), "little")
+
+
+#: All actions by code: kind, smallest and largest number, and whether the number must be whole.
+_KINDS_BY_CODE: dict[int, tuple[ActionKind, float, float, bool]] = {
+    _encode_kind(_WAIT): (Wait(), 0, MAX_UNITS, True),
+    _encode_kind(_LINE): (LineChange(), 0, _MOST_LINES**2, True),
+    **{_encode_kind(_READ, part): (SensorRead(what), 1, 2, True) for part, what in enumerate(SENSORS)},
+    **{
+        _encode_kind(_MOVE, part, place, number): (MotorCommand(port, set_point, command), -LARGEST, LARGEST, False)
+        for (part, port), (place, set_point), (number, command) in itertools.product(
+            enumerate(_PORTS), enumerate(_SET_POINTS), enumerate(_COMMANDS)
+        )
+    },
+}
+
+
+def read_header(header: bytes) -> tuple[int, int]:
+    """Return the length of a packet and its frame number.
+
+    Raises:
+        WireError: If the packet is empty or too long.
+    """
+    mark, count, number = _HEADER.unpack_from(header)
+    size: int = HEADER_BYTES + count * _ACTION.size
+    if mark != PACKET_MARK or count == 0 or size > MAX_FRAME_BYTES:
+        raise WireError(f"a packet of {count} acts")
+    return size, number
+
+
+def unpack_actions(packet: bytes) -> list[Action]:
+    """Return the actions in a packet, in order.
+
+    Raises:
+        WireError: If an action is invalid.
+    """
+    acts = []
+    for code, number in _ACTION.iter_unpack(packet[HEADER_BYTES:]):
+        known = _KINDS_BY_CODE.get(code)
+        if known is None:
+            raise WireError("an act that there is not")
+        kind, least, most, whole = known
+        if not least <= number <= most or (whole and number % 1):
+            raise WireError("an act that there is not")
+        acts.append((kind, number))
+    return acts
+
+
+def unpack_lines(place: float) -> tuple[int, int]:
+    """Return the innermost and the outermost line in the number of a place."""
+    outer, inner = divmod(int(place), _MOST_LINES)
+    return inner, outer
+
+
+def pack_readings(units: int, values: Sequence[float], number: int) -> bytes:
+    """Return packet ``number`` for a child: the time in thirds of a microsecond, and all sensor readings."""
+    return _build_readings_struct(len(values)).pack(PACKET_MARK, 1 + len(values), number, units, *values)
+
+
+@functools.cache
+def _build_readings_struct(count: int) -> struct.Struct:
+    return struct.Struct(f"{_HEADER.format}q{count}d")

@@ -1,0 +1,97 @@
+"""Suggestions for name and import errors: a similar name, or a missing import.
+
+They use only data of the error and change nothing. The worker doesn't trust them.
+"""
+
+from __future__ import annotations
+
+import builtins
+import difflib
+import keyword
+import os
+import re
+import sys
+from collections.abc import Iterable
+from types import ModuleType
+
+_LONGEST_NAME = 60
+_MOST_KNOWN = 5000
+_CANNOT_IMPORT = re.compile(r"cannot import name '(\w+)' from '([\w.]+)'")
+#: Import statements for names that are often used without one.
+_IMPORTS = {
+    "np": "import numpy as np",
+    "pd": "import pandas as pd",
+    "sleep": "from time import sleep",
+    "randint": "from random import randint",
+    "pyState": "from ev3dev2_glue import pyState",
+    "load": "from joblib import load",
+}
+#: Functions of modules by their names in other languages and libraries.
+_FOREIGN_NAMES = {
+    "time": {"wait": "sleep", "pause": "sleep", "delay": "sleep", "now": "time"},
+    "random": {"rand": "random", "number": "randint", "pick": "choice", "int": "randint"},
+    "math": {"power": "pow", "root": "sqrt"},
+    "json": {"parse": "loads", "stringify": "dumps", "encode": "dumps", "decode": "loads"},
+}
+#: Modules that are suggested before standard modules with similar names.
+_LIBRARIES = ("joblib", "json", "matplotlib", "nbev3devsim", "nn_tools", "numpy", "pandas", "sklearn", "time")
+#: Brick modules that a robot program may not have loaded yet.
+_BRICK = ("ev3dev2", "ev3dev2.motor", "ev3dev2.sensor", "ev3dev2.sensor.lego", "ev3dev2.sound", "ev3dev2_glue")
+
+
+def suggest_fix(error: BaseException) -> str:
+    """Return a sentence with a suggestion, or "" if there is none."""
+    try:
+        if isinstance(error, UnboundLocalError):
+            return ""
+        if isinstance(error, NameError):
+            return _suggest_for_name(error)
+        if isinstance(error, AttributeError) and error.name is not None:
+            return _suggest_module_function(error) or _suggest_near_name(error.name, dir(error.obj), 0.7)
+        if isinstance(error, ModuleNotFoundError) and str(error).startswith("No module named"):
+            brick = _BRICK if "brick_link" in sys.modules else ()
+            name = str(error.name)
+            return _suggest_near_name(name, [*brick, *_LIBRARIES], 0.8) or _suggest_near_name(
+                name, [*sys.stdlib_module_names, *sys.modules], 0.8
+            )
+        if isinstance(error, FileNotFoundError) and isinstance(error.filename, str) and os.getcwd() != "/":
+            return _suggest_near_name(error.filename, os.listdir(), 0.7)
+        found = _CANNOT_IMPORT.search(str(error)) if isinstance(error, ImportError) else None
+        return _suggest_near_name(found[1], dir(sys.modules.get(found[2])), 0.7) if found else ""
+    except Exception:
+        # ``dir`` may run code of the student's objects, which may raise anything.
+        return ""
+
+
+def _suggest_for_name(error: NameError) -> str:
+    name = str(error.name)
+    statement = f"import {name}" if name in sys.stdlib_module_names else _IMPORTS.get(name)
+    if statement is not None:
+        return f"Did you forget {statement}?"
+    known: list[str] = [*dir(builtins), *keyword.kwlist]
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    if trace is not None:
+        known = [*trace.tb_frame.f_locals, *trace.tb_frame.f_globals, *known]
+    return _suggest_near_name(name, known, 0.7)
+
+
+def _suggest_module_function(error: AttributeError) -> str:
+    module = getattr(error.obj, "__name__", "") if isinstance(error.obj, ModuleType) else ""
+    meant = _FOREIGN_NAMES.get(module, {}).get(str(error.name).lower())
+    return f"Did you mean {module}.{meant}?" if meant else ""
+
+
+def _suggest_near_name(name: str, known: Iterable[object], least: float) -> str:
+    """Return ``Did you mean print?`` for the best match of ``name`` among ``known``, or ""."""
+    names = [each for each in known if type(each) is str and len(each) <= _LONGEST_NAME][:_MOST_KNOWN]
+    if name in names or len(name) > _LONGEST_NAME:
+        return ""
+    usable = {_normalise_name(each): each for each in reversed(names) if not each.startswith("_")}
+    near = difflib.get_close_matches(_normalise_name(name), usable, 1, least)
+    return f"Did you mean {usable[near[0]]}?" if near else ""
+
+
+def _normalise_name(name: str) -> str:
+    return name.lower().replace("_", "")

@@ -1,0 +1,64 @@
+"""List similar submissions of a batch for staff to review.
+
+``service.similarity`` finds them. Similarity never changes marks.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from service.commands.installation import open_installation
+from service.commands.output import create_table, print_json, print_line, print_note, print_renderables
+from service.operations import batches
+from service.operations.similarity import show_similar_in_batch
+from service.reports.output_files import prepare_folder, write_page
+from service.reports.similarity import (
+    build_similarity_rows,
+    describe_similarity,
+    render_similarity_page,
+    similarity_to_json,
+)
+from service.reports.view import SimilarityView, build_similarity_view
+
+#: Maximum number of pairs on the screen and on the page. The JSON output contains all pairs.
+_MOST_SHOWN = 100
+
+
+def find_similar(batch: str, given: Path | None, output: Path | None) -> None:
+    """Print the similar pairs and write the page with the evidence.
+
+    Args:
+        batch: Batch id, or the beginning of it.
+        given: File or folder of Python code to ignore, because students received it.
+        output: Page to write, or None.
+
+    Raises:
+        UsageError: A file cannot be read or written.
+    """
+    if output is not None:
+        prepare_folder(output)
+    with open_installation() as (service, actor):
+        found = batches.find(service, actor, batch)
+        shown = show_similar_in_batch(service, actor, found.course_id, found.id, given)
+        view = build_similarity_view(shown.found or ())
+        if output is not None:
+            page = render_similarity_page(view, shown.source, f"Similar submissions in {shown.batch.name}", _MOST_SHOWN)
+            path = write_page(output, "similar.html", page)
+            print_note(f"evidence: {path}")
+    print_json(assignments=similarity_to_json(view))
+    _show_similarity(view)
+
+
+def _show_similarity(view: SimilarityView) -> None:
+    for found in view.found:
+        print_line(describe_similarity(found))
+        for kind, groups in (("the same file", found.same), ("the same recordings", found.same_recordings)):
+            for group in groups[:_MOST_SHOWN]:
+                print_line(f"{kind}: {', '.join(group)}")
+        alike = create_table("student", "student", "alike", "where", "same behaviour")
+        for row in build_similarity_rows(found)[:_MOST_SHOWN]:
+            alike.add_row(*row)
+        if found.pairs:
+            print_renderables(alike)
+        if len(found.pairs) > _MOST_SHOWN:
+            print_line(f"{len(found.pairs) - _MOST_SHOWN} more pairs are not shown; --json shows all")

@@ -1,0 +1,79 @@
+"""Hints with the line that caused a criterion's result, used if no other rule knows the cause.
+
+A line is named only if it is the only candidate.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from service.grading.hint_clues import Clues, describe_first_failure
+from service.grading.hint_functions import hint_about_wrong_values
+from service.grading.hint_motion import STOPPING_CRITERIA
+from service.grading.hint_structure import DRIVING_CRITERIA, collect_statements, has_motor_call
+from service.grading.hint_tables import LIMITED_MOVES, PROPERTIES
+from service.grading.hint_texts import describe_quoting_line
+from submissions.criteria import Criterion
+from submissions.criteria.code import Functions
+from submissions.criteria.logs import Datalog
+from submissions.criteria.reporting import Events, Reports
+from submissions.criteria.sequence import WordSequence
+from submissions.criteria.texts import TextSequence
+
+_SPEECH_FUNCTIONS = frozenset({"say", "speak"})
+_PRINT_FUNCTIONS = frozenset({"print"})
+_TEXT_CRITERIA = (Reports, Events, WordSequence, TextSequence, Datalog)
+_LABEL = re.compile(r'did not come after "([^"]{1,40})"')
+_EXPECTED = re.compile(r"Expected ")
+
+
+def hint_about_cause_line(clues: Clues) -> Iterator[str]:
+    """Yield the result of the criterion that lost most, prefixed with its line."""
+    for criterion in clues.costliest_criteria[:1]:
+        found = describe_first_failure(clues, criterion)
+        if isinstance(criterion, Functions) and _EXPECTED.match(found):
+            yield hint_about_wrong_values(criterion.function, found)
+            return
+        where = _describe_cause_line(criterion, found, clues) if _EXPECTED.match(found) else ""
+        if where:
+            yield f"{where}: {found[0].lower()}{found[1:].rstrip('.')}"
+
+
+def _describe_cause_line(criterion: Criterion, told: str, clues: Clues) -> str:
+    """Return the position of the cause; empty if it is unknown or ambiguous."""
+    if isinstance(criterion, Reports) and criterion.source == "reply":
+        key = _LABEL.search(told)
+        found = [
+            clues.describe_matching_line("responder", re.compile(rf"""["']{re.escape(key[1])}["']""")) if key else ""
+        ]
+    elif isinstance(criterion, _TEXT_CRITERIA):
+        says = getattr(criterion, "source", "") == "speech" or criterion.check == "says"
+        names = _SPEECH_FUNCTIONS if says else _PRINT_FUNCTIONS | _SPEECH_FUNCTIONS
+        found = [
+            listing.locate(each.line)
+            for listing, each in collect_statements(clues)
+            if any(call.name.rpartition(".")[2] in names for call in each.calls)
+        ]
+        texts = [text for text in (*clues.printed, *clues.spoken) if len(text) > 2 and text in told]
+        if len(found) > 1 and texts:
+            found = [describe_quoting_line(clues, "program", texts[-1])]
+    elif isinstance(criterion, DRIVING_CRITERIA + STOPPING_CRITERIA):
+        driving = [
+            (listing, each)
+            for listing, each in collect_statements(clues)
+            if has_motor_call(each, LIMITED_MOVES)
+            and not any(one.keyword == "def" for one in listing.code.list_enclosing(each))
+        ]
+        loops = [
+            (listing, each)
+            for listing, each in collect_statements(clues)
+            if each.keyword == "while" and any(token in PROPERTIES for token in each.condition)
+        ]
+        found = [
+            listing.locate(each.line)
+            for listing, each in (loops if isinstance(criterion, STOPPING_CRITERIA) else driving)
+        ]
+    else:
+        return ""
+    return found[0] if len(found) == 1 and found[0].startswith("line ") else ""

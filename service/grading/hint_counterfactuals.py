@@ -1,0 +1,208 @@
+"""Hints from counterfactual runs: which single number of the program, changed, would have met the criterion.
+
+Each line that moves the robot is scaled in the recorded path, and the criterion is judged on the changed path. Nothing
+is simulated, so this applies only to programs that drive without sensors. Only visible trials are used.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from service.grading.grade import TrialResult
+from service.grading.hint_clues import Clues, Listing, describe_first_failure
+from service.grading.hint_code import CallInCode, Statement
+from service.grading.hint_structure import has_motor_call
+from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES
+from service.grading.judging.judge import JUDGES
+from service.grading.judging.judge_declaration import Case, StaticAnalysis
+from sim.recording import Pose, Recording
+from submissions.criteria import Criterion
+from submissions.criteria.drawing import Drawing
+from submissions.criteria.ending import EndPose
+from submissions.criteria.motion import Displacement, Excursions, Moves
+from submissions.criteria.path import KeepsOut, Visits
+from submissions.criteria.point import Circuits
+
+#: Criteria that depend on the path alone.
+_PATH_CRITERIA = (Circuits, Displacement, Drawing, EndPose, Excursions, KeepsOut, Moves, Visits)
+#: Factors to try: the opposite direction, then from the nearest to the farthest.
+_ROUND_FACTORS = (1 / 3, 0.5, 2 / 3, 0.75, 0.8, 1.25, 4 / 3, 1.5, 2, 3)
+_STEP_FACTORS = (1.06**step for step in range(-28, 29) if step)
+_FACTORS = tuple(sorted((*_STEP_FACTORS, *_ROUND_FACTORS), key=lambda each: abs(math.log(each))))
+_MOST_TICKS = 250_000
+_MOST_LINES = 6
+_MIN_PASS_SHARE = 0.999
+
+
+@dataclass(frozen=True, slots=True)
+class _Change:
+    """Ticks of one line in each trial. ``line`` has the number to change."""
+
+    listing: Listing
+    statement: Statement
+    call: CallInCode | None
+    ticks: tuple[np.ndarray, ...]
+
+
+def hint_about_wrong_number(clues: Clues) -> Iterator[str]:
+    """Yield the line and the number that would have met the criterion that lost most."""
+    listing = next(iter(clues.programs), None)
+    criterion = next((each for each in clues.costliest_criteria if isinstance(each, _PATH_CRITERIA)), None)
+    if listing is None or criterion is None or criterion is not clues.costliest_criteria[0] or clues.definition is None:
+        return
+    trials = [each for each in clues.shown if not criterion.scenarios or each.scenario in criterion.scenarios]
+    unfit = any(each.recording.partner is not None or not each.recording.places for each in trials)
+    if not trials or unfit or any(each.has_token(*PROPERTIES) for each in listing.code.statements):
+        return
+    asked = [each for each in clues.definition.criteria if each.visibility == "visible"]
+    judged = [each for each in asked if isinstance(each, _PATH_CRITERIA)]
+    left = _MOST_TICKS
+    ticks = sum(len(each.recording.ticks) for each in trials)
+    best: tuple[float, float, _Change, float] | None = None
+    for change in list(_collect_changes(listing, trials))[:_MOST_LINES]:
+        passed = []
+        for factor in (-1.0, *_FACTORS):
+            left -= ticks
+            if left < 0:
+                break
+            if _has_full_marks(criterion, clues, _apply_change(trials, change, factor)):
+                passed.append(factor)
+        if not passed:
+            continue
+        factor = _choose_factor(passed)
+        total = sum(_compute_marks(each, clues, _apply_change(trials, change, factor)) for each in judged)
+        size = abs(math.log(abs(factor))) + (factor < 0)
+        if best is None or (-total, size) < best[:2]:
+            best = -total, size, change, factor
+    if best is not None:
+        yield _describe_change(best[2], best[3], describe_first_failure(clues, criterion))
+
+
+def _choose_factor(passed: list[float]) -> float:
+    """Return the middle of the passing factors beside the nearest one, or -1 if only the opposite direction passes."""
+    ahead = sorted(each for each in passed if each > 0)
+    if not ahead:
+        return -1.0
+    nearest = min(ahead, key=lambda each: abs(math.log(each)))
+    low = high = nearest
+    while any(abs(each / low - 1 / 1.06) < 0.01 for each in ahead):
+        low /= 1.06
+    while any(abs(each / high - 1.06) < 0.01 for each in ahead):
+        high *= 1.06
+    # Far from the borders of a wide range, but not farther from the student's number than necessary.
+    return min(math.sqrt(low * high), nearest * 1.2) if nearest > 1 else max(math.sqrt(low * high), nearest / 1.2)
+
+
+def _collect_changes(listing: Listing, trials: list[TrialResult]) -> Iterator[_Change]:
+    """Yield the lines that moved the robot: single calls in functions first, then each moving line."""
+    code = listing.code
+    inner, outer = zip(*(_find_lines_at_ticks(each.recording) for each in trials), strict=True)
+    seen: set[bytes] = set()
+    for lines in (outer, inner):
+        for line in dict.fromkeys(int(each) for each in np.concatenate(lines)):
+            statement = code.find_statement(line)
+            ticks = tuple(each == line for each in lines)
+            key = b"".join(each.tobytes() for each in ticks)
+            if statement is None or key in seen or not _has_moved(trials, ticks):
+                continue
+            seen.add(key)
+            if lines is inner and not (
+                has_motor_call(statement, LIMITED_MOVES | CONTINUOUS_MOVES) or _is_sleep(statement)
+            ):
+                continue
+            call = next((each for each in statement.calls if _list_numbers(listing, each)), None)
+            yield _Change(listing, statement, call, ticks)
+
+
+def _find_lines_at_ticks(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """Return the innermost and the outermost line that ran during each tick."""
+    starts = np.array([each.t for each in recording.places])
+    at = np.maximum(np.searchsorted(starts, recording.ticks.t - 1e-6, side="right") - 1, 0)
+    places = np.array([(each.line, each.outer) for each in recording.places])[at]
+    return np.where(places[:, 1] > 0, places[:, 0], 0), places[:, 1]
+
+
+def _has_moved(trials: list[TrialResult], ticks: tuple[np.ndarray, ...]) -> bool:
+    steps = (_compute_steps(each.recording)[among] for each, among in zip(trials, ticks, strict=True))
+    return any(bool(np.abs(each).max(initial=0) > 1e-6) for each in steps)
+
+
+def _compute_steps(recording: Recording) -> np.ndarray:
+    """Return forward, sideways and turn of each tick, in the robot's frame at the tick's start. Shape (n, 3)."""
+    start, ticks = recording.start, recording.ticks
+    x, y = np.diff(ticks.x, prepend=start.x), np.diff(ticks.y, prepend=start.y)
+    before = np.radians(np.concatenate([[start.heading], ticks.heading[:-1]]))
+    turn = np.diff(ticks.heading, prepend=start.heading)
+    forward, sideways = x * np.cos(before) + y * np.sin(before), y * np.cos(before) - x * np.sin(before)
+    return np.stack([forward, sideways, turn], axis=1)
+
+
+def _apply_change(trials: list[TrialResult], change: _Change, factor: float) -> list[TrialResult]:
+    return [
+        replace(each, recording=_scale_motion(each.recording, ticks, factor))
+        for each, ticks in zip(trials, change.ticks, strict=True)
+    ]
+
+
+def _scale_motion(recording: Recording, among: np.ndarray, factor: float) -> Recording:
+    """Return the recording with the motion of some ticks scaled."""
+    steps = _compute_steps(recording)
+    steps[among] *= factor
+    start, ticks = recording.start, recording.ticks
+    heading = start.heading + np.cumsum(steps[:, 2])
+    before = np.radians(np.concatenate([[start.heading], heading[:-1]]))
+    x = start.x + np.cumsum(steps[:, 0] * np.cos(before) - steps[:, 1] * np.sin(before))
+    y = start.y + np.cumsum(steps[:, 0] * np.sin(before) + steps[:, 1] * np.cos(before))
+    scale = np.where(among, factor, 1.0)
+    wheels = (np.cumsum(np.diff(each, prepend=0.0) * scale) for each in (ticks.left_position, ticks.right_position))
+    left, right = wheels
+    end = Pose(float(x[-1]), float(y[-1]), float(heading[-1]))
+    moved = replace(ticks, x=x, y=y, heading=heading, left_position=left, right_position=right)
+    return replace(recording, ticks=moved, end=end)
+
+
+def _has_full_marks(criterion: Criterion, clues: Clues, trials: list[TrialResult]) -> bool:
+    return _compute_marks(criterion, clues, trials) >= _MIN_PASS_SHARE * float(criterion.marks)
+
+
+def _compute_marks(criterion: Criterion, clues: Clues, trials: list[TrialResult]) -> float:
+    """Return the marks of a criterion for changed trials; 0 if it looks at none of them."""
+    looked_at = any(not criterion.scenarios or each.scenario in criterion.scenarios for each in trials)
+    if clues.definition is None or not looked_at:
+        return 0.0
+    case = Case(clues.definition, trials, StaticAnalysis(), {})
+    return float(JUDGES[type(criterion)].judge(criterion, case).marks)
+
+
+def _is_sleep(statement: Statement) -> bool:
+    return any(call.name.rpartition(".")[2] == "sleep" for call in statement.calls)
+
+
+def _list_numbers(listing: Listing, call: CallInCode) -> list[float]:
+    """Return the numbers that a call is given."""
+    found = (listing.code.number(each) for each in call.arguments)
+    return [each for each in found if each is not None]
+
+
+def _describe_change(change: _Change, factor: float, found: str) -> str:
+    where = change.listing.locate(change.statement.line)
+    numbers = _list_numbers(change.listing, change.call) if change.call is not None else []
+    name = change.call.name.rpartition(".")[2] if change.call is not None else ""
+    amount = numbers[-1] if numbers and (len(numbers) == 1 or name in LIMITED_MOVES | {"sleep"}) else None
+    if factor < 0:
+        fix = "Let the robot move the other way here: change the sign of the speed or steering"
+    elif amount:
+        fix = f"Change {amount:g} to about {format_rounded(amount * factor)}"
+    else:
+        more = "more" if factor > 1 else "less"
+        fix = f"Let the robot move about {factor:.2g} times as far or turn as much here, {more} than now"
+    return f"{where}: {found[0].lower()}{found[1:].rstrip('.')}. {fix}"
+
+
+def format_rounded(number: float) -> str:
+    """Return a number with as many digits as a student would choose."""
+    return f"{number:.0f}" if abs(number) >= 20 else f"{number:.2g}"

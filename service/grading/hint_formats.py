@@ -1,0 +1,192 @@
+"""Rules for known near misses: how to detect each one, and a sentence on what was found and what is expected.
+
+A rule needs evidence from a trial if its mistake leaves any. The submission's text then only supplies the line.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterator
+
+from responders.message_format import IMG_DATA, JSON, PY, classify_text
+from service.grading.hint_clues import Clues, Listing, name_faulty_text
+from service.grading.judging.message_parts import quote_text
+from submissions.file_kinds import find_similar_file
+from submissions.notebook import NEARLY_MAGIC
+from submissions.raw_files import sanitise_name
+from submissions.submission import PART_FILES
+
+_NOTEBOOK_LINE = re.compile(r"^\s*[%!]")
+#: A return of an object, in any form.
+RETURN_LINE = re.compile(r"\breturn\b.*(?:dumps|JSON::|\{)")
+_NEARLY_PY = re.compile(r"""\s*["']?(?:p\s*y\s*[:;.]{1,3}|\w{1,6}::)""", re.IGNORECASE)
+#: A message with a text before it.
+_LATE_PY = re.compile(r"[^\n]{1,60}?[ \"'>:]((?:PY::|IMG_DATA).*)")
+_NAME_IN_TEXT = re.compile(r"PY::(\{?[A-Za-z_]\w*\}?)$")
+_KEY = re.compile(r"""["'](\w+)["']\s*:""")
+_NEARLY_JSON = re.compile(r"""\s*["']?json\s*[:;]{0,3}\s*(?=[\[{"'])""", re.IGNORECASE)
+_RETURNS_OBJECT = re.compile(r"\breturn\b(?!.*JSON::).*(?:dumps|str\s*\(|\{)")
+#: The log entry of ``image_data`` without a side.
+_NO_SIDE = "undefined image data logged..."
+_MIN_SIMILARITY = 0.75
+
+
+def hint_about_missing_files(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a part that was submitted under a similar file name."""
+    near = find_similar_file(clues.missing, clues.files) if clues.missing is not None else ""
+    if clues.missing is not None and near:
+        yield f"there is {sanitise_name(near)}, but no {PART_FILES[clues.missing]}; expected that name, so rename it"
+
+
+def hint_about_empty_parts(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a part that contains only blank lines and comments."""
+    for listing in clues.listings:
+        if (
+            listing.part is not None
+            and not listing.code.statements
+            and all(not line.strip() or line.lstrip().startswith("#") for line in listing.lines)
+        ):
+            yield f"{listing.name} is empty. Write your program in it, save it, and submit it again"
+            return
+
+
+def hint_about_magics(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a magic line that is below other code, lacks its %, or is valid only in a notebook."""
+    faulty = [fault for fault in clues.faults if fault.message.startswith(("SyntaxError", "NameError"))]
+    for listing in clues.listings:
+        if listing.part is None:
+            continue
+        lines = [fault.line for fault in faulty if name_faulty_text(fault) == listing.name]
+        if not lines:
+            continue
+        place = listing.magic_place
+        for number, line in enumerate(listing.lines, 1):
+            if place == number - 1 and listing.part == "program":
+                continue
+            if NEARLY_MAGIC.match(line):
+                yield _hint_about_magic(listing, number, line)
+                return
+            if number in lines and _NOTEBOOK_LINE.match(line):
+                yield f"{listing.locate(number)} is {quote_text(line)}, which only a notebook can run; expected Python"
+                return
+
+
+def _hint_about_magic(listing: Listing, number: int, line: str) -> str:
+    what = f"{listing.locate(number)} is {quote_text(line)}"
+    if listing.part == "responder":
+        return f"{what}, which begins a robot program; expected it in robot.py alone"
+    above = next((n for n, text in enumerate(listing.lines[: number - 1], 1) if not _is_empty_line(text)), None)
+    if above is not None:
+        code = quote_text(listing.lines[above - 1])
+        return f"{what}, but line {above}, {code}, stands above it; expected only blank lines and comments there"
+    return f"{what}; expected %%sim_magic_preloaded and its flags"
+
+
+def hint_about_messages(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a printed text that is almost a message."""
+    if not clues.collaborative or not any(clues.list_texts("program")):
+        return
+    for text in clues.printed:
+        late = _LATE_PY.match(text)
+        if late and not clues.sent and not text.startswith(PY):
+            where = clues.describe_matching_line("program", re.compile(r"""["'](?:PY::|IMG_DATA)"""))
+            yield (
+                f"{where} prints {quote_text(text)}, which is not sent as a message; expected "
+                f"{quote_text(late[1])} at the "
+                "start of the text. Print the other words with a print of their own"
+            )
+            return
+        begin = _NEARLY_PY.match(text)
+        if begin and not text.startswith(PY):
+            yield (
+                f"{clues.describe_matching_line('program', _build_literal_pattern(begin[0]))} prints "
+                f'"{text[:60]}", which is not sent as a message; '
+                f'expected "{PY}" at its very start, in capitals, with two colons and no blank'
+            )
+            return
+
+
+def hint_about_images(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a printed text that almost sends the images."""
+    if not clues.collaborative or not any(clues.list_texts("program")):
+        return
+    for text in (*clues.printed, *clues.sent):
+        if classify_text(text) == "image":
+            continue
+        said = text[:40].partition(":{")[0]
+        word = said.removeprefix(PY).strip(" :'\"")
+        near = max(_measure_similarity(word.upper(), IMG_DATA), _measure_similarity(word.upper(), "IMAGE_DATA"))
+        if text != _NO_SIDE and near < _MIN_SIMILARITY:
+            continue
+        printed = "image_data" if text == _NO_SIDE else text
+        where = clues.describe_matching_line(
+            "program", _build_literal_pattern("image_data" if text == _NO_SIDE else said)
+        )
+        yield f'{where} prints {quote_text(printed)}, which sends no image; expected "{IMG_DATA}" and nothing before it'
+        return
+
+
+def hint_about_image_log(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a print that logs no image because it names no side."""
+    if not clues.collaborative and clues.lost and _NO_SIDE in clues.printed:
+        where = clues.describe_matching_line("program", _build_literal_pattern("image_data"))
+        yield (
+            f'{where} prints "image_data" without a side, so no image is logged. Write "image_data both", '
+            '"image_data left" or "image_data right"'
+        )
+
+
+def hint_about_quoted_names(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a message that contains a variable's name instead of its value."""
+    for text in (*clues.sent, *clues.printed) if clues.lost else ():
+        name = _NAME_IN_TEXT.match(text)
+        if name is None:
+            continue
+        word = name[1].strip("{}")
+        if any(word in each.bound_names for listing in clues.programs for each in listing.code.statements):
+            where = clues.describe_matching_line("program", re.compile(re.escape(f"{PY}{name[1]}")))
+            better = f'f"{PY}{{{word}}}"'
+            yield f'{where} sends {quote_text(text)}: the name, and not its value such as "{PY}0"; expected {better}'
+            return
+
+
+def hint_about_answers(clues: Clues) -> Iterator[str]:
+    """Yield a hint on an answer that is almost an object for the robot's queue."""
+    if not any(clues.list_texts("responder")):
+        return
+    for text in clues.answers:
+        if text.startswith(JSON):
+            continue
+        begin = _NEARLY_JSON.match(text)
+        if begin:
+            where = clues.describe_matching_line("responder", _build_literal_pattern(begin[0].rstrip(" [{\"'")))
+        elif text.lstrip().startswith("{") and clues.should_use_queue:
+            where = describe_return_line(text, clues)
+        else:
+            continue
+        missing = f'which is not added to the message queue; expected "{JSON}" at its very start'
+        yield f"{where}: the answer is {quote_text(text)}, {missing}"
+        return
+
+
+def describe_return_line(text: str, clues: Clues, pattern: re.Pattern[str] = _RETURNS_OBJECT) -> str:
+    """Return the line of the last return whose keys are all in the answer; otherwise the first matching line."""
+    for listing in clues.responders:
+        for number, line in reversed(list(enumerate(listing.lines, 1))):
+            if pattern.search(line) and all(key in text for key in _KEY.findall(line)):
+                return listing.locate(number)
+    return clues.describe_matching_line("responder", pattern)
+
+
+def _is_empty_line(line: str) -> bool:
+    return not line.strip() or line.lstrip().startswith("#")
+
+
+def _build_literal_pattern(begin: str) -> re.Pattern[str]:
+    """Return a pattern for a quoted text with this beginning."""
+    return re.compile(rf"""["']\s*{re.escape(begin.strip())}(?!:)""")
+
+
+def _measure_similarity(one: str, other: str) -> float:
+    return difflib.SequenceMatcher(None, one, other).ratio()

@@ -1,0 +1,227 @@
+"""Hints on valid steps that do something else than intended, as the lost marks show.
+
+Examples: a loop that counts from 1, the first message instead of the last, a name in quotes, a wrong turn.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+
+from service.grading.hint_clues import Clues, Listing
+from service.grading.hint_code import LOOPS, Statement, join_tokens
+from service.grading.hint_slips import format_arguments
+from service.grading.hint_structure import DRIVING_CRITERIA, collect_statements, has_motor_call
+from service.grading.hint_tables import LIMITED_MOVES
+from service.grading.judging.geometry import to_relative_position
+from sim.recording import Pose, Recording
+from submissions.criteria.ending import EndPose
+from submissions.criteria.motion import Excursions
+from submissions.criteria.sequence import WordSequence
+from submissions.criteria.texts import Says
+
+_FIRST_VALUE_NAME = re.compile(r"(?:\w+_)?(?:begin|beginning|start|first)(?:_\w+)?\Z", re.IGNORECASE)
+_AWAY = 60.0
+#: The number after which a sequence went wrong, the wrong one, and the expected one.
+_OTHER_NUMBER = re.compile(r'but after "(-?\d+)" came "(-?\d+)" instead of "(-?\d+)"')
+
+
+def hint_about_range_start(clues: Clues) -> Iterator[str]:
+    """Yield a hint on ``range(1, SIDES)`` with an unused loop variable, if one iteration is missing."""
+    if not any(isinstance(each, (*DRIVING_CRITERIA, WordSequence)) for each in clues.lost):
+        return
+    for listing, each in collect_statements(clues):
+        call = next((one for one in each.calls if one.name == "range"), None)
+        if each.keyword != "for" or call is None or len(call.arguments) != 2 or call.arguments[0] != ("1",):
+            continue
+        end, variable = listing.code.number(call.arguments[1]), each.tokens[1]
+        used = any(one.has_token(variable) for one in listing.code.list_body(each))
+        counts = {str(int(end)), str(int(end) - 1)} if end is not None and end > 1 else set()
+        told = (set(re.findall(r"\d+", _join_messages(clues, one.id))) for one in clues.lost)
+        if end is not None and counts and not used and any(counts <= numbers for numbers in told):
+            last = join_tokens(call.arguments[1])
+            yield (
+                f"{listing.locate(each.line)}: range(1, {last}) counts from 1 to {end - 1:g}, so the loop runs "
+                f"{end - 1:g} "
+                f"times. To run {end:g} times, write range({last})"
+            )
+            return
+
+
+def hint_about_range_step(clues: Clues) -> Iterator[str]:
+    """Yield a hint on ``range(10, 101)``, if the required numbers have a larger step."""
+    for criterion in clues.lost:
+        found = (
+            _OTHER_NUMBER.search(_join_messages(clues, criterion.id)) if isinstance(criterion, WordSequence) else None
+        )
+        if found is None:
+            continue
+        before, came, wanted = map(int, found.groups())
+        for listing, each in collect_statements(clues):
+            call = next((one for one in each.calls if one.name == "range"), None)
+            numbers = [listing.code.number(one) for one in call.arguments] if call is not None else []
+            begin, end, step = (*numbers, 1.0, 1.0)[:3] if len(numbers) in (2, 3) else (None, None, None)
+            if call is None or begin is None or end is None or step != came - before or not begin <= before < end:
+                continue
+            right = (*map(join_tokens, call.arguments[:2]), str(wanted - before))
+            shown = f"range({format_arguments(call.arguments)})"
+            yield (
+                f"{listing.locate(each.line)}: {shown} counts in steps of {step:g}, so {came} comes after "
+                f"{before}, and "
+                f"not {wanted}. The third number is the step: write range({', '.join(right)})"
+            )
+            return
+
+
+def hint_about_first_value(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a variable for the first value that each later value overwrites."""
+    for listing, each in collect_statements(clues):
+        name = each.target
+        inner = next((one for one in listing.code.list_enclosing(each)), None)
+        if not _FIRST_VALUE_NAME.match(name) or inner is None or inner.keyword != "if" or name in inner.condition:
+            continue
+        is_empty = any(one.tokens == (name, "=", "None") and not one.indent for one in listing.code.statements)
+        if is_empty and any(one.keyword in LOOPS for one in listing.code.list_enclosing(each)):
+            yield (
+                f"{listing.locate(each.line)} sets {name} again each time that the if in line {inner.line} is "
+                "true, so it "
+                f'has the last value. For the first, write "if {join_tokens(inner.condition)} and {name} is None:"'
+            )
+            return
+
+
+def hint_about_first_message(clues: Clues) -> Iterator[str]:
+    """Yield a hint on code that reads the first message of the queue, if the last is required."""
+    if not any(isinstance(each, Says) and "last text that" in _join_messages(clues, each.id) for each in clues.lost):
+        return
+    for listing, each in collect_statements(clues):
+        for place, token in enumerate(each.tokens):
+            if token.strip("\"'") == "messages" and each.tokens[place + 1 : place + 5] == ("]", "[", "0", "]"):
+                yield f"{listing.locate(each.line)} takes the first message of the queue, [0]. Write [-1] for the last"
+                return
+
+
+def hint_about_spoken_name(clues: Clues) -> Iterator[str]:
+    """Yield a hint on ``say("count")``: a variable's name instead of its value."""
+    for listing, each in collect_statements(clues):
+        for call in each.calls:
+            text = call.arguments[0][0] if call.arguments and len(call.arguments[0]) == 1 else ""
+            name = text[1:-1]
+            is_output = call.name in ("say", "print") and name in (*clues.spoken, *clues.printed)
+            if is_output and text[:1] in ("'", '"') and _is_variable(name, listing):
+                fixed = format_arguments((("str", "(", name, ")"), *call.arguments[1:]))
+                yield (
+                    f"{listing.locate(each.line)} {call.name}s the word {text} and not the value of {name}, "
+                    "because it is "
+                    f"in quotes. Write {call.name}({fixed})"
+                )
+                return
+
+
+def _is_variable(name: str, listing: Listing) -> bool:
+    statements = listing.code.statements
+    return any(name == each.target or (each.keyword == "for" and name in each.bound_names) for each in statements)
+
+
+def hint_about_unused_parameter(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a function that drives without using one of its parameters."""
+    for listing in clues.programs if any(isinstance(each, DRIVING_CRITERIA) for each in clues.lost) else ():
+        for head in listing.code.list_functions():
+            body = listing.code.list_body(head)
+            driving = next((each for each in body if has_motor_call(each, LIMITED_MOVES)), None)
+            name = head.tokens[1]
+            if driving is None or not any(call.name == name for each in listing.code.statements for call in each.calls):
+                continue
+            for parameter in _list_parameters(head):
+                if not any(each.has_token(parameter) for each in body):
+                    call = next(one for one in driving.calls if one.name.rpartition(".")[2] in LIMITED_MOVES)
+                    amount = join_tokens(call.arguments[-1]) if call.arguments else "the number"
+                    yield (
+                        f"{listing.locate(driving.line)}: {name} never uses its parameter {parameter}, so it does "
+                        "the same "
+                        f"with each value. Write {parameter} in place of {amount} if that is meant"
+                    )
+                    return
+
+
+def hint_about_missing_reverse(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a program that only drives forwards, if the robot should come back."""
+    if not any(isinstance(each, Excursions) for each in clues.lost):
+        return
+    moving = [(listing, each) for listing, each in collect_statements(clues) if has_motor_call(each, LIMITED_MOVES)]
+    calls = [call for _, each in moving for call in each.calls if call.name.rpartition(".")[2] in LIMITED_MOVES]
+    turns = any("turn" in call.name or "-" in "".join(map("".join, call.arguments)) for call in calls)
+    if len(moving) > 1 and not turns:
+        listing, each = moving[-1]
+        yield (
+            f"{listing.locate(each.line)} drives forwards like the lines before it, so the robot never comes back. "
+            "Write - before both speeds to drive backwards"
+        )
+
+
+def hint_about_mirrored_end(clues: Clues) -> Iterator[str]:
+    """Yield a hint on an end position mirrored at the last straight line: the last turn went the wrong way."""
+    for criterion in clues.lost:
+        if not isinstance(criterion, EndPose) or criterion.x is None or criterion.y is None:
+            continue
+        for recording in clues.recordings:
+            corner = _find_last_corner(recording)
+            turn = _find_last_turn(clues)
+            if corner is None or turn is None:
+                continue
+            target = to_relative_position(corner, criterion.x, criterion.y)
+            end = to_relative_position(corner, recording.end.x, recording.end.y)
+            off = math.hypot(target[0] - end[0], target[1] + end[1])
+            if abs(target[1]) > _AWAY and target[1] * end[1] < 0 and off < max(criterion.tolerance, _AWAY):
+                listing, each = turn
+                side = "left" if target[1] > 0 else "right"
+                yield (
+                    f"{listing.locate(each.line)} turns the robot to the wrong side: it ends as far from its way "
+                    "as the "
+                    f"target, but on the other side. Turn {side} there"
+                )
+                return
+
+
+def _find_last_turn(clues: Clues) -> tuple[Listing, Statement] | None:
+    """Return the last statement outside functions that turns the robot, directly or by a function; or None."""
+    found = None
+    for listing, each in collect_statements(clues):
+        turning = {
+            head.tokens[1]
+            for head in listing.code.list_functions()
+            if any(call.name.startswith("tank_turn.") for one in listing.code.list_body(head) for call in one.calls)
+        }
+        outside = not any(one.keyword == "def" for one in listing.code.list_enclosing(each))
+        if outside and any(call.name.startswith("tank_turn.") or call.name in turning for call in each.calls):
+            found = listing, each
+    return found
+
+
+def _find_last_corner(recording: Recording) -> Pose | None:
+    """Return the pose where the robot began its last turn, with the heading before it; None if it did not turn."""
+    headings = [recording.start.heading, *recording.ticks.heading]
+    still = len(headings) - 1
+    while still > 0 and abs(headings[still] - headings[still - 1]) < 0.02:
+        still -= 1
+    while still > 0 and abs(headings[still] - headings[still - 1]) >= 0.02:
+        still -= 1
+    if still <= 0:
+        return None
+    return Pose(float(recording.ticks.x[still - 1]), float(recording.ticks.y[still - 1]), float(headings[still]))
+
+
+def _list_parameters(head: Statement) -> list[str]:
+    """Return the parameters without a default value."""
+    tokens = head.tokens
+    return [
+        token
+        for place, token in enumerate(tokens[3:-2], 3)
+        if tokens[place - 1] in "(," and tokens[place + 1] in ",)" and token.isidentifier()
+    ]
+
+
+def _join_messages(clues: Clues, identity: str) -> str:
+    result = next((each for each in clues.results if each.id == identity), None)
+    return "" if result is None else " ".join((result.message, *(each.message for each in result.evidence)))

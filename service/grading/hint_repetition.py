@@ -1,0 +1,152 @@
+"""Hints on texts and programs that repeat too often or too rarely, because of the loops they are in.
+
+Each rule compares the loops with what the robot said, or with how early the program ended.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from service.grading.hint_clues import Clues
+from service.grading.hint_code import LOOPS, Statement, join_tokens
+from service.grading.hint_slips import format_arguments
+from service.grading.hint_structure import collect_statements, has_motor_call
+from service.grading.hint_tables import LIMITED_MOVES, PROPERTIES
+from service.grading.judging.message_parts import quote_text
+from sim.recording import Verdict
+from submissions.criteria.logs import Datalog
+from submissions.criteria.motion import Encounters
+from submissions.criteria.sequence import WordSequence
+
+_OUTPUT_FUNCTIONS = frozenset({"say", "print"})
+_REPEATED_WORDS = re.compile(r"these words (\d+) more times")
+#: The last correct number and the missing one.
+_ENDED_EARLY = re.compile(r'after "(-?\d+)" came (?:nothing|"[^\W\d]+") instead of "(-?\d+)"')
+_INCLUSIVE = {"<": "<=", ">": ">="}
+
+
+def hint_about_repeated_words(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a text that is said in each iteration, but required once."""
+    for criterion in clues.lost:
+        if not isinstance(criterion, WordSequence):
+            continue
+        for listing, each in collect_statements(clues):
+            call = next((one for one in each.calls if one.name in _OUTPUT_FUNCTIONS), None)
+            loop = listing.code.statements[each.parent] if each.parent >= 0 else None
+            if call is None or loop is None or loop.keyword not in LOOPS or not call.arguments:
+                continue
+            text = call.arguments[0][0][1:-1] if call.arguments[0][0][:1] in ("'", '"') else ""
+            once = sum(text.casefold() in map(str.casefold, texts) for texts in criterion.words) == 1
+            lines = clues.recordings[0].spoken if call.name == "say" else clues.recordings[0].printed
+            count = sum(line.text == text for line in lines)
+            if once and count > 1 and len(call.arguments[0]) == 1:
+                yield (
+                    f"{listing.locate(each.line)} {call.name}s {quote_text(text)} {count} times, in each pass of "
+                    "the loop in "
+                    f"line {loop.line}; expected once. To run it after the loop, remove its indentation"
+                )
+                return
+
+
+def hint_about_inner_loop(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a loop that repeats its output because it is nested in an unrelated loop."""
+    again = next((found for each in clues.results if (found := _REPEATED_WORDS.search(each.message))), None)
+    if again is None:
+        return
+    for listing, each in collect_statements(clues):
+        outer = listing.code.statements[each.parent] if each.parent >= 0 else None
+        if each.keyword != "for" or outer is None or outer.keyword != "for":
+            continue
+        body = listing.code.list_body(each)
+        speaks = any(call.name in _OUTPUT_FUNCTIONS for one in body for call in one.calls)
+        if speaks and not any(one.has_token(*outer.bound_names - each.bound_names) for one in (each, *body)):
+            yield (
+                f"{listing.locate(each.line)}: this loop is inside the loop in line {outer.line}, so it repeats "
+                "its words "
+                f"in each pass of that loop. Words that are expected once appeared {again[1]} more times. To run this "
+                "loop once, after the other loop, indent it less"
+            )
+            return
+
+
+def hint_about_last_number(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a count that ends one too early: ``< 10`` for ``<= 10``, ``range(5)`` for ``range(1, 6)``."""
+    for criterion in clues.lost:
+        result = next((each for each in clues.results if each.id == criterion.id), None)
+        found = _ENDED_EARLY.search(result.message) if isinstance(criterion, WordSequence) and result else None
+        if found is None or not isinstance(criterion, WordSequence):
+            continue
+        before, missing = int(found[1]), int(found[2])
+        for listing, each in collect_statements(clues):
+            signed = each.condition if each.keyword == "while" else ()
+            if len(signed) == 3 and signed[1] in _INCLUSIVE and listing.code.number(signed[2:]) == missing:
+                better = f"{signed[0]} {_INCLUSIVE[signed[1]]} {signed[2]}"
+                yield f"{listing.locate(each.line)}: the loop ends before {missing}. Write while {better}"
+                return
+            call = next((one for one in each.calls if one.name == "range"), None) if each.keyword == "for" else None
+            if call is None or not 1 <= len(call.arguments) <= 3:
+                continue
+            end = call.arguments[0] if len(call.arguments) == 1 else call.arguments[1]
+            if listing.code.number(end) != missing:
+                continue
+            first = ("1",) if len(call.arguments) == 1 and criterion.words[0][0] == "1" else call.arguments[0]
+            start = ("0",) if len(call.arguments) == 1 and criterion.words[0][0] == "0" else first
+            fixed = (start, (str(missing + (1 if missing > before else -1)),), *call.arguments[2:])
+            yield (
+                f"{listing.locate(each.line)}: range({format_arguments(call.arguments)}) ends before {missing}. "
+                f"Write range({format_arguments(fixed)})"
+            )
+            return
+
+
+def hint_about_exact_reading(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a loop that logs only while a reading equals one exact number."""
+    if not any(isinstance(each, Datalog) for each in clues.lost) or not _has_ended_normally(clues):
+        return
+    for listing, each in collect_statements(clues):
+        signed = each.condition if each.keyword == "while" else ()
+        body = listing.code.list_body(each)
+        prints = any(call.name in _OUTPUT_FUNCTIONS for one in body for call in one.calls)
+        reads = any(signed and (token in PROPERTIES) for one in (each, *body) for token in one.tokens)
+        if "==" in signed and prints and reads and listing.code.number(signed[signed.index("==") + 1 :]) is not None:
+            yield (
+                f"{listing.locate(each.line)}: the loop goes on only while {join_tokens(signed)} is true, so it "
+                "ends at the "
+                f"first other reading: the program ended after {clues.seconds:.1f} s. Write a condition that is true "
+                "until the last reading that is asked for"
+            )
+            return
+
+
+def hint_about_single_reaction(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a program that reacts to a sensor once, if the robot has to do so repeatedly."""
+    several = any(isinstance(each, Encounters) and each.at_least > 1 for each in clues.lost)
+    if not several or not _has_ended_normally(clues) or clues.seconds > clues.limit / 2:
+        return
+    for listing, each in collect_statements(clues):
+        waits = each.keyword == "while" and each.parent < 0 and any(token in PROPERTIES for token in each.condition)
+        if not waits:
+            continue
+        reacts = [
+            one for one in listing.code.list_following(each) if one.parent < 0 and has_motor_call(one, LIMITED_MOVES)
+        ]
+        if reacts:
+            yield (
+                f"{listing.locate(_find_first_move(listing.code.statements, each).line)}: the program does "
+                "everything once, and "
+                f"ends after {clues.seconds:.1f} s of {clues.limit:g} s. To repeat it, write while True: above this "
+                f"line, and indent the lines from here to line {reacts[-1].last_line}"
+            )
+            return
+
+
+def _find_first_move(statements: tuple[Statement, ...], loop: Statement) -> Statement:
+    """Return the first statement above a loop that switches a motor on; the loop if there is none."""
+    above = [each for each in statements[: loop.number] if has_motor_call(each, frozenset({"on"}))]
+    return above[0] if above else loop
+
+
+def _has_ended_normally(clues: Clues) -> bool:
+    """Return whether the program ended by itself in every visible trial."""
+    return bool(clues.recordings) and all(each.verdict is Verdict.FINISHED for each in clues.recordings)

@@ -1,0 +1,195 @@
+"""Hints on unused or misplaced values: unread variables, swapped ports and flags.
+
+The program text shows each of them. They apply only if visible criteria lost marks.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from service.grading.hint_clues import Clues, Listing
+from service.grading.hint_code import Statement, is_name, join_tokens
+from service.grading.hint_motion import STOPPING_CRITERIA
+from service.grading.hint_structure import DRIVING_CRITERIA, collect_statements
+from service.grading.hint_tables import PROPERTIES
+from submissions.criteria.code import SourceRules
+from submissions.criteria.collecting import Collects
+from submissions.criteria.logs import Datalog
+from submissions.criteria.stopping import StopOn
+
+_OPERATORS = frozenset("+-*/")
+_PAIRS = frozenset({"MoveTank", "MoveSteering"})
+_SWAPPED_PORTS = ("OUTPUT_C", ",", "OUTPUT_B")
+_MISSING_FLAG = re.compile(r"to have -(\w), but")
+#: A flag that takes a value, and the value after it.
+_VALUED_FLAG = re.compile(r"(?<=\s)-(\w*?)([broxyaPNMs])([A-Za-z]{2,})(?=\s|$)")
+_TOO_FEW_SAMPLES = re.compile(r"[Ee]xpected at least (\d+) samples of \w+, but there (?:is|are) (\d+)")
+_PAIRS_TAKEN = re.compile(r"\d+ of (\d+) pairs are usable")
+_READING = re.compile(r"reading (\S+) to (\S+) %, but the sensor was reading (\d+(?:\.\d+)?) %")
+_X_NAME = re.compile(r"(?:\w*_)?d?x\d?\Z", re.IGNORECASE)
+_Y_NAME = re.compile(r"(?:\w*_)?d?y\d?\Z", re.IGNORECASE)
+
+
+def hint_about_unused_value(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a value that is computed but never used."""
+    for listing, each in collect_statements(clues):
+        name, value = each.target, each.tokens[2:]
+        computes = name and (_OPERATORS & set(value) or value[-1] in PROPERTIES) and name not in value
+        if computes and not any(_is_name_used(one, name) for one in listing.code.statements):
+            yield (
+                f"{listing.locate(each.line)} computes {name}, but no line uses it. Write {name} where its value "
+                "is needed"
+            )
+            return
+
+
+def _is_name_used(statement: Statement, name: str) -> bool:
+    """Return whether a statement uses a name apart from its assignment, including in f-strings."""
+    tokens = statement.tokens[2:] if statement.target == name else statement.tokens
+    return any(token == name or (not is_name(token) and name in token) for token in tokens)
+
+
+def hint_about_swapped_ports(clues: Clues) -> Iterator[str]:
+    """Yield a hint on ``MoveTank(OUTPUT_C, OUTPUT_B)``: the left motor, on B, must come first."""
+    if not any(isinstance(each, DRIVING_CRITERIA + STOPPING_CRITERIA) for each in clues.lost):
+        return
+    found = [(listing, each, call.name) for listing, each in collect_statements(clues) for call in each.calls]
+    swapped = [
+        (listing, each, name)
+        for listing, each, name in found
+        if name.rpartition(".")[2] in _PAIRS and "".join(_SWAPPED_PORTS) in "".join(each.tokens)
+    ]
+    if swapped:
+        listing, each, name = swapped[0]
+        others = [one.line for _, one, _ in swapped[1:]]
+        more = f" Line {others[0]} has the same." if others else ""
+        yield (
+            f"{listing.locate(each.line)} takes OUTPUT_C for the left motor, so the robot turns to the other side: the "
+            f"left motor is on OUTPUT_B. Write {name}(OUTPUT_B, OUTPUT_C).{more}"
+        )
+
+
+def hint_about_swallowed_flags(clues: Clues) -> Iterator[str]:
+    """Yield a hint on ``-oAHWR``: the flag takes a value, so the flags after it become its value."""
+    told = [each.message for each in clues.results for one in clues.lost if one.id == each.id and _is_source_rule(one)]
+    missing = {flag for message in told for flag in _MISSING_FLAG.findall(message)}
+    for listing in clues.programs if missing else ():
+        place = listing.magic_place
+        found = _VALUED_FLAG.search(listing.lines[place]) if place is not None else None
+        if place is None or found is None or not missing & set(found[3]):
+            continue
+        before, flag, value = found.groups()
+        other = flag.swapcase()
+        better = (
+            f"-{before}{other}{value}" if other in missing else f"-{before}{value}, and -{flag} with its value apart"
+        )
+        yield (
+            f"{listing.locate(place + 1)}: -{flag} takes a value, so {value} is its value and sets no flags. "
+            f"Write {better}"
+        )
+        return
+
+
+def _is_source_rule(criterion: object) -> bool:
+    return isinstance(criterion, SourceRules)
+
+
+def hint_about_few_samples(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a log with too few samples, which may explain its other errors."""
+    # A robot that stopped too early could not log enough.
+    stopped = any(isinstance(each, StopOn) for each in clues.lost)
+    for criterion in () if stopped else clues.lost:
+        told = next((each.message for each in clues.results if each.id == criterion.id), "")
+        found = _TOO_FEW_SAMPLES.search(told) if isinstance(criterion, Datalog) else None
+        if found is None or found[2] == "0":
+            continue
+        few = f"only {found[2]} samples were logged, and at least {found[1]} are asked for"
+        sleeping = _collect_sleeping_loops(clues)
+        if len(sleeping) == 1:
+            listing, each, seconds = sleeping[0]
+            yield (
+                f"{listing.locate(each.line)}: {few}. The loop waits {seconds:g} s after each of them: wait less, "
+                "and let "
+                "the loop repeat more often"
+            )
+            return
+
+
+def _collect_sleeping_loops(clues: Clues) -> list[tuple[Listing, Statement, float]]:
+    """Return the statements that sleep in a printing loop, with their seconds."""
+    found = []
+    for listing, each in collect_statements(clues):
+        call = next((one for one in each.calls if one.name in ("time.sleep", "sleep")), None)
+        seconds = listing.code.number(call.arguments[0]) if call is not None and call.arguments else None
+        loops = listing.code.list_enclosing_loops(each)
+        if (
+            seconds
+            and loops
+            and any(one.name == "print" for other in listing.code.list_body(loops[0]) for one in other.calls)
+        ):
+            found.append((listing, each, seconds))
+    return found
+
+
+def hint_about_few_images(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a robot that is too fast to take enough images of its patterns."""
+    for criterion in clues.lost:
+        told = next((each.message for each in clues.results if each.id == criterion.id), "")
+        found = _PAIRS_TAKEN.search(told) if isinstance(criterion, Collects) else None
+        driving = [
+            (listing, each)
+            for listing, each in collect_statements(clues)
+            if any(call.name.endswith(".on") and call.arguments for call in each.calls)
+        ]
+        if found is None or len(driving) != 1 or clues.seconds > clues.limit / 4:
+            continue
+        listing, each = driving[0]
+        yield (
+            f"{listing.locate(each.line)}: the robot passed the patterns in {clues.seconds:.1f} s and took only "
+            f"{found[1]} "
+            "pairs of images. Drive slower, or take images more often"
+        )
+        return
+
+
+def hint_about_partial_reading(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a robot that stops when only the edge of its sensor is on the target."""
+    for criterion in clues.lost:
+        told = next((each.message for each in clues.results if each.id == criterion.id), "")
+        found = _READING.search(told) if isinstance(criterion, StopOn) else None
+        if found is None or not float(found[2]) < float(found[3]) < 100:
+            continue
+        loops = [
+            (listing, each)
+            for listing, each in collect_statements(clues)
+            if each.keyword == "while" and any(token in PROPERTIES for token in each.condition)
+        ]
+        if len(loops) == 1:
+            listing, each = loops[0]
+            yield (
+                f"{listing.locate(each.line)}: the loop ends as soon as the edge of the sensor leaves the white: "
+                "it read "
+                f"{found[3]} %, expected {found[1]} to {found[2]} %. Let the robot drive on a little after the loop, "
+                "for example with time.sleep(0.2)"
+            )
+            return
+
+
+def hint_about_swapped_atan2(clues: Clues) -> Iterator[str]:
+    """Yield a hint on ``math.atan2(dx, dy)``, if the robot misses its target."""
+    if not any(isinstance(each, DRIVING_CRITERIA + STOPPING_CRITERIA) for each in clues.lost):
+        return
+    for listing, each in collect_statements(clues):
+        for call in each.calls:
+            if call.name.rpartition(".")[2] != "atan2" or len(call.arguments) != 2:
+                continue
+            first, second = ([token for token in one if is_name(token)] for one in call.arguments)
+            if first and second and all(map(_X_NAME.match, first)) and all(map(_Y_NAME.match, second)):
+                y, x = join_tokens(call.arguments[1]), join_tokens(call.arguments[0])
+                yield (
+                    f"{listing.locate(each.line)}: atan2 takes y first, and then x. For the angle from the x axis "
+                    "write "
+                    f"{call.name}({y}, {x})"
+                )
+                return

@@ -1,0 +1,279 @@
+"""Judging of logged data: datalog series, and images.
+
+Images and readings come from the simulator's recording. Values are those the program printed, so they may be invented.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from service.grading.grade import Measure, TrialResult
+from service.grading.judging.geometry import Side, find_light_sensor, locate_footprint, measure_floor_share
+from service.grading.judging.judge_declaration import declare_judge
+from service.grading.judging.label_patches import GREYS, decode_label
+from service.grading.judging.outcome import Outcome, fail_with, pass_with
+from service.grading.judging.sensor_readings import match_readings
+from service.grading.judging.stray_penalty import Strays, apply_stray_penalty
+from sim.camera import HEIGHT, WIDTH, build_sensor_mask
+from sim.floors import Floor
+from sim.light_sensors import Footprint
+from sim.recording import DatalogEntry, Image, Recording
+from sim.recording_values import get_pose_after, get_pose_at, rebuild_floor, tick_to_seconds
+from submissions.criteria.logs import Datalog, ImageLog
+
+Check = tuple[Fraction, str]  # the fraction reached, and the message if it is below 1
+
+
+@declare_judge(Datalog)
+def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
+    """Judge the samples of one datalog series; if required, only those that a sensor read."""
+    recording = trial.recording
+    name = criterion.series
+    logged = [datum for datum in recording.datalog if datum.name == name]
+    true = _filter_measured_samples(criterion, logged, recording)
+    samples = true if criterion.measured is None else _drop_repeats(true)
+    made_up = len(logged) - len(true)
+    values = [datum.value for datum in samples]
+    measures = (Measure("samples", float(len(values))), *_measure_extremes(values))
+    if criterion.measured is not None:
+        measures += (Measure("made up", float(made_up)),)
+    if logged and not values:
+        return fail_with(
+            f"Expected {name} to be readings of {_describe_instrument(criterion)}, but all {len(logged)} samples "
+            "are made up: "
+            "none matches the reading at the time of printing.",
+            measures=measures,
+        )
+    if not values and (criterion.at_least or criterion.plateaus or criterion.between or criterion.covers):
+        return fail_with(
+            f'Expected the program to log {name}, but the datalog has none: no line like "{name}: 42" was printed.'
+        )
+    checks = _check_datalog(criterion, samples, recording)
+    if criterion.plateaus:
+        checks.append(_check_plateaus(criterion, values))
+    wrong = next((words for reached, words in checks if reached < 1), None)
+    told = (
+        f"; {made_up} of {len(logged)} are made up, not readings of {_describe_instrument(criterion)}"
+        if made_up
+        else ""
+    )
+    if wrong is None:
+        outcome = pass_with(f"The program logged {len(values)} samples of {name} as expected{told}.", measures=measures)
+    else:
+        score = sum((reached for reached, _ in checks), Fraction(0)) / len(checks)
+        outcome = fail_with(f"{wrong}{told}.", score=score, measures=measures)
+    return apply_stray_penalty(
+        outcome, criterion, max(len(samples), 1), Strays("so much of the log is made up", made_up)
+    )
+
+
+def _describe_instrument(criterion: Datalog) -> str:
+    name = criterion.measured or ""
+    return f"the {name} sensor" if name in ("left light", "right light", "ultrasonic") else f"the {name}"
+
+
+def _filter_measured_samples(
+    criterion: Datalog, logged: Sequence[DatalogEntry], recording: Recording
+) -> list[DatalogEntry]:
+    """Return the samples that the instrument read; all if the criterion names none."""
+    if criterion.measured is None:
+        return list(logged)
+    values, at = [datum.value for datum in logged], [datum.t for datum in logged]
+    read = match_readings(values, at, (criterion.measured,), recording)
+    return [datum for datum, true in zip(logged, read.tolist(), strict=True) if true]
+
+
+def _format_image_count(count: int) -> str:
+    return f"{count or 'no'} image{'' if count == 1 else 's'}"
+
+
+def _format_there_are(count: int) -> str:
+    return f"there {'is' if count == 1 else 'are'} {count or 'none'}"
+
+
+@declare_judge(ImageLog)
+def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
+    """Judge the number and order of logged images of each light sensor, and the content of those at the start."""
+    recording = trial.recording
+    log = recording.image_log
+    checks: list[Check] = []
+    for side, count, least in (
+        ("left", criterion.left, criterion.left_at_least),
+        ("right", criterion.right, criterion.right_at_least),
+    ):
+        got = sum(entry[0] == side for entry in log)
+        asked = f"at least {_format_image_count(least)}" if count is None else _format_image_count(count)
+        words = f"Expected {asked} of the {side} sensor to be logged, but {_format_there_are(got)}"
+        if count is not None or least:
+            reached = min(Fraction(got, least), Fraction(1)) if count is None else Fraction(got == count)
+            checks.append((reached, words))
+    if criterion.pairs:
+        sides = [entry[0] for entry in log]
+        turns = bool(sides) and sides == ["left", "right"] * (len(sides) // 2)
+        checks.append(
+            (Fraction(turns), "Expected left and right images to alternate, but they did not (image_data both)")
+        )
+    if criterion.at_start:
+        moved = next((entry for entry in log if not _is_start_image(entry, recording, trial.light_noise)), None)
+        where = _describe_position(recording, moved[2]) if moved else ""
+        checks.append(
+            (
+                Fraction(bool(log) and moved is None),
+                f"Expected every image to be taken at the start pose, but {where or 'there is none'}",
+            )
+        )
+    if criterion.uniform is not None:
+        own = [entry for entry in log if entry[0] == criterion.uniform]
+        flat = bool(own) and all(_is_uniform(entry[1]) and _has_content(entry, recording) for entry in own)
+        checks.append(
+            (
+                Fraction(flat),
+                f"Expected every image of the {criterion.uniform} sensor to be of one colour, but one is not "
+                "or shows no label's patch",
+            )
+        )
+    measures = (Measure("images", float(len(log))),)
+    wrong = next((words for reached, words in checks if reached < 1), None)
+    if wrong is None:
+        return pass_with(
+            f"The program logged {len(log)} {'image' if len(log) == 1 else 'images'} as expected.", measures=measures
+        )
+    last = tick_to_seconds(recording, log[-1][2]) if log else None
+    pose = None if last is None else get_pose_at(recording, last)
+    held = sum((reached for reached, _ in checks), Fraction(0)) / len(checks)
+    return fail_with(f"{wrong}.", last, pose, held if log else Fraction(0), measures)
+
+
+def _measure_extremes(values: Sequence[float]) -> tuple[Measure, ...]:
+    finite = [value for value in values if math.isfinite(value)]
+    return (Measure("least", min(finite)), Measure("most", max(finite))) if finite else ()
+
+
+def _check_datalog(criterion: Datalog, samples: Sequence[DatalogEntry], recording: Recording) -> list[Check]:
+    """Return all checks except plateaus. The number of samples counts only if more than one is required."""
+    name, count = criterion.series, len(samples)
+    values = [datum.value for datum in samples]
+    checks: list[Check] = []
+    if criterion.at_least > 1:
+        words = f"Expected at least {criterion.at_least} samples of {name}, but there are {count}"
+        checks.append((min(Fraction(count, criterion.at_least), Fraction(1)), words))
+    if criterion.at_most is not None:
+        most = criterion.at_most
+        checks.append((Fraction(count <= most), f"Expected at most {most} samples of {name}, but there are {count}"))
+    if criterion.timed:
+        timed = Fraction(sum(datum.simtime is not None for datum in samples), max(count, 1))
+        checks.append(
+            (timed, f'Expected every sample of {name} to have its time ("{name}: 42 1.5"), but some have none')
+        )
+    if criterion.between is not None:
+        least, greatest = criterion.between
+        strays = [value for value in values if not least <= value <= greatest]
+        stray = f"{strays[0]:g}" if strays else ""
+        words = f"Expected {name} to stay between {least:g} and {greatest:g}, but it was {stray} once"
+        checks.append((Fraction(count - len(strays), max(count, 1)), words))
+    if criterion.covers is not None and values:
+        low, high = criterion.covers
+        words = f"Expected {name} to go from {low:g} to {high:g}, but it went from {min(values):g} to {max(values):g}"
+        checks.append((Fraction(min(values) <= low and max(values) >= high), words))
+    if criterion.dips_below is not None:
+        others = [datum.value for datum in recording.datalog if datum.name == criterion.dips_below]
+        deeper = bool(others) and bool(values) and min(values) < min(others)
+        words = f"Expected the lowest {name} to be below the lowest {criterion.dips_below}, but it is not"
+        checks.append((Fraction(deeper), words))
+    return checks
+
+
+def _check_plateaus(criterion: Datalog, values: Sequence[float]) -> Check:
+    found, count = _count_ordered_plateaus(criterion, values), len(criterion.plateaus)
+    series = ", ".join(f"{value:g}" for value in criterion.plateaus)
+    before = f"after {criterion.plateaus[found - 1]:g} " if found else ""
+    missing = criterion.plateaus[min(found, count - 1)]
+    words = f"Expected {criterion.series} to stay at {series} in this order, but {before}it never stayed at {missing:g}"
+    return Fraction(found, count), words
+
+
+def _count_ordered_plateaus(criterion: Datalog, values: Sequence[float]) -> int:
+    """Return how many of the plateaus come in order."""
+    place = 0
+    for found, wanted in enumerate(criterion.plateaus):
+        run = 0
+        while place < len(values) and run < criterion.plateau_samples:
+            run = run + 1 if abs(values[place] - wanted) <= criterion.tolerance + 1e-9 else 0
+            place += 1
+        if run < criterion.plateau_samples:
+            return found
+    return len(criterion.plateaus)
+
+
+def _is_start_image(entry: tuple[str, str, int], recording: Recording, noise: float) -> bool:
+    """Return whether a logged image is the floor's crop at the start pose, within the noise of the light sensors."""
+    floor = rebuild_floor(recording)
+    if floor is None:
+        pose = get_pose_after(recording, entry[2])
+        return math.dist((pose.x, pose.y), (recording.start.x, recording.start.y)) < 1
+    side, csv, _ = entry
+    which: Side = "left" if side == "left" else "right"
+    sensor = find_light_sensor(recording, which)
+    expected = _crop_floor(floor, locate_footprint(recording, which, recording.start), sensor.diameter)
+    found = _parse_pixels(csv, sensor.diameter)
+    if found is None:
+        return False
+    mask = build_sensor_mask(sensor.diameter)
+    return bool((np.abs(found[mask] - expected[mask]) <= noise).all())
+
+
+def _crop_floor(floor: Floor, where: Footprint, side: int) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+    """Return the RGB under a sensor of that many pixels, shape (side, side, 3), black off the floor."""
+    crop = np.zeros((side, side, 3), np.int64)
+    top, left = max(where.row, 0), max(where.column, 0)
+    bottom, right = min(where.row + side, HEIGHT), min(where.column + side, WIDTH)
+    if top < bottom and left < right:
+        place = (slice(top - where.row, bottom - where.row), slice(left - where.column, right - where.column))
+        crop[place] = floor.pixels[top:bottom, left:right]
+    return crop
+
+
+def _parse_pixels(csv: str, side: int) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]] | None:
+    numbers = np.array([int(number) for number in csv.split(",") if number.isdecimal()], np.int64)
+    return numbers.reshape(side, side, 4)[:, :, :3] if numbers.size == side * side * 4 else None
+
+
+def _is_uniform(csv: str) -> bool:
+    side = math.isqrt((csv.count(",") + 1) // 4)
+    pixels = _parse_pixels(csv, side)
+    return pixels is not None and bool((np.ptp(pixels[build_sensor_mask(side)], axis=0) == 0).all())
+
+
+def _has_content(entry: tuple[str, str, int], recording: Recording) -> bool:
+    """Return whether there was floor under the sensor and, on floors with label patches, a patch fills the image."""
+    side, csv, tick = entry
+    pose = get_pose_after(recording, tick)
+    if measure_floor_share(recording, "left" if side == "left" else "right", pose) < 1:
+        return False
+    if side == "left" or recording.background not in GREYS or not recording.label_patches:
+        return True
+    pixels = bytes(map(int, csv.split(",")))
+    image = Image(0.0, tick, pose, b"", pixels, -1, side=math.isqrt(len(pixels) // 4))
+    return decode_label(image, GREYS[recording.background]) is not None
+
+
+def _describe_position(recording: Recording, tick: int) -> str:
+    pose = get_pose_after(recording, tick)
+    return f"one was taken at ({pose.x:.1f}, {pose.y:.1f})"
+
+
+#: The duration of a sensor reading, in seconds. A sample printed sooner after another repeats it.
+_READING_SECONDS = 0.01
+
+
+def _drop_repeats(samples: Sequence[DatalogEntry]) -> list[DatalogEntry]:
+    """Return the samples without those printed sooner than a reading takes."""
+    found: list[DatalogEntry] = []
+    for datum in samples:
+        if not (found and datum.t < found[-1].t + _READING_SECONDS - 1e-9):
+            found.append(datum)
+    return found

@@ -1,0 +1,318 @@
+"""Queries for a student's own work: open assignments, submissions, and visible marks.
+
+``reports.view`` decides which marks are visible; the pages render them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+from decimal import Decimal
+
+from sqlalchemy import ColumnElement, Select, and_, func, literal, or_, select, tuple_
+from sqlalchemy.orm import Session, aliased
+
+from service.grading.grade import Grade
+from service.reports.view import build_student_view
+from service.store.codec import decode
+from service.store.courses import open_assignments, policies
+from service.store.courses.policies import ExceededLimit, OverLimit, PolicyLimits
+from service.store.engine import now
+from service.store.grades import appeals, current_grades, results
+from service.store.grades.appeals import AppealLine
+from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
+from service.store.states import UNFINISHED, BatchState, CancelReason, JobState, PlotState, Standing
+
+#: Per student and assignment; only the newest submissions are shown.
+MOST_SHOWN = 50
+
+
+@dataclass(frozen=True, slots=True)
+class OwnSubmission:
+    """A submission of a student, with the marks visible to them; None without visible marks."""
+
+    id: int
+    job_id: str
+    assignment: str
+    title: str
+    attempt: int
+    source: str
+    submitted_at: datetime
+    days_late: int
+    staff_only: str  # the limit that it exceeds, as a sentence for staff
+    over: OverLimit | None
+    same_as: int | None  # the student's first attempt with the same files, which counts as the same attempt
+    state: JobState
+    held_back: bool  # its batch is paused or cancelled
+    suspect: bool
+    superseded: bool
+    published: bool  # the whole grade is released
+    plots: PlotState
+    shown: bool  # its student may see its grade
+    counts: bool  # its marks count for its assignment
+    released: frozenset[str] = frozenset()  # the visibilities that its student sees
+    marks: Decimal | None = None
+    max_marks: Decimal | None = None
+
+    @property
+    def waits(self) -> bool:
+        """Return whether the job is still queued or running."""
+        return self.state in UNFINISHED
+
+
+@dataclass(frozen=True, slots=True)
+class Allowance:
+    """A student's remaining attempts and time for an assignment."""
+
+    limits: PolicyLimits
+    attempts_made: int
+    left: timedelta | None  # until the student's due date; negative after it, None without one
+    late_left: timedelta | None  # until late submissions stop counting
+
+    @property
+    def attempts_left(self) -> int | None:
+        """Number of remaining attempts; None without a limit."""
+        return None if self.limits.attempts is None else max(0, self.limits.attempts - self.attempts_made)
+
+    @property
+    def days_left(self) -> int:
+        """Days until the due date, rounded up."""
+        return 0 if self.left is None else max(0, math.ceil(self.left / timedelta(days=1)))
+
+    @property
+    def hours_left(self) -> int | None:
+        """Whole hours until the due date; None without one, or after it."""
+        return None if self.left is None or self.left < timedelta(0) else self.left // timedelta(hours=1)
+
+    @property
+    def date_over(self) -> bool:
+        """Return whether a submission would be too late to count."""
+        return self.late_left is not None and self.late_left < timedelta(0)
+
+    @property
+    def used_up(self) -> bool:
+        """Return whether no new submission can count."""
+        return self.attempts_left == 0 or self.date_over
+
+    def hours_late(self, found: OwnSubmission) -> int | None:
+        """Return the whole hours that a submission is late.
+
+        None if it is on time or a day or more late, or if its due date has moved since.
+        """
+        if found.days_late != 1 or self.limits.due_at is None or found.submitted_at <= self.limits.due_at:
+            return None
+        late = found.submitted_at - self.limits.due_at
+        return late // timedelta(hours=1) if late < timedelta(days=1) else None
+
+
+@dataclass(frozen=True, slots=True)
+class OwnAssignment:
+    """An assignment, as its student sees it in a list."""
+
+    assignment: str
+    title: str
+    open: bool
+    allowance: Allowance
+    newest: OwnSubmission | None
+    counting: OwnSubmission | None  # the newest that is graded and within the limits
+    appeal: AppealLine | None  # the newest
+
+
+@dataclass(frozen=True, slots=True)
+class OwnAttempts:
+    """A student's submissions to an assignment, newest first, and the one whose marks count."""
+
+    newest: list[OwnSubmission]
+    counting: OwnSubmission | None
+
+
+def load_own_assignments(session: Session, course_id: int, enrolment_id: int) -> list[OwnAssignment]:
+    """Return the assignments that are open to a student or that they submitted to: open ones first, by due date."""
+    found = _load_submissions(
+        session, _select_submissions(enrolment_id).where(or_(_is_counting(enrolment_id), _is_newest(enrolment_id)))
+    )
+    newest = {each.assignment: each for each in sorted(found, key=lambda each: each.attempt)}
+    counting = {each.assignment: each for each in found if each.counts}
+    asked = appeals.load_newest_appeals(session, enrolment_id)
+    prepared = open_assignments.list_assignments(session, course_id)
+    titles = {each.assignment: each.title for each in prepared if each.open}
+    is_open = frozenset(titles)
+    titles = {name: each.title for name, each in newest.items()} | titles
+    allowed = compute_allowances(session, enrolment_id, titles)
+    lines = [
+        OwnAssignment(
+            name, title, name in is_open, allowed[name], newest.get(name), counting.get(name), asked.get(name)
+        )
+        for name, title in titles.items()
+    ]
+    return sorted(lines, key=_compute_urgency)
+
+
+def load_own_attempts(session: Session, enrolment_id: int, assignment: str) -> OwnAttempts:
+    """Return a student's submissions to an assignment."""
+    # The column's type makes any text storable; a bare literal would not.
+    return _build_attempts(
+        _load_submissions(session, _select_attempts(enrolment_id, literal(assignment, SubmissionRow.assignment.type)))
+    )
+
+
+def find_submission_with_attempts(
+    session: Session, enrolment_id: int, submission_id: int
+) -> tuple[OwnSubmission, OwnAttempts] | None:
+    """Return a student's submission and all their submissions to its assignment; None if they do not have it."""
+    row = aliased(SubmissionRow)
+    own = (row.id == submission_id, row.enrolment_id == enrolment_id)
+    assignment = select(row.assignment).where(*own).scalar_subquery()
+    found = _load_submissions(session, _select_attempts(enrolment_id, assignment, SubmissionRow.id == submission_id))
+    this = next((each for each in found if each.id == submission_id), None)
+    return None if this is None else (this, _build_attempts(found))
+
+
+def load_submissions_before(
+    session: Session, enrolment_id: int, submission_id: int | None, limit: int
+) -> list[OwnSubmission]:
+    """Return at most ``limit`` submissions of a student to all assignments, newest first, before this one."""
+    query = _select_submissions(enrolment_id)
+    if submission_id is not None:
+        query = query.where(SubmissionRow.id < submission_id)
+    return _load_submissions(session, query.order_by(SubmissionRow.id.desc()).limit(limit))
+
+
+def find_own_submission(session: Session, enrolment_id: int, submission_id: int) -> OwnSubmission | None:
+    """Return a student's submission; None if they do not have it."""
+    found = _load_submissions(session, _select_submissions(enrolment_id).where(SubmissionRow.id == submission_id))
+    return found[0] if found else None
+
+
+def compute_allowance(session: Session, enrolment_id: int, assignment: str) -> Allowance:
+    """Return the remaining attempts and time of a student, including extensions."""
+    return compute_allowances(session, enrolment_id, [assignment])[assignment]
+
+
+def compute_allowances(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, Allowance]:
+    """Return ``allowance`` for several assignments, with the same number of statements."""
+    limits, at = policies.load_limits_by_assignment(session, enrolment_id, assignments), now(session)
+    made = policies.count_attempts(session, enrolment_id, assignments)
+    return {
+        each: Allowance(
+            limits[each],
+            made[each],
+            None if (due_at := limits[each].due_at) is None else due_at - at,
+            None if (closed_at := limits[each].closed_at) is None else closed_at - at,
+        )
+        for each in assignments
+    }
+
+
+_SubmissionSelect = Select[SubmissionRow, Job, str, BatchState | None, int | None, bool, bool]
+
+
+def _select_attempts(
+    enrolment_id: int, assignment: ColumnElement[str], *also: ColumnElement[bool]
+) -> _SubmissionSelect:
+    """Return a query for the newest submissions to an assignment, the one that counts, and those matching ``also``."""
+    row = aliased(SubmissionRow)
+    newest = select(row.id).where(row.enrolment_id == enrolment_id, row.assignment == assignment)
+    some = or_(
+        SubmissionRow.id.in_(newest.order_by(row.attempt.desc()).limit(MOST_SHOWN)), _is_counting(enrolment_id), *also
+    )
+    query = _select_submissions(enrolment_id).where(SubmissionRow.assignment == assignment, some)
+    return query.order_by(SubmissionRow.attempt.desc())
+
+
+def _build_attempts(found: list[OwnSubmission]) -> OwnAttempts:
+    return OwnAttempts(found[:MOST_SHOWN], next((each for each in found if each.counts), None))
+
+
+def _is_counting(enrolment_id: int) -> ColumnElement[bool]:
+    """Return the condition that the marks of a student's ``SubmissionRow`` count."""
+    return SubmissionRow.id.in_(current_grades.select_counted_submissions(SubmissionRow.enrolment_id == enrolment_id))
+
+
+def _is_newest(enrolment_id: int) -> ColumnElement[bool]:
+    """Return the condition that a student's ``SubmissionRow`` is the newest to its assignment."""
+    row = aliased(SubmissionRow)
+    newest = (
+        select(row.assignment, func.max(row.attempt))
+        .join(Job, Job.submission_id == row.id)
+        .where(row.enrolment_id == enrolment_id, Job.standing == Standing.STANDS)
+        .group_by(row.assignment)
+    )
+    return tuple_(SubmissionRow.assignment, SubmissionRow.attempt).in_(newest)
+
+
+def _select_submissions(enrolment_id: int) -> _SubmissionSelect:
+    earlier = aliased(SubmissionRow)
+    same_as = (
+        select(func.min(earlier.attempt))
+        .where(
+            earlier.enrolment_id == SubmissionRow.enrolment_id,
+            earlier.assignment == SubmissionRow.assignment,
+            earlier.sha256 == SubmissionRow.sha256,
+            earlier.attempt < SubmissionRow.attempt,
+        )
+        .scalar_subquery()
+    )
+    return (
+        select(
+            SubmissionRow,
+            Job,
+            AssignmentVersion.title,
+            Batch.state,
+            same_as,
+            and_(*current_grades.CAN_COUNT),
+            _is_counting(enrolment_id),
+        )
+        .join(Job, Job.submission_id == SubmissionRow.id)
+        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+        .outerjoin(Batch, Job.batch_id == Batch.id)
+        .where(SubmissionRow.enrolment_id == enrolment_id, Job.standing == Standing.STANDS)
+    )
+
+
+def _load_submissions(session: Session, query: _SubmissionSelect) -> list[OwnSubmission]:
+    found = [_build_submission(*row) for row in session.execute(query)]
+    shown = [each.job_id for each in found if each.shown]
+    marked, released = results.load_marks(session, shown), policies.load_visibilities_by_job(session, shown)
+    return [
+        _add_marks(each, marked[each.job_id], released[each.job_id]) if each.job_id in marked else each
+        for each in found
+    ]
+
+
+def _add_marks(found: OwnSubmission, grade: Grade, released: frozenset[str]) -> OwnSubmission:
+    seen = build_student_view(grade, released).grade
+    return replace(found, marks=seen.marks, max_marks=seen.max_marks, released=released)
+
+
+def _build_submission(
+    row: SubmissionRow, job: Job, title: str, batch: BatchState | None, same_as: int | None, shown: bool, counts: bool
+) -> OwnSubmission:
+    return OwnSubmission(
+        id=row.id,
+        job_id=job.id,
+        assignment=row.assignment,
+        title=title,
+        attempt=row.attempt,
+        source=row.source,
+        submitted_at=row.submitted_at or row.created_at,
+        days_late=row.days_late,
+        staff_only=row.staff_only or "",
+        over=None if row.exceeded is None else decode(ExceededLimit, row.exceeded).limit,
+        same_as=same_as,
+        state=job.state,
+        held_back=batch not in (None, BatchState.OPEN),
+        suspect=job.suspect is not None,
+        superseded=job.cancelled_for is CancelReason.SUPERSEDED,
+        published=job.published_at is not None,
+        plots=job.plots,
+        shown=shown,
+        counts=counts,
+    )
+
+
+def _compute_urgency(line: OwnAssignment) -> tuple[bool, bool, float, str]:
+    due_at = line.allowance.limits.due_at
+    return not line.open, line.allowance.date_over, math.inf if due_at is None else due_at.timestamp(), line.title

@@ -1,0 +1,187 @@
+"""Outgoing HTTP requests that cannot reach addresses which only this machine or its network can reach.
+
+The caller names additional permitted networks. A name is resolved once, all its addresses are checked, and only a
+checked address is connected to.
+"""
+
+from __future__ import annotations
+
+import http.client
+import socket
+import ssl
+from collections.abc import Mapping, Sequence
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from ipaddress import IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
+from threading import Timer
+from urllib.parse import urlsplit
+
+from sim.errors import RobomarkError
+
+#: Time limit for the whole request, from the connection to the end of the body.
+TIMEOUT_SECONDS = 10.0
+_MOST_ADDRESSES = 20
+Networks = Sequence[IPv4Network | IPv6Network]
+#: No networks besides public addresses.
+NO_NETWORKS: Networks = ()
+#: Networks that Python 3.11 wrongly considers global, or that lead to an unchecked address.
+_NON_PUBLIC_NETWORKS: Networks = tuple(
+    map(
+        ip_network,
+        (
+            "192.0.0.0/24",  # protocol assignments
+            "192.88.99.0/24",  # 6to4 relays, deprecated
+            "::/96",  # IPv4-compatible addresses, deprecated
+            "64:ff9b::/96",  # translated to IPv4
+            "64:ff9b:1::/48",  # translated to IPv4 within one network
+            "100::/64",  # discarded
+            "2001::/23",  # protocol assignments
+            "2001:db8::/32",  # documentation
+            "3fff::/20",  # documentation
+            "5f00::/16",  # segment routing
+            "fec0::/10",  # site-local addresses, deprecated in favour of fc00::/7
+        ),
+    )
+)
+ALL_NETWORKS: Networks = (ip_network("0.0.0.0/0"), ip_network("::/0"))
+
+
+class RequestFailure(RobomarkError):
+    """An address that may not be requested, or did not respond."""
+
+
+@dataclass(frozen=True, slots=True)
+class HttpResponse:
+    """The response, with its body up to the limit plus one byte if it is longer."""
+
+    status: int
+    headers: Mapping[str, str]  # by lower-case name
+    body: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class _ParsedUrl:
+    scheme: str
+    host: str
+    port: int
+    path: str
+
+
+def send_request(
+    url: str, *, method: str, body: bytes | None, headers: Mapping[str, str], others: Networks, most_bytes: int = 0
+) -> HttpResponse:
+    """Send a request and return the response, without following redirections.
+
+    ``others`` are permitted networks in addition to public addresses. Raises NotReached.
+    """
+    target = _parse_url(url)
+    addresses = _resolve_addresses(target, others)
+    try:
+        sock = _open_socket(target, addresses)
+        # Each read has its own time limit; this one stops a server that sends single bytes.
+        ending = Timer(TIMEOUT_SECONDS, _shut_down_socket, [sock])
+        ending.daemon = True
+        ending.start()
+        with (
+            closing(sock),
+            closing(http.client.HTTPConnection(target.host, target.port, timeout=TIMEOUT_SECONDS)) as connection,
+        ):
+            try:
+                answer = _send_on_socket(connection, sock, target, method, body, headers, most_bytes)
+            finally:
+                # If the timer has fired, the response is incomplete.
+                late = ending.finished.is_set()
+                ending.cancel()
+    except (OSError, http.client.HTTPException, ValueError) as error:
+        raise RequestFailure(f"{target.host} did not answer: {type(error).__name__}") from None
+    if late:
+        raise RequestFailure(f"{target.host} did not answer within {TIMEOUT_SECONDS:g} seconds")
+    return answer
+
+
+def _send_on_socket(
+    connection: http.client.HTTPConnection,
+    sock: socket.socket,
+    target: _ParsedUrl,
+    method: str,
+    body: bytes | None,
+    headers: Mapping[str, str],
+    most_bytes: int,
+) -> HttpResponse:
+    if isinstance(sock, ssl.SSLSocket):
+        sock.do_handshake()
+    connection.sock = sock
+    host = f"[{target.host}]" if ":" in target.host else target.host
+    usual = {"https": 443, "http": 80}[target.scheme]
+    named = host if target.port == usual else f"{host}:{target.port}"
+    connection.request(method, target.path, body, {"Host": named, "Connection": "close", **headers})
+    answer = connection.getresponse()
+    told = {name.lower(): value for name, value in answer.getheaders()}
+    return HttpResponse(answer.status, told, answer.read(most_bytes + 1) if most_bytes else b"")
+
+
+def _parse_url(url: str) -> _ParsedUrl:
+    try:
+        parts = urlsplit(url)
+        port = parts.port or (443 if parts.scheme == "https" else 80)
+    except ValueError:
+        raise RequestFailure("the address is not valid") from None
+    if parts.scheme not in ("http", "https") or not parts.hostname:
+        raise RequestFailure("the address is neither http nor https")
+    path = f"{parts.path or '/'}?{parts.query}" if parts.query else parts.path or "/"
+    return _ParsedUrl(parts.scheme, parts.hostname, port, path)
+
+
+def _resolve_addresses(target: _ParsedUrl, others: Networks) -> list[str]:
+    """Return the addresses to connect to.
+
+    Raises NotReached if the name is unknown, or any address is neither public nor in ``others``. The message is the
+    same for both, because it would otherwise reveal internal names.
+    """
+    try:
+        found = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_STREAM)[:_MOST_ADDRESSES]
+    except (OSError, UnicodeError):
+        found = []
+    addresses = [str(each[4][0]) for each in found]
+    if not addresses or not all(is_public(each) or _is_in_networks(each, others) for each in addresses):
+        raise RequestFailure(f"{target.host} is not the name of a public address")
+    return addresses
+
+
+def _open_socket(target: _ParsedUrl, addresses: Sequence[str]) -> socket.socket:
+    """Connect to the first reachable address, before any TLS handshake. Raises OSError."""
+    for place, address in enumerate(addresses, start=1):
+        try:
+            plain = socket.create_connection((address, target.port), timeout=TIMEOUT_SECONDS / len(addresses))
+            break
+        except OSError:
+            if place == len(addresses):
+                raise
+    plain.settimeout(TIMEOUT_SECONDS)
+    if target.scheme == "http":
+        return plain
+    context = ssl.create_default_context()
+    return context.wrap_socket(plain, server_hostname=target.host, do_handshake_on_connect=False)
+
+
+def _is_in_networks(address: str, networks: Networks) -> bool:
+    found = ip_address(address.partition("%")[0])
+    return any(found in network for network in networks)
+
+
+def is_public(address: str) -> bool:
+    """Return whether an address is public and does not embed one that is not."""
+    found = ip_address(address.partition("%")[0])
+    if isinstance(found, IPv6Address):
+        # An address that embeds an IPv4 address is as public as that one; translators accept unchecked addresses.
+        carried = found.ipv4_mapped or found.sixtofour or (found.teredo and found.teredo[1])
+        if carried:
+            return is_public(str(carried))
+    if any(found in network for network in _NON_PUBLIC_NETWORKS):
+        return False
+    return found.is_global and not (found.is_multicast or found.is_reserved)
+
+
+def _shut_down_socket(sock: socket.socket) -> None:
+    with suppress(OSError):
+        sock.shutdown(socket.SHUT_RDWR)

@@ -1,0 +1,67 @@
+"""Drawing of the diagrams in a notebook, beside diagrams of the recorded events.
+
+``own_diagrams.py`` finds the diagrams and their differences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from matplotlib.figure import Figure
+
+from service.grading.grade import Grade
+from service.reports.display_text import to_one_line
+from service.reports.plots.block_drawing import draw_blocks
+from service.reports.plots.diagram_differences import Differences, identify_actor_party
+from service.reports.plots.diagram_parts import Highlights
+from service.reports.plots.message_counts import (
+    build_block_diagram,
+    build_sequence_diagram,
+    count_messages,
+    identify_party,
+)
+from service.reports.plots.own_diagrams import OwnDiagram
+from service.reports.plots.plot import Plot
+from service.reports.plots.sequence import build_conversation
+from service.reports.plots.sequence_drawing import draw_sequence
+from service.reports.plots.style import FAULT
+from submissions.diagram import Diagram, DiagramActor
+
+_HAPPENED = "#8a5a00"
+#: Limits of a conversation beside a diagram of it.
+_MOST_EXCHANGES, _MOST_STEPS = 2, 24
+
+
+def draw_own_diagram(own: OwnDiagram, grade: Grade, plot: Plot) -> Figure:
+    """Draw one of the two plots of ``own``."""
+    found = own.differences or Differences()
+    if plot.kind == "own":
+        highlights = Highlights(
+            frozenset(found.drawn_actors), frozenset(found.drawn_arrows), FAULT, "✗", "drawn, did not happen"
+        )
+        return draw_diagram(own.cell.diagram, plot.title, "as the notebook draws it", highlights)
+    trial = grade.trials[plot.subject]
+    subtitle = f"{to_one_line(trial.scenario, 40)}, trial {trial.index + 1}, as it was observed"
+    actors, arrows = found.happened_actors, found.happened_arrows
+    if own.cell.diagram.kind == "blockdiag":
+        happened = build_block_diagram(count_messages(trial.recording))
+    else:
+        happened = build_sequence_diagram(build_conversation(trial.recording, _MOST_EXCHANGES, _MOST_STEPS))
+        happened = replace(happened, actors=_sort_parties(happened.actors, own.cell.diagram.actors))
+        actors = tuple(map(identify_party, actors))
+        arrows = tuple((identify_party(one), identify_party(other)) for one, other in arrows)
+    highlights = Highlights(frozenset(actors), frozenset(arrows), _HAPPENED, "+", "happened, is not drawn")
+    return draw_diagram(happened, plot.title, subtitle, highlights)
+
+
+def draw_diagram(diagram: Diagram, title: str, subtitle: str, highlights: Highlights) -> Figure:
+    """Draw a diagram of either kind."""
+    draw = draw_blocks if diagram.kind == "blockdiag" else draw_sequence
+    return draw(diagram, title, subtitle, highlights)
+
+
+def _sort_parties(parties: Sequence[DiagramActor], drawn: Sequence[DiagramActor]) -> tuple[DiagramActor, ...]:
+    """Return the parties in the order in which they are drawn, followed by those that are not."""
+    order = [identify_actor_party(actor) for actor in drawn]
+    return tuple(sorted(parties, key=lambda party: order.index(party.name) if party.name in order else len(order)))

@@ -1,0 +1,208 @@
+"""The plots of a classifier's evaluation: confusion matrix, misread images, and robustness curves.
+
+``models/evaluation.py`` measures the values. Tables and curves are drawn by the same code as for grades.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from models.cards import CardCurve, Tally
+from models.evaluation import ClassifiedImage, Evaluation
+from models.preprocessing import Grey
+from service.reports.plots.confusion import ConfusionTable, draw_confusion_table
+from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
+from service.reports.plots.style import (
+    FAINT,
+    FAULT,
+    HEAD,
+    INK,
+    RULE,
+    SAID,
+    WIDTH,
+    add_axes,
+    create_figure,
+    load_font,
+    render_png,
+    replace_missing_glyphs,
+    write_text,
+)
+
+MOST_MISREAD = 10
+_SIDE, _GAP, _ROW = 0.74, 0.12, 0.92
+_TEXT = 3 * (_SIDE + _GAP) + 0.04
+_LINE = 16  # characters per line beside the images
+
+
+def render_evaluation_plots(evaluation: Evaluation) -> dict[str, bytes]:
+    """Return PNG files by name: ``NAME-confusion.png``, ``NAME-misread.png`` and ``NAME-robustness.png``."""
+    name = evaluation.card.name
+    return {
+        f"{name}-confusion.png": render_png(draw_evaluation_confusion(evaluation)),
+        f"{name}-misread.png": render_png(draw_evaluation_misread(evaluation)),
+        f"{name}-robustness.png": render_png(draw_robustness(evaluation)),
+    }
+
+
+def draw_evaluation_confusion(evaluation: Evaluation) -> Figure:
+    """Draw the confusion matrix."""
+    measured, classes = evaluation.measured, evaluation.card.classes
+    table = ConfusionTable(classes, classes, measured.confusion, tuple(sum(row) for row in measured.confusion))
+    return draw_confusion_table(table, f"{evaluation.card.name}: confusion matrix", describe_tally(measured.accuracy))
+
+
+def describe_tally(tally: Tally) -> str:
+    """Return a tally as ``accuracy 0.966, 95 % interval 0.955 to 0.975, n = 1320 images``."""
+    low, high = tally.interval
+    return f"accuracy {tally.share:.3f}, 95 % interval {low:.3f} to {high:.3f}, n = {tally.n} images"
+
+
+def draw_robustness(evaluation: Evaluation) -> Figure:
+    """Draw one panel for each varied condition."""
+    panels: dict[str, list[CardCurve]] = {}
+    for curve in evaluation.measured.curves:
+        panels.setdefault(curve.varied, []).append(curve)
+    return draw_curves(
+        [
+            AccuracyPanel(varied, curves[0].unit, tuple(_build_curve(curve) for curve in curves))
+            for varied, curves in panels.items()
+        ],
+        f"{evaluation.card.name}: robustness",
+        "accuracy for images of the left sensor under harder conditions",
+    )
+
+
+def render_comparison_plot(names: Sequence[str], found: Sequence[Sequence[CardCurve]]) -> bytes:
+    """Return a PNG with one panel per condition, and in it one curve for each classifier in ``names``."""
+    figure = draw_curves(
+        [
+            AccuracyPanel(
+                f"{curves[0].varied}, {curves[0].under}",
+                curves[0].unit,
+                tuple(_build_curve(curve, name) for name, curve in zip(names, curves, strict=True)),
+            )
+            for curves in found
+        ],
+        f"{', '.join(names[:-1])} and {names[-1]}: robustness",
+        "same places and same noise for each model",
+    )
+    return render_png(figure)
+
+
+def _build_curve(counted: CardCurve, label: str | None = None) -> Curve:
+    intervals = [tally.interval for tally in counted.tallies]
+    counts = {tally.n for tally in counted.tallies}
+    words = label or counted.under
+    return Curve(
+        label=f"{words}, n = {counts.pop()}" if len(counts) == 1 else words,
+        x=counted.values,
+        share=tuple(tally.share for tally in counted.tallies),
+        low=tuple(low for low, _ in intervals),
+        high=tuple(high for _, high in intervals),
+        n=tuple(tally.n for tally in counted.tallies),
+    )
+
+
+def draw_evaluation_misread(evaluation: Evaluation) -> Figure:
+    """Draw at most ``MOST_MISREAD`` misread images, each beside its nearest correctly read neighbours.
+
+    One neighbour is of the true class, one of the answered class. Distance is the mean square of the differences of
+    greys.
+    """
+    misread = [each for each in evaluation.answered if not each.right]
+    chosen = _rank_mistakes(misread)[:MOST_MISREAD]
+    count, total = len(misread), len(evaluation.answered)
+    shown = f"{len(chosen)} of {count}" if len(chosen) < count else f"all {count}" if count else "none"
+    title = f"{evaluation.card.name}: misread images"
+    if not chosen:
+        figure = create_figure(HEAD + 0.3, title, f"none of n = {total} images was misread")
+        write_text(figure, 0.08, 0.1, "No misread images.", size=9)
+        return figure
+    heads = 0.40
+    height = heads + _ROW * len(chosen)
+    figure = create_figure(HEAD + height + 0.06, title, f"{shown} misread, of n = {total} images; 14 × 14 grey pixels")
+    axes = add_axes(figure, 0.08, 0.06, WIDTH - 0.16, height)
+    axes.set_axis_off()
+    axes.set_xlim(-0.05, WIDTH - 0.21)
+    axes.set_ylim(height, 0)
+    for column, words in enumerate(("misread", "nearest correct\nof that class", "nearest correct\nof that answer")):
+        _draw_text(axes, column * (_SIDE + _GAP), heads - 0.20, words, FAINT, 7.4, va="center")
+    right = [each for each in evaluation.answered if each.right]
+    for row, each in enumerate(chosen):
+        _draw_row(axes, evaluation.card.classes, each, right, heads + row * _ROW)
+    return figure
+
+
+def _rank_mistakes(misread: Sequence[ClassifiedImage]) -> list[ClassifiedImage]:
+    """Return the images so that each kind of mistake comes once before any repeats, without duplicates."""
+    seen: set[bytes] = set()
+    kinds: dict[tuple[int, int], int] = {}
+    ranked = []
+    for number, each in enumerate(misread):
+        image = each.grey.tobytes()
+        if image in seen:
+            continue
+        seen.add(image)
+        kind = (each.place.label, each.answer)
+        kinds[kind] = kinds.get(kind, 0) + 1
+        ranked.append((kinds[kind], number, each))
+    return [each for _, _, each in sorted(ranked, key=lambda entry: entry[:2])]
+
+
+def _draw_row(
+    axes: Axes, classes: tuple[str, ...], each: ClassifiedImage, right: Sequence[ClassifiedImage], y: float
+) -> None:
+    shown, read = each.place.label, each.answer
+    for column, (image, colour) in enumerate(
+        ((each, FAULT), (_find_nearest(each, right, shown), SAID), (_find_nearest(each, right, read), SAID))
+    ):
+        if image is not None:
+            _draw_grey(axes, image.grey, column * (_SIDE + _GAP), y, colour, dashed=column > 0)
+    lines = [
+        (f"shows {classes[shown]}", INK, True),
+        (f"✗ read as {classes[read]}", FAULT, True),
+        (_describe_place(each), FAINT, False),
+    ]
+    above = 0
+    for text, colour, bold in lines:
+        broken = textwrap.wrap(text, _LINE)
+        _draw_text(axes, _TEXT, y + 0.02 + 0.14 * above, "\n".join(broken), colour, 8, bold=bold)
+        above += len(broken)
+
+
+def _describe_place(each: ClassifiedImage) -> str:
+    place = each.place
+    sheet = f", sheet {place.sheet}" if place.sheet else ""
+    noise = f", noise {each.noise:g}" if each.noise else ""
+    return f"x {place.pose.x:g}, y {place.pose.y:g} mm{sheet}{noise}"
+
+
+def _find_nearest(to: ClassifiedImage, among: Sequence[ClassifiedImage], label: int) -> ClassifiedImage | None:
+    same = [each for each in among if each.place.label == label]
+    if not same:
+        return None
+    greys = np.array([each.grey for each in same], np.float64)
+    return same[int(((greys - to.grey) ** 2).mean(axis=(1, 2)).argmin())]
+
+
+def _draw_grey(axes: Axes, grey: Grey, x: float, y: float, colour: str, *, dashed: bool) -> None:
+    axes.imshow(grey, cmap="gray", vmin=0, vmax=255, extent=(x, x + _SIDE, y + _SIDE, y), interpolation="nearest",
+                aspect="auto")  # fmt: skip
+    axes.add_patch(Rectangle((x, y), _SIDE, _SIDE, facecolor="none", edgecolor=RULE, linewidth=0.8))
+    edge = Rectangle((x - 0.03, y - 0.03), _SIDE + 0.06, _SIDE + 0.06, facecolor="none", edgecolor=colour,
+                     linewidth=1.0 if dashed else 1.8, linestyle=(0, (2.5, 1.5)) if dashed else "-")  # fmt: skip
+    axes.add_patch(edge)
+
+
+def _draw_text(
+    axes: Axes, x: float, y: float, text: str, colour: str, size: float, *, bold: bool = False, va: str = "top"
+) -> None:
+    axes.text(x, y, replace_missing_glyphs(text), color=colour, font=load_font(size, bold=bold), va=va,
+              parse_math=False,
+              linespacing=1.0)  # fmt: skip

@@ -1,0 +1,100 @@
+"""Drawing of misread images, each beside the nearest correctly read ones.
+
+``sensor_images.py`` selects them.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from service.grading.grade import Prediction
+from service.reports.display_text import to_one_line
+from service.reports.plots.sensor_images import MOST_MISREAD, MisreadImage, crop_focus
+from service.reports.plots.style import (
+    FAINT,
+    FAULT,
+    HEAD,
+    INK,
+    RULE,
+    SAID,
+    WIDTH,
+    add_axes,
+    create_figure,
+    load_font,
+    replace_missing_glyphs,
+)
+
+_SIDE, _GAP, _ROW = 0.76, 0.10, 1.24  # inches
+_HEADS = 0.34
+_TEXT = 3 * (_SIDE + _GAP) + 0.08
+
+
+def draw_misread(found: Sequence[MisreadImage], images: int, title: str) -> Figure:
+    """Draw at most ``MOST_MISREAD`` rows: the image, and the nearest correct ones of its truth and of its answer."""
+    shown = found[:MOST_MISREAD]
+    height = _ROW * len(shown)
+    count = f"{len(shown)} of {len(found)}" if len(shown) < len(found) else str(len(found))
+    figure = create_figure(
+        HEAD + _HEADS + height, title, f"{count} misread of n = {images} images; each: the part that a network receives"
+    )
+    axes = add_axes(figure, 0.02, 0.0, WIDTH - 0.04, height + _HEADS)
+    axes.set_axis_off()
+    for column, head in enumerate(("misread", "correct,\nsame truth", "correct,\nsame answer")):
+        _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, -0.5 * _HEADS, head, FAINT, 8, ha="center")
+    for row, item in enumerate(shown):
+        _draw_row(axes, item, row * _ROW)
+    axes.set_xlim(-0.08, WIDTH - 0.12)
+    axes.set_ylim(height, -_HEADS)
+    return figure
+
+
+def _draw_row(axes: Axes, item: MisreadImage, y: float) -> None:
+    _draw_image(axes, item.prediction, 0, y, FAULT, 1.8)
+    for column, other in ((1, item.like_truth), (2, item.like_answer)):
+        if other is None:
+            _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, y + _SIDE / 2, "none", FAINT, 8, ha="center")
+        else:
+            _draw_image(axes, other, column * (_SIDE + _GAP), y, RULE, 0.8)
+    lines = [
+        (f"{item.number}. ✗ wrong", FAULT, True),
+        ("truth:", FAINT, False),
+        (to_one_line(item.prediction.truth, 40), INK, False),
+        ("answered:", FAINT, False),
+        (to_one_line(item.prediction.answer or "", 40), INK, False),
+    ]
+    line = 0
+    for text, colour, bold in lines:
+        for part in textwrap.wrap(text, 16, max_lines=2, placeholder="…") or [""]:
+            _write(axes, _TEXT, y + 0.08 + 0.145 * line, part, colour, 8.2, bold=bold)
+            line += 1
+    for column, other in ((1, item.like_truth), (2, item.like_answer)):
+        if other is not None:
+            name = textwrap.shorten(to_one_line(other.truth, 40), 14, placeholder="…")
+            _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, y + _SIDE + 0.1, name, SAID, 7.2, ha="center")
+
+
+def _draw_image(axes: Axes, prediction: Prediction, x: float, y: float, colour: str, width: float) -> None:
+    pixels = np.repeat(np.asarray(crop_focus(prediction.image))[:, :, None], 3, axis=2)
+    axes.imshow(pixels, extent=(x, x + _SIDE, y + _SIDE, y), interpolation="nearest", aspect="auto")
+    axes.add_patch(Rectangle((x, y), _SIDE, _SIDE, facecolor="none", edgecolor=colour, linewidth=width))
+
+
+def _write(
+    axes: Axes, x: float, y: float, text: str, colour: str, size: float, *, ha: str = "left", bold: bool = False
+) -> None:
+    axes.text(
+        x,
+        y,
+        replace_missing_glyphs(text),
+        color=colour,
+        font=load_font(size, bold=bold),
+        ha=ha,
+        va="center",
+        parse_math=False,
+    )

@@ -1,0 +1,103 @@
+"""Assignment versions: stored once per content, with everything that a worker on another machine needs.
+
+``submissions.assignment.reader`` reads assignments from folders.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zlib
+from dataclasses import dataclass
+from datetime import datetime
+from typing import TYPE_CHECKING, Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.store.codec import decode, encode
+from service.store.conditional_insert import insert_if_new
+from service.store.models import AssignmentVersion
+from sim.errors import UsageError
+from submissions.assignment.folder import list_catalogue_ids
+from submissions.suggestions import suggest_name
+
+if TYPE_CHECKING:
+    from submissions.assignment.definition import Assignment
+
+#: New names of keys in assignments that earlier releases stored.
+_NEW_KEYS = {"picture": "image", "pictures": "images"}
+
+
+@dataclass(frozen=True, slots=True)
+class FrozenAssignment:
+    """An assignment and its stored form. Created before a transaction, so that compressing it delays no lock."""
+
+    assignment: Assignment
+    content: bytes
+    sha256: str
+
+
+def freeze_assignment(assignment: Assignment) -> FrozenAssignment:
+    """Return the stored form of the assignment."""
+    content = assignment_to_bytes(assignment)
+    return FrozenAssignment(assignment, content, hashlib.sha256(zlib.decompress(content)).hexdigest())
+
+
+def store_version(session: Session, frozen: FrozenAssignment, at: datetime) -> int:
+    """Return the id of the row with exactly this content, inserting it if necessary."""
+    of_version = select(AssignmentVersion.id).where(AssignmentVersion.sha256 == frozen.sha256)
+    found = session.scalar(of_version)
+    if found is not None:
+        return found
+    assignment = frozen.assignment
+    insert_if_new(
+        session,
+        AssignmentVersion,
+        assignment=assignment.id,
+        sha256=frozen.sha256,
+        version=assignment.version,
+        title=assignment.title,
+        max_marks=assignment.max_marks,
+        content=frozen.content,
+        created_at=at,
+    )
+    return session.scalars(of_version).one()
+
+
+def check_assignment(session: Session, name: str) -> None:
+    """Raise UsageError, with a similar name, if an assignment is neither in the catalogue nor stored.
+
+    An empty name means all assignments and is accepted.
+    """
+    known = {"", *list_catalogue_ids(), *session.scalars(select(AssignmentVersion.assignment).distinct())}
+    if name not in known:
+        hint = suggest_name(name, known) or "; robomark assignments list shows the catalogue"
+        raise UsageError(f"there is no assignment {name!r}{hint}")
+
+
+def assignment_to_bytes(assignment: Assignment) -> bytes:
+    """Encode an assignment, including images, given files and its secret."""
+    text = json.dumps(encode(assignment), sort_keys=True, separators=(",", ":"))
+    return zlib.compress(text.encode("ascii"), 6)
+
+
+def assignment_from_bytes(content: bytes) -> Assignment:
+    """Decode an assignment. Raises ValueError or TypeError if the bytes are not one."""
+    # Imports all criteria, which callers that only store or name an assignment do not need.
+    from submissions.assignment.definition import Assignment
+
+    try:
+        return decode(Assignment, _rename_old_keys(json.loads(zlib.decompress(content))))
+    except zlib.error as error:
+        raise ValueError(f"not an assignment: {error}") from error
+
+
+def _rename_old_keys(content: dict[str, Any]) -> dict[str, Any]:
+    """Return the stored tables of an assignment with keys renamed to their current names."""
+    kept = {name: _rename_keys(content[name]) for name in ("world", "training") if content.get(name) is not None}
+    return content | kept | {"criteria": [_rename_keys(table) for table in content["criteria"]]}
+
+
+def _rename_keys(table: dict[str, Any]) -> dict[str, Any]:
+    return {_NEW_KEYS.get(key, key): value for key, value in table.items()}

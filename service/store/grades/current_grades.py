@@ -1,0 +1,115 @@
+"""Visibility of grades, and the current attempt of each student and assignment. The only definition of both.
+
+The states "trusted", "for students" and "can count" are each defined as a predicate and as an SQL expression; a test
+compares the two. The current attempt is the newest that can count, regardless of how it was submitted.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from sqlalchemy import ColumnElement, Select, Subquery, and_, case, func, or_, select, tuple_
+from sqlalchemy.orm import aliased
+
+from service.store.models import Job, SubmissionRow
+from service.store.states import JobState, Standing
+
+#: Condition on a job: it is graded, and its worker is not known to grade incorrectly.
+IS_TRUSTED: tuple[ColumnElement[bool], ...] = (Job.state == JobState.DONE, Job.suspect.is_(None))
+#: Condition on a job joined with its submission: students may see the grade when it is standing.
+IS_FOR_STUDENTS: tuple[ColumnElement[bool], ...] = (*IS_TRUSTED, SubmissionRow.staff_only.is_(None))
+#: Condition on a job joined with its submission: its student may see the grade, and it can count.
+CAN_COUNT: tuple[ColumnElement[bool], ...] = (*IS_FOR_STUDENTS, Job.standing == Standing.STANDS)
+
+
+class JobStatus(Protocol):
+    """Fields that decide whether a grade is trusted: a job, or a line read from one."""
+
+    @property
+    def state(self) -> str: ...  # noqa: D102
+    @property
+    def suspect(self) -> str | None: ...  # noqa: D102
+
+
+class AttemptStatus(JobStatus, Protocol):
+    """Fields of ``JobOutcome``, with the limit that the submission exceeds."""
+
+    @property
+    def staff_only(self) -> str | None: ...  # noqa: D102
+
+
+class StandingStatus(AttemptStatus, Protocol):
+    """Fields of ``AttemptStatus``, with the standing of the job."""
+
+    @property
+    def standing(self) -> Standing: ...  # noqa: D102
+
+
+def is_trusted(job: JobStatus) -> bool:
+    """Return whether ``IS_TRUSTED`` applies."""
+    return job.state == JobState.DONE and job.suspect is None
+
+
+def is_for_students(attempt: AttemptStatus) -> bool:
+    """Return whether ``IS_FOR_STUDENTS`` applies."""
+    return is_trusted(attempt) and attempt.staff_only is None
+
+
+def can_count(attempt: StandingStatus) -> bool:
+    """Return whether ``CAN_COUNT`` applies."""
+    return is_for_students(attempt) and attempt.standing is Standing.STANDS
+
+
+def select_counted_submissions(*which: ColumnElement[bool]) -> Select[int]:
+    """Return a query for the ids of the submissions that count, among those selected by ``which``.
+
+    Each condition on ``SubmissionRow`` must select all attempts of a student at an assignment, or none.
+    """
+    ranked = _select_ranked(*which)
+    return select(ranked.c.id).where(ranked.c.place == 1, ranked.c.counts == 1)
+
+
+def select_shown_submissions(*which: ColumnElement[bool]) -> Select[int]:
+    """Return a query like ``counting`` with one submission for every student.
+
+    If none counts, it is the newest within the limits, otherwise the newest.
+    """
+    ranked = _select_ranked(*which)
+    return select(ranked.c.id).where(ranked.c.place == 1)
+
+
+def match_students_of_batches(batch_ids: Select[str]) -> ColumnElement[bool]:
+    """Return the condition that the student of a ``SubmissionRow`` has submitted to its assignment in these batches."""
+    member = aliased(SubmissionRow)
+    pairs = select(member.enrolment_id, member.assignment).where(member.batch_id.in_(batch_ids))
+    return tuple_(SubmissionRow.enrolment_id, SubmissionRow.assignment).in_(pairs)
+
+
+def select_newer_attempt() -> ColumnElement[int | None]:
+    """Return the newest later attempt of the student of a ``SubmissionRow`` that does not count; None without one."""
+    newer, job = aliased(SubmissionRow), aliased(Job)
+    return (
+        select(func.max(newer.attempt))
+        .join(job, and_(job.submission_id == newer.id, job.standing == Standing.STANDS))
+        .where(
+            newer.enrolment_id == SubmissionRow.enrolment_id,
+            newer.assignment == SubmissionRow.assignment,
+            newer.attempt > SubmissionRow.attempt,
+            or_(newer.staff_only.is_not(None), job.state != JobState.DONE),
+        )
+        .correlate(SubmissionRow)
+        .scalar_subquery()
+    )
+
+
+def _select_ranked(*which: ColumnElement[bool]) -> Subquery:
+    counts = case((and_(*CAN_COUNT), 1), else_=0)
+    best_first = (counts.desc(), SubmissionRow.staff_only.is_not(None), SubmissionRow.attempt.desc())
+    pair = (SubmissionRow.enrolment_id, SubmissionRow.assignment)
+    place = func.row_number().over(partition_by=pair, order_by=best_first).label("place")
+    return (
+        select(SubmissionRow.id, counts.label("counts"), place)
+        .join(Job, and_(Job.submission_id == SubmissionRow.id, Job.standing == Standing.STANDS))
+        .where(*which)
+        .subquery()
+    )

@@ -1,0 +1,76 @@
+"""Marks of jobs for statistics, as they count: read from criterion rows, without recordings. Read-only."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from decimal import Decimal
+from typing import Protocol
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.grading.class_statistics import MarkedCriterion, MarkedSubmission, scale_marks
+from service.store.grades import current_grades, overrides
+from service.store.models import CriterionResultRow
+
+#: Number of jobs per query: databases limit the number of parameters.
+_AT_ONCE = 1000
+
+
+class MarkedLine(Protocol):
+    """Fields of a job that are read for statistics."""
+
+    @property
+    def id(self) -> str: ...  # noqa: D102
+    @property
+    def student(self) -> str: ...  # noqa: D102
+    @property
+    def assignment(self) -> str: ...  # noqa: D102
+    @property
+    def state(self) -> str: ...  # noqa: D102
+    @property
+    def verdict(self) -> str | None: ...  # noqa: D102
+    @property
+    def marks(self) -> Decimal | None: ...  # noqa: D102
+    @property
+    def max_marks(self) -> Decimal: ...  # noqa: D102
+    @property
+    def suspect(self) -> str | None: ...  # noqa: D102
+    @property
+    def staff_only(self) -> str | None: ...  # noqa: D102
+
+
+def load_marked_submissions(session: Session, lines: Sequence[MarkedLine]) -> list[MarkedSubmission]:
+    """Return the graded jobs that are neither staff-only nor excused completely."""
+    graded = [line for line in lines if current_grades.is_for_students(line)]
+    criteria: dict[str, list[MarkedCriterion]] = {line.id: [] for line in graded}
+    worths = dict.fromkeys(criteria, Decimal(0))
+    for begin in range(0, len(graded), _AT_ONCE):
+        some = [line.id for line in graded[begin : begin + _AT_ONCE]]
+        by_hand = overrides.load_overrides(session, some)
+        rows = session.execute(
+            select(
+                CriterionResultRow.job_id,
+                CriterionResultRow.criterion,
+                CriterionResultRow.title,
+                CriterionResultRow.marks,
+                CriterionResultRow.max_marks,
+                CriterionResultRow.unjudged,
+            )
+            .where(CriterionResultRow.job_id.in_(some))
+            .order_by(CriterionResultRow.job_id, CriterionResultRow.position)
+        )
+        for job_id, criterion, title, marks, worth, unjudged in rows:
+            override = by_hand.get(job_id, {}).get(criterion)
+            worths[job_id] += worth
+            if override is not None:
+                criteria[job_id].append(MarkedCriterion(criterion, title, *override.compute_marks(worth)))
+            elif unjudged is None:
+                criteria[job_id].append(MarkedCriterion(criterion, title, marks, worth))
+    found = []
+    for line in graded:
+        worth, own = worths[line.id], tuple(criteria[line.id])
+        counted = None if line.marks is None else scale_marks(line.marks, line.max_marks, worth)
+        if counted is not None:
+            found.append(MarkedSubmission(line.student, line.assignment, counted, worth, line.verdict or "", own))
+    return found

@@ -1,0 +1,227 @@
+"""Test runs: student programs that run without being submitted. Limits, claims and results.
+
+They have a separate queue, leave no marks and are deleted after a day. ``service.test_runs`` runs them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any, cast
+
+from sqlalchemy import ColumnElement, CursorResult, and_, delete, func, or_, select, update
+from sqlalchemy.orm import Session
+
+from service.store.engine import Store, now, retry_conflicts
+from service.store.models import AssignmentVersion, Enrolment
+from service.store.revision import needs_newer_code
+from service.store.states import RunState
+from service.store.web_tables import Tryout
+from sim.errors import UsageError
+
+#: Test runs of one student within an hour.
+MOST_AN_HOUR = 30
+#: The first death of a worker is retried; a second one is attributed to the program.
+MOST_ATTEMPTS = 2
+_RETENTION = timedelta(days=1)
+_SILENT_WORKER = "The worker stopped responding twice. An operator can find details in the log of the worker."
+_UNFINISHED = (RunState.QUEUED.value, RunState.RUNNING.value)
+
+
+@dataclass(frozen=True, slots=True)
+class ClaimedTestRun:
+    """A test run claimed by one worker; ``attempt`` distinguishes it from later claims."""
+
+    id: str
+    attempt: int
+
+
+@dataclass(frozen=True, slots=True)
+class QueuedTestRuns:
+    """Number of queued and running test runs, and the waiting time of the oldest."""
+
+    queued: int
+    running: int
+    oldest_seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class StudentTestRun:
+    """A test run, as its student sees it."""
+
+    id: str
+    assignment: str
+    title: str
+    state: RunState
+    queued_at: datetime
+    before: int  # number of older queued ones
+    words: dict[str, Any]
+    error: str
+
+    @property
+    def waits(self) -> bool:
+        """Return whether the result is still pending."""
+        return self.state.value in _UNFINISHED
+
+
+def queue_test_run(session: Session, enrolment_id: int, version_id: int, packed: bytes) -> str:
+    """Queue a program for a test run and return its id.
+
+    Raises UsageError if the student has an unfinished one, or too many within an hour.
+    """
+    # Serialises concurrent requests, so that the second one finds the first.
+    session.execute(select(Enrolment.id).where(Enrolment.id == enrolment_id).with_for_update(key_share=True)).all()
+    at = now(session)
+    of_student = Tryout.enrolment_id == enrolment_id
+    session.execute(delete(Tryout).where(Tryout.queued_at < at - _RETENTION, Tryout.state.not_in(_UNFINISHED)))
+    if session.scalar(select(func.count()).where(of_student, Tryout.state.in_(_UNFINISHED))):
+        raise UsageError("your previous test run is not completed yet; wait for it before you start another one.")
+    if (session.scalar(select(func.count()).where(of_student, Tryout.queued_at > at - timedelta(hours=1))) or 0) >= (
+        MOST_AN_HOUR
+    ):
+        raise UsageError(
+            "%(count)s test runs within an hour is the limit; wait a few minutes, or submit your files.",
+            count=MOST_AN_HOUR,
+        )
+    _delete_programs(session, enrolment_id, version_id)
+    row = Tryout(
+        enrolment_id=enrolment_id,
+        assignment_version_id=version_id,
+        packed=packed,
+        state=RunState.QUEUED.value,
+        queued_at=at,
+    )
+    session.add(row)
+    session.flush()
+    return row.id
+
+
+def _delete_programs(session: Session, enrolment_id: int, version_id: int) -> None:
+    """Remove the programs of a student's earlier test runs of the assignment; their results are kept for a day."""
+    assignment = select(AssignmentVersion.assignment).where(AssignmentVersion.id == version_id).scalar_subquery()
+    versions = select(AssignmentVersion.id).where(AssignmentVersion.assignment == assignment)
+    tried = (Tryout.enrolment_id == enrolment_id, Tryout.assignment_version_id.in_(versions))
+    session.execute(update(Tryout).where(*tried, Tryout.state.not_in(_UNFINISHED)).values(packed=b""))
+
+
+@retry_conflicts
+def claim_test_run(store: Store, lease_seconds: float) -> ClaimedTestRun | None:
+    """Claim the oldest test run; None if none is due. Gives up those that ended two workers."""
+    with store.transaction() as session:
+        if needs_newer_code(session):
+            return None
+        at = now(session)
+        given_up = update(Tryout).where(_match_due(at), Tryout.attempt >= MOST_ATTEMPTS)
+        session.execute(given_up.values(state=RunState.FAILED.value, error=_SILENT_WORKER, finished_at=at))
+        query = select(Tryout.id, Tryout.attempt).where(_match_due(at)).order_by(Tryout.queued_at, Tryout.id).limit(1)
+        found = session.execute(query.with_for_update(skip_locked=True, key_share=True)).one_or_none()
+        if found is None:
+            return None
+        claimed = ClaimedTestRun(found.id, found.attempt + 1)
+        lease = {"lease_until": at + timedelta(seconds=lease_seconds), "attempt": claimed.attempt}
+        taken = update(Tryout).where(Tryout.id == found.id)
+        session.execute(taken.values(state=RunState.RUNNING.value, **lease))
+        return claimed
+
+
+@retry_conflicts
+def renew_lease(store: Store, claimed: ClaimedTestRun, lease_seconds: float) -> bool:
+    """Renew the lease. Return False if another worker owns the test run."""
+    with store.transaction() as session:
+        return _update_owned(session, claimed, lease_until=now(session) + timedelta(seconds=lease_seconds))
+
+
+@retry_conflicts
+def finish_test_run(store: Store, claimed: ClaimedTestRun, words: dict[str, Any], replay: bytes | None) -> bool:
+    """Store the result. Return False if another worker owns the test run."""
+    with store.transaction() as session:
+        done = {"state": RunState.DONE.value, "finished_at": now(session), "lease_until": None}
+        return _update_owned(session, claimed, words=words, replay=replay, error=None, **done)
+
+
+@retry_conflicts
+def fail_test_run(store: Store, claimed: ClaimedTestRun, sentence: str) -> bool:
+    """Handle a host fault: the test run is queued for its second attempt, or has failed."""
+    with store.transaction() as session:
+        if claimed.attempt < MOST_ATTEMPTS:
+            return _update_owned(session, claimed, state=RunState.QUEUED.value, lease_until=None, error=sentence)
+        failed = {"state": RunState.FAILED.value, "finished_at": now(session), "lease_until": None}
+        return _update_owned(session, claimed, error=sentence, **failed)
+
+
+def count_due_runs(store: Store) -> int:
+    """Return the number of test runs that are due."""
+    with store.reading() as session:
+        return session.scalar(select(func.count()).where(_match_due(now(session)))) or 0
+
+
+def measure_queue(session: Session) -> QueuedTestRuns:
+    """Return the load of the test run queue."""
+    waits, runs = (Tryout.state == each.value for each in (RunState.QUEUED, RunState.RUNNING))
+    counts = (func.count().filter(waits), func.count().filter(runs), func.min(Tryout.queued_at).filter(waits))
+    queued, running, since = session.execute(select(*counts).select_from(Tryout)).one()
+    return QueuedTestRuns(queued, running, 0.0 if since is None else max(0.0, (now(session) - since).total_seconds()))
+
+
+def load_program(session: Session, tryout_id: str) -> tuple[bytes, bytes]:
+    """Return the packed program and the encoded assignment of a test run."""
+    query = select(Tryout.packed, AssignmentVersion.content).join(
+        AssignmentVersion, Tryout.assignment_version_id == AssignmentVersion.id
+    )
+    packed, content = session.execute(query.where(Tryout.id == tryout_id)).one()
+    return packed, content
+
+
+def find_newest_run(session: Session, enrolment_id: int, assignment: str) -> str | None:
+    """Return the id of a student's newest test run of an assignment; None if there is none."""
+    query = (
+        select(Tryout.id)
+        .join(AssignmentVersion, Tryout.assignment_version_id == AssignmentVersion.id)
+        .where(Tryout.enrolment_id == enrolment_id, AssignmentVersion.assignment == assignment)
+    )
+    return session.scalar(query.order_by(Tryout.queued_at.desc(), Tryout.id).limit(1))
+
+
+def find_student_run(session: Session, enrolment_id: int, tryout_id: str) -> StudentTestRun | None:
+    """Return one test run of a student; None if the student does not have it."""
+    query = (
+        select(Tryout, AssignmentVersion.assignment, AssignmentVersion.title)
+        .join(AssignmentVersion, Tryout.assignment_version_id == AssignmentVersion.id)
+        .where(Tryout.id == tryout_id, Tryout.enrolment_id == enrolment_id)
+    )
+    found = session.execute(query).one_or_none()
+    if found is None:
+        return None
+    row, assignment, title = found
+    longer = (Tryout.state == RunState.QUEUED.value, Tryout.queued_at < row.queued_at)
+    return StudentTestRun(
+        row.id,
+        assignment,
+        title,
+        RunState(row.state),
+        row.queued_at,
+        session.scalar(select(func.count()).where(*longer)) or 0,
+        row.words or {},
+        row.error or "",
+    )
+
+
+def load_replay(session: Session, tryout_id: str) -> bytes | None:
+    """Return the compressed replay; None without one."""
+    return session.scalar(select(Tryout.replay).where(Tryout.id == tryout_id))
+
+
+def _match_due(at: datetime) -> ColumnElement[bool]:
+    lost = and_(Tryout.state == RunState.RUNNING.value, Tryout.lease_until < at)
+    return or_(Tryout.state == RunState.QUEUED.value, lost)
+
+
+def _update_owned(session: Session, claimed: ClaimedTestRun, **values: Any) -> bool:
+    held = (
+        Tryout.id == claimed.id,
+        Tryout.attempt == claimed.attempt,
+        Tryout.state == RunState.RUNNING.value,
+    )
+    options = {"synchronize_session": False}
+    statement = update(Tryout).where(*held).values(**values)
+    return cast("CursorResult[Any]", session.execute(statement, execution_options=options)).rowcount == 1

@@ -1,0 +1,95 @@
+"""API of test runs: start one, follow its progress and read its output. A test run has no marks."""
+
+from __future__ import annotations
+
+import zlib
+from datetime import datetime
+from typing import Annotated, Any
+
+from fastapi import Depends, Query, Request
+from fastapi.responses import Response
+from pydantic import Field
+
+from service.operations import test_runs
+from service.operations.test_runs import StudentTestRun
+from service.operations.types import Role, RunState
+from service.web.access import RowName
+from service.web.api.grades import REPLAY_RESPONSES
+from service.web.api.shapes import Shape, build_example_config
+from service.web.api_access import CallerInCourse, require_role
+from service.web.api_routes import api_router, respond_with_etag
+from service.web.api_uploads import LARGEST_SUBMISSION, SENT_BODY, SentFiles
+from service.web.context import Context
+from service.web.request_bodies import takes_upload
+from service.web.student_submissions import start_test_run
+
+router = api_router("mine")
+ReadAccess = Annotated[CallerInCourse, Depends(require_role(Role.STUDENT, "read"))]
+SubmitAccess = Annotated[CallerInCourse, Depends(require_role(Role.STUDENT, "submit"))]
+PREFIX = "/courses/{course_id}/mine/tryouts"
+
+
+class TryoutShape(Shape):
+    """A test run of a program."""
+
+    id: str
+    assignment: str
+    state: RunState
+    queued_at: datetime
+    before: int = Field(description="Number of test runs ahead in the queue.")
+    said: dict[str, Any] | None = Field(
+        description="Result of a finished test run: `happened`, `whose`, `seconds`, `lines` as [time, text], "
+        "`faults`; or `refused`, the reason for rejecting the program. Null until then."
+    )
+    error: str = Field(description="Reason for a failure of the system; empty if there is none.")
+
+    model_config = build_example_config(
+        id="7xk2v9q4m0ab",
+        assignment="shape-recognition",
+        state="done",
+        queued_at="2026-11-02T09:00:00Z",
+        before=0,
+        said={"happened": "The program ended by itself.", "seconds": 2.5, "lines": [[0.1, "begun"]], "faults": []},
+        error="",
+    )
+
+
+@router.post(PREFIX, status_code=201, openapi_extra=SENT_BODY)
+@takes_upload(LARGEST_SUBMISSION, Role.STUDENT)
+def ask(
+    here: SubmitAccess,
+    context: Context,
+    sent: SentFiles,
+    assignment: Annotated[str, Query(min_length=1, max_length=100, examples=["shape-recognition"])],
+) -> TryoutShape:
+    """Start a test run at the first pose of the first visible scenario.
+
+    A test run has no marks and does not count as an attempt.
+    """
+    made = start_test_run(context, here.actor, here.course_id, assignment, sent)
+    return _to_tryout_shape(test_runs.show(context.service, here.actor, here.course_id, made))
+
+
+@router.get(PREFIX + "/{tryout_id}")
+def one_tryout(here: ReadAccess, context: Context, tryout_id: RowName) -> TryoutShape:
+    """Return the state and the result of a test run. Test runs are deleted after a day."""
+    return _to_tryout_shape(test_runs.show(context.service, here.actor, here.course_id, tryout_id))
+
+
+@router.get(PREFIX + "/{tryout_id}/replay", responses=REPLAY_RESPONSES, response_class=Response)
+def replay(request: Request, here: ReadAccess, context: Context, tryout_id: RowName) -> Response:
+    """Return the data of a replay of the test run; 404 until it is available."""
+    kept = test_runs.show_replay(context.service, here.actor, here.course_id, tryout_id)
+    return respond_with_etag(request, zlib.decompress(kept), "application/json")
+
+
+def _to_tryout_shape(line: StudentTestRun) -> TryoutShape:
+    return TryoutShape(
+        id=line.id,
+        assignment=line.assignment,
+        state=line.state,
+        queued_at=line.queued_at,
+        before=line.before,
+        said=line.words or None,
+        error="" if line.waits else line.error,
+    )

@@ -1,0 +1,157 @@
+"""A student's own work in a course: the open assignments, the task of one, and submitting to it.
+
+``own_submission.py`` shows the results of a submission.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from io import BytesIO
+from typing import Annotated
+
+from fastapi import APIRouter, File, Form, Request, UploadFile
+from fastapi.responses import RedirectResponse, Response
+from starlette.exceptions import HTTPException
+
+from service.operations import own_views
+from service.operations.errors import NotFound
+from service.operations.own_submissions import OwnSubmission
+from service.operations.submissions import MissingPart, SubmissionRequest
+from service.operations.types import Role
+from service.reports.display_text import join_wrapped_lines
+from service.web.access import CourseStudent, ReaderInCourse
+from service.web.api_uploads import LARGEST_SUBMISSION
+from service.web.attachments import respond_with_attachment
+from service.web.context import Context, WebContext
+from service.web.errors import describe_error
+from service.web.http_errors import extract_message
+from service.web.language import detect_language
+from service.web.rendering import render_page
+from service.web.request_bodies import takes_upload
+from service.web.student_submissions import submit
+from sim.errors import UsageError
+from submissions.assignment.task_sheet import TaskSheet
+from submissions.raw_files import UploadedFile
+
+router = APIRouter()
+
+#: The files of a form, and the texts typed instead of them, in the order of the requested files.
+Files = Annotated[tuple[UploadFile, ...], File()]
+Texts = Annotated[tuple[str, ...], Form()]
+
+
+@dataclass(frozen=True, slots=True)
+class _Rejection:
+    """The reason why a submission was rejected, and the texts that the student typed."""
+
+    sentence: str
+    status: int
+    texts: Sequence[str]
+    headers: Mapping[str, str] = field(default_factory=dict)
+    lacks_part: bool = False
+
+
+@router.get("/courses/{course_id}/mine")
+def list_own_assignments(request: Request, here: CourseStudent, context: Context) -> Response:
+    """Show the open assignments and the student's submissions."""
+    lines = own_views.list_assignments(context.service, here.actor, here.course_id)
+    return render_page(request, here.reader, "mine.html", here=here, lines=lines)
+
+
+@router.get("/courses/{course_id}/mine/{assignment}")
+def show_own_assignment(request: Request, here: CourseStudent, context: Context, assignment: str) -> Response:
+    """Show an assignment's task, the form to submit to it, and earlier attempts."""
+    return _render_assignment(request, here, context, assignment, None)
+
+
+@router.post("/courses/{course_id}/mine/{assignment}")
+@takes_upload(LARGEST_SUBMISSION, Role.STUDENT)
+def submit_own_files(
+    request: Request,
+    here: CourseStudent,
+    context: Context,
+    assignment: str,
+    files: Files = (),
+    texts: Texts = (),
+    even_in_part: Annotated[bool, Form()] = False,
+) -> Response:
+    """Submit the chosen files and typed texts, and redirect to the submission's page."""
+    sheet = own_views.show_sheet(context.service, here.actor, here.course_id, assignment)
+    try:
+        asked = SubmissionRequest(assignment, collect_sent_files(sheet, files, texts), even_in_part)
+        accepted = submit(context, here.actor, here.course_id, asked)
+    except NotFound:
+        raise
+    except UsageError as error:
+        sentence = describe_error(error, detect_language(request))
+        refused = _Rejection(sentence, 422, texts, lacks_part=isinstance(error, MissingPart))
+        return _render_assignment(request, here, context, assignment, refused)
+    except HTTPException as error:
+        if error.status_code != 429:
+            raise
+        sentence = detect_language(request).translate_sentence(extract_message(error))
+        refused = _Rejection(sentence, 429, texts, dict(error.headers or {}))
+        return _render_assignment(request, here, context, assignment, refused)
+    return RedirectResponse(f"/courses/{here.course_id}/mine/submissions/{accepted.submission_id}", 303)
+
+
+@router.get("/courses/{course_id}/mine/{assignment}/given/{file}")
+def download_given_file(here: CourseStudent, context: Context, assignment: str, file: str) -> Response:
+    """Return a file that the assignment provides to students."""
+    return respond_with_attachment(
+        own_views.show_given_file(context.service, here.actor, here.course_id, assignment, file), file
+    )
+
+
+def collect_sent_files(sheet: TaskSheet, files: Sequence[UploadFile], texts: Sequence[str]) -> list[UploadedFile]:
+    """Return the submitted files of a form: the chosen files, and each typed text under the name of its file.
+
+    Raises:
+        UsageError: A file was both chosen and typed.
+    """
+    chosen = [UploadedFile(each.filename, each.file) for each in files if each.filename]
+    typed = [
+        UploadedFile(name, BytesIO(text.replace("\r\n", "\n").encode()))
+        for name, text in zip(sheet.asked, texts, strict=False)
+        if text.strip()
+    ]
+    names = {each.flat_name.lower() for each in chosen}
+    for each in typed:
+        if each.flat_name in names:
+            raise UsageError("%(name)s was both selected as a file and typed. Remove one of them.", name=each.flat_name)
+    return [*chosen, *typed]
+
+
+def compute_marks_curve(attempts: Sequence[OwnSubmission]) -> list[tuple[float, float]]:
+    """Return the marks of the graded attempts, oldest first, as points in a drawing of 100 by 24 units."""
+    shares = [
+        float(each.marks / each.max_marks) for each in reversed(attempts) if each.marks is not None and each.max_marks
+    ]
+    step = 92 / max(1, len(shares) - 1)
+    return [(round(4 + number * step, 1), round(20 - 16 * share, 1)) for number, share in enumerate(shares)]
+
+
+def _render_assignment(
+    request: Request, here: ReaderInCourse, context: WebContext, assignment: str, refused: _Rejection | None
+) -> Response:
+    found = own_views.show_task(context.service, here.actor, here.course_id, assignment)
+    shown = render_page(
+        request,
+        here.reader,
+        "own_assignment.html",
+        status_code=refused.status if refused else 200,
+        here=here,
+        sheet=found.sheet,
+        description=join_wrapped_lines(found.sheet.description),
+        attempts=found.attempts,
+        counting=found.counting,
+        curve=compute_marks_curve(found.attempts),
+        allowance=found.allowance,
+        is_open=found.is_open,
+        can_try=found.can_test_run,
+        has_tried=found.has_test_run,
+        refused=refused,
+    )
+    shown.headers.update(refused.headers if refused else {})
+    return shown

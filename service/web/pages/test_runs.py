@@ -1,0 +1,107 @@
+"""Test runs: the form, the progress, the output and the replay. A test run has no marks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from fastapi import APIRouter, Request
+from fastapi.responses import RedirectResponse, Response
+from starlette.exceptions import HTTPException
+
+from service.operations import own_views, test_runs
+from service.operations.errors import NotFound
+from service.operations.types import Role
+from service.reports.html import render_replay_section
+from service.web.access import CourseStudent, ReaderInCourse
+from service.web.api_uploads import LARGEST_SUBMISSION
+from service.web.context import Context, WebContext
+from service.web.errors import describe_error
+from service.web.http_errors import extract_message
+from service.web.language import detect_language
+from service.web.pages.own_assignments import Files, Texts, collect_sent_files
+from service.web.rendering import is_htmx_request, render_page
+from service.web.request_bodies import takes_upload
+from service.web.student_submissions import start_test_run
+from sim.errors import UsageError
+from submissions.assignment.task_sheet import TaskSheet
+from submissions.submission import PART_FILES, Submission
+
+router = APIRouter()
+
+
+@router.get("/courses/{course_id}/mine/{assignment}/try")
+def show_newest_test_run(request: Request, here: CourseStudent, context: Context, assignment: str) -> Response:
+    """Show the newest test run, with its program in the form for the next one.
+
+    Requests from htmx get only the progress, or an instruction to reload the page when the run has ended.
+    """
+    if not is_htmx_request(request):
+        return _render_test_run(request, here, context, assignment)
+    line = test_runs.find_newest(context.service, here.actor, here.course_id, assignment)
+    if line is None or not line.waits:
+        return Response(headers={"hx-refresh": "true"})
+    return render_page(request, here.reader, "tryout_progress.html", here=here, line=line)
+
+
+@router.post("/courses/{course_id}/mine/{assignment}/try")
+@takes_upload(LARGEST_SUBMISSION, Role.STUDENT)
+def submit_test_run(
+    request: Request, here: CourseStudent, context: Context, assignment: str, files: Files = (), texts: Texts = ()
+) -> Response:
+    """Start a test run of the chosen files and typed texts."""
+    sheet = own_views.show_sheet(context.service, here.actor, here.course_id, assignment)
+    try:
+        start_test_run(context, here.actor, here.course_id, assignment, collect_sent_files(sheet, files, texts))
+    except NotFound:
+        raise
+    except UsageError as error:
+        return _render_test_run(
+            request, here, context, assignment, 422, describe_error(error, detect_language(request)), texts
+        )
+    except HTTPException as error:
+        if error.status_code != 429:
+            raise
+        sentence = detect_language(request).translate_sentence(extract_message(error))
+        return _render_test_run(request, here, context, assignment, 429, sentence, texts, error.headers)
+    return RedirectResponse(str(request.url.path), 303)
+
+
+def _render_test_run(
+    request: Request,
+    here: ReaderInCourse,
+    context: WebContext,
+    assignment: str,
+    status: int = 200,
+    refused: str = "",
+    typed: Sequence[str] = (),
+    headers: Mapping[str, str] | None = None,
+) -> Response:
+    found = test_runs.show_newest(context.service, here.actor, here.course_id, assignment)
+    shown = render_page(
+        request,
+        here.reader,
+        "tryout.html",
+        status_code=status,
+        here=here,
+        sheet=found.sheet,
+        seconds=found.seconds,
+        line=found.line,
+        replay=render_replay_section(found.replay, detect_language(request)) if found.replay else None,
+        refused=refused,
+        texts=list(typed) or (_read_texts(found.sheet, found.submission) if found.submission else []),
+    )
+    shown.headers.update(headers or {})
+    return shown
+
+
+def _read_texts(sheet: TaskSheet, tried: Submission) -> list[str]:
+    """Return the texts of the test run's files, in the order of the requested files.
+
+    A missing file gives an empty text.
+    """
+    parts = {PART_FILES["program"]: tried.program, PART_FILES["responder"]: tried.responder}
+    found = []
+    for name in sheet.asked:
+        code = parts.get(name)
+        found.append(code.text if code is not None else tried.files.get(name, b"").decode("utf-8", "replace"))
+    return found

@@ -1,0 +1,167 @@
+"""Uploads that wait for confirmation. They are kept in the home folder for a day, or until the sender decides.
+
+``batch_uploads.py`` reads them. The number of uploads is limited for each sender and in total.
+"""
+
+from __future__ import annotations
+
+import secrets
+import shutil
+import time
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import TypeAdapter
+
+from sim.errors import UsageError
+from sim.readers.json_text import read_json
+from submissions.raw_files import UploadedFile, sanitise_name
+from submissions.student_identity import RejectedSubmission
+
+_RETENTION_SECONDS = 24 * 3600
+_MOST_OF_ONE, _MOST_OF_ALL = 3, 30
+_MOST_FILES = 1000
+_LONGEST_NAME = 200
+_METADATA_FILE = "upload.json"
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectedSubmission:
+    """A submission that would be accepted, with the remarks to show before confirming."""
+
+    student: str
+    name: str
+    assignment: str
+    source: str
+    missing: str = ""  # the file of a missing part, or empty
+    enrolled: bool = True
+    known: bool = False
+    copied: bool = False
+    empty: str = ""  # an empty file of the submission, or an empty string
+
+
+@dataclass(frozen=True, slots=True)
+class PendingUpload:
+    """One upload, with its accepted and rejected submissions."""
+
+    id: str
+    person_id: int
+    course_id: int
+    name: str
+    assignment: str
+    people: str  # file name of the table of people; empty without a table
+    file: str  # file name of the zip; empty if the submissions are single files in a folder
+    expected: tuple[ExpectedSubmission, ...] = ()
+    refusals: tuple[RejectedSubmission, ...] = ()
+
+
+_METADATA_ADAPTER = TypeAdapter(PendingUpload)
+
+
+class PendingUploads:
+    """The uploads in one home folder."""
+
+    def __init__(self, home: Path) -> None:
+        self._folder = home / "uploads"
+
+    def begin(self, person_id: int, course_id: int, assignment: str) -> PendingUpload:
+        """Create an empty upload, after removing expired uploads and the sender's oldest ones over the limit.
+
+        Raises:
+            UsageError: Too many uploads of all senders are waiting.
+        """
+        self._folder.mkdir(mode=0o700, exist_ok=True)
+        own = []
+        kept = sorted(self._folder.iterdir(), key=lambda path: path.stat().st_mtime)
+        for path in kept:
+            note = self._read_metadata(path.name)
+            if note is None or path.stat().st_mtime < time.time() - _RETENTION_SECONDS:
+                self._remove_abandoned(path)
+            elif note.person_id == person_id:
+                own.append(path)
+        for path in own[: max(0, len(own) - _MOST_OF_ONE + 1)]:
+            shutil.rmtree(path, ignore_errors=True)
+        if len(list(self._folder.iterdir())) >= _MOST_OF_ALL:
+            raise UsageError("too many uploads are waiting for confirmation; try again later")
+        made = PendingUpload(secrets.token_hex(16), person_id, course_id, "", assignment, "", "")
+        (self._folder / made.id).mkdir(mode=0o700)
+        self.write(made)
+        return made
+
+    def write(self, upload: PendingUpload) -> None:
+        """Save the metadata of an upload."""
+        (self._folder / upload.id / _METADATA_FILE).write_bytes(_METADATA_ADAPTER.dump_json(upload))
+
+    def find(self, upload_id: str, person_id: int, course_id: int) -> PendingUpload | None:
+        """Return an upload of this sender to this course, or None if it does not exist or has expired."""
+        found = self._read_metadata(upload_id) if upload_id.isalnum() else None
+        if found is None or (found.person_id, found.course_id) != (person_id, course_id):
+            return None
+        return found
+
+    def list_waiting(self, person_id: int, course_id: int) -> list[PendingUpload]:
+        """Return the uploads of this sender to this course that were read but neither confirmed nor discarded."""
+        names = [path.name for path in self._folder.iterdir()] if self._folder.is_dir() else []
+        found = [each for name in sorted(names) if (each := self.find(name, person_id, course_id)) is not None]
+        return [each for each in found if each.expected or each.refusals]
+
+    def remove(self, upload: PendingUpload) -> None:
+        """Delete an upload."""
+        shutil.rmtree(self._folder / upload.id, ignore_errors=True)
+
+    def submissions_path(self, upload: PendingUpload) -> Path:
+        """Return the path of the submissions: a zip, or a folder of files."""
+        folder = self._folder / upload.id / "batch"
+        return folder / upload.file if upload.file else folder
+
+    def people_path(self, upload: PendingUpload) -> Path | None:
+        """Return the path of the table of people, or None."""
+        return self._folder / upload.id / "people" / upload.people if upload.people else None
+
+    def store_files(self, upload: PendingUpload, files: Sequence[UploadedFile], into: str) -> list[str]:
+        """Copy files into a folder of the upload and return their names there.
+
+        Raises:
+            UsageError: There are too many files, or a name is invalid or occurs twice.
+        """
+        if len(files) > _MOST_FILES:
+            raise UsageError(f"{len(files)} files were uploaded, expected at most {_MOST_FILES}, or one zip of them")
+        folder = self._folder / upload.id / into
+        folder.mkdir(mode=0o700)
+        names = []
+        for file in files:
+            name = clean_file_name(file)
+            try:
+                with (folder / name).open("xb") as sink:
+                    shutil.copyfileobj(file.stream, sink)
+            except FileExistsError:
+                raise UsageError(
+                    f"two files have the name {sanitise_name(name)}, expected a different name for each student"
+                ) from None
+            names.append(name)
+        return names
+
+    def _read_metadata(self, upload_id: str) -> PendingUpload | None:
+        try:
+            return _METADATA_ADAPTER.validate_python(
+                read_json((self._folder / upload_id / _METADATA_FILE).read_bytes())
+            )
+        except (OSError, ValueError):
+            return None
+
+    def _remove_abandoned(self, path: Path) -> None:
+        # A folder without metadata may belong to an upload that is being created at this moment.
+        if path.stat().st_mtime < time.time() - 60:
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def clean_file_name(sent: UploadedFile) -> str:
+    """Return a safe file name without folders. Raises UsageError if it is empty or too long."""
+    name = "".join("?" if unicodedata.category(c)[0] == "C" else c for c in sent.flat_name).strip().lstrip(".")
+    if not name:
+        raise UsageError("a file without a name was uploaded, expected a name that identifies its student")
+    if len(name.encode()) > _LONGEST_NAME:
+        raise UsageError(f"the name {sanitise_name(name)} is too long, expected at most {_LONGEST_NAME} bytes")
+    return name

@@ -1,0 +1,35 @@
+"""Error class and nesting limit shared by the readers.
+
+The message describes the problem. Callers add the file name.
+"""
+
+from __future__ import annotations
+
+from sim.errors import UsageError
+
+#: Far deeper than any real file; Python's own limit is ten times as high.
+MAX_DEPTH = 100
+_TO_ROUND = bytes.maketrans(b"[]{}", b"()()")
+_NO_BRACKETS = bytes(set(range(256)) - set(b"[]{}"))
+
+
+class UnreadableDataError(UsageError, ValueError):
+    """Reading the data would take too much work or memory."""
+
+
+class TooManyValuesError(UnreadableDataError):
+    """The data contain more values than the limit."""
+
+
+def check_depth(structure: str, deepest: int = MAX_DEPTH) -> None:
+    """Raise Unreadable if brackets in ``structure``, a text without strings, are nested deeper than ``deepest``.
+
+    Each pass removes all innermost pairs, so the number of passes is limited by the allowed depth.
+    """
+    if structure.count("[") + structure.count("{") <= deepest:
+        return
+    brackets = structure.encode("utf-8", "surrogatepass").translate(_TO_ROUND, _NO_BRACKETS)
+    for _ in range(deepest):
+        brackets = brackets.replace(b"()", b"")
+    if b"()" in brackets or brackets.count(b"(") > deepest:
+        raise UnreadableDataError("it is nested too deeply")
