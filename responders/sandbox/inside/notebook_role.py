@@ -48,7 +48,7 @@ class NotebookRole(ResponderRole):
 
         self._prepare()
         roboSim.look = self._request_robot_state
-        placeholders.install(self._shell)
+        placeholders.install_placeholders(self._shell)
         self._namespace.update(In=[], Out={})
         # As in IPython, modules that a cell imports have these too.
         builtins.display = placeholders.display  # type: ignore[attr-defined]
