@@ -1,6 +1,6 @@
 """The worker's end of the wire: strict parsing of untrusted frames from a child.
 
-Each line is one JSON object with a closed schema. No frame can carry a mark, a time or a verdict. ``packed.py`` handles
+Each line is one JSON object with a closed schema. No frame can carry a mark, a time or a verdict. ``packets.py`` handles
 the compact packets for a robot program's frequent actions.
 """
 

@@ -1,6 +1,6 @@
 """Identity of students: id, name, e-mail address, the course's table of people, and rejected submissions.
 
-Files are handled elsewhere; ``names.py`` compares names.
+Files are handled elsewhere; ``student_names.py`` compares names.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""``robomark run``: its options, including the flags of the magic. ``running.py`` does the work."""
+"""``robomark run``: its options, including the flags of the magic. ``program_run.py`` does the work."""
 
 from __future__ import annotations
 

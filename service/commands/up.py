@@ -1,4 +1,4 @@
-"""``robomark up`` and ``robomark serve``: their options. ``serving.py`` does the work."""
+"""``robomark up`` and ``robomark serve``: their options. ``service_startup.py`` does the work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``robomark verify``: its options. ``verifying.py``, which loads slowly, does the work."""
+"""``robomark verify``: its options. ``verification.py``, which loads slowly, does the work."""
 
 from __future__ import annotations
 

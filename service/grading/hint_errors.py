@@ -1,6 +1,6 @@
 """Hints on errors: the first error of each trial and of a notebook's cells, with advice.
 
-The advice comes from the table in ``hint_advice.py``, or from the submission if the table is not enough.
+The advice comes from the table in ``hint_tables.py``, or from the submission if the table is not enough.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Criterion about training data that a robot collects: number and quality of images per class.
 
-Criteria about the content of a single log are in ``logged.py``.
+Criteria about the content of a single log are in ``logs.py``.
 """
 
 from __future__ import annotations

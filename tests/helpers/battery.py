@@ -13,7 +13,7 @@ import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -261,6 +261,29 @@ def _text(line: str, attack: Attack, targets: dict[str, Any]) -> str:
     return _FRAME.format(tools=_TOOLS, numbers=_NUMBERS, targets=targets, group=attack.text, attack=line)
 
 
+def run_together(
+    sandboxes: Sandboxes, role: ChildRole, group: Sequence[Attack], targets: dict[str, Any]
+) -> dict[str, str]:
+    """Run the attacks of one group in as few children as possible, and return their results by name.
+
+    An attack may profit from the attacks before it. If one ends the child, the next child begins with the one after it.
+    """
+    results: dict[str, str] = {}
+    while remaining := group[len(results) :]:
+        lines = [f'tools.report(group.{attack.name}, "{attack.name} ")' for attack in remaining]
+        with sandboxes.open_private_folder() as folder:
+            printed, stop = run_text(sandboxes, role, _text("\n".join(lines), remaining[0], targets), folder)
+        reports = dict(line.split(" ", 1) for line in printed if " " in line)
+        for attack in remaining:
+            if attack.name not in reports:
+                break
+            results[attack.name] = reports[attack.name]
+        else:
+            continue
+        results[attack.name] = _describe_stop(stop)
+    return results
+
+
 def scrambled(*secrets: str) -> list[str]:
     """Return the secrets in scrambled form, for an attack that searches for them."""
     return [bytes(byte ^ 0x5A for byte in secret.encode()).hex() for secret in secrets]
@@ -273,11 +296,18 @@ def run(sandboxes: Sandboxes, role: ChildRole, attack: Attack, targets: dict[str
     leaks = [line for line in said if line.startswith("LEAK")]
     if leaks:
         return leaks[0]
-    if stop is not None and stop.verdict is Verdict.HOST_ERROR:
+    return "\n".join(said) if stop is None else _describe_stop(stop)
+
+
+def _describe_stop(stop: ChildStopped | None) -> str:
+    """Return the result of an attack that ended its child."""
+    if stop is None:
+        return "LEAK it ended the file without a word"
+    if stop.verdict is Verdict.HOST_ERROR:
         return f"LEAK it died as if somebody else had killed it ({stop.message})"
-    if stop is not None and any(words in stop.message for words in ("not JSON", "without its number")):
+    if any(words in stop.message for words in ("not JSON", "without its number")):
         return f"LEAK another program wrote on the wire ({stop.message})"
-    return stop.message if stop is not None else "\n".join(said)
+    return stop.message
 
 
 def remembered(sandboxes: Sandboxes, role: ChildRole, attack: Attack, targets: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""``robomark batch export``: its options. ``exporting.py``, which loads slowly, does the work."""
+"""``robomark batch export``: its options. ``batch_export.py``, which loads slowly, does the work."""
 
 from __future__ import annotations
 

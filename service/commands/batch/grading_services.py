@@ -1,6 +1,6 @@
 """Waiting for batches, with the running services or with services started for this command.
 
-``waiting.py`` shows the progress.
+``batch_waiter.py`` shows the progress.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""``robomark batch similar``: its options. ``finding_similar.py``, which loads slowly, does the work."""
+"""``robomark batch similar``: its options. ``similarity_list.py``, which loads slowly, does the work."""
 
 from __future__ import annotations
 

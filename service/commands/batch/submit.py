@@ -1,4 +1,4 @@
-"""``robomark batch submit``: its options. ``submitting.py``, which loads slowly, does the work."""
+"""``robomark batch submit``: its options. ``batch_submission.py``, which loads slowly, does the work."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Judging of image recognition: the answer to each image, which answers count, and how many are correct.
 
-``truths.py`` finds the true labels. ``classification.py`` and ``robustness.py`` decide the marks.
+``true_labels.py`` finds the true labels. ``classification.py`` and ``robustness.py`` decide the marks.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Judging of recognition under a swept condition: the marks for the accuracy curve.
 
-``recognition.py`` classifies the images, and ``sweeps.py`` makes the curves.
+``recognition.py`` classifies the images, and ``accuracy_curves.py`` makes the curves.
 """
 
 from __future__ import annotations

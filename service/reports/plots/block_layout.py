@@ -1,6 +1,6 @@
 """Layout of block diagrams: blocks further along the arrows are further along the page.
 
-Positions are counted in levels, and in rows across them. ``blocks.py`` converts them to inches.
+Positions are counted in levels, and in rows across them. ``block_drawing.py`` converts them to inches.
 """
 
 from __future__ import annotations

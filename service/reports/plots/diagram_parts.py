@@ -1,6 +1,6 @@
 """Parts of block and sequence diagrams: actors, arrows, labels, and highlights of differences.
 
-``blocks.py`` and ``lanes.py`` decide the positions.
+``block_drawing.py`` and ``sequence_drawing.py`` decide the positions.
 """
 
 from __future__ import annotations

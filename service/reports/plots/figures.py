@@ -1,6 +1,6 @@
 """The drawing of one plot of a grade, by the module for its kind.
 
-It loads the drawing library; ``drawn.py``, which lists the plots of a grade, does not.
+It loads the drawing library; ``grade_plots.py``, which lists the plots of a grade, does not.
 """
 
 from __future__ import annotations

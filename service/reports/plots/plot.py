@@ -1,6 +1,6 @@
 """The title and description of a plot in a report.
 
-``drawn.py`` lists the plots of a grade, and ``own_diagrams.py`` those of a notebook's own diagrams.
+``grade_plots.py`` lists the plots of a grade, and ``own_diagrams.py`` those of a notebook's own diagrams.
 """
 
 from __future__ import annotations

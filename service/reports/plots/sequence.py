@@ -1,6 +1,6 @@
 """The conversation of a trial as steps between parties, for a sequence diagram.
 
-The module selects the steps. Pages list them, and ``lanes.py`` draws them beside a notebook's diagram.
+The module selects the steps. Pages list them, and ``sequence_drawing.py`` draws them beside a notebook's diagram.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Scheduling: the next job by queue, by fair share of course, batch and student, and by age.
 
-Only reads (and, on PostgreSQL, locks) the row; ``jobs.claim`` takes the job.
+Only reads (and, on PostgreSQL, locks) the row; ``jobs.claim_job`` takes the job.
 """
 
 from __future__ import annotations

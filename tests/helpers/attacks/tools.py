@@ -104,11 +104,11 @@ def says_leak(program, *arguments):
 def disarm():
     """Disable the refusals that Python adds by itself."""
     for found in gc.get_objects():
-        if getattr(found, "__qualname__", "") == "install.<locals>.hook":
+        if getattr(found, "__qualname__", "") == "install_refusals.<locals>.hook":
             for name, cell in zip(found.__code__.co_freevars, found.__closure__, strict=True):
                 if name == "folders":
                     cell.cell_contents = ("/",)
-            found.__globals__["_SENTENCES"].clear()
+            found.__globals__["_MESSAGES"].clear()
 
 
 def tell(function):
@@ -121,12 +121,12 @@ def tell(function):
     say(said)
 
 
-def report(function):
-    """Run an attack and print its result."""
+def report(function, start=""):
+    """Run an attack and print its result after ``start``."""
     say = sys.stdout.write
     try:
         got = function()
     except BaseException as error:
-        say(f"blocked {type(error).__name__}: {error}")
+        say(f"{start}blocked {type(error).__name__}: {error}")
     else:
-        say(f"LEAK {got!r}"[:200] if got else "blocked")
+        say(start + (f"LEAK {got!r}"[:200] if got else "blocked"))

@@ -5,6 +5,7 @@ The attacks are in ``attacks/``; this module tests their results.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import tempfile
@@ -21,6 +22,7 @@ from battery import (
     SETTINGS,
     SYSTEM_PYTHON,
     Attack,
+    Decoys,
     Victim,
     attacks,
     decoys,
@@ -28,6 +30,7 @@ from battery import (
     readable_tree,
     remembered,
     run,
+    run_together,
     unread,
 )
 from responders.sandbox import access_times, private_folders, zygote
@@ -37,13 +40,14 @@ from responders.sandbox.zygote import ChildRole, Isolation
 
 ATTACKS = attacks()
 MEMORIES = memories()
+REMAINS = frozenset(attack.name for attack in ATTACKS if attack.stopped_by == tools.REMAINS)
+GROUPS = sorted({attack.group for attack in ATTACKS})
+#: Where attacks run together. Alone, each runs as a robot program in the full sandbox.
 ENCLOSED: list[tuple[str, ChildRole]] = [
-    ("full", "robot"),
     ("full", "responder with libraries"),
     ("full-1", "robot"),
     ("full", "responder"),
 ]
-OLD_KERNEL_LONG = [pytest.param(*each, marks=pytest.mark.long if each in ENCLOSED[2:] else ()) for each in ENCLOSED]
 
 #: Bubblewrap sets an invented machine name.
 REMAINS_INSIDE_BUBBLEWRAP = frozenset(
@@ -97,26 +101,45 @@ def own_user() -> Iterator[Sandboxes]:
         yield made
 
 
-@pytest.mark.parametrize(("setting", "role"), OLD_KERNEL_LONG, ids=lambda value: value)
 @pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: attack.id)
-def test_the_sandbox_holds(
-    attack: Attack, setting: str, role: ChildRole, sandboxes: dict[str, Sandboxes], tmp_path: Path, victim: Victim
-) -> None:
+def test_the_sandbox_holds(attack: Attack, sandboxes: dict[str, Sandboxes], tmp_path: Path, victim: Victim) -> None:
     """The child has a writable folder, which is more than a robot program gets."""
     with decoys(tmp_path, victim) as targets:
-        outcome = run(sandboxes[setting], role, attack, targets.targets())
+        outcome = run(sandboxes["full"], "robot", attack, targets.targets())
         assert outcome.startswith("LEAK") == (attack.stopped_by == tools.REMAINS), outcome
         assert targets.harm() == []
 
 
+def _expect_only(
+    successes: frozenset[str],
+    group: str,
+    sandboxes: Sandboxes,
+    role: ChildRole,
+    made: contextlib.AbstractContextManager[Decoys],
+) -> None:
+    """Run the attacks of a group together. None may succeed but ``successes``, and none may harm the decoys."""
+    together = [attack for attack in ATTACKS if attack.group == group]
+    with made as targets:
+        outcomes = run_together(sandboxes, role, together, targets.targets())
+        assert {name for name, outcome in outcomes.items() if outcome.startswith("LEAK")} <= successes, outcomes
+        assert outcomes.keys() == {attack.name for attack in together}
+        assert targets.harm() == []
+
+
+@pytest.mark.parametrize(("setting", "role"), ENCLOSED, ids=lambda value: value)
+@pytest.mark.parametrize("group", GROUPS)
+def test_the_sandbox_holds_against_attacks_together(
+    group: str, setting: str, role: ChildRole, sandboxes: dict[str, Sandboxes], tmp_path: Path, victim: Victim
+) -> None:
+    """Each attack may profit from those before it in the same child."""
+    _expect_only(REMAINS, group, sandboxes[setting], role, decoys(tmp_path, victim))
+
+
 @pytest.mark.parametrize(
     "attack",
-    [
-        pytest.param(attack, id=attack.id, marks=[] if attack.stopped_by == tools.REMAINS else pytest.mark.long)
-        for attack in ATTACKS
-    ],
+    [pytest.param(attack, id=attack.id) for attack in ATTACKS if attack.stopped_by == tools.REMAINS],
 )
-def test_the_sandbox_holds_inside_bubblewrap(
+def test_few_remaining_attacks_succeed_inside_bubblewrap(
     attack: Attack, wrapped: Sandboxes, tmp_path: Path, victim: Victim
 ) -> None:
     """Most remaining attacks, especially those on names of files, fail inside bubblewrap."""
@@ -126,18 +149,20 @@ def test_the_sandbox_holds_inside_bubblewrap(
         assert targets.harm() == []
 
 
+@pytest.mark.parametrize("group", GROUPS)
+def test_the_sandbox_holds_inside_bubblewrap(group: str, wrapped: Sandboxes, tmp_path: Path, victim: Victim) -> None:
+    _expect_only(REMAINS_INSIDE_BUBBLEWRAP, group, wrapped, "robot", decoys(tmp_path, victim))
+
+
 @pytest.mark.long
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
 @pytest.mark.skipif(not Path(SYSTEM_PYTHON).exists(), reason="needs an interpreter that others can read")
-@pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: attack.id)
+@pytest.mark.parametrize("group", GROUPS)
 def test_the_sandbox_holds_round_a_user_of_its_own(
-    attack: Attack, own_user: Sandboxes, tmp_path: Path, victim: Victim
+    group: str, own_user: Sandboxes, tmp_path: Path, victim: Victim
 ) -> None:
     """Some remaining attacks fail for a user who may not even enter the folders."""
-    with decoys(tmp_path, victim) as targets:
-        outcome = run(own_user, "robot", attack, targets.targets())
-        assert attack.stopped_by == tools.REMAINS or not outcome.startswith("LEAK"), outcome
-        assert targets.harm() == []
+    _expect_only(REMAINS, group, own_user, "robot", decoys(tmp_path, victim))
 
 
 @pytest.mark.parametrize(

@@ -46,8 +46,8 @@ assert libc.syscall(317, 1, 0, struct.pack("=H6xQ", len(code), ctypes.addressof(
 _CHECK = """
 from responders.sandbox.manager import Sandboxes
 with Sandboxes() as sandboxes:
-    print(sandboxes.check())
-    print(sandboxes.remembers())
+    print(sandboxes.check_isolation())
+    print(sandboxes.check_data_leaks())
 """
 #: A container can have devices on a mount that records access times. No way of reading a device records one.
 _USE_A_DEVICE = """

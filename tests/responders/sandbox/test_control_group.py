@@ -206,14 +206,14 @@ from running import run_program
 from service.grading.trial_runner import TrialRunner
 
 logging.basicConfig(stream=sys.stderr)
-assert control_group.divide() is None, control_group.divide()
-here = control_group._own(Path("/proc"))
+assert control_group.divide_group() is None, control_group.divide_group()
+here = control_group._locate_own_group(Path("/proc"))
 assert here.name == "robomark-service"
 slot = here.parent / f"robomark-slot-{os.getpid()}"
 ECHO = "def responder(text): return text\\n"
 BUSY = "print('PY::a')\\nsum(range(10**7))"
 def runner(memory_mb=1536):
-    return TrialRunner(Sandboxes(group=control_group.for_this_process(memory_mb)))
+    return TrialRunner(Sandboxes(group=control_group.create_slot_group(memory_mb)))
 """
 
 
@@ -261,7 +261,7 @@ held += [bytearray(1 << 20) for _ in range(320)]
 def test_whoever_is_killed_for_the_limit_of_its_slot_is_at_fault_at_once() -> None:
     said, log = in_group(
         f"""
-control_group._BESIDE_LIMITS = -(1 << 30)  # else a slot is never smaller than what the assignment allows
+control_group._EXTRA_MEMORY = -(1 << 30)  # else a slot is never smaller than what the assignment allows
 told = {{}}
 with runner(330) as made:
     for name, hog in {HOGS!r}.items():

@@ -28,7 +28,7 @@ from responders.sandbox.manager import Sandboxes
 from sim.errors import HostError
 try:
     with Sandboxes() as sandboxes:
-        print("stands:", sandboxes.check())
+        print("stands:", sandboxes.check_isolation())
 except HostError as error:
     print(f"{type(error).__name__}: {error}")
     sys.exit(3)

@@ -1,6 +1,6 @@
 """Detection of call arguments that may be texts to look up or run: method names, and files with pickled objects.
 
-It uses only the syntax. ``walk.py`` decides which arguments are doubtful.
+It uses only the syntax. ``syntax_walker.py`` decides which arguments are doubtful.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Properties of single syntax nodes: dotted name, constant text, bound names, reachability.
 
-Nothing is resolved or executed. ``walk.py`` analyses whole files.
+Nothing is resolved or executed. ``syntax_walker.py`` analyses whole files.
 """
 
 from __future__ import annotations

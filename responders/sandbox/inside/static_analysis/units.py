@@ -1,6 +1,6 @@
 """Data structures for the contents of a file: mentions, their places, and the units of code that run together.
 
-``walk.py`` fills them. ``reader.py`` applies the rules.
+``syntax_walker.py`` fills them. ``reader.py`` applies the rules.
 """
 
 from __future__ import annotations

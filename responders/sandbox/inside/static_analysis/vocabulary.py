@@ -1,6 +1,6 @@
 """Names with a meaning for the analysis: constructs, and functions that look up, import or run a text.
 
-``walk.py`` applies them.
+``syntax_walker.py`` applies them.
 """
 
 from __future__ import annotations
