@@ -1,7 +1,7 @@
 """The worker's end of the wire: strict parsing of untrusted frames from a child.
 
-Each line is one JSON object with a closed schema. No frame can carry a mark, a time or a verdict. ``packets.py`` handles
-the compact packets for a robot program's frequent actions.
+Each line is one JSON object with a closed schema. No frame can carry a mark, a time or a verdict. ``packets.py``
+handles the compact packets for a robot program's frequent actions.
 """
 
 from __future__ import annotations

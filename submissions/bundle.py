@@ -1,6 +1,7 @@
 """Conversion of submitted files (a .py file, a notebook, a folder, a .zip) to a ``Submission``.
 
-``raw_files.py`` reads files safely, ``stored_submission.py`` stores submissions, and the assignment defines how they are marked.
+``raw_files.py`` reads files safely, ``stored_submission.py`` stores submissions, and the assignment defines how they
+are marked.
 """
 
 from __future__ import annotations
