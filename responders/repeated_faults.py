@@ -32,15 +32,18 @@ _COSTLY_VERDICTS = MappingProxyType({"robot": _LIMIT_VERDICTS | {Verdict.PROGRAM
 #: Limits on the recorded steps of one child, and on failed attempts to replay it.
 _MOST_STEPS, _MOST_BYTES = 20_000, 8 << 20
 _MAX_FAILED_REPLAYS = 3
+#: Maximum length of the texts that are searched for randomness. Longer ones count as using it.
+_MOST_CHARACTERS = 100_000
 #: Modules without access to randomness. Any other import may give access to it.
 _DETERMINISTIC_MODULES = frozenset(
     ["collections", "ev3dev2", "ev3dev2_glue", "functools", "itertools", "json", "math", "re", "string", "time"]
 )
 _IMPORT = re.compile(r"\bfrom\s+([\w.]+)\s+import\b|\bimport\b([^\n;#]*)")
 #: Names that give access to randomness or to another child's memory, and constructs that can hide a name: escapes,
-#: format fields, copied attributes.
+#: format fields, copied attributes, ``type`` with anything but one plain argument. Student texts are searched with
+#: these patterns outside all limits, so the time must be linear in their length.
 _UNSAFE_NAMES = re.compile(
-    r"\\[xuN0-7\n]|\b(?:v?format(?:_map|_field)?|get_field|Formatter|update_wrapper|wraps|metaclass)\b|\btype\s*\([^)]*,|"
+    r"\\[xuN0-7\n]|\b(?:v?format(?:_map|_field)?|get_field|Formatter|update_wrapper|wraps|metaclass)\b|\btype\s*+\((?![^(),*]*+\))|"
     r"\b(?:_?random|urandom|_?sys|modules|eval|exec|compile|open|getattr|globals|locals|vars|id|hash|inspect"
     r"|(?:gi|cr|ag|tb)_frame|_getframe|f_\w+|__(?!(?:name|main|init|str|repr)__)\w+)\b"
 )
@@ -305,11 +308,23 @@ def _may_use_chance(frame: Mapping[str, Any], folder: Path | None) -> bool:
     modules: dict[str, str] = dict(frame.get("modules", {}))
     if folder is not None:
         modules |= {file.stem: file.read_text("utf-8", "replace") for file in folder.glob("*.py")}
-    texts = [unicodedata.normalize("NFKC", text) for text in (frame["text"], *modules.values())]
-    return any(
+    texts = [frame["text"], *modules.values()]
+    if sum(map(len, texts)) > _MOST_CHARACTERS:
+        return True
+    texts = list(map(_normalise_characters, texts))
+    # Normalising can make a text up to 18 times as long.
+    return sum(map(len, texts)) > _MOST_CHARACTERS or any(
         _UNSAFE_NAMES.search(text) or not _find_imports(text) <= _DETERMINISTIC_MODULES | modules.keys()
         for text in texts
     )
+
+
+def _normalise_characters(text: str) -> str:
+    """Return the text with each character in NFKC form, so that an identifier has the spelling that Python reads.
+
+    Normalising a whole text takes quadratic time for long runs of combining marks.
+    """
+    return text.translate({ord(letter): unicodedata.normalize("NFKC", letter) for letter in set(text)})
 
 
 def _find_imports(text: str) -> set[str]:
