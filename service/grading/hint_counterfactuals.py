@@ -54,6 +54,9 @@ def hint_about_wrong_number(clues: Clues) -> Iterator[str]:
     criterion = next((each for each in clues.costliest_criteria if isinstance(each, _PATH_CRITERIA)), None)
     if listing is None or criterion is None or criterion is not clues.costliest_criteria[0] or clues.definition is None:
         return
+    failure = describe_first_failure(clues, criterion)
+    if not failure:  # only hidden trials lost marks
+        return
     trials = [each for each in clues.shown if not criterion.scenarios or each.scenario in criterion.scenarios]
     unfit = any(each.recording.partner is not None or not each.recording.places for each in trials)
     if not trials or unfit or any(each.has_token(*PROPERTIES) for each in listing.code.statements):
@@ -79,7 +82,7 @@ def hint_about_wrong_number(clues: Clues) -> Iterator[str]:
         if best is None or (-total, size) < best[:2]:
             best = -total, size, change, factor
     if best is not None:
-        yield _describe_change(best[2], best[3], describe_first_failure(clues, criterion))
+        yield _describe_change(best[2], best[3], failure)
 
 
 def _choose_factor(passed: list[float]) -> float:
@@ -188,7 +191,7 @@ def _list_numbers(listing: Listing, call: CallInCode) -> list[float]:
     return [each for each in found if each is not None]
 
 
-def _describe_change(change: _Change, factor: float, found: str) -> str:
+def _describe_change(change: _Change, factor: float, failure: str) -> str:
     where = change.listing.locate(change.statement.line)
     numbers = _list_numbers(change.listing, change.call) if change.call is not None else []
     name = change.call.name.rpartition(".")[2] if change.call is not None else ""
@@ -200,7 +203,7 @@ def _describe_change(change: _Change, factor: float, found: str) -> str:
     else:
         more = "more" if factor > 1 else "less"
         fix = f"Let the robot move about {factor:.2g} times as far or turn as much here, {more} than now"
-    return f"{where}: {found[0].lower()}{found[1:].rstrip('.')}. {fix}"
+    return f"{where}: {failure[0].lower()}{failure[1:].rstrip('.')}. {fix}"
 
 
 def format_rounded(number: float) -> str:

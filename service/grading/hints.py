@@ -7,6 +7,7 @@ words, or missing keys.
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Callable, Iterator, Sequence
 
@@ -135,6 +136,8 @@ from service.grading.judging.message_parts import quote_text
 from service.grading.run_plan import RunPlan
 from submissions.submission import Part, Submission
 
+_log = logging.getLogger(__name__)
+
 _MAX_HINTS = 5
 Rule = Callable[[Clues], Iterator[str]]
 #: Problems that prevent everything else.
@@ -174,6 +177,8 @@ _MESSAGE_RULES: Sequence[Rule] = (
     hint_about_other_keys,
     hint_about_text_numbers,
 )
+#: Rules for programs that ran into a limit.
+_LIMIT_RULES: Sequence[Rule] = (hint_about_stop_in_loop, hint_about_gyro_direction, hint_about_limits)
 #: Rules for programs that finished but did too little, the most certain first.
 _STRUCTURE_RULES: Sequence[Rule] = (
     hint_about_ignored_magic,
@@ -278,16 +283,12 @@ def _collect_all_hints(clues: Clues) -> tuple[str, ...]:
 def collect_near_misses(clues: Clues) -> tuple[str, ...]:
     """Return everything that the rules find, regardless of marks. Problems that prevent everything else come first."""
     explained = _apply_rules(_ERROR_RULES, clues)
-    errors = explained or tuple(hint_about_errors(clues))
+    errors = explained or _apply_rules((hint_about_errors,), clues)
     sent = _apply_rules(_MESSAGE_RULES, clues)
-    slips = () if errors else tuple(hint_about_slips(clues))
-    limits = (
-        ()
-        if errors or slips
-        else (*hint_about_stop_in_loop(clues), *hint_about_gyro_direction(clues), *hint_about_limits(clues))
-    )
+    slips = () if errors else _apply_rules((hint_about_slips,), clues)
+    limits = () if errors or slips else _apply_rules(_LIMIT_RULES, clues)
     structure = () if errors else _apply_rules(_STRUCTURE_RULES, clues)
-    still = () if errors or slips or limits or structure else tuple(hint_about_stillness(clues))
+    still = () if errors or slips or limits or structure else _apply_rules((hint_about_stillness,), clues)
     first = (*explained, *sent) if explained else (*sent, *errors)
     found = (
         *_apply_rules(_FILE_RULES, clues),
@@ -298,27 +299,37 @@ def collect_near_misses(clues: Clues) -> tuple[str, ...]:
         *still,
         *_apply_rules(_RESULT_RULES, clues),
     )
-    found = found or next(filter(None, (tuple(rule(clues)) for rule in _FALLBACK_RULES)), ())
+    found = found or next(filter(None, (_apply_rules((rule,), clues) for rule in _FALLBACK_RULES)), ())
     return tuple(dict.fromkeys(found))[:_MAX_HINTS]
 
 
 def _apply_rules(rules: Sequence[Rule], clues: Clues) -> tuple[str, ...]:
-    return tuple(sentence for rule in rules for sentence in rule(clues))
+    return tuple(sentence for rule in rules for sentence in _apply_rule(rule, clues))
+
+
+def _apply_rule(rule: Rule, clues: Clues) -> tuple[str, ...]:
+    """Return the hints of one rule. A rule that fails is logged and gives none, and the others still apply."""
+    try:
+        return tuple(rule(clues))
+    except MemoryError:
+        raise  # the search for hints has exceeded its limits
+    except Exception:
+        _log.warning("%s failed, so it gives no hint", rule.__name__, exc_info=True)
+        return ()
 
 
 def collect_accepted_differences(clues: Clues) -> tuple[str, ...]:
     """Return one sentence each on words and on keys that differ from the description. Empty if none do."""
-    task = " ".join(clues.task.split())
-    return (*_hint_about_other_words(task, clues), *_hint_about_missing_keys(task, clues))
+    return _apply_rules((_hint_about_other_words, _hint_about_missing_keys), clues)
 
 
-def _hint_about_other_words(task: str, clues: Clues) -> Iterator[str]:
+def _hint_about_other_words(clues: Clues) -> Iterator[str]:
     texts: Sequence[tuple[Part, str, Sequence[str]]] = (
         ("program", "says", clues.spoken),
         ("program", "prints", clues.printed),
         ("responder", "answers", clues.answers),
     )
-    for asked in _QUOTED.findall(task):
+    for asked in _QUOTED.findall(_join_task_lines(clues)):
         begin = asked.partition("...")[0].strip()
         if len(begin.split()) < 2 or _VARIABLE_TEXT.search(begin):
             continue
@@ -333,8 +344,10 @@ def _hint_about_other_words(task: str, clues: Clues) -> Iterator[str]:
                 return
 
 
-def _hint_about_missing_keys(task: str, clues: Clues) -> Iterator[str]:
-    asked = list(dict.fromkeys(key for form in _extract_json_objects(task) for key in _KEY.findall(form)))
+def _hint_about_missing_keys(clues: Clues) -> Iterator[str]:
+    asked = list(
+        dict.fromkeys(key for form in _extract_json_objects(_join_task_lines(clues)) for key in _KEY.findall(form))
+    )
     answers = [text for text in clues.answers if text.startswith(JSON) and len(text) < LONGEST_TEXT]
     given = {key for text in answers for key in _KEY.findall(text)}
     missing = [key for key in asked if key not in given]
@@ -342,6 +355,10 @@ def _hint_about_missing_keys(task: str, clues: Clues) -> Iterator[str]:
         where = describe_return_line(answers[0], clues, RETURN_LINE)
         keys = " and ".join(map(quote_text, missing[:3]))
         yield f"{where}: the answer is {quote_text(answers[0])}, without {keys}, which the assignment asks for"
+
+
+def _join_task_lines(clues: Clues) -> str:
+    return " ".join(clues.task.split())
 
 
 def _extract_json_objects(task: str) -> Iterator[str]:

@@ -18,6 +18,7 @@ from rich.console import Console
 from notebook_builder import notebook
 from paths import DATA, ROOT
 from report_builders import line_follower_recording
+from service.grading import hints
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.hint_clues import collect_clues
@@ -236,6 +237,59 @@ def test_searching_for_hints_takes_time_that_grows_with_the_length(tmp_path: Pat
 
     short = max(cost(100), 0.002)
     assert cost(4 * 100) < 20 * 4 * short
+
+
+def test_a_rule_that_fails_is_logged_and_the_others_give_their_hints(
+    runner: TrialRunner, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    asked = find_assignment("echo-responder")
+    submission = read_submission(locate_examples("echo-responder") / "flawed", asked=asked.parts)
+    whole = grade(submission, asked, runner=runner)
+    assert whole.hints
+    for rules in ("_FILE_RULES", "_ERROR_RULES", "_RESULT_RULES", "_FALLBACK_RULES"):
+        others = getattr(hints, rules)
+        monkeypatch.setattr(hints, rules, (_raises, *others))
+    assert grade(submission, asked, runner=runner).hints == whole.hints
+    causes = {(each.message, str(each.exc_info[1])) for each in caplog.records if each.exc_info}
+    assert causes == {("_raises failed, so it gives no hint", "a rule that nobody thought through")}
+
+
+HIDDEN_TURN = """
+id = "ends-there"
+title = "Drive"
+description = "Drive 300 mm forward."
+[world]
+background = "Empty_Map"
+[parts]
+responder = "none"
+[[scenario]]
+id = "shown"
+poses = [[500, 500, 0]]
+seconds = 10
+[[scenario]]
+id = "hidden"
+visibility = "hidden"
+poses = [[500, 500, 20]]
+seconds = 10
+[[criterion]]
+title = "Ends there"
+marks = 5
+check = "pose"
+x = 800
+y = 500
+tolerance = 60
+"""
+
+
+def test_a_criterion_that_only_hidden_trials_fail_leaves_all_rules_working(
+    tmp_path: Path, runner: TrialRunner, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "assignment.toml").write_text(HIDDEN_TURN)
+    (tmp_path / "robot.py").write_text("tank_drive.on_for_seconds(SpeedPercent(30), SpeedPercent(30), 2.44)\n")
+    asked = find_assignment(str(tmp_path))
+    graded = grade(read_submission(tmp_path / "robot.py", asked=asked.parts), asked, runner=runner)
+    assert 0 < graded.marks < graded.max_marks
+    assert not caplog.records
 
 
 def _raises(_: object) -> tuple[str, ...]:
