@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from sqlalchemy.orm import Session
@@ -19,6 +20,7 @@ from service.reports.html import (
     BatchRow,
     ReportParts,
     render_batch_index,
+    render_or_explain,
     render_refusal_page,
     render_report_page,
     render_report_parts,
@@ -197,7 +199,8 @@ def render_each_report(
         version = (view.grade.assignment, view.grade.assignment_version)
         if not _has_built_in_floors(view) and version not in floors:
             floors[version] = load_own_floors(intake.load_assignment(session, job_id))
-        yield job_id, view, render_report_page(view, plotted, submission, floors.get(version, {}))
+        page = partial(render_report_page, view, plotted, submission, floors.get(version, {}))
+        yield job_id, view, render_or_explain(view, page)
 
 
 def _has_built_in_floors(view: View) -> bool:
@@ -226,11 +229,15 @@ def _render_page(
         drawn = plots.load_plots(session, line.id) if line.plots is PlotState.DONE else None
         built_in = {trial.recording.background for trial in grade.trials} <= set(list_floor_names())
         assignment = None if drawn is not None and built_in else intake.load_assignment(session, line.id)
-    if drawn is None and assignment is not None:
-        drawn = draw_plots(grade, assignment, submission)
-    found = drawn or {}
-    floors = load_own_floors(assignment) if assignment is not None else {}
-    return render_report_page(view, found, submission, floors, others), found
+    shown = dict(drawn or {})
+
+    def render() -> str:
+        if drawn is None and assignment is not None:
+            shown.update(draw_plots(grade, assignment, submission))
+        floors = load_own_floors(assignment) if assignment is not None else {}
+        return render_report_page(view, shown, submission, floors, others)
+
+    return render_or_explain(view, render), shown
 
 
 def _build_view(session: Session, line: JobLine, grade: Grade, language: Language = ENGLISH) -> View:

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import logging
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import lru_cache
@@ -32,8 +33,11 @@ from service.reports.replay.labels import translate_labels
 from service.reports.rows import TableRow
 from service.reports.verdict_sentences import describe_verdict
 from service.reports.view import NO_OVERLAY, OverlayTrials, View
+from sim.errors import RobomarkError
 from sim.recording import Verdict
 from submissions.submission import Submission
+
+_log = logging.getLogger(__name__)
 
 #: The expected form of a submission, for rejections that don't state it.
 _EXPECTED_FORM = "robot.py and responder.py, or a notebook: side by side, in a folder or a .zip"
@@ -158,6 +162,31 @@ def render_report_page(
     return _render_secured_page(
         "report.html", parts.style, script, {"title": parts.title, "body": parts.body}, view.language
     )
+
+
+def render_or_explain(view: View, render: Callable[[], str]) -> str:
+    """Return the page of one grade from ``render``, for callers that write the pages of many students.
+
+    If that fails, the log has the cause, and the page has the marks and says that the report cannot be shown.
+
+    Raises:
+        RobomarkError: If ``render`` raises one.
+    """
+    grade = view.grade
+    try:
+        return render()
+    except RobomarkError:
+        raise
+    except Exception:
+        _log.exception("the report of a grade for %s cannot be rendered", grade.assignment)
+    context = {
+        "title": f"{grade.assignment_title}: {grade.student}",
+        "who": grade.student,
+        "assignment": grade.assignment_title,
+        "marks": format_decimal(grade.marks),
+        "max_marks": format_decimal(grade.max_marks),
+    }
+    return _render_secured_page("unavailable.html", load_report_style(), "", context, view.language)
 
 
 def render_replay_page(replay: Mapping[str, Any], language: Language = ENGLISH) -> str:

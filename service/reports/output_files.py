@@ -132,11 +132,15 @@ def write_file(folder: Path, name: str, data: bytes) -> Path:
 
 def write_report(folder: Path, grade: Grade, submission: Submission, written: str, language: Language) -> Path:
     """Draw the plots of a grade and write the report, named after the student as ``written``. Return its path."""
-    from service.reports.html import render_report_page
+    from service.reports.html import render_or_explain, render_report_page
     from service.reports.plots.grade_plots import draw_all_plots
     from service.reports.view import build_student_view
     from submissions.diagram_cells import read_diagrams
 
-    plots = draw_all_plots(grade, cells=read_diagrams(submission.notebook).cells)
-    page = render_report_page(build_student_view(grade, language=language), plots, submission)
-    return write_page(folder, f"{build_file_stem(written)}.html", page)
+    view = build_student_view(grade, language=language)
+
+    def render() -> str:
+        plots = draw_all_plots(grade, cells=read_diagrams(submission.notebook).cells)
+        return render_report_page(view, plots, submission)
+
+    return write_page(folder, f"{build_file_stem(written)}.html", render_or_explain(view, render))

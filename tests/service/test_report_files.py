@@ -15,7 +15,14 @@ import report_builders as build
 from builders import grading_request
 from replays import data_of, parting_grade
 from service.grading.grade import Grade
-from service.report_files import write_grade_film, write_grade_replay, write_report
+from service.report_files import (
+    render_each_report,
+    write_batch_reports,
+    write_grade_film,
+    write_grade_replay,
+    write_report,
+)
+from service.reports.view import View, build_student_view
 from service.store.batches import batches
 from service.store.batches.batches import JobLine
 from service.store.batches.intake import accept_batch
@@ -48,6 +55,33 @@ def replay_over(store: Store, line: JobLine, over: JobLine, folder: Path) -> dic
         grade = results.load_grade(session, line.id)
     write_grade_replay(store, line, grade, folder / "replay.json", over)
     return dict(json.loads((folder / "replay.json").read_text())["trials"][0]["over"])
+
+
+def test_a_report_that_cannot_be_rendered_does_not_stop_those_of_other_students(
+    store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def render_for_bob(view: View, *_: object) -> str:
+        if view.grade.student == "ada":
+            raise OverflowError("too large")
+        return "the report"
+
+    monkeypatch.setattr("service.report_files.render_report_page", render_for_bob)
+    monkeypatch.setattr("service.report_files.draw_plots", lambda *_: {})
+    grade = build.line_follower_grade()
+    lines = [
+        stored(store, student, number, replace(grade, student=student))[0]
+        for number, student in enumerate(("ada", "bob"))
+    ]
+    write_batch_reports(store, "class", lines, [], tmp_path)
+    assert (tmp_path / "bob.html").read_text() == "the report"
+    page = (tmp_path / "ada.html").read_text()
+    assert "This report cannot be shown" in page
+    assert f"{grade.marks:g} of {grade.max_marks:g} marks" in page
+    assert [str(each.exc_info[1]) for each in caplog.records if each.exc_info] == ["too large"]
+    with store.reading() as session:
+        views = [(each.id, build_student_view(results.load_grade(session, each.id))) for each in lines]
+        pages = [page for *_, page in render_each_report(session, sorted(views), [each.id for each in lines])]
+    assert sum("This report cannot be shown" in each for each in pages) == 1
 
 
 def test_a_student_watches_an_earlier_attempt_in_a_report_and_in_a_replay(store: Store, tmp_path: Path) -> None:

@@ -5,8 +5,11 @@ The modules of each kind draw them. Nothing here is random, depends on time, or 
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+import logging
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from service.grading.grade import CriterionResult, Grade, Prediction
 from service.language import ENGLISH, Language
@@ -28,6 +31,11 @@ from sim.recording import Pose, Recording
 from sim.recording_values import is_stationary
 from submissions.diagram_cells import DiagramCell
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_log = logging.getLogger(__name__)
+
 _NO_IMAGES: Mapping[str, Pixels] = MappingProxyType({})
 
 
@@ -46,7 +54,7 @@ def draw_all_plots(
     """Draw every plot of ``grade`` and of the notebook's ``cells``, for staff and student, as name -> PNG.
 
     ``images`` are floors that are not built in, by background name, (1143, 2362, 3) uint8 with row 0 at y = 1143 mm. A
-    floor that is in neither is drawn white.
+    floor that is in neither is drawn white. A plot that cannot be drawn is an image with a sentence that says so.
     """
     drawn: dict[str, bytes] = {}
     for view in (build_staff_view(grade), build_student_view(grade)):
@@ -63,16 +71,31 @@ def draw_all_plots(
 def _render_plot(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> bytes:
     # The drawing library is loaded only if there is something to draw.
     from service.reports.plots.figures import draw_plot
-    from service.reports.plots.style import render_png
 
-    return render_png(draw_plot(grade, plot, images))
+    return _render_or_explain(plot, partial(draw_plot, grade, plot, images))
 
 
 def _render_own_plot(own: OwnDiagram, grade: Grade, plot: Plot) -> bytes:
     from service.reports.plots.diagram_drawing import draw_own_diagram
-    from service.reports.plots.style import render_png
 
-    return render_png(draw_own_diagram(own, grade, plot))
+    return _render_or_explain(plot, partial(draw_own_diagram, own, grade, plot))
+
+
+def _render_or_explain(plot: Plot, draw: Callable[[], Figure]) -> bytes:
+    """Return the figure from ``draw`` as a PNG, or an image with one sentence if it fails. The log has the cause.
+
+    Raises:
+        MemoryError: If memory is short, so that the plot can be drawn later.
+    """
+    from service.reports.plots.style import HEAD, create_figure, render_png
+
+    try:
+        return render_png(draw())
+    except MemoryError:
+        raise
+    except Exception:
+        _log.exception("the plot %s cannot be drawn", plot.name)
+    return render_png(create_figure(HEAD, "This plot cannot be drawn because of an error in Robomark."))
 
 
 def group_same_answers(grade: Grade) -> tuple[tuple[int, ...], ...]:

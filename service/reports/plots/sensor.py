@@ -40,6 +40,7 @@ _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.12  # inches
 _GAP = 0.20  # between panels, room for the panel's title
 _ROW = 0.15  # height of a strip of events
 _MOST_MARKS = 400  # of one kind; more would form a solid bar
+_LARGEST_READING = 1e100  # a program can set motor positions that are too large to draw
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +154,7 @@ def _draw_strips(axes: Axes, strips: Sequence[Strip], end: float) -> None:
 def _draw_panel(axes: Axes, panel: ReadingPanel, times: NDArray[np.float64], end: float) -> None:
     axes.set_xlim(0, end)
     for curve, colour, dashes, width in zip(panel.curves, (LEFT, RIGHT), ((), (3.2, 1.2)), (1.1, 1.3), strict=False):
-        axes.plot(times, curve.values, color=colour, linewidth=width, dashes=dashes or (None, None))
+        axes.plot(times, _clip_readings(curve.values), color=colour, linewidth=width, dashes=dashes or (None, None))
     limits = panel.panel.limits or _compute_limits(panel)
     axes.set_ylim(*limits)
     if panel.panel.marks:
@@ -169,13 +170,19 @@ def _draw_panel(axes: Axes, panel: ReadingPanel, times: NDArray[np.float64], end
 
 
 def _compute_limits(panel: ReadingPanel) -> tuple[float, float]:
-    values = np.concatenate([curve.values for curve in panel.curves])
+    values = _clip_readings(np.concatenate([curve.values for curve in panel.curves]))
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
-    if high - low < 10:
-        low, high = (low + high) / 2 - 5, (low + high) / 2 + 5
+    # Large numbers need a wider range, in which the ends of the axis still differ.
+    least = max(10.0, 1e-6 * max(abs(low), abs(high)))
+    if high - low < least:
+        low, high = (low + high - least) / 2, (low + high + least) / 2
     room = 0.08 * (high - low)
     return low - room, high + room
+
+
+def _clip_readings(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.clip(values, -_LARGEST_READING, _LARGEST_READING)
 
 
 def _label_curves(figure: Figure, panel: ReadingPanel, y: float) -> None:

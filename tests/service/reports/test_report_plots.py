@@ -83,6 +83,36 @@ def test_bytes_repeat_and_sizes_are_small() -> None:
         assert len(data) < 150_000
 
 
+@pytest.mark.parametrize(
+    "positions", [(1e308, -1e308), (1.7e308, 1.7e308), (1e17, 1e17), (5e-324, 0.0), (float("inf"), float("nan"))]
+)
+@pytest.mark.filterwarnings("error")
+def test_readings_of_any_size_are_drawn(positions: tuple[float, float]) -> None:
+    grade = build.line_follower_grade()
+    trial = grade.trials[0]
+    ticks = trial.recording.ticks
+    left, right = (np.full(len(ticks), each) for each in positions)
+    recording = replace(trial.recording, ticks=replace(ticks, left_position=left, right_position=right))
+    draw_sensors(replace(trial, recording=recording), "t").savefig(io.BytesIO())
+
+
+def test_a_plot_that_cannot_be_drawn_is_an_image_with_a_sentence(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail(*_: object) -> Figure:
+        raise OverflowError("too large")
+
+    whole = draw_all_plots(build.line_follower_grade())
+    monkeypatch.setattr("service.reports.plots.figures.draw_sensors", fail)
+    drawn = draw_all_plots(build.line_follower_grade())
+    assert drawn.keys() == whole.keys()
+    for name, data in drawn.items():
+        with Image.open(io.BytesIO(data)) as image:
+            assert (data == whole[name]) is not name.startswith("sensors")
+            assert image.height > 30
+    assert {str(each.exc_info[1]) for each in caplog.records if each.exc_info} == {"too large"}
+
+
 def test_hidden_trials_are_in_staff_plots_only() -> None:
     for plot in list_plots(build.hidden_grade()):
         if "SECRET" in plot.title or plot.kind in ("confusion", "predictions"):
