@@ -16,14 +16,15 @@ from responders.conversation import Answer, Conversation
 from responders.faults import build_error_fault, build_stop_fault, describe_refusal, to_child_data_error
 from responders.link import build_link
 from responders.responder_process import LoggedData, ResponderProcess
-from responders.sandbox.meter import ChildStopped, JobMeter
+from responders.sandbox.meter import OBJECT_BYTES, ChildStopped, JobMeter
 from responders.sandbox.running_child import ServedChild
 from responders.trial_spec import TrialSpec
 from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.drive import Wheel
+from sim.line_trace import LINE_BYTES, LineTrace
 from sim.random_streams import RandomStream
-from sim.recording import MILLISECOND, SECOND, STAND_IN_PREFIX, Fault, Image, ProgramLine, TimedText, Verdict
+from sim.recording import MILLISECOND, SECOND, STAND_IN_PREFIX, Fault, Image, TimedText, Verdict
 from sim.world import HashChain, World
 
 _READ_TIME = 10 * MILLISECOND
@@ -69,8 +70,8 @@ class Bridge:
         self.images: list[Image] = []
         self.image_log: list[tuple[str, str, int]] = []
         self.notes: list[str] = []
-        self.places: list[ProgramLine] = []
-        self._places_complete = True
+        self.places = LineTrace()
+        self._places_complete = spec.records_lines
         self._limit = round(spec.seconds * SECOND)
         self._said_until = 0
         self._arrived: list[str] = []
@@ -353,9 +354,10 @@ class Bridge:
         """Note a line of the program. Places that are not complete would mislead, so they are dropped."""
         self._places_complete &= number > 0 and len(self.places) < _MOST_PLACES
         if self._places_complete:
-            self.places.append(ProgramLine(self.now / SECOND, *packets.unpack_lines(number)))
-        else:
-            self.places.clear()
+            self._meter.charge_bytes(LINE_BYTES - OBJECT_BYTES)  # a line is no separate object
+            self.places.append(self.now / SECOND, *packets.unpack_lines(number))
+        elif self.places:
+            self.places = LineTrace()
 
     def _count_free_action(self) -> None:
         self._free_acts += 1

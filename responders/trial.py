@@ -101,5 +101,5 @@ def build_recording(spec: TrialSpec, bridge: Bridge, faults: tuple[Fault, ...], 
         pen=((0, True),) if spec.pen_down else (),
         sandbox=sandbox,
         notes=tuple(bridge.notes)[:MOST_NOTES],
-        places=tuple(bridge.places),
+        places=bridge.places,
     )

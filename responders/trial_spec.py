@@ -128,6 +128,7 @@ class TrialSpec:
     agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # by name
     partner: PartnerSpec | None = None
     number: int = 1  # the robot's number, as its program sees it
+    records_lines: bool = True  # whether the recording has the lines of the program, for hints
 
     def build_partner_spec(self, partner: PartnerSpec) -> TrialSpec:
         """Return the trial as the second robot sees it, with its own seeds."""

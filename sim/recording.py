@@ -6,7 +6,7 @@ ticks can import this module without numpy.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
@@ -349,6 +349,6 @@ class Recording:
     agent_outputs: tuple[AgentOutput, ...] = ()  # of every agent, in the assignment's order
     partner: Recording | None = None
     cell_errors: tuple[Fault, ...] = ()  # of a notebook: the first cells that failed, even if the run continued
-    places: tuple[ProgramLine, ...] = field(
+    places: Sequence[ProgramLine] = field(
         default=(), compare=False, repr=False
     )  # for hints, complete or empty; neither hashed nor stored

@@ -243,6 +243,7 @@ def _build_trial_spec(trial: Trial, plan: RunPlan) -> TrialSpec:
         physics=Physics(world.solid, world.drive),
         tick=BROWSER_TICK if world.tick == "browser" else TICK,
         partner=_build_partner_spec(trial, plan),
+        records_lines=trial.scenario.visibility == "visible",
     )
 
 

@@ -164,6 +164,7 @@ class NotebookRuns:
             child_seed=seed,
             pen_down=setup.pen_down,
             tick=own.tick,
+            records_lines=False,
         )
 
 

@@ -7,23 +7,33 @@ from __future__ import annotations
 
 import pickle
 import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 import running
 from floods import CALL, ECHO, FLOODS, Flood, long
 from hostile import flood
+from notebook_builder import notebook
+from responders import notebook_executor
 from responders.function_calls import FunctionCall
 from responders.notebook_executor import ExecutedNotebook, PlannedRun
 from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobLimits, JobMeter
 from responders.sandbox.running_child import ChildLimits
 from responders.source_file import SourceFile
+from responders.trial import build_recording
 from responders.trial_spec import ResponderSpec
 from rows import quick_first
 from running import run_program
+from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
+from sim.line_trace import LineTrace
 from sim.recording import Fault, Recording, Verdict
+from submissions.assignment.reader import find_assignment
+from submissions.bundle import read_submission
 
 BUDGET = 2 << 20
 
@@ -103,6 +113,50 @@ def test_what_honest_programs_send_in_thousands_costs_nothing(runner: TrialRunne
     meter = JobMeter()
     assert run_program(runner, program, meter=meter).verdict is Verdict.FINISHED
     assert meter.spent.kept_bytes < 1000
+
+
+TWO_LINES = """from ev3dev2.motor import Motor, OUTPUT_B
+motor = Motor(OUTPUT_B)
+for _ in range(2000):
+    motor.speed_sp = 1
+    motor.speed_sp = 2
+"""
+
+
+def test_the_lines_of_a_program_are_paid_for_and_take_little_memory(runner: TrialRunner) -> None:
+    meter = JobMeter()
+    recording = run_program(runner, TWO_LINES, meter=meter)
+    assert len(recording.places) > 4000
+    assert 16 * len(recording.places) <= meter.spent.kept_bytes < 20 * len(recording.places)
+    assert _held((recording.places,)) < 20 * len(recording.places)
+    assert run_program(runner, TWO_LINES, meter=JobMeter(JobLimits(kept_bytes=60_000))).verdict is Verdict.OUTPUT_LIMIT
+
+
+def test_a_trace_of_lines_is_a_sequence() -> None:
+    trace = LineTrace()
+    assert not trace
+    trace.append(0.5, 3, 1)
+    trace.append(1.0, (1 << 20) - 1, 0)
+    assert list(trace) == [trace[0], trace[-1]] == list(trace[:]) == [(0.5, 3, 1), (1.0, (1 << 20) - 1, 0)]
+    assert [each.line for each in reversed(trace)] == [(1 << 20) - 1, 3]
+
+
+def test_only_the_marked_run_of_a_notebook_has_lines(
+    runner: TrialRunner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[Recording] = []
+
+    def keep(*given: Any) -> Recording:
+        made.append(build_recording(*given))
+        return made[-1]
+
+    monkeypatch.setattr(notebook_executor, "build_recording", keep)
+    run = '%%sim_magic_preloaded -b Empty_Map -R\nprint("PY::1")\n'
+    path = notebook(tmp_path / "eve.ipynb", ["def responder(text):\n    return text\n", run, run])
+    asked = find_assignment("echo-responder")
+    asked = replace(asked, scenarios=tuple(replace(each, poses=each.poses[:1]) for each in asked.scenarios[:1]))
+    grade(read_submission(path, asked=asked.parts), asked, runner=runner)
+    assert sorted({bool(each.places) for each in made}) == [False, True]
 
 
 class _NoRuns:

@@ -289,6 +289,7 @@ def test_a_criterion_that_only_hidden_trials_fail_leaves_all_rules_working(
     asked = find_assignment(str(tmp_path))
     graded = grade(read_submission(tmp_path / "robot.py", asked=asked.parts), asked, runner=runner)
     assert 0 < graded.marks < graded.max_marks
+    assert [bool(each.recording.places) for each in graded.trials] == [True, False]
     assert not caplog.records
 
 
