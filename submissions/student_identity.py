@@ -32,6 +32,8 @@ _COLUMNS = {
     "last": ("last name", "surname"),
     "identifier": ("identifier",),
 }
+#: Maximum number of people to enrol at once: SQLite has one writer, so all courses wait until they are enrolled.
+MAX_PEOPLE = 5000
 #: Moodle's name for every student if names are hidden from markers.
 HIDDEN_NAME = "Participant"
 
@@ -107,11 +109,15 @@ def read_people(path: Path) -> People:
     """Read the people in a CSV file, for example Moodle's offline grading worksheet.
 
     Raises:
-        UsageError: The file is not such a table.
+        UsageError: The file is not such a table, or has more than ``MAX_PEOPLE`` rows.
     """
     table = read_csv(path, _COLUMNS, "id, name, email")
     if not table.columns & {"id", "name", "email", "first", "last"}:
         raise UsageError(f"{path.name}: has no column id, name or email in its first line, expected one of them.")
+    if len(table.rows) > MAX_PEOPLE:
+        raise UsageError(
+            f"{path.name}: has {len(table.rows)} people, expected at most {MAX_PEOPLE}; split it into several tables."
+        )
     numbers: dict[str, Student] = {}
     called: dict[str, list[Student]] = {}
     for row, student in _read_students(table.rows, path.name):

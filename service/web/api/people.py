@@ -18,7 +18,7 @@ from service.web.api.shapes import Shape, build_example_config
 from service.web.api_access import CallerInCourse, require_role
 from service.web.api_routes import After, Limit, Listed, api_router, build_list_page, decode_cursor
 from service.web.context import Context
-from submissions.student_identity import Student
+from submissions.student_identity import MAX_PEOPLE, Student
 
 router = api_router("people")
 ReadAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "read"))]
@@ -101,7 +101,7 @@ class StudentAsked(BaseModel):
 class EnrolAsked(BaseModel):
     """Students to enrol. If one of them is invalid, none is enrolled."""
 
-    students: list[StudentAsked] = Field(min_length=1, max_length=5000)
+    students: list[StudentAsked] = Field(min_length=1, max_length=MAX_PEOPLE)
 
 
 class EnrolledShape(Shape):

@@ -8,6 +8,7 @@ from builders import grading_request
 from service.store import audit
 from service.store.batches import intake
 from service.store.people import membership
+from submissions.student_identity import MAX_PEOPLE
 from web import COURSE, Web, submit, words
 
 HOME = "/courses/1"
@@ -30,6 +31,18 @@ def test_students_are_let_in_and_get_more_time(web: Web, grace: TestClient) -> N
     answer = submit(grace, f"{path}/table", files={"file": ("x.csv", b"\xff\xfe nothing")})
     assert (answer.status_code, "x.csv: " in words(answer.text)) == (422, True)
     assert grace.get(f"{path}/table").headers["location"] == path
+
+
+def test_a_table_with_too_many_people_is_refused(web: Web, grace: TestClient) -> None:
+    path, ids = f"{HOME}/people", [f"s{number}" for number in range(MAX_PEOPLE + 1)]
+    answer = submit(grace, f"{path}/table", files={"file": ("class.csv", "\n".join(["id", *ids]).encode())})
+    assert answer.status_code == 422
+    assert "class.csv: has 5001 people, expected at most 5000" in words(answer.text)
+    token = web.token(web.instructor(), "manage")
+    sent = {"students": [{"id": each} for each in ids]}
+    assert web.browser().post(f"/api/v1{path}", headers=token, json=sent).status_code == 422
+    with web.store.reading() as session:
+        assert len(membership.list_members(session, 1)) == 1
 
 
 def test_letting_in_one_changes_nobody_who_is_there(web: Web, grace: TestClient) -> None:
