@@ -34,7 +34,7 @@ _ERROR_SOURCES = [
         "store/grades/overrides",
         "store/people/lti",
         "store/queue/test_runs",
-        "web/pages/mine",
+        "web/pages/own_assignments",
     )
 ]
 _SUBMISSION_ERROR_SOURCES = [
@@ -54,9 +54,9 @@ _KEYWORDS |= {"Sentence": None}
 _ERROR_KEYWORDS = {
     "Sentence": None,
     "UsageError": None,
-    "LacksPart": None,
+    "MissingPart": None,
     "MarksChanged": None,
-    "StudentsKnowAnother": None,
+    "AssignmentAlreadySeen": None,
 }
 _ERROR_KEYWORDS |= {"NotFound": None, "Forbidden": None, "Conflict": None, "Invalid": None, "UnknownPlatform": None}
 _OPTIONS = {
