@@ -5,14 +5,16 @@ A missing object and a missing role give the same error, so that no answer revea
 
 from __future__ import annotations
 
-from sqlalchemy import select
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from service.operations.context import Actor, Service
-from service.operations.errors import Forbidden, NotFound
+from service.operations.errors import Forbidden, Invalid, NotFound
 from service.store.courses.hidden_names import NO_HIDDEN_NAMES, HiddenNames, load_hidden_names
+from service.store.courses.open_assignments import match_anonymous_assignments
 from service.store.models import Batch, Course, Enrolment, Job, SubmissionRow
 from service.store.states import Role
+from service.store.web_tables import OpenAssignment
 
 
 def check_operator(actor: Actor) -> None:
@@ -115,6 +117,28 @@ def require_own_enrolment(session: Session, actor: Actor, course_id: int, *roles
 def load_names_for_actor(service: Service, actor: Actor, course_id: int) -> HiddenNames:
     """Return the labels that the actor sees in place of students' names; commands on the machine see every name."""
     return NO_HIDDEN_NAMES if actor.is_machine else load_hidden_names(service.store, course_id)
+
+
+def check_no_names_hidden(session: Session, actor: Actor, course_id: int) -> None:
+    """Raise Invalid if the action could show an instructor who submitted to an assignment with hidden names.
+
+    It depends only on the course, so that it shows nothing about a student. Operators can read every name.
+    """
+    if actor.operator:
+        return
+    hidden = select(OpenAssignment.assignment).where(*match_anonymous_assignments(course_id))
+    submitted = (
+        select(func.min(SubmissionRow.assignment))
+        .join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
+        .where(Enrolment.course_id == course_id, SubmissionRow.assignment.in_(hidden))
+    )
+    assignment = session.scalar(submitted)
+    if assignment is not None:
+        raise Invalid(
+            "names are hidden for %(assignment)s, and this could show who submitted to it; show the names first, or "
+            "ask an operator to do this with a command",
+            assignment=assignment,
+        )
 
 
 def _build_not_found() -> NotFound:

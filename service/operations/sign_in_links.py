@@ -1,6 +1,8 @@
 """Single-use sign-in links: for one student, for all students of a course, and for any member by an operator.
 
-Only a person's newest link is valid. ``service/store/people/credentials.py`` exchanges links for sessions.
+Only a person's newest link is valid. With hidden names, instructors create links only before the first submission,
+because they could sign in as a student and see the student's submissions.
+``service/store/people/credentials.py`` exchanges links for sessions.
 """
 
 from __future__ import annotations
@@ -12,7 +14,13 @@ from sqlalchemy.orm import Session
 
 from service.operations.context import Actor, Service
 from service.operations.errors import Invalid
-from service.operations.lookup import check_machine, check_operator, require_course, require_student
+from service.operations.lookup import (
+    check_machine,
+    check_no_names_hidden,
+    check_operator,
+    require_course,
+    require_student,
+)
 from service.store import audit
 from service.store.engine import now
 from service.store.people import credentials, membership
@@ -49,12 +57,16 @@ class UnusedLink:
 
 
 def make_links(service: Service, actor: Actor, course_id: int, days: int = DAYS) -> list[StudentLink]:
-    """Create a new link for each student of the course, replacing earlier ones. Raises NotFound, Invalid."""
+    """Create a new link for each student of the course, replacing earlier ones.
+
+    Raises NotFound, and Invalid for a number of days that is out of range, or if names are hidden.
+    """
     if not 1 <= days <= MOST_DAYS:
         raise Invalid("sign-in links can be valid for 1 to %(most)s days", most=MOST_DAYS)
     lifetime = timedelta(days=days)
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
+        check_no_names_hidden(session, actor, course_id)
         listed = membership.list_students(session, course_id)
         person_ids = [each.person_id for each, more in listed if not more]
         made = credentials.replace_links(session, person_ids, lifetime, reach=_build_reach(course_id))
@@ -71,10 +83,12 @@ def make_students_link(service: Service, actor: Actor, course_id: int, enrolment
 
     Raises:
         NotFound: The student does not exist, or the actor does not instruct the course.
+        Invalid: Names are hidden.
         UsageError: The student is also in other courses, or an operator.
     """
     with service.store.transaction() as session:
         row = require_student(session, actor, course_id, enrolment_id)
+        check_no_names_hidden(session, actor, course_id)
         if membership.has_other_access(session, row):
             raise UsageError(f"this person {_ELSEWHERE}")
         return make_link(session, actor, row.person_id, word=word, reach=_build_reach(course_id))

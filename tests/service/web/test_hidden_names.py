@@ -16,6 +16,8 @@ import acting
 import report_builders
 from builders import echo, grading_request
 from naming import is_named
+from service.operations import sign_in_links
+from service.operations.context import create_machine_actor
 from service.store.batches import intake, regrades
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
@@ -28,6 +30,7 @@ from zips import zipped
 
 STUDENTS = ("ada", "bea", "cyd", "dot", "eve", "fay", "gil", "hal")
 HERE = "/api/v1/courses/1"
+HIDDEN = "hidden for echo-responder, and this could show who submitted to it; show the names first"
 
 
 @pytest.fixture
@@ -145,6 +148,33 @@ def test_a_file_that_is_matched_by_names_is_refused(web: Web, grace: Member, reg
         answer = web.browser().get(f"{path}/export?format={form}", headers=token)
     assert answer.status_code == 422
     assert "but names are hidden for echo-responder; show the names first" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize("who", ["ada", "newcomer"])
+def test_an_instructor_creates_no_link_that_opens_a_hidden_submission(
+    web: Web, grace: Member, regrade: str, who: str
+) -> None:
+    student, token = web.student(who), web.token(grace, "manage")
+    browser = web.browser(grace)
+    for way in ("links", f"{student.enrolment_id}/link"):
+        refused = web.browser().post(f"{HERE}/people/{way}", headers=token)
+        assert (refused.status_code, HIDDEN in refused.json()["detail"]) == (422, True)
+        refused = submit(browser, f"/courses/1/people/{way}")
+        assert (refused.status_code, HIDDEN in words(refused.text)) == (422, True)
+    service = web.app.state.context.service
+    assert sign_in_links.make_students_link(service, create_machine_actor(), 1, student.enrolment_id)
+    with web.store.transaction() as session:
+        open_assignments.hide_names(session, 1, "echo-responder", False)
+    assert web.browser().post(f"{HERE}/people/{student.enrolment_id}/link", headers=token).status_code == 201
+
+
+def test_links_are_created_before_the_first_submission_with_a_hidden_name(web: Web, grace: Member) -> None:
+    token, ada = web.token(grace, "manage"), web.student("ada")
+    with web.store.transaction() as session:
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
+        open_assignments.hide_names(session, 1, "echo-responder", True)
+    for way in ("links", f"{ada.enrolment_id}/link"):
+        assert web.browser().post(f"{HERE}/people/{way}", headers=token).status_code == 201
 
 
 def test_numbers_of_submissions_are_not_in_the_order_of_the_names(web: Web) -> None:
