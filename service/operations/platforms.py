@@ -96,12 +96,20 @@ def enrol_members(service: Service, actor: Actor, course_id: int) -> EnrolledMem
 def pass_back(service: Service, actor: Actor, course_id: int, assignment: str) -> int:
     """Send the published marks of an assignment to the platform's gradebook. Returns their number.
 
-    Raises NotFound, UsageError without a platform, PlatformError if it does not accept them.
+    Raises NotFound, UsageError without a platform, Invalid if names are hidden for the assignment, PlatformError if the
+    platform does not accept them.
     """
     from service.lti.passback import send_marks
 
     with service.store.reading() as session:
         link = _require_platform_link(session, actor, course_id)
+        hidden = open_assignments.load_anonymous_assignments(session, course_id)
+    # Instructors read the gradebook, also if an operator sends the marks.
+    if assignment in hidden:
+        raise Invalid(
+            "a learning platform shows marks with names, but names are hidden for %(assignment)s; show the names first",
+            assignment=assignment,
+        )
     sent = send_marks(service.store, link, course_id, assignment)
     with service.store.transaction() as session:
         audit.record_action(

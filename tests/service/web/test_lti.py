@@ -18,10 +18,15 @@ from sqlalchemy import func, select, update
 from starlette.testclient import TestClient
 
 import report_builders
-from builders import grading_request
+from builders import echo, grading_request
 from lti_platform import CLIENT, INSTRUCTOR, ISSUER, LEARNER, LearningPlatform, learning_platform
 from service.lti.launch import CLAIM
+from service.operations import platforms
+from service.operations.context import create_machine_actor
+from service.operations.errors import Invalid
 from service.store.batches import intake
+from service.store.courses import open_assignments
+from service.store.courses.assignment_versions import freeze_assignment
 from service.store.grades import results
 from service.store.models import Job
 from service.store.people import lti, membership
@@ -31,7 +36,7 @@ from service.store.states import Role
 from service.store.web_tables import LtiCourse, LtiLaunch
 from service.web.access import CSRF_FIELD
 from service.web.rate_limits import RateLimit
-from web import Web, csrf, web_in
+from web import Web, csrf, grade_all, web_in
 
 SAME_SITE = "https://localhost"
 
@@ -277,6 +282,28 @@ def test_members_are_enrolled_and_published_marks_sent(launched: tuple[Web, Lear
     ] * 2
     missing = grace.post("/courses/1/platform/marks", data={**send, "assignment": "shape-recognition"})
     assert missing.status_code == 422
+
+
+def test_no_marks_are_sent_while_names_are_hidden(launched: tuple[Web, LearningPlatform]) -> None:
+    web, platform = launched
+    platform.tool_keys = _browser(web).get("/lti/keys").json()
+    grace, _ = _launch(web, platform, "grace", INSTRUCTOR)
+    platform.members = [{"user_id": "ada", "name": "Ada Example", "roles": ["Learner"], "lis_person_sourcedid": "ada"}]
+    word = csrf(grace.get("/account"))
+    grace.post("/courses/1/platform/members", data={CSRF_FIELD: word})
+    intake.accept_batch(web.store, "b", [grading_request("ada")], (), course="Robotics", max_attempts=3)
+    grade_all(web, report_builders.faulty_grade())
+    with web.store.transaction() as session:
+        session.execute(update(Job).values(published_at=datetime.now(UTC), published_by="grace"))
+        open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
+        open_assignments.hide_names(session, 1, "echo-responder", True)
+    send = {CSRF_FIELD: word, "assignment": "echo-responder"}
+    refused = grace.post("/courses/1/platform/marks", data=send)
+    assert (refused.status_code, "names are hidden for echo-responder" in refused.text) == (422, True)
+    service = web.app.state.context.service
+    with pytest.raises(Invalid):
+        platforms.pass_back(service, create_machine_actor(), 1, "echo-responder")
+    assert platform.scores == []
 
 
 def test_a_platform_that_does_not_answer_is_said_so(launched: tuple[Web, LearningPlatform]) -> None:
