@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 from service.operations.context import Actor, Service
 from service.operations.credentials import check_scopes, check_token_count
 from service.operations.errors import Conflict, Invalid, NotFound
-from service.operations.lookup import check_operator, require_course
+from service.operations.lookup import check_no_names_hidden, check_operator, require_course
 from service.store import audit
 from service.store.engine import now, retry_conflicts
 from service.store.locks import lock_course, lock_persons
@@ -169,8 +169,8 @@ def check_lengths(students: Sequence[Student]) -> None:
 def remove(service: Service, actor: Actor, course_id: int, enrolment_id: int) -> str:
     """Remove a member without submissions from a course, and revoke their credentials there. Returns their id.
 
-    Instructors can remove students; operators can also remove instructors. Raises NotFound, and UsageError for a member
-    with submissions.
+    Instructors can remove students; operators can also remove instructors. Raises NotFound, Invalid if names are
+    hidden, and UsageError for a member with submissions.
     """
     with service.store.transaction() as session:
         lock_course(session, course_id)
@@ -179,6 +179,7 @@ def remove(service: Service, actor: Actor, course_id: int, enrolment_id: int) ->
         may = actor.roles.get(course_id) is Role.INSTRUCTOR and row.role is Role.STUDENT
         if not is_ours or not (actor.operator or may):
             raise NotFound("this person is not a member of the course")
+        check_no_names_hidden(session, actor, course_id)
         removed = row.student
         membership.set_role(session, row, Role.STUDENT)
         remove_student(session, row.id, actor.name)

@@ -8,7 +8,13 @@ from pathlib import Path
 
 from service.operations.context import Actor, Service
 from service.operations.errors import Invalid
-from service.operations.lookup import check_machine, require_course, require_own_enrolment, require_student
+from service.operations.lookup import (
+    check_machine,
+    check_no_names_hidden,
+    require_course,
+    require_own_enrolment,
+    require_student,
+)
 from service.store import purge as purging
 from service.store.backup import back_up
 from service.store.courses import open_assignments
@@ -63,11 +69,12 @@ def export_student(service: Service, actor: Actor, course_id: int, enrolment_id:
 def erase_student(service: Service, actor: Actor, course_id: int, enrolment_id: int) -> PurgeCounts:
     """Permanently remove all submissions of a student, their results, and personal data.
 
-    Raises NotFound, and UsageError while a submission of the student is being graded.
+    Raises NotFound, Invalid if names are hidden, and UsageError while a submission of the student is being graded.
     """
     with service.store.transaction() as session:
         lock_course(session, course_id)
         require_student(session, actor, course_id, enrolment_id)
+        check_no_names_hidden(session, actor, course_id)
         return purging.erase_student(session, enrolment_id, actor.name)
 
 

@@ -16,7 +16,7 @@ import acting
 import report_builders
 from builders import echo, grading_request
 from naming import is_named
-from service.operations import sign_in_links
+from service.operations import privacy, sign_in_links
 from service.operations.context import create_machine_actor
 from service.store.batches import intake, regrades
 from service.store.courses import open_assignments
@@ -166,6 +166,19 @@ def test_an_instructor_creates_no_link_that_opens_a_hidden_submission(
     with web.store.transaction() as session:
         open_assignments.hide_names(session, 1, "echo-responder", False)
     assert web.browser().post(f"{HERE}/people/{student.enrolment_id}/link", headers=token).status_code == 201
+
+
+@pytest.mark.parametrize("who", ["ada", "newcomer"])
+def test_a_removal_does_not_tell_who_submitted_with_a_hidden_name(
+    web: Web, grace: Member, regrade: str, who: str
+) -> None:
+    student = web.student(who)
+    refused = submit(web.browser(grace), f"/courses/1/people/{student.enrolment_id}/remove")
+    assert (refused.status_code, HIDDEN in words(refused.text)) == (422, True)
+    refused = web.browser().delete(f"{HERE}/people/{student.enrolment_id}", headers=web.token(grace, "manage"))
+    assert (refused.status_code, HIDDEN in refused.json()["detail"]) == (422, True)
+    erased = privacy.erase_student(web.app.state.context.service, create_machine_actor(), 1, student.enrolment_id)
+    assert erased.students == 1
 
 
 def test_links_are_created_before_the_first_submission_with_a_hidden_name(web: Web, grace: Member) -> None:
