@@ -75,8 +75,7 @@ def load_submission_target(service: Service, actor: Actor, course_id: int, assig
         )
         if opened is None or opened.opened_at is None:
             raise NotFound("There is no such page or item, or you have no access to it.")
-        if not opened.open:
-            raise UsageError("%(title)s is closed; you can no longer submit to it.", title=opened.title)
+        open_assignments.check_open(opened)
         found = open_assignments.load_assignment(session, course_id, assignment)
         course = session.get_one(Course, course_id).name
         return SubmissionTarget(course, enrolment.id, Student(enrolment.written), opened, found)

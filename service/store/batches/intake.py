@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 
 from service.store import outbox
 from service.store.codec import encode
+from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import (
     FrozenAssignment,
     assignment_from_bytes,
@@ -109,9 +110,10 @@ def accept_submission(
     is kept, ungraded until staff ask for it.
 
     ``most_bytes`` limits the total size of the student's submissions to the assignment; set it when students submit
-    themselves. With ``enrolment_id``, the signed-in student must be enrolled under that id.
+    themselves. With ``enrolment_id``, the signed-in student must be enrolled under that id, and the assignment open.
 
-    Raises UsageError if the student is ambiguous, exceeds the size limit or is no longer enrolled.
+    Raises UsageError if the student is ambiguous, exceeds the size limit or is no longer enrolled, or if the assignment
+    is closed.
     """
     (packed,) = _pack_requests([grading_request])
     secret = load_secret(store).sha256
@@ -128,6 +130,10 @@ def accept_submission(
             enrolment_id = students.enrol(grading_request.student, at)
         elif not students.is_enrolled(enrolment_id, grading_request.student):
             raise UsageError("you are no longer a student of this course, so nothing was submitted.")
+        else:
+            # The lock of the course keeps it open until the submission is stored.
+            opened = open_assignments.load_course_assignment(session, terms.course_id, grading_request.assignment.id)
+            open_assignments.check_open(opened)
         return _accept_item(session, _IntakeItem(packed, enrolment_id), terms)
 
 

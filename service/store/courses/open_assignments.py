@@ -18,6 +18,7 @@ from service.store import outbox
 from service.store.courses import policies
 from service.store.courses.assignment_versions import FrozenAssignment, assignment_from_bytes, store_version
 from service.store.engine import now
+from service.store.locks import lock_course
 from service.store.models import AssignmentVersion, Batch
 from service.store.web_tables import OpenAssignment
 from sim.errors import UsageError
@@ -73,8 +74,15 @@ def open_for_students(session: Session, course_id: int, assignment: str) -> None
         row.batch_id = batch.id
 
 
+def check_open(found: CourseAssignment) -> None:
+    """Raise UsageError if an assignment does not accept submissions."""
+    if not found.open:
+        raise UsageError("%(title)s is closed; you can no longer submit to it.", title=found.title)
+
+
 def close_assignment(session: Session, course_id: int, assignment: str) -> None:
     """Stop accepting submissions; existing ones are kept. Raises UsageError if the course does not have it."""
+    lock_course(session, course_id)
     row = _require_row(session, course_id, assignment)
     row.closed_at = now(session)
     session.flush()

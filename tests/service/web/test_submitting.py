@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sqlalchemy import select
@@ -149,6 +150,24 @@ def test_only_what_is_open_takes_submissions(web: Web, ada: Member) -> None:
         open_assignments.open_for_students(session, 1, echo().id)
     with pytest.raises(NotFound):
         submit(web.app.state.context, _actor(web, ada), 1, SubmissionRequest("no-such", []))
+
+
+def test_an_assignment_that_closes_before_the_submission_is_stored_takes_none(
+    web: Web, ada: Member, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    accept = intake.accept_submission
+
+    def close_then_accept(*asked: Any, **options: Any) -> AcceptedSubmission:
+        with web.store.transaction() as session:
+            open_assignments.close_assignment(session, 1, echo().id)
+        return accept(*asked, **options)
+
+    monkeypatch.setattr(intake, "accept_submission", close_then_accept)
+    with pytest.raises(UsageError, match="is closed"):
+        _submit(web, ada, *BOTH)
+    with web.store.transaction() as session:
+        assert not session.scalars(select(SubmissionRow).where(SubmissionRow.enrolment_id == ada.enrolment_id)).all()
+        open_assignments.open_for_students(session, 1, echo().id)
 
 
 def test_nobody_submits_without_end(web: Web, ada: Member) -> None:
