@@ -439,6 +439,8 @@ def _delete_put_aside(session: Session, of_student: tuple[ColumnElement[bool], .
         Job.state == JobState.CANCELLED,
         Job.cancelled_for == CancelReason.OVER_LIMIT,
     )
+    # Without the lock, staff could ask for one between the choice and the deletion.
+    lock_jobs(session, *waiting)
     gone = session.scalars(select(Job.submission_id).where(*waiting)).all()
     # A submission that was graded before and requested again has other jobs.
     other_reason = Job.cancelled_for.is_distinct_from(CancelReason.OVER_LIMIT)
@@ -446,7 +448,7 @@ def _delete_put_aside(session: Session, of_student: tuple[ColumnElement[bool], .
     kept = set(session.scalars(others))
     kept.update(session.scalars(select(Comment.submission_id).where(Comment.submission_id.in_(gone))))
     ids = [each for each in gone if each not in kept]
-    session.execute(delete(Job).where(Job.submission_id.in_(ids)))
+    session.execute(delete(Job).where(Job.submission_id.in_(ids), *waiting))
     session.execute(delete(SubmissionRow).where(SubmissionRow.id.in_(ids)))
 
 

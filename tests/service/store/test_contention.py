@@ -12,7 +12,7 @@ from decimal import Decimal
 from typing import Any
 
 import pytest
-from sqlalchemy import func, select, text, update
+from sqlalchemy import Delete, delete, func, select, text, update
 from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.orm import Session
 
@@ -298,6 +298,39 @@ def test_an_attempt_that_is_claimed_while_the_next_comes_in_counts_alone(
     newer = intake.accept_submission(server, grading_request("ada", "print('newer')\n"), max_attempts=1)
     begun = [claim for claim in claims if claim is not None]
     assert (len(begun), newer.staff_only) in ((0, ""), (1, "attempt 2, allowed: 1"))
+
+
+@pytest.mark.long
+def test_a_submission_over_a_limit_is_either_graded_for_staff_or_removed_for_a_newer_one(
+    server: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def submit(number: int) -> str:
+        request = grading_request("ada", f"print({number})\n")
+        return intake.accept_submission(server, request, max_attempts=1, most_bytes=10**6).job_id
+
+    submit(1)
+    _finish_next(server, "worker")
+    with server.transaction() as session:
+        policies.set_policy(session, 1, "", PolicyLimits(attempts=1))
+    over_limit = submit(2)
+
+    def ask_for_grade() -> bool:
+        with server.transaction() as session:
+            return jobs.queue_over_limit_job(session, over_limit, datetime.now(UTC))
+
+    asked: list[Future[bool]] = []
+    with ThreadPoolExecutor(1) as pool:
+
+        def ask_then_delete(table: type[Base]) -> Delete:
+            if not asked:
+                asked.append(pool.submit(ask_for_grade))
+                until(lambda: asked[0].done() or _waiting(server))
+            return delete(table)
+
+        monkeypatch.setattr(intake, "delete", ask_then_delete)
+        submit(3)
+    with server.reading() as session:
+        assert asked[0].result() == (session.get(Job, over_limit) is not None)
 
 
 class _Deadlock(Exception):
