@@ -5,6 +5,8 @@ Sends nothing to the broker: the row is the job, and workers are notified after 
 
 from __future__ import annotations
 
+import secrets
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -352,9 +354,11 @@ def _accept_batch(
     session.add(batch)
     session.flush()
     terms = replace(terms, batch_id=batch.id)
-    # Students keep the order of the batch. Submission numbers follow another order, so they don't identify students.
-    first = {item.enrolment_id: item.packed.grading_request.submission.sha256 for item in reversed(items)}
-    order = sorted(range(len(items)), key=lambda number: first[items[number].enrolment_id])
+    # Submission numbers are in a random order, so that they identify neither the student nor the student's submissions
+    # to other assignments. Repeated submissions to one assignment keep the order of the batch.
+    places: defaultdict[tuple[int, str], bytes] = defaultdict(lambda: secrets.token_bytes(16))
+    keys = [places[item.enrolment_id, item.packed.grading_request.assignment.id] for item in items]
+    order = sorted(range(len(items)), key=keys.__getitem__)
     taken = {number: _accept_item(session, items[number], terms) for number in order}
     accepted = AcceptedBatch(batch.id, tuple(taken[number] for number in range(len(items))))
     outbox.emit_batch_finished(session, batch.id)

@@ -7,6 +7,7 @@ import json
 import re
 import zipfile
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -190,13 +191,19 @@ def test_links_are_created_before_the_first_submission_with_a_hidden_name(web: W
         assert web.browser().post(f"{HERE}/people/{way}", headers=token).status_code == 201
 
 
-def test_numbers_of_submissions_are_not_in_the_order_of_the_names(web: Web) -> None:
-    requests = [grading_request(f"student-{number:02}", f"print({number})\n") for number in range(30)]
-    batch = intake.accept_batch(web.store, "week two", requests, (), course=COURSE, max_attempts=3)
+def test_submission_numbers_identify_neither_students_nor_their_other_submissions(web: Web) -> None:
+    students = [f"student-{number:02}" for number in range(30)]
+    first = [grading_request(each, f"print({each!r})\n") for each in students]
+    again = [grading_request(each, f"print({each!r}, 2)\n") for each in students]
+    other = [replace(each, assignment=replace(echo(), id="other")) for each in first]
+    batch = intake.accept_batch(web.store, "two", [*first, *other, *again], (), course=COURSE, max_attempts=3)
+    assert [job.student for job in batch.jobs] == students * 3
     numbers = [job.submission_id for job in batch.jobs]
-    assert [job.student for job in batch.jobs] == [each.submission.student for each in requests]
-    hashes = [each.submission.sha256 for each in requests]
-    assert sorted(range(30), key=lambda place: numbers[place]) == sorted(range(30), key=lambda place: hashes[place])
+    of_first, of_other, of_again = numbers[:30], numbers[30:60], numbers[60:]
+    assert of_first != sorted(of_first)
+    assert [sorted(of_first).index(each) for each in of_first] != [sorted(of_other).index(each) for each in of_other]
+    assert all(before < after for before, after in zip(of_first, of_again, strict=True))
+    assert [job.attempt for job in batch.jobs] == [1] * 60 + [2] * 30
 
 
 def test_a_student_has_another_label_in_each_assignment() -> None:
