@@ -34,7 +34,8 @@ _MEMBERS = "application/vnd.ims.lti-nrps.v2.membershipcontainer+json"
 _LINEITEM = "application/vnd.ims.lis.v2.lineitem+json"
 _LINEITEMS = "application/vnd.ims.lis.v2.lineitemcontainer+json"
 _SCORE = "application/vnd.ims.lis.v1.score+json"
-_NEXT_LINK = re.compile(r'<([^>]+)>\s*;\s*rel="?next"?')
+# Without "<" in the address, a search takes time linear in the length of the header.
+_NEXT_LINK = re.compile(r'<([^<>]+)>\s*;\s*rel="?next"?')
 _MOST_PAGES = 200
 _ASSERTION_SECONDS = 60
 

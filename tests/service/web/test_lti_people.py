@@ -359,3 +359,19 @@ def _rows(store: Store) -> set[tuple[int, int, Role, int]]:
     with store.reading() as session:
         query = select(Enrolment.id, Enrolment.person_id, Enrolment.role, Enrolment.course_id).join(Person)
         return {tuple(row) for row in session.execute(query.where(Person.signed_in_at.is_not(None)))}  # type: ignore[misc]
+
+
+def test_the_next_page_of_members_has_an_address_without_brackets(
+    store: Store, platform: Platform, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # With "<" in an address, the search would start again at each "<" of a long header.
+    replies = iter([PlatformReply([1], f'{"<" * 1000}https://p.example.org/2>; rel="next"'), PlatformReply([2], "")])
+    urls = []
+
+    def fetch(url: str, **_: object) -> PlatformReply:
+        urls.append(url)
+        return next(replies)
+
+    monkeypatch.setattr(services, "_send_request", lambda _platform, url, **_: fetch(url))
+    assert list(services._fetch_pages(platform, "https://p.example.org/1", {})) == [[1], [2]]
+    assert urls == ["https://p.example.org/1", "https://p.example.org/2"]
