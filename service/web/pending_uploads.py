@@ -9,6 +9,7 @@ import secrets
 import shutil
 import time
 import unicodedata
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,10 +22,12 @@ from submissions.raw_files import UploadedFile, sanitise_name
 from submissions.student_identity import RejectedSubmission
 
 _RETENTION_SECONDS = 24 * 3600
+_UNREADABLE_SECONDS = 60
 _MOST_OF_ONE, _MOST_OF_ALL = 3, 30
 _MOST_FILES = 1000
 _LONGEST_NAME = 200
 _METADATA_FILE = "upload.json"
+_REMOVED = "this upload was removed, because too many uploads are waiting for confirmation; upload the files again"
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,30 +72,30 @@ class PendingUploads:
     def begin(self, person_id: int, course_id: int, assignment: str) -> PendingUpload:
         """Create an empty upload, after removing expired uploads and the sender's oldest ones over the limit.
 
-        Raises:
-            UsageError: Too many uploads of all senders are waiting.
+        If too many uploads of all senders are waiting, the oldest one of the sender with the most is removed.
         """
         self._folder.mkdir(mode=0o700, exist_ok=True)
-        own = []
-        kept = sorted(self._folder.iterdir(), key=lambda path: path.stat().st_mtime)
-        for path in kept:
-            note = self._read_metadata(path.name)
-            if note is None or path.stat().st_mtime < time.time() - _RETENTION_SECONDS:
-                self._remove_abandoned(path)
-            elif note.person_id == person_id:
-                own.append(path)
-        for path in own[: max(0, len(own) - _MOST_OF_ONE + 1)]:
-            shutil.rmtree(path, ignore_errors=True)
-        if len(list(self._folder.iterdir())) >= _MOST_OF_ALL:
-            raise UsageError("too many uploads are waiting for confirmation; try again later")
+        uploads = self._list_recent()
+        own = [upload for upload in uploads if upload.person_id == person_id]
+        for upload in own[: max(0, len(own) - _MOST_OF_ONE + 1)]:
+            self.remove(upload)
+            uploads.remove(upload)
+        while len(uploads) >= _MOST_OF_ALL:
+            counts = Counter(upload.person_id for upload in uploads)
+            oldest = max(uploads, key=lambda upload: counts[upload.person_id])
+            self.remove(oldest)
+            uploads.remove(oldest)
         made = PendingUpload(secrets.token_hex(16), person_id, course_id, "", assignment, "", "")
         (self._folder / made.id).mkdir(mode=0o700)
         self.write(made)
         return made
 
     def write(self, upload: PendingUpload) -> None:
-        """Save the metadata of an upload."""
-        (self._folder / upload.id / _METADATA_FILE).write_bytes(_METADATA_ADAPTER.dump_json(upload))
+        """Save the metadata of an upload. Raises UsageError if the upload was removed meanwhile."""
+        try:
+            (self._folder / upload.id / _METADATA_FILE).write_bytes(_METADATA_ADAPTER.dump_json(upload))
+        except FileNotFoundError:
+            raise UsageError(_REMOVED) from None
 
     def find(self, upload_id: str, person_id: int, course_id: int) -> PendingUpload | None:
         """Return an upload of this sender to this course, or None if it does not exist or has expired."""
@@ -124,24 +127,29 @@ class PendingUploads:
         """Copy files into a folder of the upload and return their names there.
 
         Raises:
-            UsageError: There are too many files, or a name is invalid or occurs twice.
+            UsageError: There are too many files, a name is invalid or occurs twice, or the upload was removed.
         """
         if len(files) > _MOST_FILES:
             raise UsageError(f"{len(files)} files were uploaded, expected at most {_MOST_FILES}, or one zip of them")
         folder = self._folder / upload.id / into
-        folder.mkdir(mode=0o700)
-        names = []
-        for file in files:
-            name = clean_file_name(file)
-            try:
-                with (folder / name).open("xb") as sink:
-                    shutil.copyfileobj(file.stream, sink)
-            except FileExistsError:
-                raise UsageError(
-                    f"two files have the name {sanitise_name(name)}, expected a different name for each student"
-                ) from None
-            names.append(name)
-        return names
+        try:
+            folder.mkdir(mode=0o700)
+            return [_store_file(folder, file) for file in files]
+        except FileNotFoundError:
+            raise UsageError(_REMOVED) from None
+
+    def _list_recent(self) -> list[PendingUpload]:
+        """Return the uploads, oldest first, after removing expired ones; other threads may remove uploads meanwhile."""
+        found = []
+        for path in self._folder.iterdir():
+            age = time.time() - _read_time(path)
+            upload = self._read_metadata(path.name)
+            # A folder without metadata may belong to an upload that is being created at this moment.
+            if age > (_UNREADABLE_SECONDS if upload is None else _RETENTION_SECONDS):
+                shutil.rmtree(path, ignore_errors=True)
+            elif upload is not None:
+                found.append((age, upload))
+        return [upload for _, upload in sorted(found, key=lambda each: -each[0])]
 
     def _read_metadata(self, upload_id: str) -> PendingUpload | None:
         try:
@@ -151,10 +159,25 @@ class PendingUploads:
         except (OSError, ValueError):
             return None
 
-    def _remove_abandoned(self, path: Path) -> None:
-        # A folder without metadata may belong to an upload that is being created at this moment.
-        if path.stat().st_mtime < time.time() - 60:
-            shutil.rmtree(path, ignore_errors=True)
+
+def _store_file(folder: Path, file: UploadedFile) -> str:
+    name = clean_file_name(file)
+    try:
+        with (folder / name).open("xb") as sink:
+            shutil.copyfileobj(file.stream, sink)
+    except FileExistsError:
+        raise UsageError(
+            f"two files have the name {sanitise_name(name)}, expected a different name for each student"
+        ) from None
+    return name
+
+
+def _read_time(path: Path) -> float:
+    """Return when a path was changed, in seconds; the current time if it no longer exists."""
+    try:
+        return path.stat().st_mtime
+    except FileNotFoundError:
+        return time.time()
 
 
 def clean_file_name(sent: UploadedFile) -> str:

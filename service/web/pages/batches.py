@@ -64,13 +64,13 @@ def upload(
             kept_uploads, begun, _list_sent_files(files), _list_sent_files([people] if people is not None else [])
         )
         checked = _read_contents(context, here, laid)
+        expected = _build_expected_submissions(
+            operations.preview_submissions(context.service, here.actor, here.course_id, checked)
+        )
+        kept_uploads.write(replace(laid, expected=expected, refusals=checked.refusals))
     except UsageError as error:
         kept_uploads.remove(begun)
         return _render_list(request, here, context, refused=str(error), status_code=422)
-    expected = _build_expected_submissions(
-        operations.preview_submissions(context.service, here.actor, here.course_id, checked)
-    )
-    kept_uploads.write(replace(laid, expected=expected, refusals=checked.refusals))
     return RedirectResponse(f"/courses/{here.course_id}/batches/uploads/{laid.id}", 303)
 
 

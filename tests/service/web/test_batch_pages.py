@@ -5,7 +5,9 @@ from __future__ import annotations
 import codecs
 import csv
 import io
+import os
 import re
+import time
 import zipfile
 from dataclasses import replace
 from decimal import Decimal
@@ -28,6 +30,7 @@ from service.store.installation import load_secret
 from service.store.models import Batch, Enrolment, Job, TrialRow
 from service.store.states import BatchState, JobState, Standing
 from service.version import hash_grader
+from service.web.pending_uploads import PendingUpload, PendingUploads
 from submissions.assignment.folder import locate_assignment_folder
 from submissions.student_identity import RejectedSubmission, Student
 from web import COURSE, Web, grade_all, submit, words
@@ -149,6 +152,52 @@ def test_an_upload_is_its_senders_alone_and_few_are_kept(web: Web, grace: TestCl
     assert grace.get(places[4]).status_code == 404
     assert len(list((web.settings.home / "uploads").iterdir())) == 2
     assert [each.get(f"{HOME}/batches").text.count("/batches/uploads/") for each in (grace, other)] == [2, 0]
+
+
+def test_waiting_uploads_of_others_prevent_no_upload(web: Web, grace: TestClient) -> None:
+    uploads = PendingUploads(web.settings.home)
+    waiting = [uploads.begin(1000 + number // 3, 1, "echo-responder") for number in range(28)]
+    for age, each in enumerate(reversed(waiting)):
+        at = time.time() - 1 - age
+        os.utime(web.settings.home / "uploads" / each.id, (at, at))
+    places = [sent(grace, a_class(f"s{number}")) for number in range(3)]
+    assert [grace.get(place).status_code for place in places] == [200, 200, 200]
+    assert [uploads.find(each.id, each.person_id, 1) is not None for each in waiting] == [False] + [True] * 27
+    # The person with the single upload keeps it.
+    uploads.begin(2000, 1, "echo-responder")
+    assert uploads.find(waiting[-1].id, waiting[-1].person_id, 1) is not None
+    assert len(list((web.settings.home / "uploads").iterdir())) == 30
+
+
+def test_an_upload_that_was_removed_meanwhile_is_refused(
+    web: Web, grace: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin = PendingUploads.begin
+
+    def begin_removed(uploads: PendingUploads, person_id: int, course_id: int, assignment: str) -> PendingUpload:
+        made = begin(uploads, person_id, course_id, assignment)
+        uploads.remove(made)
+        return made
+
+    monkeypatch.setattr(PendingUploads, "begin", begin_removed)
+    files = {"files": ("a.zip", a_class("ada"), "application/zip")}
+    answer = submit(grace, f"{HOME}/batches/uploads", {"assignment": "echo-responder"}, files=files)
+    assert (answer.status_code, "upload the files again" in words(answer.text)) == (422, True)
+
+
+def test_uploads_may_vanish_while_another_begins(web: Web, monkeypatch: pytest.MonkeyPatch) -> None:
+    uploads = PendingUploads(web.settings.home)
+    first = uploads.begin(1, 1, "a")
+    read = PendingUploads._read_metadata
+
+    def read_and_remove(self: PendingUploads, upload_id: str) -> PendingUpload | None:
+        found = read(self, upload_id)
+        uploads.remove(first)
+        return found
+
+    monkeypatch.setattr(PendingUploads, "_read_metadata", read_and_remove)
+    second = uploads.begin(2, 1, "a")
+    assert [path.name for path in (web.settings.home / "uploads").iterdir()] == [second.id]
 
 
 def test_the_assignment_is_the_courses_own_where_it_has_one_and_never_a_folder(web: Web, grace: TestClient) -> None:
