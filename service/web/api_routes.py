@@ -90,6 +90,11 @@ def _parse_cursor_part(part: object, kind: type) -> object:
         return datetime.fromisoformat(part).astimezone(UTC)
     if type(part) is not kind or (isinstance(part, int) and not 0 <= part < 2**31):
         raise TypeError(kind)
+    if isinstance(part, str):
+        # Databases accept neither NUL nor lone surrogates.
+        if "\0" in part:
+            raise ValueError(part)
+        part.encode()
     return part
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 import re
@@ -291,3 +292,11 @@ def test_a_token_made_on_the_page_is_one_and_stays_to_be_copied_until_it_is_used
     assert "rmt_" not in others
     assert Program(web.browser(), {"authorization": f"Bearer {secret}"}).ask("GET", "/batches").status_code == 200
     assert "rmt_" not in browser.get(made.headers["location"]).text
+
+
+@pytest.mark.parametrize("text", ["\0", "\ud800", 7, None])
+def test_a_cursor_with_text_that_no_database_accepts_is_refused(web: Web, text: object) -> None:
+    token = web.token(web.instructor(), "read")
+    cursor = base64.urlsafe_b64encode(json.dumps([text]).encode()).decode().rstrip("=")
+    answer = web.browser().get(f"/api/v1/courses/1/assignments?after={cursor}", headers=token)
+    assert (answer.status_code, answer.json()["detail"]) == (422, "after: expected the `next` of the previous page.")
