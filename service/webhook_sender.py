@@ -9,7 +9,7 @@ import hashlib
 import hmac
 import json
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from threading import Event, Thread
 from typing import Self
 
@@ -45,21 +45,26 @@ class WebhookSender:
         self._thread.join(timeout=1.0)
 
     def _run(self) -> None:
-        while not self._ended.wait(_POLL_SECONDS):
-            try:
-                while not self._ended.is_set() and send_due_deliveries(self._store, self._others):
-                    pass
-            except Exception:
-                _log.exception("webhooks.failed")
-
-
-def send_due_deliveries(store: Store, others: Networks) -> int:
-    """Send some of the due deliveries. Returns their number."""
-    claimed = outbox.claim_deliveries(store, _AT_ONCE)
-    if claimed:
         with ThreadPoolExecutor(_AT_ONCE) as pool:
-            list(pool.map(lambda each: _send_delivery(store, each, others), claimed))
-    return len(claimed)
+            running: set[Future[None]] = set()
+            while not self._ended.is_set():
+                started: set[Future[None]] = set()
+                try:
+                    started = start_due_deliveries(self._store, self._others, pool, _AT_ONCE - len(running))
+                except Exception:
+                    _log.exception("webhooks.failed")
+                running |= started
+                # A slow receiver occupies one thread; the others continue.
+                if running:
+                    running = wait(running, _POLL_SECONDS, FIRST_COMPLETED).not_done
+                else:
+                    self._ended.wait(_POLL_SECONDS)
+
+
+def start_due_deliveries(store: Store, others: Networks, pool: Executor, most: int) -> set[Future[None]]:
+    """Start to send up to ``most`` due deliveries, and return their futures."""
+    claimed = outbox.claim_deliveries(store, most) if most > 0 else []
+    return {pool.submit(_send_delivery, store, each, others) for each in claimed}
 
 
 def sign_body(secret: str, at: int, body: bytes) -> str:
@@ -69,6 +74,14 @@ def sign_body(secret: str, at: int, body: bytes) -> str:
 
 
 def _send_delivery(store: Store, claimed: ClaimedDelivery, others: Networks) -> None:
+    try:
+        _send_and_record(store, claimed, others)
+    except Exception:
+        # The delivery is repeated after its claim expires.
+        _log.exception("webhooks.failed")
+
+
+def _send_and_record(store: Store, claimed: ClaimedDelivery, others: Networks) -> None:
     body = json.dumps(
         {"id": claimed.id, "event": claimed.event, "made_at": claimed.made_at.isoformat(), **claimed.payload}
     ).encode()

@@ -6,13 +6,14 @@ The web server sends them; ``webhooks.py`` stores the addresses. Courses without
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from enum import StrEnum
 from typing import Any
 
-from sqlalchemy import Select, and_, delete, func, or_, select, update
+from sqlalchemy import ColumnElement, Select, and_, delete, func, or_, select, update
 from sqlalchemy.orm import Session
 
 from service.store.engine import Store, now, retry_conflicts
@@ -99,41 +100,64 @@ def emit_appeal_opened(session: Session, submission_id: int, appeal_id: int) -> 
 
 @retry_conflicts
 def claim_deliveries(store: Store, most: int) -> list[ClaimedDelivery]:
-    """Claim the deliveries that are due; no other process gets them until the claim expires."""
+    """Claim the oldest due delivery of up to ``most`` webhooks; no other process gets them until the claim expires.
+
+    Each webhook has at most one claimed delivery. Webhooks of courses with fewer claimed deliveries come first.
+    """
     with store.reading() as session:
-        at = now(session)
-        due = (Delivery.delivered_at.is_(None), Delivery.due_at <= at)
-        if session.scalar(select(Delivery.id).where(*due).limit(1)) is None:
+        if not _choose_webhooks(session, now(session), 1):
             return []
     with store.transaction() as session:
         at = now(session)
         given_up = (Delivery.delivered_at.is_(None), Delivery.due_at.is_(None), Delivery.made_at < at - _RETENTION)
         session.execute(delete(Delivery).where(or_(Delivery.delivered_at < at - _RETENTION, and_(*given_up))))
-        query = (
-            select(Delivery, Webhook)
-            .join(Webhook, Delivery.webhook_id == Webhook.id)
-            .where(*due)
-            .order_by(Delivery.due_at, Delivery.id)
-            .limit(most)
-            .with_for_update(of=Delivery, skip_locked=True, key_share=True)
-        )
-        claimed = []
-        for delivery, hook in session.execute(query):
-            attempt = delivery.attempts + 1
-            mine = Delivery.id == delivery.id
-            session.execute(update(Delivery).where(mine).values(attempts=attempt, due_at=at + _LEASE))
-            claimed.append(
-                ClaimedDelivery(
-                    delivery.id,
-                    hook.url,
-                    hook.secret,
-                    delivery.event,
-                    delivery.payload,
-                    delivery.made_at,
-                    attempt,
-                )
-            )
-        return claimed
+        chosen = select(Webhook).where(Webhook.id.in_(_choose_webhooks(session, at, most)))
+        hooks = session.scalars(chosen.order_by(Webhook.id).with_for_update(skip_locked=True, key_share=True)).all()
+        # Another process may have claimed a delivery of a webhook before it was locked here.
+        busy = _load_busy_webhooks(session, at)
+        return [
+            claimed
+            for hook in hooks
+            if hook.id not in busy and (claimed := _claim_oldest_delivery(session, hook, at)) is not None
+        ]
+
+
+def _choose_webhooks(session: Session, at: datetime, most: int) -> list[str]:
+    """Return up to ``most`` webhooks with due deliveries and without claimed ones."""
+    busy = _load_busy_webhooks(session, at)
+    query = select(Webhook.id, Webhook.course_id).join(Delivery, Delivery.webhook_id == Webhook.id)
+    query = query.where(*_is_due(at), Webhook.id.not_in(busy)).group_by(Webhook.id, Webhook.course_id)
+    claimed_by_course = Counter(busy.values())
+    ranked = []
+    for webhook_id, course_id in session.execute(query.order_by(func.min(Delivery.due_at), Webhook.id)):
+        ranked.append((claimed_by_course[course_id], webhook_id))
+        claimed_by_course[course_id] += 1
+    return [webhook_id for _, webhook_id in sorted(ranked, key=lambda each: each[0])[:most]]
+
+
+def _load_busy_webhooks(session: Session, at: datetime) -> dict[str, int]:
+    """Return the webhooks with a claimed delivery, with their courses."""
+    # A delivery that waits for its next attempt has the error of the previous one.
+    claimed = (Delivery.delivered_at.is_(None), Delivery.due_at > at, Delivery.attempts > 0, Delivery.error.is_(None))
+    query = select(Webhook.id, Webhook.course_id).join(Delivery, Delivery.webhook_id == Webhook.id)
+    return dict(session.execute(query.where(*claimed)).all())
+
+
+def _claim_oldest_delivery(session: Session, hook: Webhook, at: datetime) -> ClaimedDelivery | None:
+    oldest = select(Delivery).where(*_is_due(at), Delivery.webhook_id == hook.id)
+    delivery = session.scalar(oldest.order_by(Delivery.due_at, Delivery.id).limit(1))
+    if delivery is None:
+        return None
+    attempt = delivery.attempts + 1
+    values = {"attempts": attempt, "due_at": at + _LEASE, "error": None}
+    session.execute(update(Delivery).where(Delivery.id == delivery.id).values(**values))
+    return ClaimedDelivery(
+        delivery.id, hook.url, hook.secret, delivery.event, delivery.payload, delivery.made_at, attempt
+    )
+
+
+def _is_due(at: datetime) -> tuple[ColumnElement[bool], ...]:
+    return (Delivery.delivered_at.is_(None), Delivery.due_at <= at)
 
 
 @retry_conflicts

@@ -142,6 +142,34 @@ def test_what_does_not_arrive_is_tried_again_ever_later_and_given_up_after_a_day
     assert 10 < len(waits) < 30
 
 
+def test_slow_receivers_of_a_course_delay_no_other_course(store: Store) -> None:
+    for course_id, hooks, deliveries in ((1, 10, 5), (2, 1, 2)):
+        _add_due_deliveries(store, course_id, hooks, deliveries)
+    slow = outbox.claim_deliveries(store, 8)
+    fast = [each for each in slow if each.payload["course"] == 2]
+    assert [each.payload["course"] for each in slow].count(1) == 7
+    # One delivery of each webhook is sent at a time. A course with fewer of them is first.
+    for each in fast:
+        outbox.record_delivery(store, each)
+    (after,) = outbox.claim_deliveries(store, 1)
+    assert [each.payload["course"] for each in (*fast, after)] == [2, 2]
+    rest = outbox.claim_deliveries(store, 8)
+    assert [each.payload["course"] for each in rest] == [1, 1, 1]
+    assert len({each.url for each in (*slow, *rest)}) == 11
+    assert outbox.claim_deliveries(store, 8) == []
+    outbox.record_failure(store, slow[0] if slow[0] not in fast else slow[1], "answered 500")
+    assert len(outbox.claim_deliveries(store, 8)) == 1
+
+
+def test_of_two_senders_one_claims_a_webhooks_delivery(store: Store) -> None:
+    _add_due_deliveries(store, 1, 3, 5)
+    with ThreadPoolExecutor(4) as pool:
+        claimed = [
+            each for claims in pool.map(lambda _: outbox.claim_deliveries(store, 8), range(4)) for each in claims
+        ]
+    assert len(claimed) == len({each.url for each in claimed}) == 3
+
+
 def test_of_two_workers_that_end_a_batch_at_once_one_says_so(store: Store) -> None:
     hook(store, "batch.finished")
     for _ in range(5):
@@ -214,3 +242,14 @@ def _past(store: Store, time: timedelta) -> None:
             due_at = None if row.due_at is None else row.due_at - time
             values = {"made_at": row.made_at - time, "due_at": due_at}
             session.execute(update(Delivery).where(Delivery.id == row.id).values(**values))
+
+
+def _add_due_deliveries(store: Store, course_id: int, hooks: int, deliveries: int) -> None:
+    """Create webhooks in a course, each with this number of due deliveries."""
+    with store.transaction() as session:
+        session.add(Course(id=course_id, name=f"course {course_id}", created_at=datetime.now(UTC)))
+        session.flush()
+        for number in range(hooks):
+            webhooks.create_webhook(session, course_id, f"https://hooks.example.org/{course_id}/{number}", EVENTS)
+        for number in range(deliveries):
+            outbox.emit_grades_published(session, course_id, batch="b", published=number)

@@ -6,18 +6,20 @@ import hashlib
 import hmac
 import json
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, HTTPServer
-from threading import Thread
+from threading import Event, Thread
 
 import pytest
 
-from service.outgoing_requests import ALL_NETWORKS, NO_NETWORKS
+from service import webhook_sender
+from service.outgoing_requests import ALL_NETWORKS, NO_NETWORKS, HttpResponse, Networks
 from service.store import outbox
 from service.store.engine import Store, now
 from service.store.models import Course
 from service.store.people import webhooks
-from service.webhook_sender import send_due_deliveries
+from service.webhook_sender import start_due_deliveries
 
 
 @dataclass
@@ -63,6 +65,12 @@ def hooked(store: Store, url: str) -> str:
     return secret
 
 
+def send_due_deliveries(store: Store, others: Networks) -> int:
+    """Send the due deliveries; return their number."""
+    with ThreadPoolExecutor(8) as pool:
+        return len(start_due_deliveries(store, others, pool, 8))
+
+
 def test_a_delivery_arrives_with_its_signature(store: Store, endpoint: Endpoint) -> None:
     secret = hooked(store, endpoint.url)
     assert send_due_deliveries(store, ALL_NETWORKS) == 1
@@ -95,3 +103,27 @@ def test_nothing_goes_inside_unless_the_operator_says_so(store: Store, endpoint:
     with store.reading() as session:
         (line,) = webhooks.list_deliveries(session, 1, 10, None)
     assert "is not the name of a public address" in (line.error or "")
+
+
+def test_a_slow_receiver_delays_no_other(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    hooked(store, "https://slow.example.org/")
+    with store.transaction() as session:
+        webhooks.create_webhook(session, 1, "https://fast.example.org/", ["grades.published"])
+        for published in range(10):
+            outbox.emit_grades_published(session, 1, batch="b", published=published)
+    arrived: list[str] = []
+    all_arrived, waited = Event(), Event()
+
+    def send(url: str, **_: object) -> HttpResponse:
+        if "slow" in url:
+            if all_arrived.wait(30):
+                waited.set()
+        else:
+            arrived.append(url)
+            if len(arrived) == 10:
+                all_arrived.set()
+        return HttpResponse(200, {}, b"")
+
+    monkeypatch.setattr(webhook_sender, "send_request", send)
+    with webhook_sender.WebhookSender(store, NO_NETWORKS):
+        assert waited.wait(60)
