@@ -15,6 +15,7 @@ from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from service.store import audit
 from service.store.audit import AuditEntry
+from service.store.models import SubmissionRow
 from service.store.web_tables import Appeal, Comment, Override
 
 
@@ -38,7 +39,10 @@ def load_history(session: Session, submission_id: int) -> list[MarkingStep]:
         "comment": _load_texts(session, submission_id, Comment, Comment.text),
         "appeal": _load_texts(session, submission_id, Appeal, Appeal.answer),
     }
-    return [_build_step(entry, texts) for entry in audit.load_entries(session, "submission", str(submission_id))]
+    # SQLite reuses the id of a deleted submission, whose log entries are older than the new submission.
+    created_at = session.scalars(select(SubmissionRow.created_at).where(SubmissionRow.id == submission_id)).one()
+    entries = audit.load_entries(session, "submission", str(submission_id))
+    return [_build_step(entry, texts) for entry in entries if entry.at >= created_at]
 
 
 def _build_step(entry: AuditEntry, texts: Mapping[str, Mapping[int, str]]) -> MarkingStep:

@@ -21,7 +21,7 @@ from service.store import audit
 from service.store.batches import intake
 from service.store.courses import policies
 from service.store.engine import Store
-from service.store.grades import results
+from service.store.grades import marking_history, results
 from service.store.models import Enrolment, Job, SubmissionRow
 from service.store.people import credentials
 from service.store.people.students import ensure_course
@@ -129,7 +129,23 @@ def test_who_is_in_another_course_stays_there(store: Store) -> None:
     _erase(store, enrolment_id)
     with store.reading() as session:
         assert KNOWN[1] in session.scalars(select(Enrolment.name)).all()
-        assert session.scalars(select(SubmissionRow.id)).all() == [2]
+        kept = session.scalars(
+            select(Enrolment.student).join(SubmissionRow, SubmissionRow.enrolment_id == Enrolment.id)
+        )
+        assert kept.all() == ["bob"]
+
+
+def test_a_new_submission_has_no_history_of_an_erased_one(store: Store) -> None:
+    erased = intake.accept_submission(store, grading_request("ada"), max_attempts=1)
+    with store.transaction() as session:
+        audit.record_action(session, "grace", "override", "submission", str(erased.submission_id), criterion="a")
+        assert len(marking_history.load_history(session, erased.submission_id)) == 1
+    _erase(store, 1)
+    new = intake.accept_submission(store, grading_request("bea"), max_attempts=1)
+    with store.transaction() as session:
+        # SQLite reuses ids; PostgreSQL does not.
+        audit.record_action(session, "grace", "comment", "submission", str(new.submission_id), criterion="a")
+        assert [step.action for step in marking_history.load_history(session, new.submission_id)] == ["comment"]
 
 
 def test_who_is_being_graded_or_instructs_is_not_erased(store: Store) -> None:
