@@ -1,4 +1,4 @@
-"""Export of one student's data as a zip: personal data, submissions and results, as visible to the student.
+"""Export of one student's data as a zip: personal data, submissions, test runs and results, as visible to the student.
 
 ``service.reports.view`` decides on visibility; nothing is removed here.
 """
@@ -9,6 +9,7 @@ import io
 import json
 import re
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping, Sequence, Set
 from typing import Any
 
@@ -21,9 +22,10 @@ from service.reports.view import View, build_student_view
 from service.store.courses import policies
 from service.store.engine import Store
 from service.store.grades import current_grades, results
-from service.store.models import Course, Enrolment, Extension, Job, Person, SubmissionRow
+from service.store.models import AssignmentVersion, Batch, Course, Enrolment, Extension, Job, Person, SubmissionRow
 from service.store.people import membership
-from service.store.web_tables import Appeal, Credential
+from service.store.web_tables import Appeal, Credential, Tryout
+from submissions.student_names import normalise_name
 
 #: Number of submissions fetched at once.
 _AT_ONCE = 10
@@ -46,14 +48,22 @@ def export_student(store: Store, enrolment_id: int, without: Set[str] = frozense
         mine = and_(SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment.not_in(without))
         folders, told = {}, []
         for submission_id, document, packed in _load_submissions(session, mine):
-            folder = f"submissions/{re.sub('[^a-zA-Z0-9._-]', '_', document['assignment'])}-{document['attempt']}"
+            folder = f"submissions/{_clean_name(document['assignment'])}-{document['attempt']}"
             archive.writestr(f"{folder}/submission.zip", packed)
             folders[submission_id] = folder
             told.append({**document, "folder": folder})
         for submission_id, view, report in _load_seen_grades(session, mine):
             archive.writestr(f"{folders[submission_id]}/grade.json", _encode_json(build_json_document(view)))
             archive.writestr(f"{folders[submission_id]}/report.html", report)
-        archive.writestr("student.json", _encode_json({**student, "submissions": told}))
+        runs = []
+        for number, (document, files) in enumerate(_load_test_runs(session, enrolment_id, without), 1):
+            folder = f"test-runs/{_clean_name(document['assignment'])}-{number}"
+            for name, data in files.items():
+                archive.writestr(f"{folder}/{name}", data)
+            runs.append({**document, "folder": folder})
+        rejected = _load_rejected_files(session, enrolment, without)
+        document = {**student, "submissions": told, "test_runs": runs, "rejected_files": rejected}
+        archive.writestr("student.json", _encode_json(document))
     return sink.getvalue()
 
 
@@ -109,6 +119,42 @@ def _load_seen_grades(session: Session, mine: ColumnElement[bool]) -> Iterator[t
     views = ((job_id, build_student_view(grade, released[job_id])) for job_id, grade in graded)
     for job_id, view, report in render_each_report(session, views, submission_of):
         yield submission_of[job_id], view, report
+
+
+def _load_test_runs(
+    session: Session, enrolment_id: int, without: Set[str]
+) -> Iterator[tuple[dict[str, Any], dict[str, bytes]]]:
+    """Yield the data and the files of each stored test run, oldest first."""
+    query = select(Tryout, AssignmentVersion.assignment, Tryout.packed, Tryout.replay)
+    query = query.join(AssignmentVersion, Tryout.assignment_version_id == AssignmentVersion.id)
+    query = query.where(Tryout.enrolment_id == enrolment_id, AssignmentVersion.assignment.not_in(without))
+    names = ("state", "queued_at", "finished_at", "words", "error")
+    ordered = query.order_by(Tryout.queued_at, Tryout.id)
+    for row, assignment, packed, replay in session.execute(ordered, execution_options={"yield_per": _AT_ONCE}):
+        files = {"submission.zip": packed} if packed else {}
+        if replay:
+            files["replay.json"] = zlib.decompress(replay)
+        yield {"assignment": assignment, **_read_columns(row, names)}, files
+
+
+def _load_rejected_files(session: Session, enrolment: Enrolment, without: Set[str]) -> list[dict[str, Any]]:
+    """Return the student's rejected files in batches, oldest first.
+
+    With assignments in ``without``, files without a known assignment are left out, too. The reasons are left out,
+    because they can name other students.
+    """
+    query = select(Batch).where(Batch.course_id == enrolment.course_id).order_by(Batch.created_at, Batch.id)
+    return [
+        {"source": each["source"], "assignment": each["assignment"], "created_at": batch.created_at}
+        for batch in session.scalars(query)
+        for each in batch.refusals
+        if normalise_name(each["student"]["id"]) == enrolment.student
+        and not (without and each["assignment"] in {"", *without})
+    ]
+
+
+def _clean_name(text: str) -> str:
+    return re.sub("[^a-zA-Z0-9._-]", "_", text)
 
 
 def _read_columns(row: object, names: Sequence[str]) -> dict[str, Any]:

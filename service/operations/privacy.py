@@ -15,6 +15,7 @@ from service.operations.lookup import (
     require_own_enrolment,
     require_student,
 )
+from service.pending_uploads import PendingUploads
 from service.store import purge as purging
 from service.store.backup import back_up
 from service.store.courses import open_assignments
@@ -69,13 +70,17 @@ def export_student(service: Service, actor: Actor, course_id: int, enrolment_id:
 def erase_student(service: Service, actor: Actor, course_id: int, enrolment_id: int) -> PurgeCounts:
     """Permanently remove all submissions of a student, their results, and personal data.
 
+    Uploads to the course that wait for confirmation may contain the student's files, so they are removed, too.
+
     Raises NotFound, Invalid if names are hidden, and UsageError while a submission of the student is being graded.
     """
     with service.store.transaction() as session:
         lock_course(session, course_id)
         require_student(session, actor, course_id, enrolment_id)
         check_no_names_hidden(session, actor, course_id)
-        return purging.erase_student(session, enrolment_id, actor.name)
+        removed = purging.erase_student(session, enrolment_id, actor.name)
+    PendingUploads(service.settings.home).remove_course(course_id)
+    return removed
 
 
 def archive(service: Service, actor: Actor, file: Path) -> int:

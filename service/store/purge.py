@@ -10,7 +10,7 @@ from collections.abc import Set
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import Column, Integer, MetaData, Table, delete, func, insert, or_, select, update
+from sqlalchemy import Column, Integer, MetaData, Table, and_, delete, func, insert, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
 from service.store import audit
@@ -111,6 +111,7 @@ def erase_student(session: Session, enrolment_id: int, actor: str) -> PurgeCount
     session.execute(insert(_LEAVING).values(id=enrolment_id))
     found = _count_marked_rows(session)
     _erase_names(session, enrolment)
+    _delete_replies(session, enrolment.course_id)
     _delete_marked(session)
     detail = {"submissions": found.submissions, "grades": found.grades}
     audit.record_action(session, actor, "erased", "enrolment", str(enrolment_id), **detail)
@@ -135,6 +136,19 @@ def _erase_names(session: Session, enrolment: Enrolment) -> None:
             row.detail = {**row.detail, "student": _ERASED}
     by_them = Audit.actor.endswith(f"(person {enrolment.person_id})", autoescape=True)
     session.execute(update(Audit).where(by_them).values(actor=f"{_ERASED} (person {enrolment.person_id})"))
+
+
+def _delete_replies(session: Session, course_id: int) -> None:
+    """Delete the stored replies to requests about a course, which may contain the names of students and files."""
+    members = select(Enrolment.person_id).where(Enrolment.course_id == course_id)
+    operators = select(Person.id).where(Person.operator)
+    unlimited = and_(
+        Credential.course_id.is_(None), or_(Credential.person_id.in_(members), Credential.person_id.in_(operators))
+    )
+    reaching = select(Credential.id).where(or_(Credential.course_id == course_id, unlimited))
+    # A reply without a status belongs to a request in progress, and is empty.
+    complete = (IdempotentReply.status > 0, IdempotentReply.credential_id.in_(reaching))
+    session.execute(delete(IdempotentReply).where(*complete))
 
 
 def _mark_old_submissions(session: Session, before: datetime, course_id: int | None) -> None:

@@ -10,6 +10,7 @@ from datetime import UTC, datetime, timedelta
 
 import report_builders
 from builders import echo, grading_request
+from service.pending_uploads import PendingUploads
 from service.store.batches import intake
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
@@ -18,7 +19,6 @@ from service.store.people import credentials, webhooks
 from service.store.people.membership import Member
 from service.store.queue import jobs, test_runs
 from service.store.states import CredentialKind
-from service.web.pending_uploads import PendingUploads
 from service.web.rendering import build_static_paths
 from submissions.raw_files import UploadedFile
 from submissions.stored_submission import pack_submission

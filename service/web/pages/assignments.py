@@ -17,13 +17,13 @@ from service.operations.assignment_uploads import AssignmentAlreadySeen, UploadR
 from service.operations.assignments import CourseAssignment
 from service.operations.policies import PolicyLimits
 from service.operations.types import Role
+from service.pending_uploads import clean_file_name
 from service.web.access import CourseInstructor, ReaderInCourse
 from service.web.api_uploads import LARGEST_ASSIGNMENT
 from service.web.attachments import respond_with_attachment
 from service.web.context import Context, WebContext
 from service.web.date_times import parse_date_time
 from service.web.language import detect_language
-from service.web.pending_uploads import clean_file_name
 from service.web.rendering import render_page
 from service.web.request_bodies import takes_upload
 from sim.errors import UsageError

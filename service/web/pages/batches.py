@@ -19,11 +19,11 @@ from service.operations import batch_views as views
 from service.operations import batches as operations
 from service.operations.batches import SubmissionPreview, SubmitRequest
 from service.operations.types import Role
+from service.pending_uploads import ExpectedSubmission, PendingUpload, PendingUploads
 from service.web.access import CourseInstructor, ReaderInCourse, RowName, RowNameAfter
 from service.web.api_uploads import LARGEST_BATCH
 from service.web.batch_uploads import read_upload
 from service.web.context import Context, WebContext
-from service.web.pending_uploads import ExpectedSubmission, PendingUpload, PendingUploads
 from service.web.rendering import render_page
 from service.web.request_bodies import takes_upload
 from sim.errors import UsageError
@@ -213,6 +213,8 @@ def _require_upload(context: WebContext, here: ReaderInCourse, upload_id: str) -
     if found is None:
         raise HTTPException(
             404,
-            translatable("This upload no longer exists. It was confirmed or discarded, or it is more than a day old."),
+            translatable(
+                "This upload no longer exists. It was confirmed, discarded or removed, or it is more than a day old."
+            ),
         )
     return found

@@ -18,6 +18,7 @@ from service.operations import people, people_views, policies, sign_in_links
 from service.operations.errors import Conflict
 from service.operations.policies import ExtensionRequest
 from service.operations.types import Role
+from service.pending_uploads import clean_file_name
 from service.reports.formats.csv_output import render_safe_csv
 from service.web.access import CourseInstructor, ReaderInCourse, RowNumber
 from service.web.api_uploads import LARGEST_TABLE
@@ -26,7 +27,6 @@ from service.web.context import Context, WebContext
 from service.web.created_links import LinkWord, build_sign_in_url, derive_secret, find_created_link, generate_word
 from service.web.date_times import parse_date_time
 from service.web.language import detect_language
-from service.web.pending_uploads import clean_file_name
 from service.web.rendering import render_page
 from service.web.request_bodies import takes_upload
 from sim.errors import UsageError

@@ -5,9 +5,11 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+import zlib
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from decimal import Decimal
+from pathlib import Path
 
 import pytest
 from sqlalchemy import select
@@ -15,15 +17,16 @@ from sqlalchemy.orm import Session
 
 import acting
 import report_builders
-from builders import grading_request
+from builders import grading_request, settings_in
 from service.operations import privacy
+from service.pending_uploads import PendingUploads
 from service.store import audit
 from service.store.batches import intake
 from service.store.courses import policies
 from service.store.engine import Store
 from service.store.grades import marking_history, results
 from service.store.models import Enrolment, Job, SubmissionRow
-from service.store.people import credentials
+from service.store.people import credentials, membership
 from service.store.people.students import ensure_course
 from service.store.purge import PurgeCounts, purge_submissions
 from service.store.queue import jobs
@@ -72,7 +75,7 @@ def everything(store: Store) -> int:
         session.add(Appeal(submission_id=submission_id, text=f"I am {KNOWN[1]}", asked_at=NOW))
         session.add(OpenAssignment(course_id=1, assignment="echo-responder", assignment_version_id=version_id))
         session.add(Tryout(enrolment_id=enrolment.id, assignment_version_id=version_id, packed=b"", state="done",
-                           queued_at=NOW, words={"said": KNOWN[1]}))  # fmt: skip
+                           queued_at=NOW, words={"said": KNOWN[1]}, replay=zlib.compress(b"{}")))  # fmt: skip
         policies.extend_policy(session, enrolment.id, "", NOW, 1)
         credentials.issue_credential(
             session,
@@ -135,6 +138,36 @@ def test_who_is_in_another_course_stays_there(store: Store) -> None:
         assert kept.all() == ["bob"]
 
 
+def test_stored_replies_and_waiting_uploads_of_the_course_are_erased(store: Store, tmp_path: Path) -> None:
+    enrolment_id = everything(store)
+    with store.transaction() as session:
+        another = ensure_course(session, "another", NOW)
+        for course, person in (("default", "grace"), ("another", "mallory")):
+            member = membership.make_instructor(session, course, Student(person))
+            credentials.issue_credential(
+                session,
+                member.person_id,
+                CredentialKind.TOKEN,
+                timedelta(days=1),
+                name="t",
+                reach=credentials.Reach(scopes=frozenset({"read"})),
+            )
+            token = credentials.list_credentials(session, member.person_id)[0].id
+            for key, status in (("done", 201), ("in progress", 0)):
+                row = IdempotentReply(credential_id=token, key=f"{person} {key}", request_sha256="", status=status)
+                row.body, row.made_at = KNOWN[1].encode() if status else b"", NOW
+                session.add(row)
+    service = replace(acting.service_on(store), settings=settings_in(tmp_path))
+    service.settings.home.mkdir(exist_ok=True)
+    uploads = PendingUploads(service.settings.home)
+    waiting = [uploads.begin(1, course_id, "echo-responder") for course_id in (1, another)]
+    privacy.erase_student(service, acting.machine(), 1, enrolment_id)
+    with store.reading() as session:
+        keys = set(session.scalars(select(IdempotentReply.key)))
+    assert keys == {"grace in progress", "mallory done", "mallory in progress"}
+    assert [uploads.find(each.id, 1, each.course_id) is not None for each in waiting] == [False, True]
+
+
 def test_a_new_submission_has_no_history_of_an_erased_one(store: Store) -> None:
     erased = intake.accept_submission(store, grading_request("ada"), max_attempts=1)
     with store.transaction() as session:
@@ -178,7 +211,14 @@ def test_the_zip_has_what_the_student_may_see(store: Store) -> None:
         document = json.loads(archive.read("student.json"))
         grade = json.loads(archive.read("submissions/echo-responder-1/grade.json"))
     folder = "submissions/echo-responder-1"
-    assert names == {"student.json", *(f"{folder}/{name}" for name in ("submission.zip", "grade.json", "report.html"))}
+    files = (f"{folder}/{name}" for name in ("submission.zip", "grade.json", "report.html"))
+    assert names == {"student.json", "test-runs/echo-responder-1/replay.json", *files}
+    (run,) = document["test_runs"]
+    assert (run["assignment"], run["words"]) == ("echo-responder", {"said": KNOWN[1]})
+    assert [each["source"] for each in document["rejected_files"]] == ["x.zip"]
+    with zipfile.ZipFile(io.BytesIO(export_student(store, enrolment_id, {"echo-responder"}))) as archive:
+        hidden = json.loads(archive.read("student.json"))
+    assert (hidden["test_runs"], hidden["rejected_files"]) == ([], [])
     assert (document["id"], document["name"], document["email"]) == KNOWN
     assert document["submissions"][0]["appeals"][0]["text"] == f"I am {KNOWN[1]}"
     assert document["extensions"][0]["more_attempts"] == 1

@@ -20,6 +20,7 @@ import report_builders
 from builders import echo, grading_request
 from naming import is_named
 from report_builders import HOSTILE
+from service.pending_uploads import PendingUpload, PendingUploads
 from service.reports.formats import FORMATS
 from service.store import audit
 from service.store.batches import intake
@@ -30,7 +31,6 @@ from service.store.installation import load_secret
 from service.store.models import Batch, Enrolment, Job, TrialRow
 from service.store.states import BatchState, JobState, Standing
 from service.version import hash_grader
-from service.web.pending_uploads import PendingUpload, PendingUploads
 from submissions.assignment.folder import locate_assignment_folder
 from submissions.student_identity import RejectedSubmission, Student
 from web import COURSE, Web, grade_all, submit, words

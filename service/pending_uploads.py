@@ -1,6 +1,6 @@
 """Uploads that wait for confirmation. They are kept in the home folder for a day, or until the sender decides.
 
-``batch_uploads.py`` reads them. The number of uploads is limited for each sender and in total.
+``web/batch_uploads.py`` reads them. The number of uploads is limited for each sender and in total.
 """
 
 from __future__ import annotations
@@ -114,6 +114,12 @@ class PendingUploads:
         """Delete an upload."""
         shutil.rmtree(self._folder / upload.id, ignore_errors=True)
 
+    def remove_course(self, course_id: int) -> None:
+        """Delete all uploads to a course."""
+        for upload in self._list_recent():
+            if upload.course_id == course_id:
+                self.remove(upload)
+
     def submissions_path(self, upload: PendingUpload) -> Path:
         """Return the path of the submissions: a zip, or a folder of files."""
         folder = self._folder / upload.id / "batch"
@@ -141,7 +147,7 @@ class PendingUploads:
     def _list_recent(self) -> list[PendingUpload]:
         """Return the uploads, oldest first, after removing expired ones; other threads may remove uploads meanwhile."""
         found = []
-        for path in self._folder.iterdir():
+        for path in self._folder.iterdir() if self._folder.is_dir() else ():
             age = time.time() - _read_time(path)
             upload = self._read_metadata(path.name)
             # A folder without metadata may belong to an upload that is being created at this moment.
