@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from PIL import Image
 from sklearn.neural_network import MLPClassifier
 
-from models import load_weights
+from models import load_weights, onnx_format
+from models.layers import DenseLayer, FlattenLayer
 from paths import DATA, ROOT
 from sim import floors
 
@@ -453,6 +454,24 @@ def test_without_litert_the_sentence_says_what_to_use_instead(kit: Kit, monkeypa
     monkeypatch.setitem(sys.modules, "ai_edge_litert.interpreter", None)
     with pytest.raises(ImportError, match=r"mnist.tflite cannot be loaded: .*robomark\[tflite\].*load_onnx"):
         kit.views.cnn_load()
+
+
+def test_a_network_with_its_weights_in_another_file_is_refused(
+    kit: Kit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = onnx_format._encode_bytes_field
+
+    def write_external(number: int, data: bytes) -> bytes:
+        if number != 9:  # TensorProto.raw_data; 13 is external_data, and 14 is data_location
+            return write(number, data)
+        return write(13, write(1, b"location") + write(2, b"net.data")) + onnx_format._encode_integer_field(14, 1)
+
+    monkeypatch.setattr(onnx_format, "_encode_bytes_field", write_external)
+    layers = [FlattenLayer(), DenseLayer(4, 2, np.random.default_rng(1))]
+    (tmp_path / "net.onnx").write_bytes(onnx_format.build_onnx_file(layers, 2, 2))
+    (tmp_path / "net.data").write_bytes(bytes(64))
+    with pytest.raises(ValueError, match=r"^net.onnx has its weights in another file; save the network as one file, "):
+        importlib.import_module("nn_tools").load_onnx(tmp_path / "net.onnx")
 
 
 def test_the_kit_needs_nothing_of_ours_and_nothing_that_draws() -> None:

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Numbers = NDArray[np.float64]
+#: A file name of external data in an ONNX file, as Protocol Buffers encode the key of such an entry.
+_EXTERNAL_WEIGHTS = b"\n\x08location\x12"
 
 
 def _compute_logistic(values: Numbers) -> Numbers:
@@ -135,6 +137,11 @@ def load_onnx(file: str | os.PathLike[str], classes: Any = None) -> OnnxNetwork:
     try:
         session = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
     except Exception as error:
+        if _EXTERNAL_WEIGHTS in data:
+            raise ValueError(
+                f"{name} has its weights in another file; save the network as one file, "
+                "for example with torch.onnx.export(..., external_data=False)"
+            ) from None
         raise ValueError(f"{name} cannot be read as a network in ONNX's format: {str(error)[:200]}") from None
     return OnnxNetwork(session, classes, name)
 
